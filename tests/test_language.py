@@ -24,6 +24,7 @@ CLEAN = (
     "proofs",
     "realisations",
     "report",
+    "runtime",
     "series",
     "spec",
     "study",

@@ -1,4 +1,4 @@
-"""What users give to a solver, checked: numbers, counts, states and parameters."""
+"""Checks and conversions of the arguments of solvers: numbers, counts, states and parameters."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from numpy.typing import ArrayLike
 from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface
 from phigen.runtime.members import Members
 
-#: What counts of steps have to fit into.
+#: Largest number of steps: the C counts them in 64 bits, of which NumPy's signed integers hold 63.
 _MOST = int(np.iinfo(np.int64).max)
 
-#: The largest number of the C of ``real: float``.
+#: Largest finite number in single precision, for C with ``real: float``.
 LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
-#: What counts have to fit into that choose random numbers.
+#: Largest values of the arguments that select random numbers, by their types in the C.
 _LARGEST = {"seed": 2**64 - 1, "member": 2**32 - 1, "step0": _MOST}
 
 
-#: Random numbers of which nothing was said.
+#: Arguments that select random numbers, with none of them passed.
 NONE_DRAWN: Mapping[str, int | None] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class Beginning:
-    """A state where a trajectory begins, at its time, and what its steps depend on, all of it checked.
+    """Checked arguments of a trajectory: initial state ``x`` at the time ``t0``, step size, parameters, random numbers.
 
-    ``first`` are the numbers of the attitude and position there, if they were given.
+    ``first`` are the values of the initial attitude and position, None for the default.
     """
 
     x: Floats
@@ -47,7 +47,7 @@ class Beginning:
 
 
 def step_size(h: float) -> float:
-    """A step size: finite, and not 0."""
+    """Return a step size. Raises `ValueError` if it is not finite, or 0."""
     size = number(h, "the step size h")
     if size == 0:
         raise ValueError("the step size h must not be 0")
@@ -55,7 +55,7 @@ def step_size(h: float) -> float:
 
 
 def end(until: float, begin: float, h: float) -> float:
-    """The span of time until an end, of the sign of the step."""
+    """Return the time from ``begin`` to ``until``. Raises `ValueError` if it does not have the sign of the step."""
     span = number(until, "the time until") - begin
     if span * h <= 0:
         raise ValueError(f"until = {until!r} is never reached from {begin!r} by steps of {h!r}")
@@ -63,7 +63,7 @@ def end(until: float, begin: float, h: float) -> float:
 
 
 def count(value: int, what: str, minimum: int, most: int = _MOST) -> int:
-    """An integer from ``minimum`` to ``most``."""
+    """Return an integer from ``minimum`` to ``most``. Raises `TypeError` and `ValueError` for others."""
     try:
         number = operator.index(value)
     except TypeError:
@@ -76,7 +76,10 @@ def count(value: int, what: str, minimum: int, most: int = _MOST) -> int:
 
 
 def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -> float:
-    """The time of a start, 0 by default. Without a time, t0 may be a parameter, which joins ``more``."""
+    """Return the time of a start, 0 by default.
+
+    If the Hamiltonian does not depend on the time, t0 may be the name of a parameter, and is added to ``more``.
+    """
     if t0 is None or interface.time:
         return 0.0 if t0 is None else number(t0, "the time t0")
     if "t0" not in interface.parameters:
@@ -86,63 +89,70 @@ def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -
 
 
 def draws(interface: Interface, more: dict[str, Any], named: Mapping[str, int | None] = NONE_DRAWN) -> Draws:
-    """The random numbers of the noise, by seed, member and step0.
+    """Return the random numbers selected by the arguments seed, member and step0.
 
-    Without noise these names may be those of parameters, which join ``more``.
+    Without noise, these names may be names of parameters, and are added to ``more``.
     """
-    given = {name: value for name, value in named.items() if value is not None}
+    passed = {name: value for name, value in named.items() if value is not None}
     if interface.noise:
-        numbers = {name: count(value, name, 0, _LARGEST[name]) for name, value in given.items()}
+        numbers = {name: count(value, name, 0, _LARGEST[name]) for name, value in passed.items()}
         return Draws(numbers.get("seed", 0), numbers.get("member", 0), numbers.get("step0", 0))
-    for name in given:
+    for name in passed:
         if name not in interface.parameters:
             raise TypeError(f"{name} was given, but {interface.name} has no noise")
-    more |= given
+    more |= passed
     return Draws()
 
 
-def increments(given: ArrayLike, interface: Interface) -> Floats:
-    """The increments of the noise in some steps (steps, draws)."""
+def increments(values: ArrayLike, interface: Interface) -> Floats:
+    """Return increments of the noise (steps, draws), checked. Raises `TypeError` and `ValueError`."""
     if not interface.noise:
         raise TypeError(f"increments were given, but {interface.name} has no noise")
-    found = real(given, "increments")
-    if found.ndim != 2 or found.shape[1] != interface.draws:
-        raise ValueError(f"increments must have shape (steps, {interface.draws}), not {found.shape}")
-    if not np.isfinite(found).all():
+    rows = real(values, "increments")
+    if rows.ndim != 2 or rows.shape[1] != interface.draws:
+        raise ValueError(f"increments must have shape (steps, {interface.draws}), not {rows.shape}")
+    if not np.isfinite(rows).all():
         raise ValueError("increments must be finite")
-    return found
+    return rows
 
 
 def expect_no_noise(what: str, interface: Interface) -> None:
-    """`TypeError` for what makes steps in parts, which have other random numbers than the whole."""
+    """Raise `TypeError` if the system has noise, for functions that divide steps.
+
+    The parts of a step would draw other random numbers than the whole step.
+    """
     if interface.noise:
         raise TypeError(f"{what} is not available with noise: parts of a step are not on the same path")
 
 
 def times_within(times: ArrayLike, t: Floats) -> Floats:
-    """The times (times,) that were asked for, of a trajectory with rows at ``t``; `ValueError` for others."""
-    wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    """Return times as an array (times,). Raises `ValueError` if one is outside of the range of ``t``."""
+    requested_times = np.atleast_1d(np.asarray(times, dtype=np.float64))
     low, high = sorted((float(t[0]), float(t[-1])))
     slack = 1e-9 * (high - low)
-    if wanted.ndim != 1 or not ((wanted >= low - slack) & (wanted <= high + slack)).all():
+    if requested_times.ndim != 1 or not ((requested_times >= low - slack) & (requested_times <= high + slack)).all():
         raise ValueError(f"times must be numbers between {low!r} and {high!r}")
-    return wanted
+    return requested_times
 
 
-def rows_at(t: Floats, x: Floats, wanted: Floats) -> Floats:
-    """The rows of ``x`` (rows, DIM) at some of the times ``t``, where others are not on the path: `ValueError`."""
-    nearest = np.argmin(np.abs(t[:, np.newaxis] - wanted), axis=0)
-    apart = np.abs(t[nearest] - wanted)
+def rows_at(t: Floats, x: Floats, requested_times: Floats) -> Floats:
+    """Return the rows of ``x`` (rows, DIM) at requested times. Raises `ValueError` for times that are not in ``t``."""
+    nearest = np.argmin(np.abs(t[:, np.newaxis] - requested_times), axis=0)
+    apart = np.abs(t[nearest] - requested_times)
     if (apart > 1e-9 * np.ptp(t)).any():
-        between = float(wanted[int(np.argmax(apart))])
+        between = float(requested_times[int(np.argmax(apart))])
         message = f"with noise only states that are stored can be asked for: {between!r} is between two of them"
         raise ValueError(f"{message}, where the path is not known; stride=1 stores all steps")
-    found: Floats = x[nearest]
-    return found
+    rows: Floats = x[nearest]
+    return rows
 
 
 def times(t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], more: dict[str, Any]) -> Floats | None:
-    """The times of states of a ``shape``, one row; None where there is no time, and t may be a parameter."""
+    """Return the times of states as an array (states,), for states of the given shape.
+
+    Returns None if the Hamiltonian does not depend on the time. Then t may be the name of a parameter, and is added to
+    ``more``.
+    """
     if not interface.time:
         if t is not None and "t" not in interface.parameters:
             raise TypeError(f"t was given, but the Hamiltonian of {interface.name} does not depend on the time")
@@ -150,24 +160,27 @@ def times(t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], mor
         return None
     if t is None:
         raise TypeError(f"t is missing: the Hamiltonian of {interface.name} depends on the time")
-    found = np.array(np.broadcast_to(np.asarray(t, dtype=np.float64), shape)).reshape(-1)
-    if not np.isfinite(found).all():
+    rows = np.array(np.broadcast_to(np.asarray(t, dtype=np.float64), shape)).reshape(-1)
+    if not np.isfinite(rows).all():
         raise ValueError("the times t must be finite")
-    return found
+    return rows
 
 
-def together(given: Mapping[str, Any] | None, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters that were ``given`` in a mapping, and ``more`` that were by keyword; none in both."""
-    both = sorted(set(given or {}) & set(more))
+def together(mapped: Mapping[str, Any] | None, more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return parameters passed in a mapping and, as ``more``, by keyword. Raises `TypeError` for a name in both."""
+    both = sorted(set(mapped or {}) & set(more))
     if both:
         raise TypeError(f"parameter {both[0]!r} is given twice")
-    return {**(given or {}), **more}
+    return {**(mapped or {}), **more}
 
 
-def parameters(interface: Interface, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
-    """The values of all parameters: those ``given`` and ``more``, which exclude each other, and defaults."""
+def parameters(interface: Interface, mapped: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
+    """Return the values of all parameters: those passed in a mapping and, as ``more``, by keyword, else defaults.
+
+    Raises `TypeError` for unknown names and names passed twice, `ValueError` for values that are not admissible.
+    """
     values = {name: float(value) for name, value in interface.parameters.items()}
-    asked = together(given, more)
+    asked = together(mapped, more)
     expect_known(asked, interface.parameters)
     for name, value in asked.items():
         values[name] = number(value, f"parameter {name!r}")
@@ -177,20 +190,20 @@ def parameters(interface: Interface, given: Mapping[str, float] | None, more: Ma
 
 
 def state(x: ArrayLike, what: str, interface: Interface) -> Floats:
-    """One state (DIM,), a copy."""
-    found = states(x, what, interface)
-    if found.ndim != 1:
+    """Return a copy of one state (DIM,). Raises `TypeError` and `ValueError`, as `states`."""
+    copy = states(x, what, interface)
+    if copy.ndim != 1:
         expected = f"({interface.dimension},)"
-        raise ValueError(f"{what} must have shape {expected}, not {found.shape}; for many states use ensemble")
-    return found
+        raise ValueError(f"{what} must have shape {expected}, not {copy.shape}; for many states use ensemble")
+    return copy
 
 
 def members(x: ArrayLike, what: str, interface: Interface) -> Floats:
-    """Many states (members, DIM), a copy."""
-    found = states(x, what, interface)
-    if found.ndim != 2:
-        raise ValueError(f"{what} must have shape (members, {interface.dimension}), not {found.shape}")
-    return found
+    """Return a copy of the states of an ensemble (members, DIM). Raises `TypeError` and `ValueError`, as `states`."""
+    copies = states(x, what, interface)
+    if copies.ndim != 2:
+        raise ValueError(f"{what} must have shape (members, {interface.dimension}), not {copies.shape}")
+    return copies
 
 
 def ensemble(
@@ -199,16 +212,16 @@ def ensemble(
     steps: int,
     stride: int | None,
     t0: ArrayLike | None,
-    given: Mapping[str, ArrayLike] | None,
+    mapped: Mapping[str, ArrayLike] | None,
     more: Mapping[str, ArrayLike],
     interface: Interface,
     draws: Draws = FIRST_DRAWS,
 ) -> Members:
-    """The members of an ensemble, by what `Solver.ensemble` is given."""
-    own: dict[str, Any] = {name: v for name, v in {**(given or {}), **more}.items() if np.ndim(v) > 0}
+    """Return the members of an ensemble from the arguments of `Solver.ensemble`, checked."""
+    per_member: dict[str, Any] = {name: v for name, v in {**(mapped or {}), **more}.items() if np.ndim(v) > 0}
     if t0 is not None and np.ndim(t0) > 0 and not interface.time:
-        own["t0"] = t0  # then it is the name of a parameter, or of nothing
-    several: list[Any] = [v for v in (h, t0, *own.values()) if v is not None and np.ndim(v) > 0]
+        per_member["t0"] = t0  # without a time, t0 can only be the name of a parameter
+    several: list[Any] = [v for v in (h, t0, *per_member.values()) if v is not None and np.ndim(v) > 0]
     if np.ndim(X0) == 1 and several:
         start = np.tile(state(X0, "X0", interface), (len(several[0]), 1))
     else:
@@ -216,13 +229,13 @@ def ensemble(
     shape = (len(start),)
     # Names are checked with a number in place of each array.
     plain: list[dict[str, Any]] = [
-        {n: 1.0 if n in own else v for n, v in (part or {}).items()} for part in (given, more)
+        {n: 1.0 if n in per_member else v for n, v in (part or {}).items()} for part in (mapped, more)
     ]
     alone: Any = 1.0 if t0 is not None and np.ndim(t0) > 0 else t0
     begin: Floats = np.asarray(start_time(alone, interface, plain[1]))
     values = {name: np.asarray(value) for name, value in parameters(interface, *plain).items()}
-    for name in own.keys() & values.keys():
-        values[name] = array(own[name], f"parameter {name!r}", shape)
+    for name in per_member.keys() & values.keys():
+        values[name] = array(per_member[name], f"parameter {name!r}", shape)
         if name in interface.positive and not (values[name] > 0).all():
             m = int(np.argmin(values[name] > 0))
             raise ValueError(f"parameter {name!r} must be positive, not {float(values[name][m])}, as of member {m}")
@@ -239,23 +252,29 @@ def ensemble(
 
 
 def states(x: ArrayLike, what: str, interface: Interface) -> Floats:
-    """States (…, DIM), a copy: what the caller does to his array later is his affair."""
-    found = real(x, what)
+    """Return a copy of states (…, DIM), so that the caller may change the array later.
+
+    Raises `TypeError` for arrays that are not of real numbers, `ValueError` for other shapes and non-finite values.
+    """
+    copy = real(x, what)
     names = interface.coordinates
-    if found.ndim == 0 or found.shape[-1] != len(names):
+    if copy.ndim == 0 or copy.shape[-1] != len(names):
         last = f"{len(names)} ({', '.join(names)})"
-        raise ValueError(f"{what} must have a last axis of length {last}, but its shape is {found.shape}")
-    if not np.isfinite(found).all():
-        index = tuple(np.argwhere(~np.isfinite(found))[0].tolist())
+        raise ValueError(f"{what} must have a last axis of length {last}, but its shape is {copy.shape}")
+    if not np.isfinite(copy).all():
+        index = tuple(np.argwhere(~np.isfinite(copy))[0].tolist())
         place = f"{names[index[-1]]}" + (f" of member {index[0]}" if len(index) > 1 else "")
-        raise ValueError(f"{what} must be finite, but {place} is {float(found[index])!r}")
-    return found
+        raise ValueError(f"{what} must be finite, but {place} is {float(copy[index])!r}")
+    return copy
 
 
 def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface, members: int) -> Floats:
-    """`first` for each of some members, (members, numbers): one for all, or one for each; by default the identity."""
+    """Return the initial attitudes and positions of members (members, numbers), by default identity and origin.
+
+    The arguments are one attitude or position for all members, or have an axis of members.
+    """
     if not interface.attitude:
-        first(np.eye(1), None, interface)  # which says why there is none
+        first(np.eye(1), None, interface)  # raises, with the reason why there is no attitude
     several = np.ndim(attitude0) > len(interface.attitude) if attitude0 is not None else False
     placed = position0 is not None and np.ndim(position0) > 1
     turns = array(attitude0, "attitude0", (members, *interface.attitude)) if several else None  # type: ignore[arg-type]
@@ -263,20 +282,25 @@ def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: 
     begin = np.empty((members, interface.element))
     identity = np.eye(interface.attitude[0])[0] if len(interface.attitude) == 1 else np.eye(interface.attitude[0])
     for m in range(members):
-        own = attitude0 if turns is None else turns[m]
-        begin[m] = first(identity if own is None else own, position0 if places is None else places[m], interface)
+        attitude = attitude0 if turns is None else turns[m]
+        begin[m] = first(
+            identity if attitude is None else attitude, position0 if places is None else places[m], interface
+        )
     return begin
 
 
 def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface) -> Floats | None:
-    """The numbers of an attitude, a quaternion of length 1 or a matrix, and a position; None if neither is given."""
+    """Return the values of an initial attitude, a unit quaternion or a matrix, and of a position, in one array.
+
+    Returns None if neither is passed. Raises `TypeError` if the system has none, and `ValueError` for other shapes.
+    """
     if attitude0 is None and position0 is None:
         return None
-    for given, there, what in (
+    for argument, there, what in (
         (attitude0, bool(interface.attitude), "attitude0"),
         (position0, interface.position, "position0"),
     ):
-        if given is not None and not there:
+        if argument is not None and not there:
             where = "reconstruct: quaternion or matrix in its spec asks for one, positions belong to se(3)"
             raise TypeError(f"{interface.name} has no {what[:-1]}: {where}")
     shape = interface.attitude
@@ -291,24 +315,27 @@ def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: I
     return np.concatenate([attitude.ravel(), place]) if interface.position else attitude.ravel()
 
 
-def array(given: ArrayLike, what: str, shape: tuple[int, ...]) -> Floats:
-    """A copy of an array of finite numbers of that shape."""
-    found = real(given, what)
-    if found.shape != shape:
-        raise ValueError(f"{what} must have shape {shape}, not {found.shape}")
-    if not np.isfinite(found).all():
+def array(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Floats:
+    """Return a copy of an array. Raises `ValueError` if its shape is not ``shape``, or a value is not finite."""
+    copy = real(values, what)
+    if copy.shape != shape:
+        raise ValueError(f"{what} must have shape {shape}, not {copy.shape}")
+    if not np.isfinite(copy).all():
         raise ValueError(f"{what} must be finite")
-    return found
+    return copy
 
 
-def real(given: ArrayLike, what: str) -> Floats:
-    """A copy of an array of numbers: not of complex ones, whose imaginary parts would be lost, nor of texts."""
+def real(values: ArrayLike, what: str) -> Floats:
+    """Return a copy of an array of real numbers.
+
+    Raises `TypeError` for texts and for complex numbers, whose imaginary parts would be lost.
+    """
     try:
-        kind = np.asarray(given).dtype.kind
+        kind = np.asarray(values).dtype.kind
         if kind in "SU":
             raise TypeError("text is not a number")
         if kind != "c":
-            return np.array(given, dtype=np.float64)
+            return np.array(values, dtype=np.float64)
     except OverflowError:
         raise ValueError(f"{what} must be finite, but a number in it is too large") from None
     except (TypeError, ValueError) as error:
@@ -317,8 +344,8 @@ def real(given: ArrayLike, what: str) -> Floats:
 
 
 def number(value: float, what: str) -> float:
-    """A finite number."""
-    if isinstance(value, str | bytes | bytearray):  # which float would read
+    """Return a value as a float. Raises `TypeError` if it is not a number, `ValueError` if it is not finite."""
+    if isinstance(value, str | bytes | bytearray):  # float() would accept texts
         raise TypeError(f"{what} must be a number, not {_shown(value)}")
     try:
         number = float(value)
@@ -332,14 +359,14 @@ def number(value: float, what: str) -> float:
 
 
 def _shown(value: Any) -> str:
-    """A value in a message; integers of thousands of digits cannot even be printed."""
+    """Return a value as text for a message; Python refuses to print integers of thousands of digits."""
     if isinstance(value, int) and abs(value) > _MOST:
         return f"an integer of {int(math.log10(abs(value))) + 1} digits"
     return shortened(value)
 
 
 def beyond_single(numbers: Mapping[str, Any]) -> str:
-    """Which of some numbers, or arrays of them, has no place in single precision, in words; nothing if all have."""
+    """Return a message that names the first value too large for single precision, "" if there is none."""
     for name, value in numbers.items():
         largest = max(np.ravel(value).tolist(), key=abs, default=0.0)
         if abs(largest) > LARGEST_SINGLE:
@@ -348,7 +375,7 @@ def beyond_single(numbers: Mapping[str, Any]) -> str:
 
 
 def expect_known(names: Iterable[str], known: Mapping[str, float]) -> None:
-    """Raises `TypeError` for the first name that no parameter has."""
+    """Raise `TypeError` for the first name that is not the name of a parameter."""
     for name in names:
         if name not in known:
             raise TypeError(_unknown(name, known))

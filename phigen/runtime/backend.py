@@ -1,4 +1,4 @@
-"""What the runtime asks of a back end: a loaded solver of one target."""
+"""Protocol of back ends: the loaded solver of one target, as the runtime calls it."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from phigen.runtime.session import Session
 class Backend(Protocol):
     """A loaded solver.
 
-    States are float64 arrays whose last axis is the coordinates. ``parameters`` holds every parameter, in the order
-    of declaration. Arguments were checked by the caller. A failing step raises `BackendError`. The times ``t0`` of a
-    start and ``t`` (rows,) of states are given where the Hamiltonian depends on the time, and 0 and None else.
+    States are float64 arrays whose last axis is the coordinates. ``parameters`` holds every parameter, in the order of
+    declaration. The caller has checked all arguments. A failing step raises `BackendError`. If the Hamiltonian depends
+    on the time, ``t0`` is the time of a start and ``t`` (rows,) are the times of states; else they are 0 and None.
     """
 
     target: str
 
     @property
     def identity(self) -> str:
-        """A hash of all that decides the results, and what bytes of a session mean."""
+        """A hash of everything that determines the results and the format of saved sessions."""
         ...
 
     def start(
@@ -33,45 +33,46 @@ class Backend(Protocol):
         first: Floats | None = None,
         draws: Draws = FIRST_DRAWS,
     ) -> Session:
-        """A session at x0 (DIM,), with an attitude and position ``first`` (numbers,); None for the identity.
+        """Return a session at x0 (DIM,), with attitude and position ``first`` (numbers,), by default the identity.
 
-        ``draws`` are the random numbers of its noise.
+        ``draws`` select the random numbers of its noise.
         """
         ...
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
-        """The session whose `Session.saved` bytes these are, made by a back end of the same `identity`."""
+        """Return the session that `Session.saved` stored as these bytes, by a back end of the same `identity`."""
         ...
 
     def with_gauge(self, gauge: Floats) -> Backend:
-        """A back end whose trajectories all have the given gauge, one value for each Casimir of the gauge."""
+        """Return a back end whose trajectories all have the given gauge, one value for each Casimir of the gauge."""
         ...
 
     def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
-        """Final states (members, DIM), or frames (rows, members, DIM); in so many threads, None for all cores.
+        """Return final states (members, DIM), or frames (rows, members, DIM); ``threads`` None uses all cores.
 
-        ``turned`` (rows, members, numbers) has the attitudes that members begin with in its first row, and gets those
-        of the frames in the others; where no frames are asked for it has two rows, and gets those of the final states.
+        ``turned`` (rows, members, numbers) holds the initial attitudes in its first row; the others are filled with the
+        attitudes of the frames. Without frames it has two rows, and the second receives the final attitudes.
         """
         ...
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
-        """Rows of states (rows, members, DIM), those of the stride, and what their cotangents ``bars`` come back to.
+        """Return the stored states (rows, members, DIM), and the pullback of their cotangents ``bars`` to the start.
 
-        These are (members, DIM) and (parameters, members). Raises `MissingExtraError` without the extra ``adjoint``.
+        The pullback is a cotangent of the initial states (members, DIM) and one of the parameters (parameters,
+        members). Raises `MissingExtraError` without the extra ``adjoint``.
         """
         ...
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """H of the states (rows, DIM), shape (rows,)."""
+        """Return H of the states (rows, DIM), shape (rows,)."""
         ...
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """Casimirs of the states (rows, DIM), shape (rows, number of Casimirs)."""
+        """Return the Casimirs of the states (rows, DIM), shape (rows, number of Casimirs)."""
         ...
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """π∇H at the states (rows, DIM), the same shape."""
+        """Return π∇H at the states (rows, DIM), the same shape."""
         ...
 
     def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
@@ -79,9 +80,9 @@ class Backend(Protocol):
         ...
 
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """σπ∇g of each source of noise at the states (rows, DIM), shape (rows, sources, DIM)."""
+        """Return σπ∇g of each source of noise at the states (rows, DIM), shape (rows, sources, DIM)."""
         ...
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """dt/dτ at the states (rows, DIM), shape (rows,), of a monitored solver."""
+        """Return dt/dτ at the states (rows, DIM), shape (rows,), for a solver with a monitor."""
         ...

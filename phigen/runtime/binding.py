@@ -9,23 +9,23 @@ from typing import Any
 
 from phigen.errors import ToolchainError
 
-#: What functions return, and take, by their names without the prefix.
+#: Name of a function, without its prefix → type of its result, and types of its arguments.
 Signatures = Mapping[str, tuple[Any, tuple[Any, ...]]]
 
 
 def bound(
-    library: Any, prefix: str, wanted: Signatures, offered: Signatures | None = None, *, single: bool = False
+    library: Any, prefix: str, required: Signatures, optional: Signatures | None = None, *, single: bool = False
 ) -> Any:
-    """A namespace of the functions ``PREFIX_NAME``; those that are only ``offered`` may be absent. Doubles are floats
-    where the precision is ``single``.
+    """Return a namespace of the library's functions ``PREFIX_NAME``, with their types; ``optional`` ones may be absent.
 
-    Raises `ToolchainError` where one that is wanted is absent.
+    With ``single``, arguments and results of type double are float. Raises `ToolchainError` if a ``required`` function
+    is absent.
     """
     numbers = {ctypes.c_double: ctypes.c_float} if single else {}
-    found = SimpleNamespace()
-    for name, (result, arguments) in {**(offered or {}), **wanted}.items():
+    functions = SimpleNamespace()
+    for name, (result, arguments) in {**(optional or {}), **required}.items():
         function = getattr(library, f"{prefix}_{name}", None)
-        if function is None and name in wanted:
+        if function is None and name in required:
             raise ToolchainError(
                 f"the compiled solver has no function {prefix}_{name}\n"
                 "  hint: the program named in CC did not compile the source it received; try gcc or clang"
@@ -33,5 +33,5 @@ def bound(
         if function is not None:
             function.restype = numbers.get(result, result)
             function.argtypes = [numbers.get(argument, argument) for argument in arguments]
-            setattr(found, name, function)
-    return found
+            setattr(functions, name, function)
+    return functions

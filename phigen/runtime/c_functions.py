@@ -1,4 +1,4 @@
-"""The functions of a generated C solver, with the types of their arguments."""
+"""Signatures of the functions of a generated C solver."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ _SIGNATURES = {
 }
 
 
-# Where there is a time, in place of those of the same name.
+# For Hamiltonians that depend on the time; these replace the signatures of the same name.
 _TIMED = {
     "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
     "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),
     "vector_field": (None, (_POINTER, _DOUBLE, _POINTER, _POINTER)),
 }
 
-# Where there is noise.
+# For systems with noise.
 _WORD, _LONG = ctypes.c_uint32, ctypes.c_uint64
 _NOISY = {
     "set_noise": (_INT, (_POINTER, _LONG, _WORD, _LONG)),
     "integrate_along": (_INT, (_POINTER, _DOUBLE, _SIZE, _POINTER)),
 }
 
-# What is there only if it was asked for, or not left out.
+# Optional functions: present if the spec or the options of the build include them.
 _EXTRAS = {
     "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
     "ensemble_at": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _DOUBLE, _SIZE, _POINTER)),
@@ -61,11 +61,11 @@ _EXTRAS = {
 
 
 def functions_of(library: Any, interface: Interface) -> Any:
-    """A namespace of the functions that a library has; `ToolchainError` where one is missing."""
+    """Return a namespace of the functions of a library. Raises `ToolchainError` if a required one is missing."""
     offered = {name: s for name, s in _EXTRAS.items() if hasattr(library, f"{interface.name}_{name}")}
-    own = _dated(offered, interface) | (_NOISY if interface.noise else {})
+    dated = _dated(offered, interface) | (_NOISY if interface.noise else {})
     timed = _TIMED if interface.time else {}
-    if interface.time or "init_gauge" in offered:  # times, or a gauge of each
+    if interface.time or "init_gauge" in offered:  # one more argument: the time, or the gauge, of each member
         _, each = _EXTRAS["ensemble_each"]
         offered |= {"ensemble_each": (_INT, (*each[:3], _POINTER, *each[3:]))} if "ensemble_each" in offered else {}
         _, back = _EXTRAS["pullback_each"]
@@ -75,23 +75,26 @@ def functions_of(library: Any, interface: Interface) -> Any:
     return bound(
         library,
         interface.name,
-        {**_SIGNATURES, **offered, **timed, **monitored, **own, **_of_attitudes(offered, interface)},
+        {**_SIGNATURES, **offered, **timed, **monitored, **dated, **_of_attitudes(offered, interface)},
         single=interface.single,
     )
 
 
 def _of_attitudes(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-    """The signature of ensembles with attitudes: times or a gauge of each, and random numbers, where there are such."""
+    """Return the signature of ensembles with attitudes, {} if absent.
+
+    It has an argument for times or gauges of the members, and arguments for the random numbers, if the system has them.
+    """
     name = "ensemble_attitudes"
-    own = (_POINTER,) if interface.time or "init_gauge" in offered else ()
+    times_or_gauges = (_POINTER,) if interface.time or "init_gauge" in offered else ()
     drawn = (_LONG, _WORD, _LONG) if interface.noise else ()
     rest = (_SIZE, _POINTER, _POINTER, _POINTER)
-    arguments = (_POINTER, _POINTER, _POINTER, _SIZE, *own, _POINTER, _SIZE, *drawn, *rest)
+    arguments = (_POINTER, _POINTER, _POINTER, _SIZE, *times_or_gauges, _POINTER, _SIZE, *drawn, *rest)
     return {name: (_INT, arguments)} if name in offered else {}
 
 
 def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-    """Return the signatures of functions that take the time too, where there is one."""
+    """Return the signatures of functions that take the time as a further argument, {} without a time."""
     places = {"observables": 1, "noise_fields": 1, "ensemble_of": 3} if interface.time else {}
-    found = {name: (offered[name], at) for name, at in places.items() if name in offered}
-    return {name: (result, (*a[:at], _DOUBLE, *a[at:])) for name, ((result, a), at) in found.items()}
+    dated = {name: (offered[name], at) for name, at in places.items() if name in offered}
+    return {name: (result, (*a[:at], _DOUBLE, *a[at:])) for name, ((result, a), at) in dated.items()}

@@ -1,4 +1,4 @@
-"""The generated C of a lattice, called through ctypes."""
+"""Back end and sessions over the generated C of a lattice, called through ctypes."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "vector_field": (None, (_POINTER, _POINTER)),
 }
 
-#: Those of graphs, where they differ.
+#: Signatures of graphs where they differ from those of grids.
 _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "work_size": (_SIZE, (_POINTER, _SIZE)),
     "init": (_INT, (_POINTER,) * 6),
 }
 
-#: Those that know the time: of grids and pairs, and of graphs. Those of noise.
+#: Further functions of Hamiltonians that depend on the time, for grids and pairs and for graphs; and those of noise.
 _PASSED: dict[str, tuple[Any, tuple[Any, ...]]] = {"passed": (_INT, (_POINTER, _DOUBLE, _SIZE))}
 _IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 4 + (_DOUBLE, _POINTER))}
 _GRAPH_IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}
 _NOISY = {**_PASSED, "set_noise": (_INT, (_POINTER, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_uint64))}
 
-#: What splittings have, and steps by hand where they are offered.
+#: Optional functions: derivatives, observables, and caller-driven stepping.
 _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "tangent_size": (_SIZE, (_POINTER, _SIZE)),
     "integrate_tangent": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, _POINTER, _POINTER)),
@@ -73,24 +73,28 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "kick": (_INT, (_POINTER, _POINTER)),
 }
 
-#: Numbers that the trail of a segment takes at most, unless it is one step: those that the cache of a core holds.
-KEPT = 1 << 18
+#: A tape has room for at least this number of values: 2 MiB in double precision, which the cache of a core holds.
+MIN_TAPE_VALUES = 1 << 18
 
-#: States that segments of a run begin with for which a pullback has room, however large they are.
-STATES = 8
+#: A tape has room for at least this number of states from which segments of a run are recomputed.
+MIN_CHECKPOINTS = 8
 
-#: Steps in whose number the trail is measured, since several may keep one state.
-LEGS = 64
+#: Number of steps over which the tape of one step is averaged, since several steps may share one stored state.
+MEASURED_STEPS = 64
 
-#: Bytes of the trail of a run that is kept as a whole, or whose segments are all made once more, at most.
-TWICE = 1 << 26
+#: Largest number of bytes of a tape (64 MiB), unless one of the two minima asks for more.
+MAX_TAPE_BYTES = 1 << 26
 
-#: Site updates between two calls: Python can deliver a keyboard interrupt then.
+#: Site updates in one call of C. Python delivers keyboard interrupts between calls.
 _UPDATES_PER_CALL = 1 << 26
 
 
 class Stage(ctypes.Structure):
-    """What one sweep of a step reads and changes: planes beside those swept, and fields as bits."""
+    """One sweep of a step, with the data that it reads and writes.
+
+    ``behind`` and ``ahead`` are the numbers of planes that it reads before and after the planes it sweeps. ``read`` and
+    ``changed`` have a bit for each field.
+    """
 
     _fields_: ClassVar = [
         ("behind", ctypes.c_size_t),
@@ -105,7 +109,7 @@ class Stage(ctypes.Structure):
 
 
 class CLatticeSession:
-    """A lattice on its way, in memory of its own. See `phigen.runtime.lattice.LatticeSession`."""
+    """A session in C, with its own memory. See `phigen.runtime.lattice.LatticeSession`."""
 
     def __init__(
         self,
@@ -120,24 +124,24 @@ class CLatticeSession:
         self._real: Any = np.float32 if interface.single else np.float64
         self._casimirs = len(interface.casimirs)
         self._observed = len(interface.observables), len(interface.observed_fields)
-        self._kept = 2 if interface.compensated else 1
+        self._saved_states = 2 if interface.compensated else 1  # the state, and its compensation terms
         self._dear = interface.dear
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
         bonds = np.ascontiguousarray(parameters.get("bonds", ()), dtype=np.uintp).reshape(-1, 2)
-        given = np.array([len(bonds), bonds.ctypes.data], dtype=np.uintp)  # the struct of bonds
+        graph = np.array([len(bonds), bonds.ctypes.data], dtype=np.uintp)  # the struct NAME_bonds
         needed = functions.work_size(sizes.ctypes.data, *([len(bonds)] if interface.graph else []))
         expect_room(f"the arrays of a solver of {' × '.join(map(str, sizes))} sites", needed)
         self._beside = np.zeros(0, dtype=np.uint8)  # for tangent vectors
         self._work = np.zeros(max(needed, 64), dtype=np.uint8)
         self._address = self._struct.ctypes.data
-        with np.errstate(over="ignore"):  # which is found infinite
+        with np.errstate(over="ignore"):  # values beyond single precision become infinite, which C reports
             first = np.ascontiguousarray(x0, dtype=self._real)
-            packed, kept = _packed(interface, parameters, x0.shape[1:], len(bonds))
-        arrays = [a.ctypes.data for a in (packed, sizes, *([given] if interface.graph else []), first)]
+            packed, referenced = _packed(interface, parameters, x0.shape[1:], len(bonds))
+        arrays = [a.ctypes.data for a in (packed, sizes, *([graph] if interface.graph else []), first)]
         begin, last = (functions.init_at, (t0,)) if interface.time else (functions.init, ())
         status = begin(self._address, *arrays, *last, self._work.ctypes.data)
-        del kept
+        del referenced  # the arrays that `packed` points to, which C has copied
         if status:
             raise BackendError(status_name(status), 0, x0[None])
         if interface.noise:
@@ -145,15 +149,15 @@ class CLatticeSession:
 
     @property
     def steps(self) -> int:
-        """Good steps since the start."""
+        """The number of successful steps since the start."""
         return self._before + int(self._c.solver_steps_done(self._address))
 
     def state(self) -> Floats:
-        """A copy of the state (coordinates, *sizes)."""
+        """Return a copy of the state (coordinates, *sizes)."""
         return self._filled(self._c.state, self._shape)
 
     def advance(self, h: float, steps: int) -> None:
-        """Make so many steps."""
+        """Make ``steps`` steps of size ``h``."""
         most = max(1, _UPDATES_PER_CALL // int(np.prod(self._shape[1:])))
         while steps > 0:
             now = min(steps, most)
@@ -163,7 +167,7 @@ class CLatticeSession:
             steps -= now
 
     def advance_tangent(self, h: float, vectors: Floats, steps: int = 1) -> Floats:
-        """Make so many steps, which carry vectors along."""
+        """Make ``steps`` steps, and return the tangent ``vectors`` multiplied by their derivatives."""
         if not hasattr(self._c, "integrate_tangent"):
             raise MissingExtraError("step_tangent")
         carried = np.array(vectors, dtype=self._real, order="C")
@@ -178,101 +182,104 @@ class CLatticeSession:
             raise BackendError(status_name(status), self.steps, self.state()[None])
         return np.asarray(carried, dtype=np.float64)
 
-    def pull_back(self, h: float, steps: int, stride: int, bars: Floats, found: int) -> tuple[Floats, Floats]:
-        """The rows of a run, and the cotangent of the state, from those of all rows but the first.
+    def pull_back(self, h: float, steps: int, stride: int, bars: Floats, parameters_bar: int) -> tuple[Floats, Floats]:
+        """Return the rows of a run, and the cotangent of its initial state from the cotangents ``bars`` of the rows.
 
-        ``found`` is the address of a struct, to which the cotangents of parameters are added.
+        The cotangent of row 0 is not added. ``parameters_bar`` is the address of a struct to which the cotangents of
+        the parameters are added.
         """
-        given = np.ascontiguousarray(bars[1:], dtype=self._real)
+        row_bars = np.ascontiguousarray(bars[1:], dtype=self._real)
         rows, x0_bar = filled(f"{len(bars)} frames", bars.shape, self._real), np.empty(self._shape, self._real)
         most, least = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
-        state, of_step = x0_bar.nbytes, (int(self._c.trail_size(self._address, 1 + LEGS)) - least) // LEGS
-        twice = least + 3 * math.isqrt(steps * state * of_step)  # segments that are made once more have room by this
-        wanted = most if self._dear or of_step < state else twice  # where sweeps are undone, all is worth its room
-        room = max(KEPT * x0_bar.itemsize, least + STATES * 2 * state, min(TWICE, wanted))
-        size = max(least, min(most or least, room))
-        expect_room("what is kept of steps to go back", size)
-        trail = np.empty(size, dtype=np.uint8)
-        pointers = (rows[1:].ctypes.data, given.ctypes.data, x0_bar.ctypes.data, found, trail.ctypes.data)
+        state = x0_bar.nbytes
+        of_step = (int(self._c.trail_size(self._address, 1 + MEASURED_STEPS)) - least) // MEASURED_STEPS
+        # With this size, checkpoints and the tapes of segments fit if each segment is recomputed once.
+        recomputed = least + 3 * math.isqrt(steps * state * of_step)
+        # A whole tape pays where steps are slow, or where sweeps are recomputed by the inverse flow and store little.
+        useful = most if self._dear or of_step < state else recomputed
+        minimum = max(MIN_TAPE_VALUES * x0_bar.itemsize, least + MIN_CHECKPOINTS * 2 * state)
+        size = max(least, min(most or least, max(minimum, min(MAX_TAPE_BYTES, useful))))
+        expect_room("the stored data of the reverse pass", size)
+        tape = np.empty(size, dtype=np.uint8)
+        pointers = (rows[1:].ctypes.data, row_bars.ctypes.data, x0_bar.ctypes.data, parameters_bar, tape.ctypes.data)
         with interruptible(lambda question: self._c.ask(self._address, question)):
             status = self._c.pullback(self._address, h, steps, stride, *pointers, size)
         if status:
-            self.advance(h, steps)  # tells where
+            self.advance(h, steps)  # raises `BackendError` with the number of the failing step
             raise BackendError(status_name(status), 0, self.state()[None])
         return np.asarray(rows, dtype=np.float64), np.asarray(x0_bar, dtype=np.float64)
 
     def hamiltonian(self) -> float:
-        """H of the state."""
+        """Return H of the state."""
         return float(self._c.hamiltonian(self._address))
 
     def density(self) -> Floats:
-        """The density of H at the sites (*sizes)."""
+        """Return the density of H at the sites (*sizes)."""
         return self._filled(self._c.density, self._shape[1:])
 
     def casimirs(self) -> Floats:
-        """The densities of the Casimirs (Casimirs, *sizes)."""
+        """Return the densities of the Casimirs (Casimirs, *sizes)."""
         return self._filled(self._c.casimirs, (self._casimirs, *self._shape[1:]))
 
     def vector_field(self) -> Floats:
-        """π∇H (coordinates, *sizes)."""
+        """Return π∇H (coordinates, *sizes)."""
         return self._filled(self._c.vector_field, self._shape)
 
     def observables(self) -> Floats:
-        """Observables that are one number each (observables,)."""
+        """Return the observables that are one number each (observables,)."""
         observed, _ = self._observed
         return self._filled(self._c.observables, (observed,)) if observed else np.empty(0)
 
     def observed_fields(self) -> Floats:
-        """Observables with a value at each site (fields, *sizes)."""
+        """Return the observables with a value at each site (fields, *sizes)."""
         shape = (self._observed[1], *self._shape[1:])
         return self._filled(self._c.observed_fields, shape) if shape[0] else np.empty(shape)
 
     def saved(self) -> dict[str, Any]:
-        """What `resume` goes on from with the same bits, beside the state."""
+        """Return the arrays that `resume` needs beside the state to continue with the same bits."""
         if not hasattr(self._c, "saved"):
             return {}
-        x = np.empty((self._kept * self._shape[0], *self._shape[1:]), self._real)
+        x = np.empty((self._saved_states * self._shape[0], *self._shape[1:]), self._real)
         far = np.zeros(1, dtype=np.uintp)
         is_open = self._c.saved(self._address, x.ctypes.data, far.ctypes.data)
         return {"before": x, "far": far} if is_open else {"far": far}
 
-    def resume(self, h: float, steps: int, kept: Mapping[str, Any]) -> None:
-        """Go on from what was saved."""
+    def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
+        """Continue after ``steps`` steps of size h, from the result of `saved`."""
         if hasattr(self._c, "passed"):
             self.passed(h, steps)
         else:
             self._before = steps
-        if "far" in kept:
-            x = np.ascontiguousarray(kept["before"], dtype=self._real) if "before" in kept else None
-            self._expect_done(
-                self._c.resume(self._address, h, x.ctypes.data if x is not None else None, int(kept["far"][0]))
-            )
+        if "far" in arrays:
+            x = np.ascontiguousarray(arrays["before"], dtype=self._real) if "before" in arrays else None
+            before = x.ctypes.data if x is not None else None
+            self._expect_done(self._c.resume(self._address, h, before, int(arrays["far"][0])))
 
     def place(self, x: Floats) -> None:
-        """Stand at ``x`` (coordinates, *sizes). Raises `BackendError` where that is not finite."""
-        self._moved("set_state", x)
+        """Replace the state by ``x`` (coordinates, *sizes). Raises `BackendError` if it is not finite."""
+        self._move("set_state", x)
 
     def kick(self, change: Floats) -> None:
-        """Move the state by ``change`` (coordinates, *sizes). Raises `BackendError` where that is not finite."""
-        self._moved("kick", change)
+        """Add ``change`` (coordinates, *sizes) to the state. Raises `BackendError` if the sum is not finite."""
+        self._move("kick", change)
 
-    def _moved(self, name: str, given: Floats) -> None:
+    def _move(self, name: str, values: Floats) -> None:
         function = getattr(self._c, name, None)
         if function is None:
             raise TypeError("this lattice was compiled without kicks; profile fast includes them")
-        x = np.ascontiguousarray(given, dtype=self._real)
+        x = np.ascontiguousarray(values, dtype=self._real)
         status = function(self._address, x.ctypes.data)
         if status:
             raise BackendError(status_name(status), self.steps, self.state()[None])
 
     def passed(self, h: float, steps: int) -> None:
-        """Count so many steps of size h as made; of lattices with a time, or noise."""
+        """Advance time and random numbers by ``steps`` steps of size h, for lattices that have either."""
         self._expect_done(self._c.passed(self._address, h, steps))
 
-    # --- steps by hand: see NAME.h
+    # --- caller-driven stepping: see NAME.h
 
     def set_planes(self, first: int, planes: int) -> None:
-        """Say that the first plane here is that number of so many; of lattices with noise."""
+        """Declare that this lattice is the part from plane ``first`` on of one with ``planes`` planes; for noise."""
         self._expect_done(self._c.set_planes(self._address, first, planes))
 
     def begin(self, h: float) -> None:
@@ -280,23 +287,23 @@ class CLatticeSession:
         self._expect_done(self._c.begin(self._address, h))
 
     def sweep(self, stage: int, far: int, first: int, end: int) -> None:
-        """One sweep over the planes from ``first``, before ``end``."""
+        """Make one sweep of a step over the planes from ``first`` to ``end`` - 1."""
         self._expect_done(self._c.sweep(self._address, stage, far, first, end))
 
     def planes(self, field: int, first: int, end: int) -> Floats:
-        """A copy of some planes of a field."""
+        """Return a copy of the planes of a field from ``first`` to ``end`` - 1."""
         out = np.empty((end - first, *self._shape[2:]), self._real)
         self._expect_done(self._c.planes(self._address, field, first, end, out.ctypes.data))
         return out
 
     def put_planes(self, field: int, first: int, end: int, values: Floats) -> None:
-        """Put other values of a field in place of those of some planes."""
+        """Replace the values of a field on the planes from ``first`` to ``end`` - 1."""
         with np.errstate(over="ignore"):
             values = np.ascontiguousarray(values, dtype=self._real)
         self._expect_done(self._c.put_planes(self._address, field, first, end, values.ctypes.data))
 
     def holds(self, first: int, end: int) -> bool:
-        """Whether all values of some planes are finite."""
+        """Whether all values on the planes from ``first`` to ``end`` - 1 are finite."""
         return bool(self._c.holds(self._address, first, end))
 
     @staticmethod
@@ -311,52 +318,52 @@ class CLatticeSession:
 
 
 class CLattice:
-    """The back end over the shared library of generated files (name → text). See `phigen.runtime.lattice`."""
+    """Back end over the shared library compiled from generated files (name → text). See `phigen.runtime.lattice`."""
 
     target = "c"
 
     def __init__(self, files: Mapping[str, str], interface: LatticeInterface) -> None:
         self.interface, self._files = interface, dict(files)
         self._library = cache.load(files, threads=True)
-        wanted = _SIGNATURES | (_OF_GRAPHS if interface.graph else {})
-        wanted |= (_GRAPH_IN_TIME if interface.graph else _IN_TIME) if interface.time else {}
-        wanted |= _NOISY if interface.noise else {}
-        self._c = bound(self._library, interface.name, wanted, _OFFERED, single=interface.single)
+        required = _SIGNATURES | (_OF_GRAPHS if interface.graph else {})
+        required |= (_GRAPH_IN_TIME if interface.graph else _IN_TIME) if interface.time else {}
+        required |= _NOISY if interface.noise else {}
+        self._c = bound(self._library, interface.name, required, _OFFERED, single=interface.single)
 
     def threads(self, sites: int) -> int:
-        """Return the number of threads that share the work on so many sites."""
+        """Return the number of threads that share the work on a lattice of ``sites`` sites."""
         if not self.interface.is_shared(sites):
             return 1
         most = getattr(self._library, "omp_get_max_threads", None)  # of the OpenMP that it is linked with
         return int(most()) if most else 1
 
     def stages(self) -> list[Stage]:
-        """The sweeps of a step in order, then the last and the first together, which are apart where there is noise.
+        """Return the sweeps of a step in order, and, without noise, the last and the first merged into one.
 
-        Raises `ValueError` if they are not offered.
+        Raises `ValueError` if the C has no caller-driven stepping.
         """
         if not hasattr(self._c, "stages"):
             raise ValueError(
                 f"{self.interface.name} has no caller-driven stepping: that needs a split lattice on a grid, "
                 "without a seam, compiled with profile fast"
             )
-        found = [Stage() for _ in range(self._c.stages() + (not self.interface.noise))]
-        for k, stage in enumerate(found):
+        sweeps = [Stage() for _ in range(self._c.stages() + (not self.interface.noise))]
+        for k, stage in enumerate(sweeps):
             self._c.describe(k, ctypes.addressof(stage))
-        return found
+        return sweeps
 
     def __reduce__(self) -> tuple[type[CLattice], tuple[Any, ...]]:
         return CLattice, (self._files, self.interface)
 
     @property
     def identity(self) -> str:
-        """A hash of all that decides the results."""
+        """A hash of everything that determines the results."""
         return cache.key_of(self._library)
 
     def start(
         self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
     ) -> CLatticeSession:
-        """A session at x0 (coordinates, *sizes), at the time t0."""
+        """Return a session at x0 (coordinates, *sizes), at the time t0."""
         return CLatticeSession(self._c, self.interface, x0, parameters, t0, draws)
 
     def pullback(
@@ -375,27 +382,30 @@ class CLattice:
         zero = dict.fromkeys(self.interface.parameters, 0.0)
         struct, arrays = _packed(self.interface, zero, x0.shape[1:], len(parameters.get("bonds", ())))
         rows, x0_bar = self.start(x0, parameters, t0).pull_back(h, steps, stride, bars, struct.ctypes.data)
-        found = {name: np.asarray(struct[name][0], dtype=np.float64) for name in zero if name not in arrays}
-        for name, own in arrays.items():
-            of_array = np.asarray(own, dtype=np.float64)
-            found[name] = of_array if np.ndim(parameters[name]) else of_array.sum()
+        parameters_bar = {name: np.asarray(struct[name][0], dtype=np.float64) for name in zero if name not in arrays}
+        for name, sums in arrays.items():
+            of_array = np.asarray(sums, dtype=np.float64)
+            parameters_bar[name] = of_array if np.ndim(parameters[name]) else of_array.sum()
         rows[0] = x0
-        return rows, x0_bar + bars[0], {name: found[name] for name in zero}
+        return rows, x0_bar + bars[0], {name: parameters_bar[name] for name in zero}
 
 
 def _packed(
     interface: LatticeInterface, parameters: Mapping[str, Any], sizes: tuple[int, ...], bonds: int
 ) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
-    """The struct of parameters, and the arrays that it points to, which are copies."""
+    """Return the struct of parameters, and copies of the arrays that it points to.
+
+    The caller must hold the copies as long as C uses the struct.
+    """
     real: Any = np.float32 if interface.single else np.float64
     arrays = {*interface.at_sites, *interface.at_bonds}
     members = [(name, np.uintp if name in arrays else real) for name in interface.parameters] or [("unused", np.int8)]
-    struct, kept = np.zeros(1, dtype=np.dtype(members, align=True)), dict[str, NDArray[Any]]()
+    struct, copies = np.zeros(1, dtype=np.dtype(members, align=True)), dict[str, NDArray[Any]]()
     for name in interface.parameters:
         value = parameters[name]
         if name in arrays:
             shape = sizes if name in interface.at_sites else (bonds,)
-            kept[name] = np.array(np.broadcast_to(np.asarray(value, dtype=real), shape), order="C")
-            value = kept[name].ctypes.data
+            copies[name] = np.array(np.broadcast_to(np.asarray(value, dtype=real), shape), order="C")
+            value = copies[name].ctypes.data
         struct[name] = value
-    return struct, kept
+    return struct, copies

@@ -1,4 +1,4 @@
-"""Trajectories in the structs of a generated C solver."""
+"""Sessions of a generated C solver, each in a struct NAME_solver."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from phigen.runtime.interface import BackendError, Floats, MissingExtraError, st
 Bytes = NDArray[np.uint8]
 Real = Any  # np.float64, or np.float32 where the C computes in single precision
 
-# Between two calls Python can deliver a keyboard interrupt.
+# Python delivers keyboard interrupts between two calls, which last milliseconds for small systems.
 _STEPS_PER_CALL = 1 << 16
-_ALIGNMENT = 64  # what the widest vector registers ask for
+_ALIGNMENT = 64  # bytes, the width of the widest vector registers (AVX-512)
 
 
 class Cotangents(NamedTuple):
-    """What is pulled back along a run: cotangents of the state, of the parameters, and of e."""
+    """Cotangents that a reverse pass updates: of the state, of the parameters, and of the energy level e."""
 
     state: Floats
     parameters: Floats
@@ -29,7 +29,7 @@ class Cotangents(NamedTuple):
 
 
 class CSession:
-    """A struct NAME_solver; being a plain value, its bytes are all there is to know. See `Session`."""
+    """A struct NAME_solver. It contains no pointers, so a copy of its bytes is a copy of the session. See `Session`."""
 
     def __init__(
         self, functions: Any, struct: Bytes, dimension: int, element: int = 0, real: Real = np.float64
@@ -67,8 +67,8 @@ class CSession:
 
     def advance_along(self, h: float, increments: Floats) -> None:
         """See `Session`."""
-        given = np.ascontiguousarray(increments, dtype=self._real)
-        status = self._c.integrate_along(self.address, h, len(given), given.ctypes.data)
+        rows = np.ascontiguousarray(increments, dtype=self._real)
+        status = self._c.integrate_along(self.address, h, len(rows), rows.ctypes.data)
         if status:
             raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
 
@@ -82,12 +82,16 @@ class CSession:
             raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
         return tangent.astype(np.float64, copy=False)
 
-    def pull_back(self, h: float, segment: Segment, trail: Floats, bars: Floats, found: Cotangents) -> Floats:
-        """The rows (rows, DIM) of a segment whose start this is; ``found`` are the cotangents after it, then before."""
-        rows, level = np.empty_like(bars), (found.level.ctypes.data,) * hasattr(self._c, "level_bar")
-        out = (rows.ctypes.data, bars.ctypes.data, found.state.ctypes.data, found.parameters.ctypes.data)
+    def pull_back(self, h: float, segment: Segment, tape: Floats, bars: Floats, cotangents: Cotangents) -> Floats:
+        """Return the rows (rows, DIM) of the segment that begins here, and pull ``cotangents`` back to its start.
+
+        ``cotangents`` are those after the segment, and are overwritten by those before it. ``bars`` are the cotangents
+        of the rows, ``tape`` is work space.
+        """
+        rows, level = np.empty_like(bars), (cotangents.level.ctypes.data,) * hasattr(self._c, "level_bar")
+        out = (rows.ctypes.data, bars.ctypes.data, cotangents.state.ctypes.data, cotangents.parameters.ctypes.data)
         counts = (segment.count, segment.stride)
-        status = self._c.pullback(self.address, h, *counts, *out, *level, trail.ctypes.data)
+        status = self._c.pullback(self.address, h, *counts, *out, *level, tape.ctypes.data)
         if status:
             raise BackendError(status_name(status), segment.first, self._x.reshape(1, -1).astype(np.float64))
         return rows
@@ -98,10 +102,10 @@ class CSession:
 
     def element(self) -> Floats:
         """See `Session`."""
-        found = np.empty(self._element, dtype=self._real)
+        element = np.empty(self._element, dtype=self._real)
         if self._element:
-            self._c.attitude(self.address, found.ctypes.data)
-        return found.astype(np.float64, copy=False)
+            self._c.attitude(self.address, element.ctypes.data)
+        return element.astype(np.float64, copy=False)
 
     def placed(self, x: Floats) -> CSession:
         """See `Session`."""
@@ -111,18 +115,18 @@ class CSession:
 
     def place(self, x: Floats) -> None:
         """See `Session`."""
-        self._moved("set_state", x)
+        self._move("set_state", x)
 
     def kick(self, change: Floats) -> None:
         """See `Session`."""
-        self._moved("kick", change)
+        self._move("kick", change)
 
-    def _moved(self, function: str, by: Floats) -> None:
+    def _move(self, function: str, by: Floats) -> None:
         if not hasattr(self._c, function):
             raise TypeError("the solver was compiled without kicks: the spec has without: [kicks]")
-        with np.errstate(over="ignore"):  # which is found infinite
-            given = np.ascontiguousarray(by, dtype=self._real)
-        status = getattr(self._c, function)(self.address, given.ctypes.data)
+        with np.errstate(over="ignore"):  # values beyond single precision become infinite, which C reports
+            values = np.ascontiguousarray(by, dtype=self._real)
+        status = getattr(self._c, function)(self.address, values.ctypes.data)
         if status:
             raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
 
@@ -132,14 +136,14 @@ class CSession:
 
 
 def aligned(size: int) -> Bytes:
-    """Room for a struct, of zeros, where vectors may lie."""
+    """Return ``size`` zero bytes whose address is aligned for vector registers."""
     memory = np.zeros(size + _ALIGNMENT, dtype=np.uint8)
     start = -memory.ctypes.data % _ALIGNMENT
     return memory[start : start + size]
 
 
 def aligned_copy(struct: Bytes) -> Bytes:
-    """The bytes of a struct, again."""
+    """Return an aligned copy of the bytes of a struct."""
     copy = aligned(len(struct))
     copy[:] = struct
     return copy

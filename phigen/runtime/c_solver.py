@@ -19,7 +19,7 @@ from phigen.runtime import cache
 from phigen.runtime.c_functions import functions_of
 from phigen.runtime.c_lattice import CLattice
 from phigen.runtime.c_session import Bytes, Cotangents, CSession, Real, aligned, aligned_copy
-from phigen.runtime.gradients import KEPT, Segment, segments
+from phigen.runtime.gradients import MAX_TAPE_VALUES, Segment, segments
 from phigen.runtime.interface import (
     FIRST_DRAWS,
     BackendError,
@@ -34,8 +34,11 @@ from phigen.runtime.members import Members, one_by_one, shared_out
 
 
 class CSolver:
-    """The back end over the shared library of generated files (name → text); it holds no state, so that threads may
-    share it. The library comes from the cache, or is compiled: raises `ToolchainError`."""
+    """Back end over the shared library compiled from generated C files (name → text).
+
+    Several threads may use it, since it holds no state of a trajectory. The library comes from the cache or is compiled
+    now. Raises `ToolchainError`.
+    """
 
     target = "c"
 
@@ -77,9 +80,9 @@ class CSolver:
             gauge = self._gauge.ctypes.data
             status = self._c.init_gauge(session.address, packed.ctypes.data, start.ctypes.data, gauge)
         if status == 0 and first is not None:
-            given = self._own(first)
-            place = given[math.prod(interface.attitude) :].ctypes.data if interface.position else None
-            status = self._c.set_attitude(session.address, given.ctypes.data, place)
+            element = self._own(first)
+            place = element[math.prod(interface.attitude) :].ctypes.data if interface.position else None
+            status = self._c.set_attitude(session.address, element.ctypes.data, place)
         if status == 0 and interface.noise:
             status = self._c.set_noise(session.address, draws.seed, draws.member, draws.step)
         if status:
@@ -120,11 +123,13 @@ class CSolver:
         failures = {int(m): status_name(int(status[m])) for m in np.flatnonzero(status)}
         if frames is not None and members.steps % members.stride:
             frames[-1] = np.where(status[:, np.newaxis] == 0, final, np.nan)
-        return members.told(final if frames is None else frames, failures)
+        return members.checked(final if frames is None else frames, failures)
 
     def _expect_parameters(self, members: Members) -> None:
-        """Where no member asks, whether steps can be made with the parameters: of a monitored system nobody can tell,
-        since its start depends on the state too."""
+        """Raise `BackendError` if no step can be made with the parameters of an ensemble without members.
+
+        With a monitor this is not checked, since it depends on the initial state too.
+        """
         if hasattr(self._c, "monitor"):
             return
         _, parameters, t0 = members.numbers(0)
@@ -140,46 +145,49 @@ class CSolver:
             raise BackendError(status_name(status), 0, members.x0)
 
     def _alike(self, members: Members, x: Floats, status: Bytes) -> None:
-        """Integrate some members (DIM, members), in place, that differ in their states only."""
+        """Integrate in place members ``x`` (DIM, members) that differ in their states only."""
         h, parameters, t0 = members.numbers(0)
         packed = self._packed(parameters)
-        given, rest = (packed.ctypes.data, x.ctypes.data, x.shape[1]), (h, members.steps, status.ctypes.data)
+        start, rest = (packed.ctypes.data, x.ctypes.data, x.shape[1]), (h, members.steps, status.ctypes.data)
         begin = (t0,) if self.interface.time else ()
         if self.interface.noise:
             draws = members.draws.seed, int(members.paths[0]), members.draws.step
-            self._c.ensemble_of(*given, *begin, *rest[:2], *draws, rest[2])
+            self._c.ensemble_of(*start, *begin, *rest[:2], *draws, rest[2])
         elif begin:
-            self._c.ensemble_at(*given, t0, *rest)
+            self._c.ensemble_at(*start, t0, *rest)
         else:
-            self._c.ensemble(*given, *rest)
+            self._c.ensemble(*start, *rest)
 
     def _each(self, members: Members, x: Floats, status: Bytes, rows: Floats | None) -> None:
-        """The same where each has numbers of its own; ``rows`` (frames, members, DIM) are to be filled."""
+        """Integrate in place members ``x`` (DIM, members) with parameters, steps and times of their own.
+
+        ``rows`` (frames, members, DIM) receive the states of the frames; None if there are none.
+        """
         count = len(members)
-        packed, began, h = self._given(members)
-        own = [packed.ctypes.data if members.parameters else None, x.ctypes.data, count]
-        own += [None if a is None else a.ctypes.data for a in began]
+        packed, began, h = self._numbers(members)
+        start = [packed.ctypes.data if members.parameters else None, x.ctypes.data, count]
+        start += [None if a is None else a.ctypes.data for a in began]
         stride = members.stride or 1
         frames = None if rows is None else np.empty((members.steps // stride, *x.shape), self._real)
         at = None if frames is None else frames.ctypes.data
-        self._c.ensemble_each(*own, h.ctypes.data, members.steps, stride, at, status.ctypes.data)
+        self._c.ensemble_each(*start, h.ctypes.data, members.steps, stride, at, status.ctypes.data)
         if rows is not None and frames is not None:
             rows[: len(frames)] = frames.transpose(0, 2, 1)
 
     def _with_attitudes(self, members: Members, threads: int | None, turned: Floats) -> Floats:
-        """`ensemble` with attitudes."""
-        count, made = len(members), members.steps // members.stride if members.stride else 0
+        """Return the result of `ensemble` for members with attitudes, and fill ``turned`` with these."""
+        count, row_count = len(members), members.steps // members.stride if members.stride else 0
         frames = members.frames() if members.stride else None
         final, last, status = members.x0.copy(), turned[0].copy(), np.zeros(count, dtype=np.uint8)
 
         def make(part: slice) -> None:
             some = members.part(part)
             x, element = (self._own(a[part].T) for a in (final, last))
-            rows, elements = (np.empty((made, *a.shape), self._real) for a in (x, element))
+            rows, elements = (np.empty((row_count, *a.shape), self._real) for a in (x, element))
             self._all_turned(some, (x, element), (rows, elements), status[part])
             final[part], last[part] = x.T, element.T
             if frames is not None:
-                frames[1 : made + 1, part], turned[1 : made + 1, part] = (
+                frames[1 : row_count + 1, part], turned[1 : row_count + 1, part] = (
                     a.transpose(0, 2, 1) for a in (rows, elements)
                 )
 
@@ -190,19 +198,22 @@ class CSolver:
         elif members.steps % members.stride:
             frames[-1], turned[-1] = (np.where(good, a, np.nan) for a in (final, last))
         failures = {int(m): status_name(int(status[m])) for m in np.flatnonzero(status)}
-        return members.told(final if frames is None else frames, failures)
+        return members.checked(final if frames is None else frames, failures)
 
     def _all_turned(
         self, members: Members, begun: tuple[Floats, Floats], rows: tuple[Floats, Floats], status: Bytes
     ) -> None:
-        """Integrate some members, in place: their states and attitudes (numbers, members), and those of the frames."""
-        packed, own, h = self._given(members)
-        given = [packed if members.parameters else None, *begun]
+        """Integrate members in place.
+
+        ``begun`` are their states and attitudes (numbers, members), ``rows`` receive those of the frames.
+        """
+        packed, times_or_gauges, h = self._numbers(members)
+        start = [packed if members.parameters else None, *begun]
         draws = members.draws.seed, int(members.paths[0]), members.draws.step
         self._c.ensemble_attitudes(
-            *(None if a is None else a.ctypes.data for a in given),
+            *(None if a is None else a.ctypes.data for a in start),
             len(members),
-            *(None if a is None else a.ctypes.data for a in own),
+            *(None if a is None else a.ctypes.data for a in times_or_gauges),
             h.ctypes.data,
             members.steps,
             *(draws if self.interface.noise else ()),
@@ -211,83 +222,99 @@ class CSolver:
             status.ctypes.data,
         )
 
-    def _given(self, members: Members) -> tuple[Floats, list[Floats | None], Floats]:
-        """Of each member the parameters (members, parameters), the time or the gauge, where there is one, the step."""
+    def _numbers(self, members: Members) -> tuple[Floats, list[Floats | None], Floats]:
+        """Return parameters (members, parameters), a list of the times or gauges, and the step sizes (members,).
+
+        The list has one array if the system has a time or a gauge, which is None for gauges that the C chooses.
+        """
         count, width = len(members), max(1, len(members.parameters))
         packed = np.empty((count, width))
         for k, value in enumerate(members.parameters.values()):
             packed[:, k] = value
-        own: list[Floats | None] = []
+        times_or_gauges: list[Floats | None] = []
         if self.interface.time:
-            own = [self._own(np.full(count, members.t0))]
+            times_or_gauges = [self._own(np.full(count, members.t0))]
         elif hasattr(self._c, "init_gauge"):
             gauge = self._gauge
-            own = [None if gauge is None else np.array(np.broadcast_to(gauge, (count, gauge.shape[-1])))]
-        return self._own(packed), own, self._own(np.full(count, members.h))
+            times_or_gauges = [None if gauge is None else np.array(np.broadcast_to(gauge, (count, gauge.shape[-1])))]
+        return self._own(packed), times_or_gauges, self._own(np.full(count, members.h))
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """See `phigen.runtime.backend.Backend`."""
         if not hasattr(self._c, "pullback"):
             raise MissingExtraError("pullback")
-        count, together = len(members), self._goes_back_together(members)
+        count, together = len(members), self._can_batch_pullback(members)
         of_step = int(self._c.trail_size_each() if together else self._c.trail_size())
-        pieces = segments(members.steps, members.stride, max(1, KEPT // of_step))
+        pieces = segments(members.steps, members.stride, max(1, MAX_TAPE_VALUES // of_step))
         room = of_step * max((s.count for s in pieces), default=1)
-        rows, x0_bar, found = np.empty_like(bars), np.empty_like(members.x0), np.zeros((len(members.parameters), count))
+        rows, x0_bar, parameters_bar = (
+            np.empty_like(bars),
+            np.empty_like(members.x0),
+            np.zeros((len(members.parameters), count)),
+        )
         status = np.zeros(count, dtype=np.uint8)
 
         def make(part: slice) -> None:
-            trail = np.empty(room, self._real)
+            tape = np.empty(room, self._real)
             if together:
-                own = self._all_pulled(members.part(part), pieces, trail, bars[:, part], status[part])
-                rows[:, part], x0_bar[part], found[:, part] = own
+                rows[:, part], x0_bar[part], parameters_bar[:, part] = self._all_pulled(
+                    members.part(part), pieces, tape, bars[:, part], status[part]
+                )
                 return
             for m in range(count)[part]:
                 h, parameters, t0 = members.numbers(m)
                 try:
-                    own = self._pulled(members.x0[m], h, pieces, trail, bars[:, m], parameters, t0)
+                    pulled = self._pulled(members.x0[m], h, pieces, tape, bars[:, m], parameters, t0)
                 except BackendError as error:
                     raise BackendError(error.status, error.step, error.states, (m,)) from error
-                rows[:, m], x0_bar[m], found[:, m] = own
+                rows[:, m], x0_bar[m], parameters_bar[:, m] = pulled
 
         shared_out(members, threads, make)
         for m in np.flatnonzero(status)[:1].tolist():
             raise BackendError(status_name(int(status[m])), 0, members.x0, (m,))
-        return rows, x0_bar, found
+        return rows, x0_bar, parameters_bar
 
-    def _goes_back_together(self, members: Members) -> bool:
-        """Whether members are pulled back by one call for all: one for each segment of a long run, unless a segment
-        would have to begin at a time, or with a gauge, of the run."""
+    def _can_batch_pullback(self, members: Members) -> bool:
+        """Whether one call pulls all members back, or one call for each segment of a long run.
+
+        A run of several segments cannot be batched if it has a time or a gauge, since later segments would need those
+        of their starts.
+        """
         if not hasattr(self._c, "pullback_each"):
             return False
         held = self.interface.time or hasattr(self._c, "init_gauge")
-        return int(self._c.trail_size_each()) * members.steps <= KEPT or (len(members) > 1 and not held)
+        return int(self._c.trail_size_each()) * members.steps <= MAX_TAPE_VALUES or (len(members) > 1 and not held)
 
     def _all_pulled(
-        self, members: Members, pieces: Sequence[Segment], trail: Floats, bars: Floats, status: Bytes
+        self, members: Members, pieces: Sequence[Segment], tape: Floats, bars: Floats, status: Bytes
     ) -> tuple[Floats, Floats, Floats]:
-        """`pullback` of some members, by one call for each piece of the run."""
-        rows, (packed, own, h) = np.empty_like(bars), self._given(members)
-        found, x_bar = np.zeros_like(packed), np.zeros_like(members.x0, dtype=self._real)
+        """Return the pullback of some members, from one call for each segment of the run."""
+        rows, (packed, times_or_gauges, h) = np.empty_like(bars), self._numbers(members)
+        parameters_bar, x_bar = np.zeros_like(packed), np.zeros_like(members.x0, dtype=self._real)
         before = packed.ctypes.data if members.parameters else None
         begun = self._begun(members, pieces, status)
         for segment, x in zip(reversed(pieces), reversed(begun), strict=True):
             if status.any():
                 break
             ends = bars[segment.rows.start : segment.rows.stop] if segment.rows else np.zeros((1, *x.shape))
-            given = np.array(ends.transpose(1, 0, 2), dtype=self._real, order="C")
-            given[:, -1] += x_bar
-            made, x_bar = np.empty_like(given), np.empty_like(x)
-            out = (a.ctypes.data for a in (made, given, x_bar, found, trail, status))
-            start = before, x.ctypes.data, len(members), *(None if a is None else a.ctypes.data for a in own)
+            row_bars = np.array(ends.transpose(1, 0, 2), dtype=self._real, order="C")
+            row_bars[:, -1] += x_bar
+            segment_rows, x_bar = np.empty_like(row_bars), np.empty_like(x)
+            out = (a.ctypes.data for a in (segment_rows, row_bars, x_bar, parameters_bar, tape, status))
+            start = (
+                before,
+                x.ctypes.data,
+                len(members),
+                *(None if a is None else a.ctypes.data for a in times_or_gauges),
+            )
             self._c.pullback_each(*start, h.ctypes.data, segment.count, max(1, segment.stride), *out)
             if segment.rows:
-                rows[segment.rows.start : segment.rows.stop] = made.transpose(1, 0, 2)
+                rows[segment.rows.start : segment.rows.stop] = segment_rows.transpose(1, 0, 2)
         rows[0] = members.x0
-        return rows, x_bar + bars[0], found.T[: len(members.parameters)]
+        return rows, x_bar + bars[0], parameters_bar.T[: len(members.parameters)]
 
     def _begun(self, members: Members, pieces: Sequence[Segment], status: Bytes) -> list[Floats]:
-        """The states of members (members, DIM) where pieces of a run begin."""
+        """Return the states of members (members, DIM) at the start of each segment of a run."""
         begun = [self._own(members.x0)]
         for segment in pieces[:-1]:
             x = np.array(begun[-1].T, order="C")
@@ -301,33 +328,33 @@ class CSolver:
         x0: Floats,
         h: float,
         pieces: Sequence[Segment],
-        trail: Floats,
+        tape: Floats,
         bars: Floats,
         parameters: Mapping[str, float],
         t0: float,
     ) -> tuple[Floats, Floats, Floats]:
-        """`pullback` of one member."""
+        """Return the pullback of one member, segment by segment."""
         at, begun, rows = self.start(x0, parameters, t0), list[CSession](), np.empty_like(bars)
         for segment in pieces:
             begun.append(at)
             if segment is not pieces[-1]:
                 at = at.branch()
                 at.advance(h, segment.count)
-        found = Cotangents(*(np.zeros(n, self._real) for n in (len(x0), max(1, len(parameters)), 1)))
+        cotangents = Cotangents(*(np.zeros(n, self._real) for n in (len(x0), max(1, len(parameters)), 1)))
         for segment, session in zip(reversed(pieces), reversed(begun), strict=True):
-            own = bars[segment.rows.start : segment.rows.stop] if segment.rows else np.zeros((1, len(x0)))
-            own = np.array(own, dtype=self._real)
-            own[-1] += found.state
-            made = session.branch().pull_back(h, segment, trail, own, found)
+            row_bars = bars[segment.rows.start : segment.rows.stop] if segment.rows else np.zeros((1, len(x0)))
+            row_bars = np.array(row_bars, dtype=self._real)
+            row_bars[-1] += cotangents.state
+            segment_rows = session.branch().pull_back(h, segment, tape, row_bars, cotangents)
             if segment.rows:
-                rows[segment.rows.start : segment.rows.stop] = made
+                rows[segment.rows.start : segment.rows.stop] = segment_rows
         rows[0] = x0
-        found.state[:] += bars[0]
+        cotangents.state[:] += bars[0]
         if hasattr(self._c, "level_bar") and self._gauge is None:
             packed, start = self._packed(parameters), self._own(x0)
-            more = (found.level[0], found.state.ctypes.data, found.parameters.ctypes.data)
+            more = (cotangents.level[0], cotangents.state.ctypes.data, cotangents.parameters.ctypes.data)
             self._c.level_bar(packed.ctypes.data, start.ctypes.data, *more)
-        return rows, found.state, found.parameters[: len(parameters)]
+        return rows, cotangents.state, cotangents.parameters[: len(parameters)]
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
@@ -368,11 +395,11 @@ class CSolver:
         return out.astype(np.float64, copy=False)
 
     def _packed(self, parameters: Mapping[str, float]) -> Floats:
-        # A struct without parameters has one unused char, which the zero covers.
+        # A struct without parameters has one unused char, so that one zero is large enough.
         return self._own(np.array(list(parameters.values()) or [0.0]))
 
     def _own(self, values: Floats) -> NDArray[Any]:
-        """A copy in the numbers of the code, where those that are too large for it are infinite."""
+        """Return a copy in the precision of the C; values too large for single precision become infinite."""
         if not self.interface.single:
             return np.array(values, dtype=np.float64, order="C")
         with np.errstate(over="ignore"):
@@ -380,18 +407,18 @@ class CSolver:
 
 
 def _times(t: Floats | None) -> list[list[float]]:
-    """The times of rows, as the first of their arguments; none where there is no time."""
+    """Return a list with the times of rows, as the first argument of C functions; empty without a time."""
     return [] if t is None else [t.tolist()]
 
 
 def _addresses(x: Floats) -> range:
-    """The addresses of the rows of a contiguous array."""
+    """Return the addresses of the rows of a contiguous array."""
     start, width = x.ctypes.data, math.prod(x.shape[1:]) * x.itemsize
     return range(start, start + len(x) * width, width)
 
 
 def load(files: Mapping[str, str], interface: Interface) -> CSolver | CLattice:
-    """The back end of generated files; see `phigen.registry`."""
+    """Return the back end of generated files; see `phigen.registry`."""
     if isinstance(interface, LatticeInterface):
         return CLattice(files, interface)
     return CSolver(files, interface)

@@ -1,9 +1,9 @@
 """A content-addressed cache of compiled solvers.
 
-An entry is one file, ``KEY-DIGEST.so``. KEY is a hash of everything that decides the library: sources, compiler,
-flags, machine. DIGEST is a hash of the library itself, so that an entry is verified with nothing but itself, and one
-atomic rename publishes it. Processes may share the directory: nobody ever changes a file in place, and whoever finds
-none, or a damaged one, builds his own and puts it there.
+An entry is one file, ``KEY-DIGEST.so``. KEY is a hash of everything that determines the library: sources, compiler,
+flags, machine. DIGEST is a hash of the library, by which an entry verifies itself. Entries are published by an atomic
+rename and never changed, so processes may share the directory. A process that finds no entry, or a damaged one,
+compiles the library and publishes it.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from phigen.errors import PhigenWarning, ToolchainError
 from phigen.runtime import toolchain
 from phigen.runtime.toolchain import Compiler
 
-#: Bytes beyond which the entries that were not used for longest are removed.
+#: Bytes of the cache beyond which the least recently used entries are removed: about 10,000 solvers of small systems.
 MAXIMUM_SIZE = 512 * 2**20
 
 _SUFFIX = ".so"
 _SCRATCH = "building-"
-_SCRATCH_LIFETIME = 3600.0  # seconds; what is older was left by a process that died
+_SCRATCH_LIFETIME = 3600.0  # seconds; an older folder belongs to a process that died: compilations end after minutes
 
 
 def directory() -> Path:
-    """The cache: PHIGEN_CACHE_DIR, else the platform's folder for caches. It need not exist yet."""
+    """Return the folder of the cache: PHIGEN_CACHE_DIR, else the platform's folder for caches. It may not exist yet."""
     named = os.environ.get("PHIGEN_CACHE_DIR")
     if named:
         return Path(named)
@@ -51,17 +51,17 @@ def directory() -> Path:
 
 
 def load(files: Mapping[str, str], *, threads: bool = False) -> ctypes.CDLL:
-    """The shared library compiled from C files (name → text), built unless the cache has it.
+    """Return the shared library compiled from C files (name → text), from the cache or compiled now.
 
-    Every name that ends in ``.c`` is compiled, the others are headers; with OpenMP if ``threads`` and the compiler has
-    it. Raises `ToolchainError`.
+    Files whose names end in ``.c`` are compiled, the others are headers. With ``threads``, the library uses OpenMP if
+    the compiler has it. Raises `ToolchainError`.
     """
     path = build(files, threads=threads)
     try:
         return ctypes.CDLL(str(path))
     except OSError:
-        # Either somebody cleared the cache this very moment, or its folder does not let libraries be loaded
-        # (mounted noexec): both are cured by a library of our own.
+        # Either another process has just cleared the cache, or its folder is mounted noexec. A library in a private
+        # folder works in both cases.
         path = build(files, _private_directory(), threads=threads)
     try:
         return ctypes.CDLL(str(path))
@@ -71,23 +71,23 @@ def load(files: Mapping[str, str], *, threads: bool = False) -> ctypes.CDLL:
 
 
 def build(files: Mapping[str, str], folder: Path | None = None, *, threads: bool = False) -> Path:
-    """The path of the library compiled from C files, verified, in ``folder`` or else in the cache.
+    """Return the path of the verified library compiled from C files, in ``folder`` or by default in the cache.
 
-    Where the cache cannot be written, the library goes to a private temporary folder, with a warning.
+    If the cache cannot be written, the library goes to a private temporary folder, with a warning.
     """
     compiler = toolchain.threaded(toolchain.find()) if threads else toolchain.find()
     name = _key(files, compiler)
     folder = folder or directory()
-    found = _look_up(folder, name)
-    if found:
-        return found
+    entry = _look_up(folder, name)
+    if entry:
+        return entry
     try:
         return _compile_into(folder, name, files, compiler)
     except OSError as error:
         fallback = _private_directory()
-        found = _look_up(fallback, name)
-        if found:
-            return found
+        entry = _look_up(fallback, name)
+        if entry:
+            return entry
         warnings.warn(
             f"the cache {folder} cannot be written ({error.strerror or error}); compiled solvers are lost "
             "when this process ends. Set PHIGEN_CACHE_DIR to a folder that can be written",
@@ -98,12 +98,12 @@ def build(files: Mapping[str, str], folder: Path | None = None, *, threads: bool
 
 
 def key_of(library: ctypes.CDLL) -> str:
-    """The hash of everything that decided a library from `load`."""
+    """Return the hash of everything that determined a library from `load`."""
     return Path(library._name).stem.rpartition("-")[0]
 
 
 def clear() -> int:
-    """Remove all entries; returns how many there were. Libraries that are loaded stay usable."""
+    """Remove all entries and return their number. Loaded libraries stay usable."""
     count = 0
     for entry in list(_entries(directory())):
         with contextlib.suppress(OSError):
@@ -131,9 +131,9 @@ def _look_up(folder: Path, name: str) -> Path | None:
         for entry in sorted(folder.glob(f"{name}-*{_SUFFIX}")):
             if entry.stem.rpartition("-")[2] == _digest(entry):
                 with contextlib.suppress(OSError):
-                    os.utime(entry)  # the mark of use that _trim goes by
+                    os.utime(entry)  # _trim removes entries by the time of their last use
                 return entry
-    except OSError:  # unreadable, or removed under our hands
+    except OSError:  # unreadable, or removed by another process
         pass
     return None
 
@@ -150,7 +150,10 @@ def _key(files: Mapping[str, str], compiler: Compiler) -> str:
 
 @cache
 def _machine() -> str:
-    """What -march=native looks at: a cache in a home shared by several machines must tell them apart."""
+    """Return the facts about the processor that -march=native depends on.
+
+    They are part of the key, because machines with different processors may share a home folder and its cache.
+    """
     known = ("model name", "flags", "Features", "CPU implementer", "CPU part", "isa")
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
@@ -172,7 +175,7 @@ def _entries(folder: Path) -> Iterator[Path]:
 
 
 def _trim(folder: Path, keep: Path) -> None:
-    """Keep the cache below its size, and sweep out what dead processes left; best effort."""
+    """Remove the least recently used entries beyond the maximum size, and folders of dead processes; ignore errors."""
     sizes: list[tuple[float, int, Path]] = []
     with contextlib.suppress(OSError):
         for left in folder.glob(f"{_SCRATCH}*"):
@@ -192,7 +195,10 @@ def _trim(folder: Path, keep: Path) -> None:
 
 @cache
 def _private_directory() -> Path:
-    """A folder of this process alone, removed at its end; a predictable name would let others plant libraries."""
+    """Return a folder for this process alone, removed at its end.
+
+    Its name is random: in a folder with a predictable name, other users could place libraries of theirs.
+    """
     folder = Path(tempfile.mkdtemp(prefix="phigen-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder

@@ -1,4 +1,4 @@
-"""Checkpoints of long runs: all that a run needs to go on, and what it must agree with to be the same run."""
+"""Checkpoints of long runs: the state of an interrupted run, and the facts by which the same run is recognised."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from phigen.reading import opened
 from phigen.writing import replacing
 
 _IDENTITY = "identity"
-#: Parts of an identity that are hashes.
+#: Entries of an identity that are hashes; messages do not print their values.
 HASHES = ("spec", "solver")
 
 
 class MismatchError(Exception):
-    """A checkpoint belongs to another run; the message says in what they differ."""
+    """A checkpoint belongs to another run; the message lists the differences."""
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """``identity`` describes the run in plain data, ``arrays`` is its state."""
+    """A checkpoint: ``identity`` describes the run in plain data, ``arrays`` are its state."""
 
     identity: Mapping[str, Any]
     arrays: Mapping[str, Any]
 
     def save(self, path: Path) -> None:
-        """Replace the file at once: whenever the process is killed, there is a whole checkpoint."""
+        """Write the file and rename it into place, so that a complete checkpoint exists whenever the process ends."""
         text = np.frombuffer(json.dumps(self.identity).encode(), dtype=np.uint8)
         stored: dict[str, Any] = {_IDENTITY: text, **self.arrays}
         with replacing(path) as file:
@@ -39,9 +39,9 @@ class Checkpoint:
 
 
 def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) -> str:
-    """Why a run may not begin, or go on, with these files; "" where it may. ``how`` names the way to go on.
+    """Return why a run may not begin or resume with these files, or "" if it may; ``how`` names the option to resume.
 
-    What an interrupted run left is not overwritten, and a run that is complete is not made again by going on with it.
+    A new run does not overwrite the files of an interrupted run. A complete run cannot be resumed.
     """
     if not resume and checkpoint.exists():
         return f"{checkpoint} belongs to an interrupted run: continue it with {how}, or remove the file"
@@ -51,29 +51,32 @@ def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) 
 
 
 def objection_to_frames(part: Path) -> str:
-    """Why a run without checkpoints may not put its frames into that file; "" where it may."""
+    """Return why a run without checkpoints may not write its frames to that file, or "" if it may."""
     if not part.exists():
         return ""
     return f"{part} holds the frames of an interrupted run: continue it with its checkpoints=, or remove the file"
 
 
 def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The arrays of a checkpoint of that run; raises `MismatchError`, also for a file that is no checkpoint."""
+    """Return the arrays of the checkpoint of a run.
+
+    Raises `MismatchError` if the checkpoint belongs to another run, or if the file is not a checkpoint.
+    """
     try:
         with opened(path) as file, np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
-        found = json.loads(arrays.pop(_IDENTITY).tobytes())
+        stored_identity = json.loads(arrays.pop(_IDENTITY).tobytes())
     except (ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
         raise MismatchError(f"{path} is not a checkpoint of phigen: {error}") from None
-    # What is compared went through JSON as well: tuples are lists.
-    wanted = json.loads(json.dumps(identity))
-    differing = [key for key in wanted if found.get(key) != wanted[key]]
+    # JSON turns tuples into lists, in both identities that are compared.
+    expected_identity = json.loads(json.dumps(identity))
+    differing = [key for key in expected_identity if stored_identity.get(key) != expected_identity[key]]
     if differing:
-        told = [_difference(key, found.get(key), wanted[key]) for key in differing]
-        raise MismatchError(f"{path} belongs to another run: {'; '.join(told)}")
+        differences = [_difference(key, stored_identity.get(key), expected_identity[key]) for key in differing]
+        raise MismatchError(f"{path} belongs to another run: {'; '.join(differences)}")
     return arrays
 
 
 def _difference(key: str, before: Any, now: Any) -> str:
-    # Hashes say nothing to people.
+    # A hash in a message would not help its reader.
     return f"the {key} has changed" if key in HASHES else f"{key} was {before!r} and is {now!r}"

@@ -1,7 +1,7 @@
-"""Poincaré sections: where a function g of the state passes through zero, found by the integrator itself.
+"""Poincaré sections: the zeros of a function g of the state along a trajectory, located by the integrator itself.
 
-Between two steps of size h the solution is followed by single steps of size θh, 0 < θ < 1, from the state before: the
-crossing is the θ for which g vanishes there, to round-off. So the points lie on the leaf, and nothing is interpolated.
+Between two steps of size h, the solution is a single step of size θh, 0 < θ < 1, from the state before. The crossing is
+at the θ for which g vanishes to round-off. So the points lie on the leaf, without interpolation.
 """
 
 from __future__ import annotations
@@ -22,24 +22,25 @@ from phigen.runtime.trajectory import trajectory_columns
 
 C = TypeVar("C", bound=Course)
 
-#: A function of states (rows, DIM), and of their times (rows,) where there is a time: shape (rows,).
+#: A function from states (rows, DIM), and their times (rows,) if H depends on the time, to values (rows,).
 Function = Callable[..., Floats]
 
-#: Steps whose solvers are kept at a time.
+#: Steps between two evaluations of g on arrays; a copy of the session is held for each.
 BLOCK = 64
-#: Numbers of equal steps that reach a point between two steps: more where one step does not converge from scratch.
+#: Numbers of equal steps that reach a point between two steps, tried in this order: a single step without a predictor
+#: may not converge.
 SUBSTEPS = (1, 2, 4, 8)
-#: Fractions of a step closer than this give the same state.
+#: Absolute tolerance of a fraction of a step: fractions closer than this give the same state.
 _RESOLUTION = 1e-18
 _ITERATIONS = 100
-#: The signs that g changes with, by the direction in which it passes through zero.
+#: Direction of a crossing → signs s for which s·g increases through zero.
 SIGNS = {"rising": (1.0,), "falling": (-1.0,), "both": (1.0, -1.0)}
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Crossings in the order they were met: times ``t`` (rows,) and states ``x`` (rows, DIM)."""
+    """Crossings of a Poincaré section in the order of integration: times ``t`` (rows,) and states ``x`` (rows, DIM)."""
 
     t: Floats
     x: Floats
@@ -58,20 +59,21 @@ class Section:
 
 
 def section_columns(coordinates: tuple[str, ...]) -> list[Column]:
-    """The columns of a table of crossings."""
+    """Return the columns of a table of crossings."""
     return trajectory_columns(coordinates, ())[:2]
 
 
 @dataclass
 class CrossingFinder(Generic[C]):
-    """Follows a session in steps of size h and finds where g passes through zero as time increases, in a ``direction``.
+    """Locates the zeros of g along a session with steps of size h, in a ``direction`` as time increases.
 
-    An interval between two steps has one crossing at most. Where g has an extremum near a step and one sign around it,
-    it is looked up whether the sign changes twice there. A start on the section counts if g leaves it in the direction.
+    At most one crossing is found between two steps. If g has the same sign at three steps and an extremum between
+    them, the extremum is located, in case g changes its sign twice there. A start with g = 0 counts as a crossing if g
+    leaves zero in the direction.
 
-    ``past`` holds solvers that stand at the last steps but the latest; ``values`` is g there and at the latest, and
-    ``first`` the number of the first of them. ``t0`` is the time of step 0; g is told times if it is ``timed``.
-    ``places`` are the solvers at the crossings of the latest block, and how many steps these are from the start.
+    ``past`` are copies of the session at the last steps except the latest. ``values`` are those of g at these steps and
+    the latest, ``first`` is the number of the first of them. ``t0`` is the time of step 0; g receives times if it is
+    ``timed``. ``places`` are sessions at the crossings of the latest block, with their numbers of steps from the start.
     """
 
     g: Function
@@ -83,14 +85,14 @@ class CrossingFinder(Generic[C]):
     first: int = 0
     direction: str = "rising"
     places: list[tuple[float, C]] = field(default_factory=list)
-    _sign: float = 1.0  # of g where a crossing is looked for: those that fall are the rising ones of -g
+    _sign: float = 1.0  # crossings of sign·g that rise are searched; falling ones are the rising ones of −g
 
     def follow(
         self, session: C, steps: int, move: Callable[[], object]
     ) -> Iterator[tuple[Floats, list[tuple[float, Floats]]]]:
-        """Blocks of the states (rows, DIM) after each step that ``move`` made, and the crossings (t, x) before them.
+        """Make ``steps`` steps, each by a call of ``move``; yield in blocks their states (rows, DIM) and the crossings.
 
-        Raises `BackendError` after the last state that there is.
+        Crossings are pairs (t, x). Raises `BackendError` after the block that ends before the failing step.
         """
         if not self.values:
             self.first = session.steps
@@ -120,9 +122,9 @@ class CrossingFinder(Generic[C]):
                 raise failure
 
     def within(self, session: C, part: float) -> list[tuple[float, Floats]]:
-        """The crossings (t, x) in the first ``part`` of the step that a followed session would make next.
+        """Return the crossings (t, x) in the first ``part`` of the next step of a session, which is not advanced.
 
-        A step that cannot be made as a whole has none.
+        There are none if the whole step fails.
         """
         copy, end = session.branch(), session.steps + part * (1 + 1e-12)
         try:
@@ -133,13 +135,13 @@ class CrossingFinder(Generic[C]):
         return [(self._clock(there, self._time(at - self.first)), there.state()) for at, there in inside]
 
     def _time(self, j: Any, fraction: float = 0.0) -> Any:
-        """The time in interval j, counted from the first of the values."""
+        """Return the time at a fraction of interval j, where interval 0 begins at the first of the values."""
         return self.t0 + (self.first + j + fraction) * self.h
 
     def _values(self, states: Floats, t: Floats) -> Floats:
-        # A section is crossed where g rises in time, whether time goes forwards or backwards.
-        found = self.g(states, t) if self.timed else self.g(states)
-        return math.copysign(1.0, self.h) * np.asarray(found, dtype=np.float64)
+        # The direction refers to increasing time, so the sign of g is reversed for negative steps.
+        values = self.g(states, t) if self.timed else self.g(states)
+        return math.copysign(1.0, self.h) * np.asarray(values, dtype=np.float64)
 
     def _value(self, session: C, j: int, fraction: float) -> float:
         return float(
@@ -147,7 +149,7 @@ class CrossingFinder(Generic[C]):
         )
 
     def _crossings(self, known: int) -> Iterator[tuple[float, Floats]]:
-        """The crossings of this block, whose first ``known`` intervals are those of an earlier one."""
+        """Yield the crossings of this block, whose first ``known`` intervals were searched before."""
         self.places = []
         for sign in SIGNS[self.direction]:
             self._sign = sign
@@ -161,13 +163,13 @@ class CrossingFinder(Generic[C]):
         if known == 0 and v[0] == 0 < v[1]:
             yield self.first, self.past[0]
         for i in range(len(v) - 1):
-            if i >= 1 and (found := self._hidden(v, i)):
-                yield self._located(*found)
+            if i >= 1 and (bracket := self._hidden(v, i)):
+                yield self._located(*bracket)
             if i >= known and v[i] < 0 <= v[i + 1]:
                 yield self._located(i, 0.0, v[i], 1.0, v[i + 1])
 
     def _hidden(self, v: list[float], i: int) -> tuple[int, float, float, float, float] | None:
-        """An interval before or after step i, and a bracket in it, where an extremum near step i changes the sign."""
+        """Return an interval beside step i and a bracket in it, if an extremum near step i changes the sign of g."""
         a, b, c = v[i - 1 : i + 2]
         peak = a < b >= c and b < 0
         if not (peak or (a > b <= c and b >= 0 and a >= 0)):
@@ -175,7 +177,7 @@ class CrossingFinder(Generic[C]):
         curvature = a - 2 * b + c
         offset = (a - c) / (2 * curvature) if curvature else 0.0
         gain = abs((a - c) * offset / 4)
-        # The parabola through three values is off by a fraction of its curvature.
+        # The parabola through three values has an error of a fraction of its curvature; a tenth is added for it.
         if not abs(b) <= 2 * gain + 0.1 * abs(curvature):
             return None
         j = i - 1 if offset < 0 else i
@@ -186,7 +188,10 @@ class CrossingFinder(Generic[C]):
         return (j, 0.0, v[j], at, value) if peak else (j, at, value, 1.0, v[j + 1])
 
     def _extremum(self, v: list[float], j: int, sign: float) -> float:
-        """Where sign·g is smallest in interval j, or where it is negative enough to have changed its sign."""
+        """Return the fraction of interval j where sign·g is smallest, or the first one found where g changes its sign.
+
+        Golden-section search.
+        """
         low, high = 0.0, 1.0
         left, right = 1 - _GOLDEN, _GOLDEN
         at_left, at_right = self._at(j, left), self._at(j, right)
@@ -208,7 +213,7 @@ class CrossingFinder(Generic[C]):
         return self._sign * self._value(self._moved(j, fraction, substeps), j, fraction)
 
     def _moved(self, j: int, fraction: float, substeps: Sequence[int]) -> C:
-        """A solver that went a fraction of step j, in the first number of equal steps that works."""
+        """Return a session after a fraction of step j, made in the first number of equal steps that does not fail."""
         for count in substeps:
             session = self.past[j].branch()
             try:
@@ -221,9 +226,9 @@ class CrossingFinder(Generic[C]):
         return session
 
     def _located(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C]:
-        """The crossing in interval j between two fractions of the step: its number of steps, and a solver there."""
+        """Return the crossing in interval j between two fractions: its number of steps, and a session there."""
         for count in SUBSTEPS:
-            # The same number for all fractions: g is a smooth function of the fraction then.
+            # All fractions take the same number of substeps, so that g is a smooth function of the fraction.
             try:
                 fraction = root(partial(self._at, j, substeps=(count,)), low, at_low, high, at_high)
                 there = self._moved(j, fraction, (count,))
@@ -235,13 +240,13 @@ class CrossingFinder(Generic[C]):
         return self.first + j + fraction, there
 
     def _clock(self, session: C, counted: float) -> float:
-        """The time of a session: its own where steps are equal in τ, else what was counted."""
-        own = getattr(session, "time", lambda: math.nan)()
-        return counted if math.isnan(own) else float(own)
+        """Return the physical time of a session if its steps are equal in τ, else the ``counted`` time."""
+        elapsed = getattr(session, "time", lambda: math.nan)()
+        return counted if math.isnan(elapsed) else float(elapsed)
 
 
 def root(f: Callable[[float], float], low: float, at_low: float, high: float, at_high: float) -> float:
-    """The zero of f between two points with values of different sign, to the last bit that f tells apart.
+    """Return the zero of f between two points with values of different sign, to the resolution of f.
 
     Inverse quadratic interpolation where it is safe, else bisection: T. R. Chandrupatla, Adv. Eng. Software 28 (1997).
     """

@@ -1,4 +1,4 @@
-"""Runs that do not end with a whole step: at a given time, or where a function of the state passes through zero."""
+"""Ends of runs that are not a number of whole steps: a given time, or a zero of a function of the state."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from phigen.runtime.interface import BackendError
 from phigen.runtime.session import Session
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: From a session after the whole steps to one at the end, and how many steps that is from the start.
+#: Maps a session after the last whole step to a session at the end, and the number of steps from the start until there.
 Finish = Callable[[Session], tuple[Session, float]]
 
 
-#: Steps within which a zero is that of the start: where a run was stopped, rounding has one beside it.
+#: Steps after the start within which a zero is ignored. A run that starts where another stopped at a zero is within
+#: rounding of that zero, and would otherwise stop at once.
 START = 1e-9
 
 
 @dataclass(frozen=True)
 class End:
-    """An end after so many whole ``steps``, and a ``part`` of one, which ``finish`` makes.
+    """End of a run: after ``steps`` whole steps and, if ``part``, a part of one step, which ``finish`` makes.
 
-    ``span`` is the time from the start. It was ``stopped`` where a function vanishes, not at a time.
+    ``span`` is the time from the start to the end. ``stopped`` is true if a zero of a function ends the run.
     """
 
     steps: int
@@ -37,7 +38,7 @@ class End:
 
 
 def at_time(session: Session, h: float, span: float) -> End:
-    """The end after a span of time, of a session that stands at its start."""
+    """Return the end after a span of time, for a session at its start."""
     steps, left = steps_until(session, h, span)
     part = abs(left) > EQUAL * abs(span)
 
@@ -51,32 +52,32 @@ def at_time(session: Session, h: float, span: float) -> End:
 
 
 def after_steps(session: Session, h: float, steps: int) -> End:
-    """The end after so many whole steps, of a session that tells their time: it stands at its start, and goes on.
+    """Return the end after a number of whole steps, for a session at its start, which is advanced to measure the time.
 
-    Where one fails, the time is that before it.
+    If a step fails, the span is the time before that step.
     """
-    with suppress(BackendError):  # which the run itself will tell
+    with suppress(BackendError):  # the run itself will report the failure
         session.advance(h, steps)
     return End(steps, lambda here: (here, float(steps)), session.time(), part=False)
 
 
 def where_zero(session: Session, h: float, most: int, g: Function, t0: float, *, timed: bool) -> End | None:
-    """Where g passes through zero first after the start, in either direction; None if that is not within so many steps.
+    """Return the end at the first zero of g after the start, in either direction; None without one in ``most`` steps.
 
-    The session stands at its start, and goes on. The end is located by steps of the solver, to round-off.
+    The session is at its start, and is advanced. The zero is located to round-off, by steps of the solver.
     """
     finder = CrossingFinder[Session](g, h, t0, timed=timed, direction="both")
     try:
         for _ in finder.follow(session, most, lambda: session.advance(h, 1)):
             for at, there in finder.places:
                 if at > START:
-                    own = there.time()
-                    span, steps = at * h if math.isnan(own) else own, int(np.floor(at))
-                    return End(steps, _given((there, at)), span, at > steps, stopped=True)
-    except BackendError:  # which the run itself will tell
+                    clock = there.time()
+                    span, steps = at * h if math.isnan(clock) else clock, int(np.floor(at))
+                    return End(steps, _finish_at((there, at)), span, at > steps, stopped=True)
+    except BackendError:  # the run itself will report the failure
         pass
     return None
 
 
-def _given(end: tuple[Session, float]) -> Finish:
+def _finish_at(end: tuple[Session, float]) -> Finish:
     return lambda here: end

@@ -1,4 +1,4 @@
-"""Trajectories as objects of xarray and pandas; both packages are optional, and imported only here."""
+"""Conversion of trajectories to objects of xarray and pandas, which are optional packages and imported only here."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def to_xarray(trajectory: Trajectory) -> xr.Dataset:
     """Return a Dataset: ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and observables (t), with attributes."""
     xarray = _imported("xarray")
-    found: xr.Dataset = xarray.Dataset(
+    dataset: xr.Dataset = xarray.Dataset(
         {
             "x": (("t", "coordinate"), trajectory.x),
             "energy": ("t", trajectory.energy),
@@ -30,11 +30,11 @@ def to_xarray(trajectory: Trajectory) -> xr.Dataset:
         coords={"t": trajectory.t, "coordinate": list(trajectory.coordinates)},
         attrs={"h": trajectory.h, "steps": trajectory.steps, **_parameters(trajectory)},
     )
-    return found
+    return dataset
 
 
 def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
-    """A DataFrame with the columns of a ``.csv``, indexed by t; step and parameters are in its ``attrs``."""
+    """Return a DataFrame with the columns of a ``.csv``, indexed by t; its ``attrs`` hold step and parameters."""
     pandas = _imported("pandas")
     names = [name for column in trajectory.columns() for name in column.names]
     frame: pd.DataFrame = pandas.DataFrame(trajectory.rows(), columns=names).set_index(names[0])
@@ -50,7 +50,7 @@ def lattice_to_xarray(trajectory: LatticeTrajectory) -> xr.Dataset:
     arrays = {n: v for n, v in trajectory.parameters.items() if np.ndim(v)}
     shapes: dict[str, tuple[str, ...]] = dict.fromkeys(about.at_sites, axes) | dict.fromkeys(about.at_bonds, ("bond",))
     numbers = {f"parameter_{n}": v for n, v in trajectory.parameters.items() if n not in arrays}
-    found: xr.Dataset = xarray.Dataset(
+    dataset: xr.Dataset = xarray.Dataset(
         {
             "x": (("t", "coordinate", *axes), trajectory.x),
             "energy": ("t", trajectory.energy),
@@ -62,7 +62,7 @@ def lattice_to_xarray(trajectory: LatticeTrajectory) -> xr.Dataset:
         coords={"t": trajectory.t, "coordinate": list(trajectory.coordinates)},
         attrs={"h": trajectory.h, "steps": trajectory.steps, **numbers},
     )
-    return found
+    return dataset
 
 
 def _parameters(trajectory: Trajectory) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Cotangents of runs: which states a run keeps to find its way back, and which steps are made again."""
+"""Pullback of cotangents through runs by checkpointing: which states are stored, and which steps are recomputed."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from phigen.runtime.interface import BackendError, Floats, MissingExtraError, ro
 if TYPE_CHECKING:
     from phigen.runtime.solver import Solver
 
-#: Numbers that the trail of a segment of a run takes at most; longer runs are made twice, but for their last segment.
-KEPT = 1 << 22
+#: Largest number of values on the tape of one segment of a run (32 MiB in double precision). Longer runs are divided
+#: into segments, and all but the last are computed twice.
+MAX_TAPE_VALUES = 1 << 22
 
 
 class Pullback(NamedTuple):
-    """What `Solver.pullback` gives: states, cotangents of the start, and those of parameters by name."""
+    """Result of `Solver.pullback`: states, and cotangents of the initial state and of the parameters, by name."""
 
     x1: Floats
     x0_bar: Floats
@@ -28,7 +29,7 @@ class Pullback(NamedTuple):
 
 
 class Jacobian(NamedTuple):
-    """What `Solver.jacobian` gives: the last state, its derivative along the start, and along parameters by name."""
+    """Result of `Solver.jacobian`: the last state, and its derivatives by the initial state and by parameters."""
 
     x1: Floats
     by_x0: Floats
@@ -37,10 +38,10 @@ class Jacobian(NamedTuple):
 
 @dataclass(frozen=True)
 class Segment:
-    """Steps that are gone through at once: ``count`` of them after the step ``first``.
+    """Part of a run between two stored states: ``count`` steps after the step ``first``.
 
-    ``rows`` are numbers of the rows that follow each ``stride`` steps, the last one also the end of the segment; empty
-    where the segment ends between two rows.
+    ``rows`` are the numbers of the trajectory's rows in it: one after every ``stride`` steps, and the last at its end.
+    They are empty if the segment ends between two rows.
     """
 
     first: int
@@ -50,7 +51,7 @@ class Segment:
 
 
 def segments(steps: int, stride: int, most: int) -> list[Segment]:
-    """The segments of a run, none with more than ``most`` steps; row r follows r strides, or the last step."""
+    """Return the segments of a run, each of at most ``most`` steps; row r follows r strides, or the last step."""
 
     def cut() -> Iterator[Segment]:
         many = max(1, most // stride) * stride
@@ -77,19 +78,19 @@ def pullback(
     stride: int | None,
     t0: ArrayLike | None,
     threads: int | None,
-    given: Mapping[str, Any],
+    parameters: Mapping[str, Any],
 ) -> Pullback:
-    """`Solver.pullback`, with the parameters that were given."""
+    """Return the pullback of `Solver.pullback`, from arguments in the shapes that users pass."""
     interface = solver.interface
     start = arguments.states(x0, "x0", interface)
     if start.ndim > 2:
         shapes = f"({interface.dimension},) or (members, {interface.dimension})"
         raise ValueError(f"x0 must have shape {shapes}, not {start.shape}")
-    steps, rest = arguments.count(steps, "steps", 0), dict(given)
+    steps, rest = arguments.count(steps, "steps", 0), dict(parameters)
     width = max(1, steps) if stride is None else arguments.count(stride, "stride", 1)
-    own = [v for v in (h, t0, *rest.values()) if np.ndim(v) > 0] if start.ndim == 1 else []
-    if own:
-        start = np.tile(start, (len(own[0]), 1))
+    per_member = [v for v in (h, t0, *rest.values()) if np.ndim(v) > 0] if start.ndim == 1 else []
+    if per_member:
+        start = np.tile(start, (len(per_member[0]), 1))
     several = start.reshape(-1, interface.dimension)
     members = arguments.ensemble(several, h, steps, width, t0, {}, rest, interface)
     rows = len(row_steps(steps, width))
@@ -98,7 +99,7 @@ def pullback(
     if stride is None:
         bars = np.concatenate([np.zeros((rows - 1, *several.shape)), bars])
     try:
-        states, x0_bar, found = solver.backend.pullback(members, bars, threads)
+        states, x0_bar, parameter_bars = solver.backend.pullback(members, bars, threads)
     except MissingExtraError:
         hint = "compile it with adjoint=True, or say adjoint: true in the spec"
         raise TypeError(f"{interface.name} was compiled without pullback; {hint}") from None
@@ -108,13 +109,13 @@ def pullback(
             error.members = ()
         raise solver.failure(error, size, None, values) from error
     states = states.reshape(rows, *start.shape)
-    each = zip(members.parameters.items(), found, strict=True)
+    each = zip(members.parameters.items(), parameter_bars, strict=True)
     bars_of = {name: bar if np.ndim(value) else bar.sum() for (name, value), bar in each}
     return Pullback(states[-1] if stride is None else states, x0_bar.reshape(start.shape), bars_of)
 
 
 def cotangents(cotangent: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Cotangents as an array of a shape. Raises `ValueError` for other shapes, and what is not finite."""
+    """Return cotangents as an array of the given shape. Raises `ValueError` for other shapes and non-finite values."""
     bars = arguments.real(cotangent, "cotangent")
     if bars.shape != shape:
         raise ValueError(f"cotangent must have shape {shape}, that of the states, not {bars.shape}")

@@ -1,4 +1,4 @@
-"""`solve_ivp` as users of SciPy know it, over a solver of phigen."""
+"""`solve_ivp` with the interface of `scipy.integrate.solve_ivp`, over a solver of phigen."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from phigen.runtime.trajectory import Trajectory
 if TYPE_CHECKING:
     from phigen.geometry.system import System
 
-#: An event: a function of t and y (DIM,), with the attributes ``terminal`` and ``direction``, if it has them.
+#: An event of SciPy: a function of t and y (DIM,), with the optional attributes ``terminal`` and ``direction``.
 Event = Callable[[float, Floats], float]
 
-#: Steps of the first attempt, where no step is given, and how often these are halved at most.
-_FIRST, _HALVINGS = 64, 16
+#: Number of steps of the first attempt without ``h``, and how often the step is halved at most.
+_FIRST_STEPS, _MAX_HALVINGS = 64, 16
 
 _REACHED = "The solver successfully reached the end of the integration interval."
 _TERMINATED = "A termination event occurred."
@@ -35,11 +35,12 @@ _TERMINATED = "A termination event occurred."
 
 @dataclass(frozen=True)
 class OdeResult:
-    """What `scipy.integrate.solve_ivp` gives: ``t`` (points,), ``y`` (DIM, points), ``sol``, a function of times or
-    None, ``t_events`` and ``y_events``, arrays for each event, or None.
+    """Result of `solve_ivp`, with the fields of SciPy's result.
 
-    ``status`` is 0 at the end of the interval, 1 at an event, -1 after a failure. ``h`` is the step,
-    ``trajectory`` what was integrated, its times counted from 0 where the Hamiltonian does not depend on the time.
+    ``t`` (points,), ``y`` (DIM, points); ``sol`` is a function of times, or None; ``t_events`` and ``y_events`` have an
+    array for each event, or are None. ``status`` is 0 at the end of the interval, 1 at an event, −1 after a failure.
+    ``h`` is the step and ``trajectory`` the integrated trajectory; its times begin at 0 if the Hamiltonian does not
+    depend on the time.
     """
 
     t: Floats
@@ -54,11 +55,11 @@ class OdeResult:
 
     @property
     def success(self) -> bool:
-        """Whether the end of the interval, or an event that ends it, was reached."""
+        """Whether the end of the interval, or a terminal event, was reached."""
         return self.status >= 0
 
 
-#: Arguments of SciPy's that have no place here.
+#: Arguments of SciPy's solve_ivp that are refused → the reason, for the message.
 _SCIPY = {
     "method": "the method is that of the solver; order= changes its order",
     "jac": "the solver has its derivatives",
@@ -85,11 +86,11 @@ def solve_ivp(
 ) -> OdeResult:
     """Integrate from ``t_span[0]`` to ``t_span[1]``, with the arguments and the result of `scipy.integrate.solve_ivp`.
 
-    ``system`` is in the place of the function: a spec, a `System`, or a `Solver`. Steps have one size, ``h`` (in τ with
-    a monitor); without it they are halved until the last state changes by less than atol + rtol |y|. States between
-    steps, at ``t_eval``, of ``sol`` and at ``events``, are those of further steps, on the leaf, not interpolated. A
-    step that fails, and tolerances that are not reached, as by chaotic motion over long times, are told by ``status``.
-    Raises `TypeError` for systems with noise: steps of other sizes are not on the same path.
+    ``system`` replaces SciPy's function: a spec, a `System`, or a `Solver`. All steps have the size ``h`` (in τ with a
+    monitor). Without ``h``, the step is halved until the last state changes by less than atol + rtol |y|. States
+    between steps, at ``t_eval``, of ``sol`` and at ``events``, are results of further steps on the leaf, and are not
+    interpolated. ``status`` is −1 if a step fails, or if the tolerances are not reached, as for chaotic motion over a
+    long time. Raises `TypeError` for systems with noise, since steps of other sizes are not on the same path.
     """
     solver = system if isinstance(system, Solver) else _compiled(system, target, order)
     for name in sorted(_SCIPY.keys() & more.keys() - {*solver.interface.parameters}):
@@ -98,22 +99,22 @@ def solve_ivp(
     begin, end = map(float, t_span)
     if not (math.isfinite(begin) and math.isfinite(end)) or begin == end:
         raise ValueError(f"t_span must be two different numbers, not {t_span!r}")
-    wanted = None if t_eval is None else _times(t_eval, begin, end)
+    requested_times = None if t_eval is None else _times(t_eval, begin, end)
     values = {**(parameters or {}), **more}
     problem = _Problem(solver, begin, end, y0, values)
     try:
         step, converged = (math.copysign(h, end - begin), True) if h is not None else problem.chosen(rtol, atol)
         listed = [events] if callable(events) else list(events or [])
-        found, stop = problem.events(listed, step)
+        crossings, stop = problem.events(listed, step)
         trajectory = problem.integrated(step, end if stop is None else stop)
     except StepError as error:
-        given = error.trajectory if isinstance(error.trajectory, Trajectory) else None
-        t = begin + given.t - problem.offset if given else np.empty(0)
-        y = given.x.T if given else np.empty((solver.interface.dimension, 0))
-        return OdeResult(t, y, None, None, None, -1, str(error), math.nan, given)
+        partial = error.trajectory if isinstance(error.trajectory, Trajectory) else None
+        t = begin + partial.t - problem.offset if partial else np.empty(0)
+        y = partial.x.T if partial else np.empty((solver.interface.dimension, 0))
+        return OdeResult(t, y, None, None, None, -1, str(error), math.nan, partial)
     last = end if stop is None else stop
     t = problem.offset + trajectory.t
-    inside = None if wanted is None else wanted[(wanted - last) * (end - begin) <= 0]
+    inside = None if requested_times is None else requested_times[(requested_times - last) * (end - begin) <= 0]
     sol = problem.solution(trajectory)
     status, message = (0, _REACHED) if stop is None else (1, _TERMINATED)
     if not converged:
@@ -122,8 +123,8 @@ def solve_ivp(
         t=t if inside is None else inside,
         y=trajectory.x.T if inside is None else sol(inside),
         sol=sol if dense_output else None,
-        t_events=[np.array([t for t, _ in one]) for one in found] if events is not None else None,
-        y_events=[np.array([x for _, x in one]) for one in found] if events is not None else None,
+        t_events=[np.array([t for t, _ in one]) for one in crossings] if events is not None else None,
+        y_events=[np.array([x for _, x in one]) for one in crossings] if events is not None else None,
         status=status,
         message=message,
         h=step,
@@ -133,7 +134,7 @@ def solve_ivp(
 
 @dataclass(frozen=True)
 class _Problem:
-    """A solver on an interval of time."""
+    """An initial value problem: a solver, an interval of time, an initial state and parameters."""
 
     solver: Solver
     begin: float
@@ -143,19 +144,22 @@ class _Problem:
 
     @property
     def offset(self) -> float:
-        """What is added to the times of the solver, which begin at 0 unless the Hamiltonian depends on them."""
+        """The time to add to those of the solver, which begin at 0 if the Hamiltonian does not depend on the time."""
         return 0.0 if self.solver.interface.time else self.begin
 
     def integrated(self, h: float, until: float, stride: int = 1) -> Trajectory:
-        """The trajectory up to a time."""
+        """Return the trajectory until a given time."""
         start: dict[str, Any] = {"t0": self.begin} if self.solver.interface.time else {}
         span = until - self.offset
         return self.solver.integrate(self.y0, h, until=span, stride=stride, parameters=self.values, **start)
 
     def chosen(self, rtol: float, atol: float) -> tuple[float, bool]:
-        """A step at which the last state has stopped to change beyond the tolerances, and whether there is one."""
-        h, before, failure = (self.end - self.begin) / _FIRST, None, None
-        for _ in range(_HALVINGS):
+        """Return a step at which a further halving changes the last state by less than the tolerances, and True.
+
+        Returns the smallest step tried, and False, if there is none.
+        """
+        h, before, failure = (self.end - self.begin) / _FIRST_STEPS, None, None
+        for _ in range(_MAX_HALVINGS):
             try:
                 last = self.integrated(h, self.end, stride=np.iinfo(np.int64).max).x[-1]
             except StepError as error:
@@ -170,20 +174,20 @@ class _Problem:
         return 2 * h, False
 
     def events(self, listed: Sequence[Event], h: float) -> tuple[list[list[tuple[float, Floats]]], float | None]:
-        """Times and states of each event up to the end, and the time of the one that ends the integration."""
-        found = [self._crossings(event, h) for event in listed]
+        """Return times and states of each event until the end, and the time of the terminal event, if there is one."""
+        by_event = [self._crossings(event, h) for event in listed]
         sign, stops = math.copysign(1.0, self.end - self.begin), []
-        for event, one in zip(listed, found, strict=True):
+        for event, one in zip(listed, by_event, strict=True):
             count = int(getattr(event, "terminal", False) or 0)
             stops += [one[count - 1][0]] if 0 < count <= len(one) else []
         stop = min(stops, key=lambda t: sign * t) if stops else None
         last = self.end if stop is None else stop
-        return [[(t, x) for t, x in one if (t - last) * sign <= 0] for one in found], stop
+        return [[(t, x) for t, x in one if (t - last) * sign <= 0] for one in by_event], stop
 
     def _crossings(self, event: Event, h: float) -> list[tuple[float, Floats]]:
         along = np.sign(getattr(event, "direction", 0)) * np.sign(
             self.end - self.begin
-        )  # of time, not of the integration
+        )  # directions refer to increasing time
         direction = {1: "rising", -1: "falling", 0: "both"}[int(along)]
 
         def g(states: Floats, t: Floats) -> Floats:
@@ -195,21 +199,21 @@ class _Problem:
         session = self.solver.backend.start(start, values, t0)
         steps = at_time(session, h, self.end - self.begin).steps + 1
         finder = CrossingFinder[Session](g, h, t0, timed=True, direction=direction)
-        found = []
+        crossings_so_far = []
         try:
             for _, crossings in finder.follow(session, steps, lambda: session.advance(h, 1)):
-                found += [(self.offset + t, x) for t, x in crossings]
+                crossings_so_far += [(self.offset + t, x) for t, x in crossings]
         except BackendError as error:
             raise self.solver.failure(error, h, None, values) from error
-        return found
+        return crossings_so_far
 
     def solution(self, trajectory: Trajectory) -> Callable[[ArrayLike], Floats]:
-        """The states (DIM,) at a time, (DIM, times) at many."""
+        """Return the function ``sol``, which returns the state (DIM,) at a time, or states (DIM, times)."""
 
         def sol(t: ArrayLike) -> Floats:
-            given = np.asarray(t, dtype=np.float64)
-            states = trajectory.at(np.atleast_1d(given) - self.offset).T
-            return states[:, 0] if given.ndim == 0 else states
+            times = np.asarray(t, dtype=np.float64)
+            states = trajectory.at(np.atleast_1d(times) - self.offset).T
+            return states[:, 0] if times.ndim == 0 else states
 
         return sol
 

@@ -1,4 +1,4 @@
-"""What the runtime knows of a generated solver, and how its failures are told."""
+"""Interfaces of generated solvers: names, sizes and features that the runtime needs, and the errors of back ends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-#: Told the number of steps done so far, now and then.
+#: Function that is called from time to time with the number of steps done so far.
 Progress = Callable[[int], Any]
 
 
@@ -21,26 +21,26 @@ STATUSES = ("OK", "NO_CONVERGENCE", "SINGULAR", "NOT_FINITE", "BAD_ARGUMENT")
 
 
 def status_name(value: int) -> str:
-    """The name of a status in C."""
+    """Return the name of a status of the C, without its prefix."""
     return STATUSES[value] if value < len(STATUSES) else f"STATUS_{value}"
 
 
 @dataclass(frozen=True)
 class Draws:
-    """Which random numbers a trajectory takes: those of a ``seed`` and a ``member``, from those of a ``step`` on."""
+    """Selection of a trajectory's random numbers: ``seed``, ``member``, and the number of its first ``step``."""
 
     seed: int = 0
     member: int = 0
     step: int = 0
 
 
-#: Where nothing else is asked for.
+#: The random numbers of a trajectory by default.
 FIRST_DRAWS = Draws()
 
 
 @dataclass(frozen=True)
 class Interface:
-    """The names a generated solver speaks of, all in the order of declaration."""
+    """Names, sizes and features of a generated solver; names are in the order of declaration."""
 
     name: str  # prefix of the symbols of the C code
     coordinates: tuple[str, ...]
@@ -48,34 +48,34 @@ class Interface:
     parameters: Mapping[str, float]  # defaults
     positive: frozenset[str] = frozenset()  # the parameters that must be positive
     casimirs: tuple[str, ...] = ()
-    time: str = ""  # its name, where the Hamiltonian depends on it
-    moving: frozenset[str] = frozenset()  # of energy and Casimirs, those that time or forces change
+    time: str = ""  # the name of the time, "" if the Hamiltonian does not depend on it
+    moving: frozenset[str] = frozenset()  # those of energy and Casimirs that time or forces change
     monitored: bool = False  # whether steps are equal in τ, not in t
-    attitude: tuple[int, ...] = ()  # the shape of an attitude, if there is one
-    position: bool = False  # whether there is a position too
-    noise: tuple[str, ...] = ()  # the sources
-    draws: int = 0  # the increments of the noise in a step
+    attitude: tuple[int, ...] = ()  # the shape of the attitude, () if the spec reconstructs none
+    position: bool = False  # whether the spec reconstructs a position too
+    noise: tuple[str, ...] = ()  # names of the sources of noise
+    draws: int = 0  # number of increments of the noise in a step
     single: bool = False  # whether the C computes in single precision
     observables: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:
-        """Number of coordinates."""
+        """The number of coordinates."""
         return len(self.coordinates)
 
     @property
     def element(self) -> int:
-        """Numbers of an attitude and a position."""
+        """The number of values of an attitude and a position together."""
         return math.prod(self.attitude) + 3 * self.position if self.attitude else 0
 
 
 @dataclass(frozen=True)
 class LatticeInterface(Interface):
-    """The solver of a lattice: ``coordinates`` are those of a site, and states have the shape (coordinates, *sizes).
+    """Interface of the solver of a lattice, whose states have the shape (coordinates, *sizes).
 
-    ``at_sites`` are the parameters with a value at each site. ``casimir_kinds`` tells of each Casimir whether it is one
-    for each of the ``sites``, or a ``sum`` or ``product`` over them. Sizes are multiples of ``periods``, at least
-    ``least``. Of a `graph` parameters at ``at_bonds`` have a value at each bond.
+    ``coordinates`` are those of one site. Parameters in ``at_sites`` have a value at each site, those in ``at_bonds``
+    at each bond of a graph. An entry of ``casimir_kinds`` is ``sites`` for a Casimir of each site, ``sum`` or
+    ``product`` for one over all sites. Sizes are multiples of ``periods``, and at least ``least``.
     """
 
     axes: tuple[str, ...] = ()
@@ -83,36 +83,40 @@ class LatticeInterface(Interface):
     casimir_kinds: tuple[str, ...] = ()
     periods: tuple[int, ...] = ()
     least: tuple[int, ...] = ()
-    required: frozenset[str] = frozenset()  # parameters at sites and bonds whose defaults are not one number
+    required: frozenset[str] = frozenset()  # parameters at sites and bonds whose default is an array
     first_open: bool = False  # whether the first axis has open ends
     open_axes: tuple[bool, ...] = ()
-    colour_period: int = 1  # the first axis: after so many planes colours of sites are as before
+    colour_period: int = 1  # number of planes of the first axis after which the colouring of sites repeats
     graph: bool = False
-    pairs: bool = False  # whether each site acts on each other
-    compensated: bool = False  # whether the C saves what rounding has left out of the fields
+    pairs: bool = False  # whether every pair of sites interacts
+    compensated: bool = False  # whether the C stores a compensation term for each field
     at_bonds: tuple[str, ...] = ()
     observed_fields: tuple[str, ...] = ()  # observables with a value at each site
-    dear: bool = False  # whether steps take longer than what is kept of them, to go back, takes to be written and read
+    dear: bool = False  # whether recomputing a step takes longer than writing and reading its tape
 
     def is_shared(self, sites: int) -> bool:
-        """Whether threads share the work on so many sites, by the numbers of the runtime in C."""
+        """Whether threads share the work on a lattice of ``sites`` sites; the thresholds are those of the C runtime."""
         return sites > (512 if self.pairs else 4096)
 
 
 @dataclass
 class Clock:
-    """The time after so many steps: counted from where the size of the step was set, so no error adds up."""
+    """The time as a function of the number of steps.
+
+    It is t + (steps − counted)·h, with ``t`` and ``counted`` from the last change of the step size. So no rounding
+    errors accumulate.
+    """
 
     t: float = 0.0
     h: float = 0.0
     counted: int = 0
 
     def after(self, steps: int) -> float:
-        """The time then."""
+        """Return the time after a number of steps."""
         return self.t + (steps - self.counted) * self.h
 
     def set_step(self, h: float, steps: int) -> None:
-        """Steps have the size h from now on."""
+        """Change the step size to h, after a number of steps."""
         if h != self.h:
             self.t, self.h, self.counted = self.after(steps), h, steps
 
@@ -120,8 +124,9 @@ class Clock:
 class BackendError(Exception):
     """A step failed inside a back end; `phigen.runtime.solver` turns it into the user's `StepError`.
 
-    ``states`` holds the rows so far with the last good state as its last row (an ensemble: its members as far as they
-    came), ``step`` the number of good steps, −1 where the back end cannot tell, ``failures`` the status of each member.
+    ``states`` are the rows until the failure, the last one the state before the failing step; for an ensemble, the last
+    state of each member. ``step`` is the number of successful steps, −1 if unknown. ``failures`` maps each failed
+    member to its status.
     """
 
     def __init__(
@@ -138,10 +143,10 @@ class BackendError(Exception):
 
 
 class MissingExtraError(Exception):
-    """The generated code was built without the function that was asked for."""
+    """The generated code was built without the requested function."""
 
 
 def row_steps(steps: int, stride: int) -> NDArray[np.int64]:
-    """Numbers of the steps that are stored: 0, stride, 2·stride, …, and the last."""
+    """Return the numbers of the steps that are stored: 0, stride, 2·stride, …, and the last."""
     rows = np.arange(0, steps + 1, stride, dtype=np.int64)
     return rows if rows[-1] == steps else np.append(rows, steps)

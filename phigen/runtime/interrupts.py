@@ -1,4 +1,4 @@
-"""Keyboard interrupts while a long call of C is under way, which asks now and then whether to stop."""
+"""Keyboard interrupts during long calls of C, which poll a function and return early when it is not 0."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ _QUESTION = ctypes.CFUNCTYPE(ctypes.c_int)
 
 @contextmanager
 def interruptible(ask: Callable[[int | None], Any]) -> Iterator[None]:
-    """Give ``ask`` the address of a function of C that is not 0 after an interrupt, and None in the end.
+    """Pass to ``ask`` the address of a C function that returns non-zero after Ctrl-C, and None at the end.
 
-    Then `KeyboardInterrupt` is raised. Where programs do something else with interrupts, nothing is asked, nor in
-    threads but the first, which alone hears of them.
+    After an interrupt `KeyboardInterrupt` is raised at the end. Nothing is passed outside of the main thread, which
+    alone receives signals, or if the program has its own handler for them.
     """
-    heard: list[int] = []
+    signals: list[int] = []
     first = threading.current_thread() is threading.main_thread()
     if not first or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
-    question = _QUESTION(lambda: len(heard))
-    signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
+    question = _QUESTION(lambda: len(signals))
+    signal.signal(signal.SIGINT, lambda number, frame: signals.append(number))
     ask(ctypes.cast(question, ctypes.c_void_p).value)
     try:
         yield
     finally:
         ask(None)
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    if heard:
+    if signals:
         raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""Solvers of lattices: states of shape (coordinates, *sizes), any sizes, frames in memory or streamed to disk."""
+"""Solvers of lattices of any size, with states of shape (coordinates, *sizes) and frames in memory or in a file."""
 
 from __future__ import annotations
 
@@ -50,62 +50,62 @@ class LatticeSession(Protocol):
 
     @property
     def steps(self) -> int:
-        """Good steps since the start."""
+        """The number of successful steps since the start."""
         ...
 
     def state(self) -> Floats:
-        """A copy of the state (coordinates, *sizes)."""
+        """Return a copy of the state (coordinates, *sizes)."""
         ...
 
     def advance(self, h: float, steps: int) -> None:
-        """Make so many steps."""
+        """Make ``steps`` steps of size ``h``."""
         ...
 
     def advance_tangent(self, h: float, vectors: Floats, steps: int = 1) -> Floats:
-        """Make so many steps; where their derivatives carry ``vectors`` (count, coordinates, *sizes).
+        """Make ``steps`` steps, and return ``vectors`` (count, coordinates, *sizes) multiplied by their derivatives.
 
         Raises `MissingExtraError` without the extra ``tangent``.
         """
         ...
 
     def saved(self) -> dict[str, Any]:
-        """Arrays that `resume` goes on from, beside the state, with the same bits."""
+        """Return the arrays that `resume` needs beside the state to continue with the same bits."""
         ...
 
-    def resume(self, h: float, steps: int, kept: Mapping[str, Any]) -> None:
-        """Go on from what was saved after so many steps of size h, in a session that began at the state."""
+    def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
+        """Continue after ``steps`` steps of size h, in a session at the saved state, with the ``arrays`` of `saved`."""
         ...
 
     def place(self, x: Floats) -> None:
-        """Stand at ``x`` (coordinates, *sizes), with all else as it is; raises `BackendError` if it is not finite."""
+        """Replace the state by ``x`` (coordinates, *sizes), and nothing else. Raises `BackendError` if not finite."""
         ...
 
     def kick(self, change: Floats) -> None:
-        """Move the state by ``change`` (coordinates, *sizes), else as `place`."""
+        """Add ``change`` (coordinates, *sizes) to the state; else as `place`."""
         ...
 
     def hamiltonian(self) -> float:
-        """H of the state."""
+        """Return H of the state."""
         ...
 
     def density(self) -> Floats:
-        """The density of H at the sites (*sizes)."""
+        """Return the density of H at the sites (*sizes)."""
         ...
 
     def casimirs(self) -> Floats:
-        """The densities of the Casimirs (Casimirs, *sizes)."""
+        """Return the densities of the Casimirs (Casimirs, *sizes)."""
         ...
 
     def vector_field(self) -> Floats:
-        """π∇H (coordinates, *sizes)."""
+        """Return π∇H (coordinates, *sizes)."""
         ...
 
     def observables(self) -> Floats:
-        """Observables that are one number each (observables,)."""
+        """Return the observables that are one number each (observables,)."""
         ...
 
     def observed_fields(self) -> Floats:
-        """Observables with a value at each site (fields, *sizes)."""
+        """Return the observables with a value at each site (fields, *sizes)."""
         ...
 
 
@@ -116,17 +116,17 @@ class LatticeBackend(Protocol):
 
     @property
     def identity(self) -> str:
-        """A hash of all that decides the results."""
+        """A hash of everything that determines the results."""
         ...
 
     def start(
         self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
     ) -> LatticeSession:
-        """A session at x0 (coordinates, *sizes), at the time t0."""
+        """Return a session at x0 (coordinates, *sizes), at the time t0."""
         ...
 
     def threads(self, sites: int) -> int:
-        """Return the number of threads that share the work on so many sites."""
+        """Return the number of threads that share the work on a lattice of ``sites`` sites."""
         ...
 
     def pullback(
@@ -139,21 +139,21 @@ class LatticeBackend(Protocol):
         parameters: Mapping[str, Any],
         t0: float = 0.0,
     ) -> tuple[Floats, Floats, dict[str, Floats]]:
-        """The rows of a run from t0 on (rows, coordinates, *sizes), and cotangents of x0 and of parameters, by name.
+        """Return the rows (rows, coordinates, *sizes) of a run from t0 on, and cotangents of x0 and of parameters.
 
-        These have the shapes of what they belong to; ``bars`` are those of the rows. Raises `MissingExtraError` without
-        the extra ``adjoint``.
+        Cotangents have the shapes of x0 and of the parameters; ``bars`` are the cotangents of the rows. Raises
+        `MissingExtraError` without the extra ``adjoint``.
         """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class LatticeTrajectory:
-    """Frames of one integration: the first is the initial state, the last always the final one.
+    """Frames of one integration. The first is the initial state, the last the final state.
 
-    ``t`` (frames,), ``x`` (frames, coordinates, *sizes), mapped from disk where it was streamed there, ``energy``
-    (frames,). ``steps`` were made with step size ``h``; the frames are those of every stride-th step and of the last.
-    ``observed`` (frames, observables) are the observables of the spec that are one number each.
+    ``t`` (frames,) are the times, ``x`` (frames, coordinates, *sizes) the states, mapped from their file if they were
+    written to one, ``energy`` (frames,) the values of H. There is a frame for every stride-th of the ``steps`` steps of
+    size ``h``, and for the last. ``observed`` (frames, observables) are the observables that are one number each.
     """
 
     t: Floats
@@ -175,20 +175,21 @@ class LatticeTrajectory:
         return f"<LatticeTrajectory of ({', '.join(self.coordinates)}) on {sizes} sites: {len(self)} frames>"
 
     def _repr_html_(self) -> str:
-        """First and last frame, and what was conserved, for notebooks."""
+        """Return a table for notebooks: the first and the last frame, and the errors of conserved quantities."""
         return cast(str, display("page of a lattice trajectory")(self))
 
     def plot(self) -> Figure:
-        """A figure of the fields: a chain over space and time, planes at some times; below, what was conserved.
+        """Return a figure of the fields, of a chain over space and time or of planes at some times.
 
-        Notebooks show it; ``.savefig(path)`` writes it. Raises `MissingPackageError` without matplotlib.
+        Below are the errors of conserved quantities. Notebooks show the figure; ``.savefig(path)`` writes it. Raises
+        `MissingPackageError` without matplotlib.
         """
         return cast("Figure", display("figure of a lattice run")(self, self.changes(), ""))
 
     def to_xarray(self) -> xr.Dataset:
-        """An `xarray.Dataset`: ``x`` (t, coordinate, *axes), ``energy`` (t), ``casimir_NAME`` (t, *axes) or (t).
+        """Return an `xarray.Dataset`: ``x`` (t, coordinate, *axes), ``energy`` (t), ``casimir_NAME`` (t, *axes) or (t).
 
-        Parameters that are arrays are variables ``parameter_NAME``; the rest are attributes. Raises
+        Parameters that are arrays are variables ``parameter_NAME``; other parameters are attributes. Raises
         `MissingPackageError` without xarray.
         """
         from phigen.runtime.exchange import lattice_to_xarray
@@ -196,16 +197,17 @@ class LatticeTrajectory:
         return lattice_to_xarray(self)
 
     def changes(self) -> dict[str, Floats]:
-        """How far the energy, in units of `energy_scale`, and each Casimir went since the start, (frames,).
+        """Return the absolute changes since the start (frames,) of the energy and of each Casimir, by name.
 
-        What time, forces or noise did to the energy is in it. Of Casimirs of sites it is the site at the worst.
+        The change of the energy is in units of `energy_scale`, and includes the effects of time, forces and noise. For
+        a Casimir of each site it is the largest change at any site.
         """
-        found = {"energy": np.abs(self.energy - self.energy[0]) / self.energy_scale}
-        return found | self.casimir_changes()
+        changes = {"energy": np.abs(self.energy - self.energy[0]) / self.energy_scale}
+        return changes | self.casimir_changes()
 
     @property
     def energy_scale(self) -> float:
-        """The unit of errors of energy: |H| at the start or, where that is nearly 0, Σ |energy of a site|."""
+        """The unit of errors of energy: |H| at the start or, if that is nearly 0, Σ |energy of a site|."""
         return self.energy_unit.size
 
     @property
@@ -239,7 +241,10 @@ class LatticeTrajectory:
         return (self.solver.casimirs(x, parameters=self.parameters) for x in self.x)
 
     def casimir_changes(self) -> dict[str, Floats]:
-        """How far each Casimir went since the start, (frames,), the worst site of those of sites. Holds one frame."""
+        """Return the absolute change (frames,) of each Casimir since the start; for one of each site, the largest.
+
+        Frames are read one by one, so that memory holds one frame.
+        """
         if not self.solver.interface.casimirs:
             return {}
         frames = self._casimirs_by_frame()
@@ -249,7 +254,7 @@ class LatticeTrajectory:
         return {name: np.array([row[name] for row in rows]) for name in first}
 
     def column(self, coordinate: str) -> Floats:
-        """The frames (frames, *sizes) of one coordinate; raises `KeyError` for a name that is none."""
+        """Return the frames (frames, *sizes) of one coordinate. Raises `KeyError` if there is no such coordinate."""
         if coordinate not in self.coordinates:
             raise KeyError(f"{coordinate!r} is not a coordinate; there are {', '.join(self.coordinates)}")
         return self.x[:, self.coordinates.index(coordinate)]
@@ -272,9 +277,9 @@ class LatticeTrajectory:
         return correlation(self, of, other or of, axis or self.axes[0], up_to, after=after)
 
     def at(self, times: ArrayLike) -> Floats:
-        """The states (times, coordinates, *sizes) at given times, by steps of the same method from the nearest frame.
+        """Return the states (times, coordinates, *sizes) at given times, by steps of the method from the nearest frame.
 
-        As `phigen.Trajectory.at`; raises the same.
+        See `phigen.Trajectory.at`; raises the same.
         """
         return self.solver.states_at(self, arguments.times_within(times, self.t))
 
@@ -301,11 +306,11 @@ class LatticeTrajectory:
 class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     """A compiled lattice: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, J=2.0)``, x0 (coordinates, *sizes).
 
-    Parameters are keyword arguments, or in ``parameters={…}``; those at sites are arrays (*sizes), or one number for
-    all, those at bonds arrays (bonds,). What is not given has its default of the spec, at the sizes of the state: a
-    list or a file with another number of values raises `SpecError`. Graphs take ``bonds`` in the same way, (bonds, 2)
-    numbers of sites from 0. Wrong arguments raise `ValueError` or `TypeError`, a step that cannot be made
-    `phigen.StepError`. Safe to use from several threads.
+    Parameters are keyword arguments, or entries of ``parameters={…}``. Those at sites are arrays (*sizes), those at
+    bonds arrays (bonds,), or one number for all. Parameters that are not passed have their defaults of the spec, at the
+    sizes of the state; a list or a file with another number of values raises `SpecError`. Graphs take ``bonds`` in the
+    same way, an array (bonds, 2) of numbers of sites from 0. Wrong arguments raise `ValueError` or `TypeError`, and a
+    failing step `phigen.StepError`. Several threads may use a solver.
     """
 
     def __init__(self, backend: LatticeBackend, interface: LatticeInterface, spec: Spec | None = None) -> None:
@@ -336,15 +341,17 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> LatticeTrajectory:
-        """Make ``steps`` steps of size ``h`` from ``x0`` (coordinates, *sizes), framed every ``stride`` and at the end.
+        """Make ``steps`` steps of size ``h`` from ``x0`` (coordinates, *sizes).
 
-        ``t0`` is the time of ``x0``, 0 by default, where H depends on the time. With noise, the random numbers of a
-        site are a function of ``seed``, ``member``, the number of the step, which begins with ``step0``, and the site.
-        With ``output``, a path that ends in .npy or .npz, frames go to that file one by one. With ``checkpoints``, a
-        path, the state is kept there at every frame; a call with the same arguments goes on from it, and removes it at
-        the end. ``resume=False`` begins anew, where no interrupted run is. ``progress`` is called after each frame with
-        the number of steps done. Raises `StepError`, whose ``trajectory`` ends with the state before the failing step,
-        and `ValueError` where files are of an interrupted run, or of a complete one that was to go on.
+        Frames are the states after every ``stride``-th step and the last.
+        ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With noise, the random
+        numbers of a site are a function of ``seed``, ``member``, the number of the step, which begins with ``step0``,
+        and the site. With ``output``, a path that ends in .npy or .npz, frames are written to that file one by one.
+        With ``checkpoints``, a path, the state is saved there at every frame; a call with the same arguments resumes
+        from that state, and removes the file at the end. ``resume=False`` starts a new run, and refuses to overwrite
+        the files of an interrupted one. ``progress`` is called after each frame with the number of steps done. Raises
+        `StepError`, whose ``trajectory`` ends with the state before the failing step, and `ValueError` if the files
+        belong to an interrupted run, or to a complete one that cannot be resumed.
         """
         drawn = {"seed": seed, "member": member, "step0": step0}
         at = self._beginning(x0, "x0", h, parameters, more, t0, drawn)
@@ -386,11 +393,11 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     ) -> LatticeTrajectory | LatticeSeries:
         """Integrate a run of the spec, the first by default, and return what `integrate` returns.
 
-        A run whose ``record`` has no ``state`` returns what `series` returns. The start, the bonds, and parameters at
-        sites and bonds are made as the run says, from its formulas, files and random numbers, at its ``sizes`` or at
-        others. The remaining arguments take the place of the settings of the spec; ``x0`` (coordinates, *sizes) is
-        another start, ``seed`` that of the noise. Raises `ValueError` for a name that is no run, and `SpecError` for a
-        start that does not fit the sizes.
+        A run whose ``record`` has no ``state`` returns the result of `series`. The initial state, the bonds, and
+        parameters at sites and bonds are computed from the formulas, files and random numbers of the run, at its
+        ``sizes`` or at those passed. The other arguments replace the settings of the spec: ``x0`` (coordinates, *sizes)
+        is the initial state, ``seed`` that of the noise. Raises `ValueError` if there is no run of that name, and
+        `SpecError` for an initial state that does not fit the sizes.
         """
         from phigen.lattice.states import start_of
 
@@ -399,14 +406,14 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         chosen = runs.changed(self.spec, base, runs.Settings(step=step, steps=steps, stride=stride, sizes=sizes))
         start = start_of(self.spec, chosen)
         integrate: Any = partial(self.series, of=chosen.record) if chosen.records_numbers else self.integrate
-        made: LatticeTrajectory | LatticeSeries = integrate(
+        recorded: LatticeTrajectory | LatticeSeries = integrate(
             start.state if x0 is None else x0, float(chosen.step), chosen.steps, chosen.stride,
             t0=float(chosen.start) if self.interface.time else None,
             seed=chosen.seed if seed is None and self.interface.noise else seed,
             output=output, checkpoints=checkpoints, progress=progress,
             parameters=start.arguments | arguments.together(parameters, more),
         )  # fmt: skip
-        return made
+        return recorded
 
     def series(
         self,
@@ -429,9 +436,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     ) -> LatticeSeries:
         """Integrate as `integrate` does, and record numbers every ``stride`` steps in place of frames.
 
-        ``of`` names them: ``energy``, Casimirs that are sums or products, and observables, by default all but the
-        Casimirs. With ``output``, .csv or .npz, they are written there at the end. With ``checkpoints`` the state and
-        the rows are kept every two seconds. Raises as `integrate`; the ``trajectory`` of a `StepError` is the series.
+        ``of`` names the numbers: ``energy``, Casimirs that are sums or products, and observables; by default all but
+        the Casimirs. With ``output``, a path that ends in .csv or .npz, they are written to that file at the end. With
+        ``checkpoints`` the state and the rows are saved every two seconds. Raises the same as `integrate`; the
+        ``trajectory`` of a `StepError` is the series.
         """
         drawn = {"seed": seed, "member": member, "step0": step0}
         at = self._beginning(x0, "x0", h, parameters, more, t0, drawn)
@@ -473,7 +481,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> Floats:
-        """The state one step of size ``h`` after ``x`` (coordinates, *sizes), at ``t0``; raises `StepError`."""
+        """Return the state one step of size ``h`` after ``x`` (coordinates, *sizes) at the time ``t0``.
+
+        Raises `StepError`.
+        """
         at = self._beginning(x, "x", h, parameters, more, t0, {"seed": seed, "step0": step0})
         session = self.started(at)
         try:
@@ -494,13 +505,14 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> tuple[Floats, Floats]:
-        """The state one step after ``x``, and where its derivative carries ``vectors`` (count, coordinates, *sizes).
+        """Return the state one step after ``x``, and the product of its derivative with each of some ``vectors``.
 
-        The derivative is exact to round-off. Raises `StepError`, `LimitError` for more than there is memory for, and
-        `TypeError` if the solver was compiled without ``tangent=True``.
+        Vectors have the shape (count, coordinates, *sizes). The derivative is exact to round-off. Raises `StepError`,
+        `LimitError` for more vectors than fit into memory, and `TypeError` if the solver was compiled without
+        ``tangent=True``.
         """
-        for found in self.tangents(x, h, 1, vectors, t0=t0, seed=seed, step0=step0, parameters=parameters, **more):
-            return found
+        for after in self.tangents(x, h, 1, vectors, t0=t0, seed=seed, step0=step0, parameters=parameters, **more):
+            return after
         raise AssertionError("one step")
 
     def tangents(
@@ -517,10 +529,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> Generator[tuple[Floats, Floats], Floats | None, None]:
-        """After every ``stride`` steps of a trajectory, and the last: the state, and where ``vectors`` are carried.
+        """Yield the state and the tangent ``vectors`` after every ``stride`` steps of a trajectory, and after the last.
 
-        These have the shape (count, coordinates, *sizes). They go on as they are, unless others are sent in their
-        place. Raises what `step_tangent` does.
+        Vectors have the shape (count, coordinates, *sizes), and are multiplied by the derivative of each step. Vectors
+        that are sent to the generator replace them. Raises the same as `step_tangent`.
         """
         at = self._beginning(x0, "x0", h, parameters, more, t0, {"seed": seed, "step0": step0})
         start, steps = at.x, arguments.count(steps, "steps", 0)
@@ -556,21 +568,22 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> Floats:
-        """Final states (members, coordinates, *sizes) of several lattices of one size, or of one that all start from.
+        """Return the final states (members, coordinates, *sizes) of several lattices of the same size.
 
-        ``h``, ``t0`` and parameters may have a first axis of members, those at sites in front of their sizes: disorder.
-        With a ``stride`` the result has a first axis of rows: states at steps 0, stride, 2·stride, … and at the last.
-        Small lattices are shared out between ``threads``, by default one on each core; large ones one by one, with
-        threads of their own. With noise, each has the random numbers of a member of its own, from ``member`` on. Raises
-        `StepError` with the ``members`` that failed and the states as far as each came, NaN in the rows after that.
+        ``X0`` has that shape, or is one initial state for all. ``h``, ``t0`` and parameters may have a first axis of
+        members, as for an average over disorder. With a ``stride`` the result has a further first axis of rows: the
+        states at steps 0, stride, 2·stride, … and at the last. Small lattices are shared out between ``threads``, by
+        default one for each core; large ones are integrated one after another, by all threads. With noise, member k
+        takes the random numbers of ``member`` + k. Raises `StepError`: its ``members`` are the failed ones, its
+        ``trajectory`` the array of states, in which failed members have their last state, or NaN in the rows after it.
         """
         times = self._times(t0, more)
         draws = arguments.draws(self.interface, more, {"seed": seed, "member": member, "step0": step0})
-        given = arguments.together(parameters, more)
-        return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, given, times, draws)
+        values = arguments.together(parameters, more)
+        return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, values, times, draws)
 
     def _times(self, t0: ArrayLike | None, more: dict[str, Any]) -> Floats:
-        """The time of the start, or one of each member; see `arguments.start_time`."""
+        """Return the initial time, a number or an array (members,); see `arguments.start_time`."""
         begin = t0 if np.ndim(t0 if t0 is not None else 0) and self.interface.time else None
         alone: Any = t0 if begin is None else 0.0
         first = arguments.start_time(alone, self.interface, more)
@@ -588,17 +601,18 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> Pullback:
-        """The state after ``steps`` steps, and the derivatives of its product with a ``cotangent``: (x1, x0_bar,
-        parameters_bar), x0_bar along ``x0``, parameters_bar by name along the parameters, of the shapes of these.
+        """Return the state after ``steps`` steps, and the derivatives of its scalar product with a ``cotangent``.
 
-        ``x0`` is (coordinates, *sizes), or has a first axis of members, as parameters may; x1 and the cotangent have
-        its shape, and ``h`` and ``t0`` may be those of each. Of what members share the derivative is the sum over them.
-        With a ``stride``, x1 are all frames of `integrate`, with a first axis of rows, and so is the cotangent. All is
-        exact to round-off. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
+        The result is (x1, x0_bar, parameters_bar): the state, the derivative of the product by ``x0``, and those by the
+        parameters, by name and in their shapes. ``x0`` is (coordinates, *sizes), or has a first axis of members; x1 and
+        the cotangent have its shape. Parameters, ``h`` and ``t0`` may have an axis of members too. The derivative by an
+        argument that all members share is the sum over members. With a ``stride``, x1 and the cotangent have a further
+        first axis of rows, for all frames of `integrate`. Derivatives are exact to round-off. Raises `StepError`, and
+        `TypeError` if the solver was compiled without ``adjoint=True``.
         """
         times = self._times(t0, more)
-        given = arguments.together(parameters, more)
-        return lattice_gradients.pullback(self, x0, h, steps, cotangent, stride, times, given)
+        values = arguments.together(parameters, more)
+        return lattice_gradients.pullback(self, x0, h, steps, cotangent, stride, times, values)
 
     def session(
         self,
@@ -611,7 +625,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> LiveLattice:
-        """A lattice from ``x0`` (coordinates, *sizes) in the hands of the caller: ``.step(h)``, ``.kick(dx)``, ``.x``.
+        """Return a session at ``x0`` (coordinates, *sizes), whose steps the caller makes: ``.step``, ``.kick``, ``.x``.
 
         The other arguments are those of `integrate`.
         """
@@ -619,14 +633,14 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         at = self._beginning(x0, "x0", None, parameters, more, t0, drawn)
         return LiveLattice(self, self.started(at), at)
 
-    # --- what is seen
+    # --- functions of states
 
     def states_at(self, trajectory: LatticeTrajectory, times: Floats) -> Floats:
-        """The states of a trajectory of this solver at given times; see `LatticeTrajectory.at`."""
+        """Return the states of a trajectory of this solver at given times; see `LatticeTrajectory.at`."""
         t, x = trajectory.t, trajectory.x
         if self.interface.noise:
             return arguments.rows_at(t, x, times)
-        found = np.empty((len(times), *x.shape[1:]))
+        states = np.empty((len(times), *x.shape[1:]))
         for k, time in enumerate(times.tolist()):
             row = int(np.argmin(np.abs(t - time)))
             begin = float(t[row]) if self.interface.time else 0.0
@@ -635,79 +649,82 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
                 advance_by(time - float(t[row]), trajectory.h, session.advance)
             except BackendError as error:
                 raise self.failure(error, trajectory.h, None, trajectory.parameters) from error
-            found[k] = session.state()
-        return found
+            states[k] = session.state()
+        return states
 
     def hamiltonian(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
     ) -> float:
-        """H of a state (coordinates, *sizes), at the time ``t`` where it depends on that."""
-        return self._seen(x, parameters, more, t).hamiltonian()
+        """Return H of a state (coordinates, *sizes), at the time ``t`` if H depends on the time."""
+        return self._session_at(x, parameters, more, t).hamiltonian()
 
     def density(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
     ) -> Floats:
-        """The density of H at the sites (*sizes), whose sum is H."""
-        return self._seen(x, parameters, more, t).density()
+        """Return the density of H at the sites (*sizes), whose sum is H."""
+        return self._session_at(x, parameters, more, t).density()
 
     def casimirs(self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> dict[str, Any]:
-        """The Casimirs of a state, by name: (*sizes) for those of sites, numbers for sums and products."""
+        """Return the Casimirs of a state, by name: arrays (*sizes) for those of sites, else numbers."""
         about = self.interface
-        found = self._seen(x, parameters, more, 0.0 if self.interface.time else None).casimirs()
-        kinds = zip(about.casimirs, about.casimir_kinds, found, strict=True)
+        densities = self._session_at(x, parameters, more, 0.0 if self.interface.time else None).casimirs()
+        kinds = zip(about.casimirs, about.casimir_kinds, densities, strict=True)
         return {name: reduced(kind, values) for name, kind, values in kinds}
 
     def observables(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
     ) -> dict[str, Any]:
-        """The observables of the spec of a state, by name: numbers, and arrays (*sizes) for those of sites."""
-        about, session = self.interface, self._seen(x, parameters, more, t)
+        """Return the observables of the spec of a state, by name: numbers, and arrays (*sizes) for those of sites."""
+        about, session = self.interface, self._session_at(x, parameters, more, t)
         numbers = dict(zip(about.observables, session.observables().tolist(), strict=True))
         return numbers | dict(zip(about.observed_fields, session.observed_fields(), strict=True))
 
     def vector_field(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
     ) -> Floats:
-        """π∇H of a state (coordinates, *sizes), the same shape."""
-        return self._seen(x, parameters, more, t).vector_field()
+        """Return π∇H of a state (coordinates, *sizes), the same shape."""
+        return self._session_at(x, parameters, more, t).vector_field()
 
-    def _seen(
+    def _session_at(
         self, x: ArrayLike, parameters: Mapping[str, Any] | None, more: dict[str, Any], t: float | None = None
     ) -> LatticeSession:
         state = self.state(x, "x")
-        found = arguments.times(t, self.interface, (), more)
+        times = arguments.times(t, self.interface, (), more)
         values = self.values(parameters, more, state.shape[1:])
-        return self.started(Beginning(state, 1.0, values, 0.0 if found is None else float(found[0])))
+        return self.started(Beginning(state, 1.0, values, 0.0 if times is None else float(times[0])))
 
     # --- arguments
 
     def shape_text(self) -> str:
-        """The shape of a state, in a message."""
+        """Return the shape of a state as text for a message."""
         return ", ".join([str(len(self.coordinates)), *(f"N_{axis}" for axis in self.interface.axes)])
 
     def state(self, x: ArrayLike, what: str) -> Floats:
-        """A state, a copy, checked with its sizes."""
+        """Return a copy of a state. Raises `ValueError` for sizes that do not fit, and for non-finite values."""
         about = self.interface
-        found = arguments.real(x, what)
-        if found.ndim != 1 + len(about.axes) or found.shape[0] != len(about.coordinates):
-            raise ValueError(f"{what} must have shape ({self.shape_text()}), not {found.shape}")
-        for axis, size, least, period in zip(about.axes, found.shape[1:], about.least, about.periods, strict=True):
+        copy = arguments.real(x, what)
+        if copy.ndim != 1 + len(about.axes) or copy.shape[0] != len(about.coordinates):
+            raise ValueError(f"{what} must have shape ({self.shape_text()}), not {copy.shape}")
+        for axis, size, least, period in zip(about.axes, copy.shape[1:], about.least, about.periods, strict=True):
             if size < least:
                 raise ValueError(f"{what} has {size} sites along {axis}; neighbours and brackets need {least} or more")
             if size % period:
                 message = f"{what} has {size} sites along {axis}; the colours of sites need multiples of {period}"
                 hint = "compile from a spec that has a run of this size, or with scheme='series'"
                 raise ValueError(f"{message}; {hint}")
-        if not np.isfinite(found).all():
-            place = tuple(np.argwhere(~np.isfinite(found))[0].tolist())
+        if not np.isfinite(copy).all():
+            place = tuple(np.argwhere(~np.isfinite(copy))[0].tolist())
             where = ", ".join(map(str, place[1:]))
             raise ValueError(f"{what} must be finite, but {about.coordinates[place[0]]} at ({where}) is not")
-        return found
+        return copy
 
-    def values(self, given: Mapping[str, Any] | None, more: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Any]:
-        """All parameters: numbers, and arrays over the sites or the bonds; of a graph the bonds too."""
+    def values(self, mapped: Mapping[str, Any] | None, more: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Any]:
+        """Return all parameters: numbers, and arrays over the sites or the bonds; for a graph the bonds too.
+
+        Raises `TypeError` for unknown names, `ValueError` for values that are not admissible.
+        """
         about = self.interface
-        everything = arguments.together(given, more)
+        everything = arguments.together(mapped, more)
         everything |= self.defaults(everything, sizes)
         bonds = {"bonds": checked_bonds(everything.pop("bonds", None), sizes[0])} if about.graph else {}
         shapes = dict.fromkeys(about.at_sites, tuple(sizes))
@@ -727,19 +744,19 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             values[name] = array
         return values | bonds
 
-    def defaults(self, given: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Floats]:
-        """Defaults of the spec that are formulas, lists, files or random, at the given sizes, of parameters not given.
+    def defaults(self, passed: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Floats]:
+        """Return the defaults of parameters not in ``passed`` that are formulas, lists, files or random numbers.
 
-        Raises `SpecError` for those that do not fit the sizes.
+        They are evaluated at the given sizes. Raises `SpecError` for those that do not fit the sizes.
         """
-        missing = self.interface.required - set(given)
+        missing = self.interface.required - set(passed)
         if not missing:
             return {}
         if self.spec is None:
             raise TypeError(f"parameter {min(missing)!r} has no default for all sizes; give an array, or one number")
         from phigen.lattice.states import defaults_at
 
-        bonds = len(checked_bonds(given.get("bonds"), sizes[0])) if self.interface.graph else 0
+        bonds = len(checked_bonds(passed.get("bonds"), sizes[0])) if self.interface.graph else 0
         return defaults_at(self.spec, missing, tuple(sizes), bonds)
 
     def _beginning(
@@ -752,7 +769,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         t0: float | None,
         drawn: Mapping[str, int | None] = arguments.NONE_DRAWN,
     ) -> Beginning:
-        """What the user gave for a trajectory, checked; None for a step that he gives later."""
+        """Return the checked arguments of a trajectory; the step size is NaN if it is not known yet."""
         begin = arguments.start_time(t0, self.interface, more)
         draws = arguments.draws(self.interface, more, drawn)
         start = self.state(x, what)
@@ -760,7 +777,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return Beginning(start, size, self.values(parameters, more, start.shape[1:]), begin, draws)
 
     def started(self, at: Beginning) -> LatticeSession:
-        """A session at a beginning that has been checked."""
+        """Return a session for checked arguments. Raises `StepError`."""
         try:
             return self.backend.start(at.x, at.values, at.t0, at.draws)
         except BackendError as error:
@@ -769,27 +786,26 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def failure(
         self, error: BackendError, h: float, so_far: Any, values: Mapping[str, Any], start: Floats | None = None
     ) -> StepError:
+        """Return the exception for users after a failure in the back end; ``so_far`` are the results until then."""
         name = self.interface.name
-        told = {"step": error.step, "status": error.status, "trajectory": so_far, "members": error.members}
+        facts = {"step": error.step, "status": error.status, "trajectory": so_far, "members": error.members}
         if error.status == "BAD_ARGUMENT":
             state = {} if start is None else dict(zip(self.coordinates, start, strict=True))
             if wrong := self.interface.single and arguments.beyond_single({**state, **values, "the step h": h}):
-                return ParameterError(f"{name}: {wrong}", **{**told, "step": 0})
-            given = ", ".join(f"{n} = {v!r}" for n, v in values.items() if np.ndim(v) == 0)
-            message = (
-                f"{name}: no step can be made with {given}: a coefficient computed from parameters alone is not finite"
-            )
-            return ParameterError(message, **{**told, "step": 0})
+                return ParameterError(f"{name}: {wrong}", **{**facts, "step": 0})
+            numbers = ", ".join(f"{n} = {v!r}" for n, v in values.items() if np.ndim(v) == 0)
+            reason = "a coefficient computed from parameters alone is not finite"
+            return ParameterError(f"{name}: no step can be made with {numbers}: {reason}", **{**facts, "step": 0})
         where = f"step {error.step} of size {h!r} failed" if error.step >= 0 else "a step failed"
         if error.members:
             where += f" for {len(error.members)} member(s) of the ensemble ({', '.join(map(str, error.members[:5]))})"
         advice = "the state left the range of the formulas; a smaller step helps, unless the solution ends here"
         if error.step == 0 and error.status == "NOT_FINITE" and (so_far is not None or not self.interface.time):
             advice = self._undefined(error.states[-1], values, None if so_far is None else float(so_far.t[0])) or advice
-        return StepError(f"{name}: {where}: {error.status}, {advice}", **told)
+        return StepError(f"{name}: {where}: {error.status}, {advice}", **facts)
 
     def _undefined(self, x: Floats, values: Mapping[str, Any], t: float | None) -> str:
-        """At which site H is not finite, "" if it is everywhere."""
+        """Return a message that names the first site where H is not finite, "" if there is none."""
         density = self.density(x, t if self.interface.time else None, parameters=values)
         sites = np.argwhere(~np.isfinite(density))
         if not len(sites):
@@ -805,24 +821,24 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
 
 def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
-    """Bonds as an array (bonds, 2). Raises `TypeError` and `ValueError`."""
+    """Return bonds as an array (bonds, 2). Raises `TypeError` and `ValueError`."""
     if bonds is None:
         raise TypeError("a lattice that is a graph needs its bonds=, an array (bonds, 2) of the numbers of sites")
     array = np.asarray(bonds)
-    found = array.reshape(-1, 2) if array.size == 0 else array
-    if found.ndim != 2 or found.shape[1] != 2:
-        raise ValueError(f"bonds must have shape (bonds, 2), not {found.shape}")
-    whole = found.astype(np.int64)
-    wrong = np.flatnonzero((whole != found).any(1) | (whole < 0).any(1) | (whole >= sites).any(1))
+    pairs = array.reshape(-1, 2) if array.size == 0 else array
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        raise ValueError(f"bonds must have shape (bonds, 2), not {pairs.shape}")
+    whole = pairs.astype(np.int64)
+    wrong = np.flatnonzero((whole != pairs).any(1) | (whole < 0).any(1) | (whole >= sites).any(1))
     wrong = np.append(wrong, np.flatnonzero(whole[:, 0] == whole[:, 1]))
     if len(wrong):
-        a, b = found[wrong[0]].tolist()
+        a, b = pairs[wrong[0]].tolist()
         raise ValueError(f"bond {wrong[0]} runs from {a} to {b}, not between two different sites from 0 to {sites - 1}")
     return whole
 
 
 def reduced(kind: str, densities: Floats) -> Any:
-    """A Casimir from its densities at the sites."""
+    """Return a Casimir from its densities at the sites: the densities, their sum or their product, by its kind."""
     if kind == "sites":
         return densities
     return float(densities.sum() if kind == "sum" else densities.prod())

@@ -1,4 +1,4 @@
-"""Ensembles of lattices: initial states, steps and parameters of each, as many at once as there are cores."""
+"""Ensembles of lattices whose members have their own states, steps and parameters, shared out between threads."""
 
 from __future__ import annotations
 
@@ -28,21 +28,25 @@ def ensemble(
     steps: int,
     stride: int | None,
     threads: int | None,
-    given: Mapping[str, Any],
+    parameters: Mapping[str, Any],
     t0: Floats,
     draws: Draws,
 ) -> Floats:
-    """See `LatticeSolver.ensemble`."""
-    own = {name: np.asarray(value) for name, value in given.items() if has_members(solver.interface, name, value)}
-    own |= {what: np.asarray(v) for what, v in (("the step size h", h), ("the times t0", t0)) if np.ndim(v)}
-    start = states(solver, X0, own)
+    """Return the states of `LatticeSolver.ensemble`, from arguments in the shapes that users pass."""
+    per_member = {
+        name: np.asarray(value) for name, value in parameters.items() if has_members(solver.interface, name, value)
+    }
+    per_member |= {what: np.asarray(v) for what, v in (("the step size h", h), ("the times t0", t0)) if np.ndim(v)}
+    start = states(solver, X0, per_member)
     count, steps = len(start), arguments.count(steps, "steps", 0)
     marks = row_steps(steps, max(steps, 1) if stride is None else arguments.count(stride, "stride", 1))
     begin = np.broadcast_to(t0, count).tolist()
     sizes = [arguments.step_size(size) for size in np.broadcast_to(h, count)]
-    given = {**given, **solver.defaults(given, start.shape[2:])}  # made once for all members
+    parameters = {**parameters, **solver.defaults(parameters, start.shape[2:])}  # once for all members
     values = [
-        solver.values({n: own[n][m] if n in own else v for n, v in given.items()}, {}, start.shape[2:])
+        solver.values(
+            {n: per_member[n][m] if n in per_member else v for n, v in parameters.items()}, {}, start.shape[2:]
+        )
         for m in range(count)
     ]
     frames, failures = filled(f"{len(marks)} frames of {count} members", (len(marks), *start.shape)), dict[int, str]()
@@ -61,7 +65,7 @@ def ensemble(
     most = cores() if threads is None else arguments.count(threads, "threads", 1)
     shared = solver.interface.is_shared(math.prod(start.shape[2:]))  # then each member has all threads
     in_threads(1 if shared else max(1, min(most, count)), make, range(count))
-    found = final if stride is None else frames
+    states_or_frames = final if stride is None else frames
     if failures:
         failed = tuple(sorted(failures))
         shown = ", ".join(map(str, failed[:5])) + (", …" if len(failed) > 5 else "")
@@ -69,27 +73,30 @@ def ensemble(
         message = (
             f"{solver.interface.name}: a step failed for {len(failed)} member(s) of the ensemble ({shown}): {status}"
         )
-        given = dict(zip(solver.coordinates, start[m], strict=True)) | values[m] | {"the step h": sizes[m]}
-        if wrong := solver.interface.single and arguments.beyond_single(given):
+        numbers = dict(zip(solver.coordinates, start[m], strict=True)) | values[m] | {"the step h": sizes[m]}
+        if wrong := solver.interface.single and arguments.beyond_single(numbers):
             message += f", {wrong}"
-        raise StepError(message, step=-1, status=status, trajectory=found, members=failed)
-    return found
+        raise StepError(message, step=-1, status=status, trajectory=states_or_frames, members=failed)
+    return states_or_frames
 
 
 def has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
-    """Whether a parameter has an axis of members in front of its own."""
+    """Whether the value of a parameter has an axis of members in front of its axes of sites or bonds."""
     if interface.graph and name == "bonds":
         return False
-    own = len(interface.axes) if name in interface.at_sites else 1 if name in interface.at_bonds else 0
-    return bool(np.ndim(value) == 1 + own)
+    axes = len(interface.axes) if name in interface.at_sites else 1 if name in interface.at_bonds else 0
+    return bool(np.ndim(value) == 1 + axes)
 
 
-def states(solver: LatticeSolver, X0: ArrayLike, own: Mapping[str, Any], what: str = "X0") -> Floats:
-    """The initial states (members, coordinates, *sizes), checked."""
+def states(solver: LatticeSolver, X0: ArrayLike, per_member: Mapping[str, Any], what: str = "X0") -> Floats:
+    """Return the initial states (members, coordinates, *sizes). Raises `ValueError` for other shapes.
+
+    ``per_member`` are the arguments with an axis of members; if there are any, one state may stand for all members.
+    """
     axes = 1 + len(solver.interface.axes)
     each: Iterable[Floats]
-    if np.ndim(X0) == axes and own:
-        count, each = len(next(iter(own.values()))), repeat(solver.state(X0, what))
+    if np.ndim(X0) == axes and per_member:
+        count, each = len(next(iter(per_member.values()))), repeat(solver.state(X0, what))
     elif np.ndim(X0) == 1 + axes:
         count, each = len(np.asarray(X0)), (solver.state(x, what) for x in np.asarray(X0))
     else:
@@ -97,7 +104,7 @@ def states(solver: LatticeSolver, X0: ArrayLike, own: Mapping[str, Any], what: s
     start = filled(f"the states of {count} members", (count, *np.shape(X0)[-axes:]))
     for m, x in zip(range(count), each, strict=False):
         start[m] = x
-    for name, value in own.items():
+    for name, value in per_member.items():
         if len(value) != len(start):
             raise ValueError(f"{name} has {len(value)} members, not {len(start)}")
     return start

@@ -1,4 +1,4 @@
-"""Frames of lattices, in memory or streamed to disk, and runs that make them, from checkpoints on."""
+"""Frames of lattices, in memory or in a file, and the runs that compute them, which can resume from checkpoints."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from phigen.runtime.arguments import Beginning
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 
-#: Where frames can be streamed to.
+#: Suffixes of files that frames can be written to.
 STREAMS = (".npy", ".npz")
 
 
 @dataclass
 class LatticeRun:
-    """One call of `LatticeSolver.integrate`: ``count`` frames have been made."""
+    """One call of `LatticeSolver.integrate`: frames at the steps ``marks``, of which ``count`` are complete."""
 
     solver: LatticeSolver
     at: Beginning
@@ -39,7 +39,7 @@ class LatticeRun:
     observed: list[Floats] = field(default_factory=list)
     count: int = 0
     session: Any = None
-    saved: Mapping[str, Any] = field(default_factory=dict)  # what a session of a checkpoint goes on from
+    saved: Mapping[str, Any] = field(default_factory=dict)  # arrays of the checkpoint, for `LatticeSession.resume`
 
     def complete(self, progress: Progress | None) -> int:
         """Compute the remaining frames, from a checkpoint if there is one, and return the number of all frames."""
@@ -58,7 +58,7 @@ class LatticeRun:
         return self.count
 
     def expect_place(self, *, resume: bool) -> None:
-        """Refuse to overwrite what an interrupted run left, and to go on with a complete one. Raises `ValueError`."""
+        """Raise `ValueError` if the files of an interrupted run would be overwritten, or a complete run resumed."""
         if self.checkpoints:
             refused = checkpoint.objection(self.checkpoints, self.frames.path, resume=resume, how="resume=True")
         else:
@@ -67,7 +67,7 @@ class LatticeRun:
             raise ValueError(refused)
 
     def discard(self) -> None:
-        """Leave no files of a run that failed, or that cannot be gone on with."""
+        """Remove all files of the run, if it failed or cannot be resumed."""
         self.frames.discard()
         self.forget()
 
@@ -82,7 +82,7 @@ class LatticeRun:
         self.count += 1
 
     def record(self) -> None:
-        """Add the energy and the observables of the state to those of the frames."""
+        """Append the energy and the observables of the present state to those of the frames."""
         self.energy.append(self.session.hamiltonian())
         self.observed.append(self.session.observables())
 
@@ -99,7 +99,7 @@ class LatticeRun:
             Checkpoint(self._identity(), arrays).save(self.checkpoints)
 
     def _resumed(self) -> Floats:
-        """The state to go on from."""
+        """Return the initial state, or restore the frames of a checkpoint and return its state."""
         if self.checkpoints is None or not self.checkpoints.exists():
             return self.at.x
         arrays = checkpoint.load(self.checkpoints, self._identity())
@@ -113,7 +113,7 @@ class LatticeRun:
 
 
 def identity_of(solver: LatticeSolver, at: Beginning, marks: Any) -> dict[str, Any]:
-    """Return all that decides the rows at the steps ``marks`` of an integration, as plain data."""
+    """Return everything that determines the rows of an integration at the steps ``marks``, as plain data."""
     arrays = {name: np.asarray(value) for name, value in at.values.items() if np.ndim(value)}
     numbers = {name: float(value) for name, value in at.values.items() if not np.ndim(value)}
     hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": at.x}.items()}
@@ -125,7 +125,7 @@ def identity_of(solver: LatticeSolver, at: Beginning, marks: Any) -> dict[str, A
 
 
 class Frames:
-    """Where frames go: an array in memory, or a file."""
+    """Storage of frames: an array in memory, or a file."""
 
     def __init__(self, path: Path | None, shape: tuple[int, ...]) -> None:
         self.path = path
@@ -135,7 +135,7 @@ class Frames:
 
     @property
     def array(self) -> Floats:
-        """All frames. Raises `LimitError` if they are kept in memory and do not fit."""
+        """The array of all frames. Raises `LimitError` if it does not fit into memory."""
         if self._array is None:
             if self._part is None:
                 self._array = filled(f"{self._shape[0]} frames", self._shape)
@@ -152,17 +152,17 @@ class Frames:
         return iter(self.array[:count])
 
     def flush(self) -> None:
-        """Hand over to the disk what is not there yet."""
+        """Write frames that are in memory only to the disk."""
         if isinstance(self._array, np.memmap):
             self._array.flush()
 
     def restore(self, frames: Floats | None, count: int) -> None:
-        """Go on after the first frames."""
+        """Restore the first ``count`` frames, from an array or from the file of the interrupted run."""
         if frames is not None:
             self.array[:count] = frames
         elif self._part is not None:
             try:
-                with opened(self._part):  # a pipe would be waited for
+                with opened(self._part):  # refuses pipes, on which open_memmap would wait
                     self._array = np.lib.format.open_memmap(self._part, "r+")
             except (OSError, ValueError) as error:
                 raise MismatchError(
@@ -172,11 +172,11 @@ class Frames:
                 raise MismatchError(f"{self._part} does not hold the frames of this run")
 
     def objection(self) -> str:
-        """Why a run without checkpoints may not put its frames here; "" where it may."""
+        """Return why a run without checkpoints may not write its frames here, or "" if it may."""
         return "" if self._part is None else checkpoint.objection_to_frames(self._part)
 
     def discard(self) -> None:
-        """Remove the file of a run that failed; what was mapped from it stays readable."""
+        """Remove the file of a run that failed; its frames are copied to memory and stay readable."""
         if self._part is not None and self._array is not None:
             self._array = np.array(self._array)
             self._part.unlink(missing_ok=True)
@@ -195,11 +195,11 @@ class Frames:
 
 
 def stream_path(path: str | Path) -> Path:
-    """The path of a file that frames can go to. Raises `ValueError` for any other."""
-    found = Path(path)
-    if found.suffix not in STREAMS:
+    """Return a path to which frames can be written. Raises `ValueError` for other suffixes."""
+    target = Path(path)
+    if target.suffix not in STREAMS:
         raise ValueError(f"frames are written to files that end in {' or '.join(STREAMS)}, not {str(path)!r}")
-    return found
+    return target
 
 
 def add_member(archive: zipfile.ZipFile, name: str, value: Any) -> None:

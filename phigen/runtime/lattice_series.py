@@ -1,4 +1,4 @@
-"""Runs of lattices that record numbers only: energy, sums and products of Casimirs, observables, and no frames."""
+"""Runs of lattices that record numbers in place of frames: energy, sums and products of Casimirs, observables."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from phigen.runtime.interface import LatticeInterface
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 
-#: Seconds between two checkpoints, which hold a whole state.
+#: Seconds between two checkpoints. Each writes a whole state, which for large lattices takes longer than a step.
 CHECKPOINT_SECONDS = 2.0
 
 
@@ -128,7 +128,7 @@ class SeriesRun:
         return self.series(int(self.marks[-1]))
 
     def series(self, steps: int) -> LatticeSeries:
-        """Return the series so far, whose state is that after so many steps."""
+        """Return the series recorded so far; the state of the session is that after ``steps`` steps."""
         t = np.asarray(self.at.t0 + self.at.h * self.marks[: len(self.rows)], dtype=np.float64)
         values = np.array(self.rows).reshape(len(self.rows), len(self.names))
         columns = {name: values[:, k] for k, name in enumerate(self.names)}
@@ -144,7 +144,7 @@ class SeriesRun:
         Checkpoint(self._identity(), arrays).save(self.checkpoints)
 
     def _resumed(self) -> tuple[Floats, Mapping[str, Any]]:
-        """Return the state to go on from, and the arrays of the checkpoint, if there is one."""
+        """Return the initial state and {}, or the state and the arrays of the checkpoint if there is one."""
         if self.checkpoints is None or not self.checkpoints.exists():
             return self.at.x, {}
         arrays = checkpoint.load(self.checkpoints, self._identity())
@@ -153,7 +153,7 @@ class SeriesRun:
 
 
 def _reader(session: Any, about: LatticeInterface, names: Sequence[str]) -> Callable[[], list[float]]:
-    """Return a function that reads the columns of a session; it computes what is recorded only."""
+    """Return a function that reads the columns of a session, and computes no others."""
     from phigen.runtime.lattice import reduced
 
     observed = [name for name in names if name in about.observables]

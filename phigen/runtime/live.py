@@ -1,4 +1,4 @@
-"""A trajectory in the hands of its user: he makes the steps, and may move the state between them."""
+"""Caller-driven stepping: trajectories whose user makes the steps, and may change the state between them."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 class LiveSession:
-    """A trajectory that stands somewhere; `Solver.session` makes one.
+    """A trajectory at its present state, made by `Solver.session`.
 
-    ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by name), ``attitude`` and
-    ``position`` (None without ``reconstruct``) are those of the state; `step` goes on, `kick` and setting ``x`` move
-    it. What the solver learnt on the way, and a gauge, stay; with a monitor e becomes −H of the new state. ``copy()``
-    branches; sessions can be pickled, and go on to the last bit.
+    Properties of the state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by name),
+    ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps; `kick` and assignment to ``x``
+    change the state, but neither the predictors of the solver nor a gauge. With a monitor, the energy level e becomes
+    −H of the new state. ``copy()`` returns an independent session. Pickled sessions continue with the same bits.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class LiveSession:
 
     @property
     def x(self) -> Floats:
-        """The state (DIM,), a copy; setting it moves the session there, onto the leaf of that state."""
+        """A copy of the state (DIM,). Assignment moves the session to another state, and to the leaf of that state."""
         return self._session.state()
 
     @x.setter
@@ -52,12 +52,18 @@ class LiveSession:
         self._move(self._session.place, self._checked(value, "x"))
 
     def kick(self, change: ArrayLike) -> Self:
-        """Move the state by ``change`` (DIM,), as an impulse does. Where that leaves the leaf, ``leaf`` follows."""
+        """Add ``change`` (DIM,) to the state, as an impulse does, and return the session.
+
+        If the new state is on another leaf, ``leaf`` has the Casimirs of that leaf from then on.
+        """
         self._move(self._session.kick, self._checked(change, "change"))
         return self
 
     def step(self, h: float, steps: int = 1) -> Self:
-        """Make steps of size ``h``, in τ with a monitor. Raises `StepError`, and stands before the step that failed."""
+        """Make steps of size ``h``, in τ with a monitor, and return the session.
+
+        Raises `StepError`; the session then has the state before the failing step.
+        """
         h, steps = arguments.step_size(h), arguments.count(steps, "steps", 0)
         if not self.solver.interface.monitored:
             self._clock.set_step(h, self.steps)
@@ -69,7 +75,7 @@ class LiveSession:
 
     @property
     def steps(self) -> int:
-        """Steps made since the start."""
+        """The number of steps since the start."""
         return self._session.steps
 
     @property
@@ -98,21 +104,21 @@ class LiveSession:
 
     @property
     def leaf(self) -> dict[str, float]:
-        """The Casimirs of the leaf that the session was last put on: at the start, by setting x, or by a kick."""
+        """The Casimirs of the state at the start, or after the last kick or assignment to x."""
         return self._casimirs_of(self._put)
 
     @property
     def attitude(self) -> Floats | None:
-        """A quaternion (4,) or a matrix (n, n); None without ``reconstruct``."""
-        return None if (found := self._element()[0]) is None else found[0]
+        """The attitude, a quaternion (4,) or a matrix (n, n); None without ``reconstruct``."""
+        return None if (rows := self._element()[0]) is None else rows[0]
 
     @property
     def position(self) -> Floats | None:
         """The position (3,); None without one."""
-        return None if (found := self._element()[1]) is None else found[0]
+        return None if (rows := self._element()[1]) is None else rows[0]
 
     def copy(self) -> LiveSession:
-        """An independent copy."""
+        """Return an independent copy."""
         twin = object.__new__(LiveSession)
         twin.__dict__.update(self.__dict__)
         twin.parameters, twin._session = dict(self.parameters), self._session.branch()
@@ -130,15 +136,15 @@ class LiveSession:
         return arguments.state(value, what, self.solver.interface)
 
     def _casimirs_of(self, x: Floats) -> dict[str, float]:
-        found = self.solver.casimirs(x, parameters=self.parameters)
-        return {name: float(value) for name, value in found.items()}
+        casimirs = self.solver.casimirs(x, parameters=self.parameters)
+        return {name: float(value) for name, value in casimirs.items()}
 
     def _element(self) -> tuple[Floats | None, Floats | None]:
         return turned_into(self.solver.interface, self._session.element()[np.newaxis])
 
-    def _move(self, by: Any, given: Floats) -> None:
+    def _move(self, by: Any, values: Floats) -> None:
         try:
-            by(given)
+            by(values)
         except BackendError as error:
             said = "or the monitor not positive there" if self.solver.interface.monitored else "too large"
             name = self.solver.interface.name
@@ -147,10 +153,10 @@ class LiveSession:
 
 
 class LiveLattice(LiveSession):
-    """A lattice that stands somewhere; `LatticeSolver.session` makes one.
+    """A trajectory of a lattice at its present state, made by `LatticeSolver.session`.
 
-    ``x`` has the shape (coordinates, *sizes), and Casimirs of sites have one value for each. All else is as of
-    `LiveSession`, and a step, a kick or a copy take work in proportion to the sites.
+    ``x`` has the shape (coordinates, *sizes), and Casimirs of sites have a value at each site. All else is as for
+    `LiveSession`. The cost of a step, a kick or a copy is proportional to the number of sites.
     """
 
     def __init__(self, solver: LatticeSolver, session: LatticeSession, at: Beginning) -> None:
@@ -159,7 +165,7 @@ class LiveLattice(LiveSession):
 
     @property
     def steps(self) -> int:
-        """Steps made since the start."""
+        """The number of steps since the start."""
         return self._before + self._session.steps
 
     @property
@@ -175,39 +181,39 @@ class LiveLattice(LiveSession):
         return numbers | dict(zip(about.observed_fields, session.observed_fields(), strict=True))
 
     def copy(self) -> LiveLattice:
-        """An independent copy."""
+        """Return an independent copy."""
         twin = object.__new__(LiveLattice)
         twin.__setstate__(self.__getstate__())
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = {"_session": (self._session.state(), self._lattice.saved()), "_made": self.steps}
-        return {**self.__dict__, "parameters": dict(self.parameters), "_clock": replace(self._clock), **kept}
+        session = {"_session": (self._session.state(), self._lattice.saved()), "_made": self.steps}
+        return {**self.__dict__, "parameters": dict(self.parameters), "_clock": replace(self._clock), **session}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         x, saved = state["_session"]
-        made = state.pop("_made")
+        steps = state.pop("_made")
         self.__dict__.update(state)
-        # counted from where the size of the step was set: with the same times and random numbers
+        # The restored session begins at the last change of the step size, for the same times and random numbers.
         clock, self._before = self._clock, self._clock.counted
         draws = replace(self._draws, step=self._draws.step + self._before)
         self._session = self.solver.started(Beginning(x, clock.h, self.parameters, clock.t, draws))
         if clock.h:
-            self._lattice.resume(clock.h, made - self._before, saved)
+            self._lattice.resume(clock.h, steps - self._before, saved)
 
     @property
     def _lattice(self) -> LatticeSession:
         return cast("LatticeSession", self._session)
 
     def _checked(self, value: ArrayLike, what: str) -> Floats:
-        found: Floats = self.solver.state(value, what)
-        if found.shape != self._put.shape:
-            raise ValueError(f"{what} must have shape {self._put.shape}, not {found.shape}")
-        return found
+        x: Floats = self.solver.state(value, what)
+        if x.shape != self._put.shape:
+            raise ValueError(f"{what} must have shape {self._put.shape}, not {x.shape}")
+        return x
 
     def _casimirs_of(self, x: Floats) -> dict[str, Any]:
-        found: dict[str, Any] = self.solver.casimirs(x, parameters=self.parameters)
-        return found
+        casimirs: dict[str, Any] = self.solver.casimirs(x, parameters=self.parameters)
+        return casimirs
 
     def _element(self) -> tuple[None, None]:
         return None, None

@@ -1,4 +1,4 @@
-"""Long integrations in pieces: what came after each piece can be stored, drawn or interrupted."""
+"""Long integrations in pieces, after each of which rows can be stored or drawn, and the run interrupted."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.session import Session
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: Seconds, steps and rows that a piece has at most, about.
+#: Approximate limits of a piece: seconds between reports to the user, steps, and rows held in memory.
 _SECONDS = 0.2
 _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 
 
 @dataclass(frozen=True)
 class Piece:
-    """What a piece of an integration gave: the stored steps and their states, and crossings of the section.
+    """Rows and crossings of a section from one piece of an integration.
 
-    ``numbers`` (rows,), of steps, with a fraction between two; ``x`` (rows, DIM), ``crossings`` as pairs of time and
-    state (DIM,). ``passed`` (rows,) is the physical time of each where the solver keeps it, NaN elsewhere. ``turned``
-    (rows, numbers) are their attitudes.
+    ``numbers`` (rows,) are the numbers of the steps, with a fraction for a state between two steps, and ``x`` (rows,
+    DIM) the states. ``crossings`` are pairs of time and state (DIM,). ``passed`` (rows,) is the physical time since the
+    start for steps equal in τ, else NaN. ``turned`` (rows, numbers) are attitudes and positions.
     """
 
     numbers: Floats
@@ -34,7 +34,7 @@ class Piece:
     turned: Floats
 
 
-#: The physical time of a row, and the numbers of its attitude.
+#: The physical time of a row since the start, and the numbers of its attitude and position.
 Mark = tuple[float, Floats]
 
 
@@ -48,11 +48,11 @@ def march(
     *,
     begun: bool = False,
 ) -> Iterator[Piece]:
-    """Go on with a session until ``steps`` steps of size h are made, storing every ``stride``-th state and the last.
+    """Advance a session to ``steps`` steps of size h, and yield every ``stride``-th state and the last, in pieces.
 
-    Pieces end somewhere; the rows do not depend on where. With ``see_tangent``, the derivative (DIM, DIM) of each step
-    is told; ``begun`` says that the initial state has been given before. Raises `BackendError` after a piece that ends
-    with the last good state.
+    The length of a piece depends on the speed of the machine, the rows do not. ``see_tangent`` receives the derivative
+    (DIM, DIM) of each step. ``begun`` is true if the initial state was yielded before. Raises `BackendError` after a
+    piece that ends with the state before the failing step.
     """
     size = 1
     if not begun:
@@ -63,10 +63,10 @@ def march(
         crossings: list[tuple[float, Floats]] = []
         failure = None
         try:
-            for number, states, marks, found in _states(
+            for number, states, marks, met in _states(
                 session, h, min(steps, session.steps + size), stride, finder, see_tangent
             ):
-                crossings += found
+                crossings += met
                 here = zip(states, marks, strict=False)
                 rows |= {number + k: row for k, row in enumerate(here) if (number + k) % stride == 0}
         except BackendError as error:
@@ -84,7 +84,7 @@ def march(
 
 
 def standing(session: Session, number: float) -> Piece:
-    """A piece of one row, where a session stands, so many steps from the start."""
+    """Return a piece with one row: the state of a session, ``number`` steps after the start."""
     return _piece([(session, number)], len(session.state()), len(session.element()))
 
 
@@ -105,11 +105,11 @@ def march_at(
     finder: CrossingFinder[Session] | None = None,
     see_tangent: Callable[[Floats], None] | None = None,
 ) -> Iterator[Piece]:
-    """Go on with a session, storing the states at given times after the start in place of every ``stride``-th.
+    """Advance a session to ``steps`` steps, and yield the states at given times after the start, in pieces.
 
-    Each is one further step, part of a whole one, from the session, which makes whole steps only; ``see_tangent`` is
-    told the derivatives of these. ``spans`` are those still to come; whole steps beyond the last are made without a
-    row. Raises `BackendError` after a piece.
+    The session makes whole steps. A state between two of them is a part of a step, made by a copy. ``see_tangent``
+    receives the derivatives of the whole steps. ``spans`` are the remaining times; steps after the last yield no rows.
+    Raises `BackendError` after a piece.
     """
     sizes = len(session.state()), len(session.element())
     rows: list[tuple[Session, float]] = []
@@ -123,8 +123,8 @@ def march_at(
 
     def advance(count: int) -> None:
         if finder:
-            for _, found in finder.follow(session, count, move):
-                crossings.extend(found)
+            for _, met in finder.follow(session, count, move):
+                crossings.extend(met)
         elif see_tangent:
             for _ in range(count):
                 move()
@@ -155,12 +155,15 @@ def march_at(
 def _there(
     session: Session, h: float, steps: int, span: float, advance: Callable[[int], object]
 ) -> tuple[Session, float]:
-    """A session at a time after the start, and how many steps that is; the given one makes the whole steps before."""
-    own = session.time()
-    passed = session.steps * h if np.isnan(own) else own
+    """Return a session at a time after the start, and its number of steps with a fraction.
+
+    The argument ``session`` is advanced by the whole steps before that time.
+    """
+    clock = session.time()
+    passed = session.steps * h if np.isnan(clock) else clock
     count, _ = steps_until(session, h, span - passed)
     advance(min(count, steps - session.steps))
-    left = span - (session.steps * h if np.isnan(own) else session.time())
+    left = span - (session.steps * h if np.isnan(clock) else session.time())
     if abs(left) <= EQUAL * abs(span):
         return session, float(session.steps)
     there, size = reached(session, h, left)
@@ -175,7 +178,10 @@ def _states(
     finder: CrossingFinder[Session] | None,
     see_tangent: Callable[[Floats], None] | None,
 ) -> Iterator[tuple[int, Sequence[Floats] | Floats, Sequence[Mark], list[tuple[float, Floats]]]]:
-    """The number of a step, its state and mark and those of the steps after it, and crossings; nothing is left out."""
+    """Yield the number of a step, the states and marks from that step on, and the crossings among them.
+
+    With a finder or with tangents all steps are yielded, else every ``stride``-th and the last.
+    """
     marks: list[Mark] = []
 
     def move() -> None:
@@ -186,8 +192,8 @@ def _states(
         marks.append((session.time(), session.element()))
 
     if finder:
-        for states, found in finder.follow(session, target - session.steps, move):
-            yield session.steps - len(states) + 1, states, marks, found
+        for states, met in finder.follow(session, target - session.steps, move):
+            yield session.steps - len(states) + 1, states, marks, met
             marks.clear()
         return
     done = session.steps

@@ -1,4 +1,4 @@
-"""Ensembles: what is asked for, shared out between threads, or made one by one where the code has no better way."""
+"""Ensembles: their members, and the distribution of members to threads."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 
-#: Members that one part of an ensemble has at least, a multiple of all that groups of lanes hold: so members have the
-#: same neighbours, and the same bits, however many parts there are.
-LEAST = 32
+#: The number of members in a part of an ensemble is a multiple of this, and so of every SIMD width. Then each member is
+#: in the same SIMD batch, and has the same bits, for any number of parts.
+PART_GRANULARITY = 32
 
-#: Steps of members for which one more thread repays that it is started.
-_REPAID = 20_000
+#: Steps (members × steps) of a further thread that take longer than its start.
+_STEPS_PER_THREAD = 20_000
 
-#: Members of a part, and steps of members, after which Python can deliver a keyboard interrupt.
-_MOST, _STEPS = 1024, 1 << 16
+#: Members, and steps of members, in one call of C. Python delivers keyboard interrupts between calls.
+_MEMBERS_PER_CALL, _STEPS_PER_CALL = 1024, 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """An ensemble: initial states (members, DIM), and numbers of shape (), the same for all, or (members,).
+    """An ensemble: initial states (members, DIM), and numbers of shape (), common to all members, or (members,).
 
-    ``paths`` are the members whose random numbers they take (members,), with the seed and the step of ``draws``. With a
-    ``stride`` the states after every so many steps are asked for, else the final ones.
+    ``paths`` (members,) select the random numbers of each member; their seed and first step are those of ``draws``.
+    The result is the states after every ``stride`` steps, or the final states if ``stride`` is 0.
     """
 
     x0: Floats
@@ -55,36 +55,37 @@ class Members:
         return not any(np.ndim(value) for value in (self.h, self.t0, *self.parameters.values()))
 
     def part(self, chosen: slice | NDArray[np.intp]) -> Members:
-        """Some of the members."""
+        """Return the ensemble of some of the members."""
 
-        def own(value: Floats) -> Floats:
+        def selected(value: Floats) -> Floats:
             return value[chosen] if np.ndim(value) else value
 
-        parameters = {name: own(value) for name, value in self.parameters.items()}
+        parameters = {name: selected(value) for name, value in self.parameters.items()}
         numbers: dict[str, Any] = {
-            "h": own(self.h),
+            "h": selected(self.h),
             "parameters": parameters,
-            "t0": own(self.t0),
+            "t0": selected(self.t0),
             "paths": self.paths[chosen],
         }
         return replace(self, x0=self.x0[chosen], **numbers)
 
     def numbers(self, m: int) -> tuple[float, dict[str, float], float]:
-        """The step, the parameters and the time of the start of one member."""
+        """Return the step size, the parameters and the initial time of one member."""
 
-        def own(value: Floats) -> float:
+        def of_member(value: Floats) -> float:
             return float(value[m] if np.ndim(value) else value)
 
-        return own(self.h), {name: own(value) for name, value in self.parameters.items()}, own(self.t0)
+        parameters = {name: of_member(value) for name, value in self.parameters.items()}
+        return of_member(self.h), parameters, of_member(self.t0)
 
     def frames(self) -> Floats:
-        """Room for the states that are asked for, (rows, members, DIM), with the initial ones."""
-        found = np.empty((len(row_steps(self.steps, self.stride)), *self.x0.shape))
-        found[0] = self.x0
-        return found
+        """Return an array (rows, members, DIM) for the states of the rows, with the initial states in row 0."""
+        frames = np.empty((len(row_steps(self.steps, self.stride)), *self.x0.shape))
+        frames[0] = self.x0
+        return frames
 
-    def told(self, states: Floats, failures: Mapping[int, str], step: int = -1) -> Floats:
-        """The states, or the `BackendError` that some members failed; their frames are no numbers from then on."""
+    def checked(self, states: Floats, failures: Mapping[int, str], step: int = -1) -> Floats:
+        """Return the states. Raises `BackendError` if some members failed; their later frames are NaN."""
         if not failures:
             return states
         failed = tuple(sorted(failures))
@@ -92,30 +93,37 @@ class Members:
 
 
 def cores() -> int:
-    """The processors that this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def parts(members: Members, threads: int) -> Iterator[slice]:
-    """What is integrated by one call each: enough to keep the threads busy, short enough to be interrupted."""
+    """Yield the parts of an ensemble that are integrated by one call each.
+
+    There are at least four parts for each thread, and a part is short enough for keyboard interrupts between calls.
+    """
     count = len(members)
-    size = max(_MOST, _STEPS // max(members.steps, 1) // _MOST * _MOST)
+    batches = _STEPS_PER_CALL // max(members.steps, 1) // _MEMBERS_PER_CALL
+    size = max(1, batches) * _MEMBERS_PER_CALL
     size = min(size, -(-count // (4 * threads)) if threads > 1 else size)
-    size = -(-max(size, 1) // LEAST) * LEAST
+    size = -(-max(size, 1) // PART_GRANULARITY) * PART_GRANULARITY
     return (slice(start, min(start + size, count)) for start in range(0, count, size))
 
 
 def shared_out(members: Members, threads: int | None, make: Callable[[slice], None]) -> None:
-    """Make all parts of an ensemble, in as many threads as are worth it; None for all cores."""
-    most = len(members) * members.steps // _REPAID
-    threads = max(1, min(cores() if threads is None else threads, most, -(-len(members) // LEAST)))
+    """Call ``make`` for each part of an ensemble, in at most ``threads`` threads (None: one for each core).
+
+    Short ensembles take fewer threads, since a thread must do more work than its start costs.
+    """
+    most = min(len(members) * members.steps // _STEPS_PER_THREAD, -(-len(members) // PART_GRANULARITY))
+    threads = max(1, min(cores() if threads is None else threads, most))
     in_threads(threads, make, parts(members, threads))
 
 
 def in_threads(threads: int, make: Callable[[Part], None], parts: Iterable[Part]) -> None:
-    """Make all parts, in so many threads."""
+    """Call ``make`` for each part, in ``threads`` threads."""
     if threads == 1:
         for part in parts:
             make(part)
@@ -130,7 +138,7 @@ def in_threads(threads: int, make: Callable[[Part], None], parts: Iterable[Part]
 
 
 def one_by_one(backend: Backend, members: Members, threads: int | None = 1) -> Floats:
-    """The states that are asked for, by a session for each member."""
+    """Return the final states or frames of an ensemble, from a session for each member."""
     final, failures = members.x0.copy(), dict[int, str]()
     frames = members.frames() if members.stride else None
     marks = row_steps(members.steps, members.stride or max(members.steps, 1))
@@ -153,4 +161,4 @@ def one_by_one(backend: Backend, members: Members, threads: int | None = 1) -> F
                 final[m] = error.states[-1]
 
     shared_out(members, threads, make)
-    return members.told(final if frames is None else frames, failures)
+    return members.checked(final if frames is None else frames, failures)

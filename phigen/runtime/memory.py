@@ -1,4 +1,7 @@
-"""Whether arrays over sites fit into memory, asked before they are made: Linux ends processes that find out later."""
+"""Checks that arrays over sites fit into memory, before their allocation.
+
+Linux lets a process allocate more than there is, and kills it later, when it writes to the pages.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +16,14 @@ from numpy.typing import NDArray
 
 from phigen.errors import Diagnostic, LimitError, Location
 
-#: Bytes that nobody is asked about: to find out would take longer than a step of so many sites.
+#: Bytes below which nothing is checked: to read the state of the memory takes longer than a step on such an array.
 UNASKED = 2**24
 
 _HINT = "fewer sites; frames in a file; real: float, which halves the solver; phigen.mpi on several machines"
 
 
 def expect_room(what: str, needed: int, place: Location | None = None, hint: str = _HINT) -> None:
-    """Raises `LimitError` if so many bytes are more than there can be. Where that is not known, or few, all is well."""
+    """Raise `LimitError` if ``needed`` bytes are not available; do nothing if the system does not say what is."""
     if needed <= UNASKED:
         return
     free = available()
@@ -31,24 +34,25 @@ def expect_room(what: str, needed: int, place: Location | None = None, hint: str
 
 
 def filled(what: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.float64) -> NDArray[Any]:
-    """An array of NaN. Raises `LimitError` where it does not fit, as `expect_room`.
+    """Return an array of NaN. Raises `LimitError` if it does not fit, as `expect_room` does.
 
-    It is written to at once: what ``np.empty`` promises would count as free when the next array is asked for.
+    NaN is written to all of it at once, because untouched pages of ``np.empty`` would still count as available when the
+    next array is allocated.
     """
     expect_room(what, np.dtype(dtype).itemsize * math.prod(shape))
     return np.full(shape, np.nan, dtype)
 
 
 def available() -> int | None:
-    """The bytes that this process can still have, swap space too; None where the system does not say."""
+    """Return the bytes that this process can still allocate, swap space included; None if the system does not say."""
     known = [free for free in (_of_machine(), *_of_groups()) if free is not None]
     return min(known, default=None)
 
 
 def _of_machine() -> int | None:
-    told = _table(Path("/proc/meminfo"), ":")
-    if "MemAvailable" in told:
-        return 1024 * (told["MemAvailable"] + told.get("SwapFree", 0))
+    sizes = _table(Path("/proc/meminfo"), ":")
+    if "MemAvailable" in sizes:
+        return 1024 * (sizes["MemAvailable"] + sizes.get("SwapFree", 0))
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (ValueError, OSError, AttributeError):  # no such name, or no sysconf, on this system
@@ -56,7 +60,10 @@ def _of_machine() -> int | None:
 
 
 def _of_groups(root: Path = Path("/sys/fs/cgroup")) -> Iterator[int | None]:
-    """What control groups leave: version 2, then 1. Pages of files do not count, since they can be given up."""
+    """Yield the bytes left by the limits of control groups, of version 2 and of version 1.
+
+    Cached pages of files count as available, since the system can drop them.
+    """
     for folder, limit, used, files in (
         (root, "memory.max", "memory.current", "file"),
         (root / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_cache"),
@@ -74,7 +81,7 @@ def _number(path: Path) -> int | None:
 
 
 def _table(path: Path, separator: str | None = None) -> dict[str, int]:
-    """Lines of a name and a number."""
+    """Return the numbers of a file whose lines are a name and a number; {} if it cannot be read."""
     try:
         rows = [line.split(separator, 1) for line in path.read_text().splitlines()]
         return {name: int(value.split()[0]) for name, value in rows}

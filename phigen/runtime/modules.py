@@ -1,4 +1,4 @@
-"""Generated Python modules, loaded from their source text."""
+"""Loading of generated Python modules from their source text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from types import ModuleType
 
 
 def load_module(source: str, name: str) -> ModuleType:
-    """The module of a source text; tracebacks through it show its lines."""
+    """Return the module that a source text defines; tracebacks show its lines."""
     filename = f"<phigen {name} {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
     # No modification time: linecache.checkcache leaves such entries alone.
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)

@@ -1,4 +1,4 @@
-"""What solvers of systems and of lattices tell of themselves."""
+"""Properties that solvers of ordinary systems and of lattices share: names of runs and coordinates, target, order."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ N = TypeVar("N", bound=Interface)
 
 
 class Named(Generic[B, N]):
-    """A solver over a back end of some target, with the names and the order of its interface."""
+    """Base class of solvers: a back end of some target, and the interface with its names and order."""
 
     backend: B
     interface: N
-    #: The spec that was compiled; None of a back end that was loaded without one.
+    #: The spec that was compiled; None for a back end that was loaded without one.
     spec: Spec | None = None
 
     @property
     def runs(self) -> tuple[str, ...]:
-        """Names of the runs of the spec, which `run` takes."""
+        """The names of the runs of the spec, as arguments of `run`."""
         return tuple(self.spec.runs) if self.spec else ()
 
     @property
@@ -43,5 +43,5 @@ class Named(Generic[B, N]):
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates, of a lattice those of a site."""
+        """The names of the coordinates; for a lattice, of the coordinates at one site."""
         return self.interface.coordinates

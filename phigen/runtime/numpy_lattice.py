@@ -1,4 +1,4 @@
-"""The generated NumPy module of a lattice. See `phigen.runtime.lattice`."""
+"""Back end and sessions over the generated NumPy module of a lattice. See `phigen.runtime.lattice`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from phigen.scheme.policies import StartPolicy
 
 
 class NumpyLatticeSession:
-    """What the loop of the module's ``integrate`` holds."""
+    """A session that holds the variables of the module's ``integrate``. See `phigen.runtime.lattice.LatticeSession`."""
 
     def __init__(
         self,
@@ -51,11 +51,11 @@ class NumpyLatticeSession:
         self._tell_time()
 
     def state(self) -> Floats:
-        """A copy of the state (coordinates, *sizes)."""
+        """Return a copy of the state (coordinates, *sizes)."""
         return self._x.copy()
 
     def advance(self, h: float, steps: int) -> None:
-        """Make so many steps."""
+        """Make ``steps`` steps of size ``h``."""
         self.prepare(h)
         past: dict[Any, Any] = {}
         with np.errstate(all="ignore"):
@@ -70,7 +70,7 @@ class NumpyLatticeSession:
                 self._tell_time()
 
     def advance_tangent(self, h: float, vectors: Floats, steps: int = 1) -> Floats:
-        """Make so many steps, which carry vectors along."""
+        """Make ``steps`` steps, and return the tangent ``vectors`` multiplied by their derivatives."""
         if not hasattr(self._module, "step_tangent"):
             raise MissingExtraError("step_tangent")
         self.prepare(h)
@@ -89,7 +89,7 @@ class NumpyLatticeSession:
         return np.array(carried).reshape(vectors.shape)
 
     def advance_along(self, h: float, increments: Floats) -> None:
-        """Make a step with each row of increments of the noise (steps, parts, sources, *sizes), not random ones."""
+        """Make one step for each row of the increments of the noise (steps, parts, sources, *sizes)."""
         try:
             for row in increments:
                 self._sites.given = row
@@ -98,11 +98,11 @@ class NumpyLatticeSession:
             self._sites.given = None
 
     def prepare(self, h: float) -> None:
-        """Compute what depends on the step size; raises `BackendError` if that is not finite."""
+        """Compute the coefficients that depend on the step size. Raises `BackendError` if one is not finite."""
         if h != self._h:
             try:
                 self._h, self._rows = h, self._module._coefficients(self._sites, h)
-            except ValueError:  # as of the other targets, a step from which no state is finite
+            except ValueError:  # the status of the other targets for steps after which no state is finite
                 raise BackendError("NOT_FINITE", self.steps, self._x[None].copy()) from None
             self._clock.set_step(h, self.steps)
 
@@ -112,45 +112,45 @@ class NumpyLatticeSession:
             self._sites.t = self._clock.after(self.steps)
 
     def saved(self) -> dict[str, Any]:
-        """Nothing: steps go on from the state."""
+        """Return {}: the next step depends on the state alone."""
         return {}
 
-    def resume(self, h: float, steps: int, kept: Mapping[str, Any]) -> None:
-        """Go on from what was saved."""
+    def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
+        """Continue after ``steps`` steps of size h, from the result of `saved`."""
         self.prepare(h)
         self.steps = steps
         self._tell_time()
 
     def place(self, x: Floats) -> None:
-        """Stand at ``x`` (coordinates, *sizes)."""
+        """Replace the state by ``x`` (coordinates, *sizes). Raises `BackendError` if it is not finite."""
         if not np.isfinite(x).all():
             raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy())
         self._x = np.array(x)
 
     def kick(self, change: Floats) -> None:
-        """Move the state by ``change`` (coordinates, *sizes)."""
+        """Add ``change`` (coordinates, *sizes) to the state. Raises `BackendError` if the sum is not finite."""
         with np.errstate(all="ignore"):
             self.place(self._x + change)
 
     def hamiltonian(self) -> float:
-        """H of the state."""
+        """Return H of the state."""
         return float(self.density().sum())
 
     def density(self) -> Floats:
-        """The density of H at the sites (*sizes)."""
-        with np.errstate(all="ignore"):  # what is not finite says so
+        """Return the density of H at the sites (*sizes)."""
+        with np.errstate(all="ignore"):  # non-finite values are part of the result, without warnings
             return np.asarray(self._module._energy(self._sites.parameters, self._x, self._sites)[0])
 
     def casimirs(self) -> Floats:
-        """The densities of the Casimirs (Casimirs, *sizes)."""
+        """Return the densities of the Casimirs (Casimirs, *sizes)."""
         return np.asarray(self._module._casimirs(self._sites.parameters, self._x, self._sites))
 
     def vector_field(self) -> Floats:
-        """π∇H (coordinates, *sizes)."""
+        """Return π∇H (coordinates, *sizes)."""
         return np.asarray(self._module._vector_field(self._sites.parameters, self._x, self._sites))
 
     def observables(self) -> Floats:
-        """Observables that are one number each (observables,)."""
+        """Return the observables that are one number each (observables,)."""
         if not hasattr(self._module, "_observables"):
             return np.empty(0)
         with np.errstate(all="ignore"):
@@ -158,7 +158,7 @@ class NumpyLatticeSession:
             return np.asarray(self._module._reduced(densities, self._sites))
 
     def observed_fields(self) -> Floats:
-        """Observables with a value at each site (fields, *sizes)."""
+        """Return the observables with a value at each site (fields, *sizes)."""
         if not hasattr(self._module, "_observed_fields"):
             return np.empty((0, *self._x.shape[1:]))
         with np.errstate(all="ignore"):
@@ -166,7 +166,7 @@ class NumpyLatticeSession:
 
 
 class NumpyLattice:
-    """The back end over the text of a generated module."""
+    """Back end over the text of a generated module."""
 
     target = "numpy"
 
@@ -180,17 +180,17 @@ class NumpyLattice:
 
     @property
     def identity(self) -> str:
-        """A hash of all that decides the results."""
+        """A hash of everything that determines the results."""
         return hashlib.sha256(f"{np.__version__}\n{self._text}".encode()).hexdigest()[:40]
 
     def threads(self, sites: int) -> int:
-        """Return 1: NumPy shares nothing."""
+        """Return 1: NumPy uses one thread."""
         return 1
 
     def start(
         self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
     ) -> NumpyLatticeSession:
-        """A session at x0 (coordinates, *sizes), at the time t0."""
+        """Return a session at x0 (coordinates, *sizes), at the time t0."""
         return NumpyLatticeSession(self._module, x0, parameters, t0, draws, timed=bool(self.interface.time))
 
     def pullback(
@@ -206,15 +206,15 @@ class NumpyLattice:
         """See `phigen.runtime.lattice.LatticeBackend`."""
         if not hasattr(self._module, "pullback"):
             raise MissingExtraError("pullback")
-        kept = min(steps, 2 * math.isqrt(steps)) + 2 * len(bars)
-        expect_room("the states that are kept to go back", kept * x0.nbytes)
+        stored_states = min(steps, 2 * math.isqrt(steps)) + 2 * len(bars)
+        expect_room("the stored states of the reverse pass", stored_states * x0.nbytes)
+        pulled_back: tuple[Floats, Floats, dict[str, Floats]]
         try:
-            found: tuple[Floats, Floats, dict[str, Floats]]
             when = {"t0": t0} if self.interface.time else {}
-            found = self._module.pullback(x0, h, steps, bars, stride, **when, **parameters)
+            pulled_back = self._module.pullback(x0, h, steps, bars, stride, **when, **parameters)
         except self._module.StepError as error:
             raise BackendError(error.status, error.step, error.states) from None
         except ValueError:
-            self.start(x0, parameters, t0).prepare(h)  # raises where the step, and not the start, is refused
+            self.start(x0, parameters, t0).prepare(h)  # raises `BackendError` if the reason is the step size
             raise BackendError("BAD_ARGUMENT", 0, x0[None]) from None
-        return found
+        return pulled_back

@@ -1,4 +1,4 @@
-"""Ensembles in NumPy: members side by side in the arrays of a generated module, which those leave that fail."""
+"""Ensembles in NumPy: a generated module steps all members at once, as rows of arrays; failed members are removed."""
 
 from __future__ import annotations
 
@@ -11,32 +11,35 @@ from phigen.runtime.members import Members
 
 
 def ensemble(module: Any, members: Members, gauge: Floats | None, turned: Floats | None = None) -> Floats:
-    """Final states or frames, as `phigen.runtime.backend.Backend.ensemble` has them; gauges are (members, Casimirs)."""
+    """Return final states or frames, as `phigen.runtime.backend.Backend.ensemble` does.
+
+    ``gauge`` is (members, Casimirs), None without a gauge.
+    """
     frames = members.frames() if members.stride else None
     if not len(members):
         return members.x0.copy() if frames is None else frames
-    abreast = Abreast(module, members, gauge, None if turned is None else turned[0].copy())
+    batch = MemberBatch(module, members, gauge, None if turned is None else turned[0].copy())
     if frames is not None:
         frames[1:] = np.nan
     marks = row_steps(members.steps, members.stride or max(members.steps, 1))
     for row, steps in enumerate(np.diff(marks), 1):
-        abreast.advance(int(steps))
+        batch.advance(int(steps))
         if frames is not None:
-            frames[row, abreast.who] = abreast.x
+            frames[row, batch.who] = batch.x
         if turned is not None:
             turned[row] = np.nan
-            turned[row, abreast.who] = abreast.turned[abreast.who]
+            turned[row, batch.who] = batch.turned[batch.who]
     if turned is not None and frames is None:
-        turned[-1] = abreast.turned
-    return members.told(abreast.final if frames is None else frames, abreast.failures, abreast.failed_at)
+        turned[-1] = batch.turned
+    return members.checked(batch.final if frames is None else frames, batch.failures, batch.failed_at)
 
 
-class Abreast:
-    """Members that have not failed, ``who`` and at ``x``, with what the loop of ``integrate`` holds of them.
+class MemberBatch:
+    """The members that have not failed, with the variables of the loop of the module's ``integrate``.
 
-    ``final`` is where each member came, ``turned`` with which attitude, ``failures`` tells how members failed, and
-    ``failed_at`` after how many steps the first did. With ``first`` (members, numbers) members have attitudes, and
-    begin with these.
+    ``who`` are their numbers and ``x`` their states. Of all members, ``final`` is the last state and ``turned`` the
+    last attitude. ``failures`` maps failed members to their status; ``failed_at`` is the number of steps before the
+    first failure. ``first`` (members, numbers) are initial attitudes, None if the spec has none.
     """
 
     def __init__(self, module: Any, members: Members, gauge: Floats | None, first: Floats | None) -> None:
@@ -52,10 +55,10 @@ class Abreast:
             still = module._identity(len(members))
             self._rate, self._turned = module._rates(values, self.x, gauge), (still, np.zeros_like(still))
             self.turned = first.copy()
-        self._look()
+        self._select_settings()
 
     def advance(self, steps: int) -> None:
-        """Make so many steps. One in which members fail is made again without them."""
+        """Make ``steps`` steps. A step in which members fail is repeated without them."""
         with np.errstate(all="ignore"):
             while steps and len(self.who):
                 failed = self._step()
@@ -63,35 +66,35 @@ class Abreast:
                     self._leave(failed)
                 else:
                     steps -= 1
-        self._tell()
+        self._report()
 
-    def _tell(self) -> None:
-        """Where those who are left are now."""
+    def _report(self) -> None:
+        """Copy states and attitudes of the remaining members to ``final`` and ``turned``."""
         self.final[self.who] = self.x
         if self._first is not None:
             elapsed = self._done * self._h
             elapsed = elapsed[:, np.newaxis] if np.ndim(elapsed) else elapsed
             self.turned[self.who] = self._module._attitude(self._first, self._turned[0], self._rate, elapsed)
 
-    def _look(self) -> None:
-        """What of the steps depends on who is left: their sizes, the times of the start, the random numbers."""
+    def _select_settings(self) -> None:
+        """Select the step sizes, initial times and random numbers of the remaining members."""
         left, draws = self._members.part(self.who), self._members.draws
         self._h, self._t0 = left.h[()], left.t0[()]
         if hasattr(self._module, "_drawing"):
             self._drawn = self._module._drawing(self._h, len(left), draws.seed, left.paths, draws.step)
 
     def _of_step(self) -> tuple[Any, ...]:
-        """What stages of the next step depend on, beside the state."""
+        """Return the arguments of the next step's stages beside the state: time, step size and noise."""
         now = self._t0 + self._done * self._h, self._h
         return (*now, self._drawn(self._done)) if hasattr(self._module, "_drawing") else now
 
     def _step(self) -> dict[int, str]:
-        """One step of all; or, where some fail in a stage, none, and by their places among ``who`` how they do."""
+        """Make one step of all members, or none if some fail; return the status of the failed by place in ``who``."""
         module, memory = self._module, list(self._memory)
         x, carry, turned = self.x, self._carry, self._turned
-        own = self._of_step() if hasattr(module, "_renewed") else ()
+        of_step = self._of_step() if hasattr(module, "_renewed") else ()
         for k, prepared in enumerate(self._stages):
-            stage = module._renewed(prepared, *own) if own else prepared
+            stage = module._renewed(prepared, *of_step) if of_step else prepared
             before = stage, x, carry
             x, carry, memory[k], status = module._advance(stage, x, carry, memory[k])
             if hasattr(module, "_time_of"):
@@ -107,15 +110,15 @@ class Abreast:
         return {}
 
     def _leave(self, failed: dict[int, str]) -> None:
-        """Who is left keeps all that it had, guesses too: so its bits are those that it has without the others."""
-        kept = np.delete(np.arange(len(self.who)), list(failed))
-        self._tell()
+        """Remove failed members. The others keep their predictors too, so that their bits do not change."""
+        remaining = np.delete(np.arange(len(self.who)), list(failed))
+        self._report()
         self.failures |= {int(self.who[m]): status for m, status in failed.items()}
         self.failed_at = self._done if self.failed_at < 0 else self.failed_at
-        self.who, self.x, self._carry = self.who[kept], self.x[kept], self._carry[kept]
-        self._memory = [(a[kept], b[kept]) for a, b in self._memory]
-        self._stages = [self._module._stage_at(stage, kept) for stage in self._stages]
+        self.who, self.x, self._carry = self.who[remaining], self.x[remaining], self._carry[remaining]
+        self._memory = [(a[remaining], b[remaining]) for a, b in self._memory]
+        self._stages = [self._module._stage_at(stage, remaining) for stage in self._stages]
         if self._first is not None:
-            self._first, self._turned = self._first[kept], (self._turned[0][kept], self._turned[1][kept])
-            self._rate = None if self._rate is None else self._rate[kept]
-        self._look()
+            self._first, self._turned = self._first[remaining], (self._turned[0][remaining], self._turned[1][remaining])
+            self._rate = None if self._rate is None else self._rate[remaining]
+        self._select_settings()

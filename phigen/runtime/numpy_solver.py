@@ -1,8 +1,9 @@
-"""A generated NumPy module, loaded from its source text.
+"""Back end and sessions over a generated NumPy module, loaded from its source text.
 
-Beside the documented functions, sessions use the parts of ``integrate``: ``_values``, ``_admissible``,
-``_coefficients``, ``_renewed`` where there is a time, ``_advance``, with tangents ``_tangent_stage``, with a monitor
-``_time_of``, and with attitudes what ``reconstruct`` uses; so do ensembles, see `phigen.runtime.numpy_members`.
+Sessions call the functions that the module's ``integrate`` consists of: ``_values``, ``_admissible``,
+``_coefficients``, ``_advance``; ``_renewed`` if the Hamiltonian depends on the time, ``_tangent_stage`` with tangents,
+``_time_of`` with a monitor, and those of ``reconstruct`` with attitudes. Ensembles do too, see
+`phigen.runtime.numpy_members`.
 """
 
 from __future__ import annotations
@@ -28,16 +29,19 @@ from phigen.runtime.numpy_lattice import NumpyLattice
 from phigen.runtime.numpy_members import ensemble
 
 Pair = tuple[Floats, Floats]
-#: Coefficients, parameters and step of a stage, and its time where there is one: passed on to the module.
+#: Coefficients, parameters and step of a stage, and its time if there is one. Only the module reads them.
 Stage = tuple[Any, ...]
 
-#: A stage, its start (state and carry), and what it solved for.
-Made = tuple[Stage, Floats, Floats, Floats]
+#: A completed stage: the stage, the state and the compensation term at its start, and the solution of its equation.
+CompletedStage = tuple[Stage, Floats, Floats, Floats]
 
 
-class Turned(NamedTuple):
-    """An attitude on its way: the element it began with, and when; the product of all steps, what rounding took of
-    that, and the rate of Casimirs."""
+class AttitudeState(NamedTuple):
+    """Attitude of a session.
+
+    ``first`` is the group element at the time ``begun``, ``element`` the product of the increments of all steps since
+    then, ``lost`` its compensation term, and ``rate`` the rotation that the gauge adds per unit of time.
+    """
 
     first: Floats
     begun: float
@@ -46,19 +50,19 @@ class Turned(NamedTuple):
     rate: Floats | None
 
     def arrays(self) -> dict[str, Any]:
-        """What a session saves."""
+        """Return the arrays by which a session is saved."""
         rate = np.empty(0) if self.rate is None else self.rate
         return {"first": self.first, "begun": self.begun, "element": self.element, "lost": self.lost, "rate": rate}
 
     @classmethod
-    def from_arrays(cls, stored: Mapping[str, Any]) -> Turned:
-        """The inverse of `arrays`."""
+    def from_arrays(cls, stored: Mapping[str, Any]) -> AttitudeState:
+        """Return the attitude that `arrays` stored."""
         rate = stored["rate"] if stored["rate"].size else None
         return cls(stored["first"], float(stored["begun"]), stored["element"], stored["lost"], rate)
 
 
 class NumpySession:
-    """What the loop of the module's ``integrate`` holds. See `phigen.runtime.session.Session`."""
+    """A session that holds the variables of the module's ``integrate``. See `phigen.runtime.session.Session`."""
 
     def __init__(
         self,
@@ -71,16 +75,17 @@ class NumpySession:
         draws: Draws = FIRST_DRAWS,
     ) -> None:
         self.steps, self._draws = 0, draws
-        # The time and the steps when the size of the step was set: the time is counted from there, without adding up.
+        # Time and number of steps at the last change of the step size. The time is a multiple of h from there, so that
+        # rounding errors do not accumulate.
         self._t, self._counted = t0, 0
         self._module, self._parameters, self._gauge = module, parameters, gauge
         self._renewed = hasattr(module, "_renewed")
         self._x, self._carry = x, carry
-        self._passed = (np.zeros(len(x)),) * 2  # physical time, where steps are equal in tau, and its carry
+        self._passed = (np.zeros(len(x)),) * 2  # for steps equal in tau: physical time and its compensation term
         self._h = np.nan
         self._stages: list[Stage] = []
         self._memory: list[Pair] = []
-        self._turned: Turned | None = None
+        self._turned: AttitudeState | None = None
 
     def state(self) -> Floats:
         """See `Session`."""
@@ -110,7 +115,7 @@ class NumpySession:
         self._stand(*self._module._sum(self._x, self._carry, change[np.newaxis]))
 
     def _stand(self, x: Floats, carry: Floats) -> None:
-        """Guesses, which are offsets from the state, move with it."""
+        """Replace the state and its compensation term. Predictors are offsets from the state, and stay as they are."""
         monitored = hasattr(self._module, "_refused")
         if not np.isfinite(x).all() or (monitored and len(self._module._refused(self._values(), x))):
             raise BackendError("BAD_ARGUMENT", self.steps, self._x.copy())
@@ -119,7 +124,7 @@ class NumpySession:
         if monitored:  # e = -H
             self._gauge = self._module.gauge(x[0], **self._parameters)
             if np.isfinite(self._h):
-                self._stages = self._made_stages()
+                self._stages = self._new_stages()
         if element is not None:
             if hasattr(self._module, "_quaternions"):
                 element[:4] /= np.sqrt(element[:4] @ element[:4])
@@ -137,12 +142,12 @@ class NumpySession:
         return np.array(self._module._attitude(turned.first, turned.element, turned.rate, elapsed)[0])
 
     def turn_from(self, first: Floats | None) -> None:
-        """Follow the attitude, from an element at the present state; None for the identity."""
+        """Set the attitude at the present state to a group element; None for the identity."""
         values, still = self._values(), self._module._identity(1)
         gauge = None if self._gauge is None else np.broadcast_to(self._gauge, (1, len(self._module.GAUGE)))
         rate = self._module._rates(values, self._x, gauge)
         begun = still if first is None else first[np.newaxis]
-        self._turned = Turned(begun, self._now(), still, np.zeros_like(still), rate)
+        self._turned = AttitudeState(begun, self._now(), still, np.zeros_like(still), rate)
 
     def advance(self, h: float, steps: int) -> None:
         """See `Session`."""
@@ -167,8 +172,8 @@ class NumpySession:
         with np.errstate(all="ignore"):
             x, carry, memory, stages = self._tried()
             for arguments in stages:
-                stage, found = self._module._tangent_stage(*arguments)
-                if not (found.all() and np.isfinite(stage).all()):
+                stage, converged = self._module._tangent_stage(*arguments)
+                if not (converged.all() and np.isfinite(stage).all()):
                     raise BackendError("NO_CONVERGENCE", self.steps, self._x.copy())
                 tangent = stage[0] @ tangent
         self._commit(x, carry, memory, stages)
@@ -176,8 +181,8 @@ class NumpySession:
 
     def branch(self) -> NumpySession:
         """See `Session`."""
-        own = self._module, self._parameters, self._x, self._carry, self._gauge, self._t, self._draws
-        twin = NumpySession(*own)
+        state = self._x, self._carry, self._gauge, self._t, self._draws
+        twin = NumpySession(self._module, self._parameters, *state)
         twin._counted, twin._passed = self._counted, self._passed
         twin.steps, twin._h, twin._stages, twin._memory = self.steps, self._h, self._stages, list(self._memory)
         twin._turned = self._turned
@@ -198,13 +203,13 @@ class NumpySession:
 
     @classmethod
     def from_bytes(cls, module: Any, parameters: Mapping[str, float], saved: bytes) -> NumpySession:
-        """The session whose `saved` bytes these are."""
+        """Return the session that `saved` stored as these bytes."""
         with np.load(io.BytesIO(saved)) as stored:
             gauge = stored["gauge"] if stored["gauge"].size else None
             draws = Draws(*stored["draws"].tolist())
             session = cls(module, parameters, stored["x"], stored["carry"], gauge, draws=draws)
             session.steps = int(stored["steps"])
-            session._turned = Turned.from_arrays(stored) if "first" in stored else None
+            session._turned = AttitudeState.from_arrays(stored) if "first" in stored else None
             if np.isfinite(stored["h"]):
                 session._prepare(float(stored["h"]))
                 session._memory = [(pair[0], pair[1]) for pair in stored["memory"]]
@@ -213,35 +218,38 @@ class NumpySession:
         return session
 
     def _now(self) -> float:
-        """The time of the state."""
+        """Return the time of the state."""
         return self._t + (self.steps - self._counted) * self._h if self.steps > self._counted else self._t
 
     def _prepare(self, h: float) -> None:
         if h != self._h:
             self._t, self._counted = self._now(), self.steps
             self._h = h
-            self._stages = self._made_stages()
+            self._stages = self._new_stages()
             self._memory = [(np.zeros_like(self._x),) * 2] * len(self._stages)
 
-    def _made_stages(self) -> list[Stage]:
+    def _new_stages(self) -> list[Stage]:
         with np.errstate(all="ignore"):
             stages: list[Stage] = self._module._coefficients(self._values(), self._x, self._h, self._gauge)
             return stages
 
     def _of_step(self, increments: Floats | None) -> tuple[Any, ...]:
-        """What stages of the next step depend on: its time, its size, and the noise, random or that given."""
+        """Return the arguments of the next step's stages: time, step size and noise (``increments``, else random)."""
         if not hasattr(self._module, "_drawing"):
             return self._now(), self._h
-        draws, given = self._draws, None if increments is None else increments[np.newaxis]
-        drawn = self._module._drawing(self._h, 1, draws.seed, draws.member, draws.step, given)
+        draws, prescribed = self._draws, None if increments is None else increments[np.newaxis]
+        drawn = self._module._drawing(self._h, 1, draws.seed, draws.member, draws.step, prescribed)
         return self._now(), self._h, drawn(0 if increments is not None else self.steps)
 
-    def _tried(self, increments: Floats | None = None) -> tuple[Floats, Floats, list[Pair], list[Made]]:
-        """State, carry and memory after one step, and of each stage: itself, its start and what it solved for."""
+    def _tried(self, increments: Floats | None = None) -> tuple[Floats, Floats, list[Pair], list[CompletedStage]]:
+        """Return state, compensation term and predictors after one step, and its completed stages.
+
+        The session does not change. Raises `BackendError`.
+        """
         x, carry, memory, stages = self._x, self._carry, list(self._memory), []
-        own = self._of_step(increments) if self._renewed else ()
+        of_step = self._of_step(increments) if self._renewed else ()
         for k, prepared in enumerate(self._stages):
-            stage = self._module._renewed(prepared, *own) if own else prepared
+            stage = self._module._renewed(prepared, *of_step) if of_step else prepared
             before = stage, x, carry
             x, carry, memory[k], status = self._module._advance(stage, x, carry, memory[k])
             if status[0] != "":
@@ -249,7 +257,7 @@ class NumpySession:
             stages.append((*before, memory[k][0]))
         return x, carry, memory, stages
 
-    def _commit(self, x: Floats, carry: Floats, memory: list[Pair], stages: list[Made]) -> None:
+    def _commit(self, x: Floats, carry: Floats, memory: list[Pair], stages: list[CompletedStage]) -> None:
         if hasattr(self._module, "_time_of"):
             passed = self._passed
             for stage, start, _, value in stages:
@@ -260,15 +268,15 @@ class NumpySession:
             self._passed = passed
         if self._turned is not None:
             element, lost = self._turned.element, self._turned.lost
-            for made in stages:
-                element, lost = self._module._turn_stage(*made, element, lost)
+            for completed in stages:
+                element, lost = self._module._turn_stage(*completed, element, lost)
             self._turned = self._turned._replace(element=element, lost=lost)
         self._x, self._carry, self._memory = x, carry, memory
         self.steps += 1
 
 
 class NumpySolver:
-    """The back end over a generated module, loaded from its text; needs no compiler, and makes an ensemble one call."""
+    """Back end over a generated module, loaded from its text. It needs no compiler, and batches ensembles."""
 
     target = "numpy"
 
@@ -321,20 +329,20 @@ class NumpySolver:
         """See `phigen.runtime.backend.Backend`."""
         if not hasattr(self.module, "pullback"):
             raise MissingExtraError("pullback")
-        x0, own = members.x0, members.parameters
-        self._expect_admissible(x0, own)
+        x0, parameters = members.x0, members.parameters
+        self._expect_admissible(x0, parameters)
         if not len(members):
             return np.empty_like(bars), np.empty_like(x0), np.empty((len(self.interface.parameters), 0))
         options: dict[str, Any] = {"t0": members.t0} if self.interface.time else {}
         options |= {"gauge": self._gauge} if self._gauge is not None else {}
         try:
-            given = x0, members.h, members.steps, bars, members.stride
-            rows, x0_bar, found = self.module.pullback(*given, **options, **own)
+            start = x0, members.h, members.steps, bars, members.stride
+            rows, x0_bar, parameter_bars = self.module.pullback(*start, **options, **parameters)
         except self.module.StepError as error:
             raise BackendError(
                 str(error.status), int(error.step), np.asarray(error.states)[-1], error.members
             ) from error
-        slopes = [np.asarray(found[name], dtype=np.float64) for name in self.interface.parameters]
+        slopes = [np.asarray(parameter_bars[name], dtype=np.float64) for name in self.interface.parameters]
         return rows, x0_bar, np.array(slopes).reshape(len(slopes), len(x0))
 
     def _expect_admissible(self, x0: Floats, parameters: Mapping[str, Any]) -> None:
@@ -344,7 +352,7 @@ class NumpySolver:
             raise BackendError("BAD_ARGUMENT", 0, x0, tuple(refused) or tuple(range(len(x0))))
 
     def _gauges(self, x0: Floats, parameters: Mapping[str, Any]) -> Floats | None:
-        """The gauge of each member, None where there is no gauge."""
+        """Return the gauge of each member (members, Casimirs of the gauge), None if there is no gauge."""
         if not self.module.GAUGE:
             return None
         chosen = self.module.gauge(x0, **parameters) if self._gauge is None else self._gauge
@@ -378,12 +386,12 @@ class NumpySolver:
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        found: Floats = self.module._monitor(self.module._values(parameters), x)[:, 0]
-        return found
+        rates: Floats = self.module._monitor(self.module._values(parameters), x)[:, 0]
+        return rates
 
 
 def load(files: Mapping[str, str], interface: Interface) -> NumpySolver | NumpyLattice:
-    """The back end of generated files; see `phigen.registry`."""
+    """Return the back end of generated files; see `phigen.registry`."""
     if isinstance(interface, LatticeInterface):
         return NumpyLattice(files, interface)
     return NumpySolver(files[f"{interface.name}.py"], interface)

@@ -1,4 +1,4 @@
-"""A session whose failing steps are made in parts, where that was asked for."""
+"""Sessions that repeat a failing step in several smaller steps, for the argument ``retry``."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from phigen.runtime.session import Followed
 
 
 class Retrying:
-    """A course (`phigen.runtime.session.Followed`) that makes a failing step in 2, 4, …, 2^``most`` equal parts.
+    """A `phigen.runtime.session.Followed` that repeats a failing step in 2, 4, …, 2^``most`` equal parts.
 
-    Each part is a step of the method: a Poisson map that stays on the leaf. But the whole is another map than the steps
-    that did not fail; ``retried`` are their numbers. ``steps`` counts whole steps.
+    Each part is a step of the method: a Poisson map that stays on the leaf. The product of the parts is a different
+    map from a whole step; ``retried`` lists the numbers of the steps made in parts. ``steps`` counts whole steps.
     """
 
     def __init__(self, session: Followed, most: int) -> None:
         self.session, self.most = session, most
         self.retried: list[int] = []
-        self._more = 0  # steps of the session beyond one for each step
+        self._extra = 0  # steps of the session minus whole steps: a step in n parts adds n - 1
 
     @property
     def steps(self) -> int:
-        """Good steps since the start."""
-        return self.session.steps - self._more
+        """The number of successful whole steps since the start."""
+        return self.session.steps - self._extra
 
     def state(self) -> Floats:
         """A copy of the state (DIM,)."""
@@ -41,7 +41,7 @@ class Retrying:
         return self.session.element()
 
     def advance(self, h: float, steps: int) -> None:
-        """Make so many steps."""
+        """Make ``steps`` whole steps; raises `BackendError` if one fails in every number of parts."""
         target = self.steps + steps
         while self.steps < target:
             try:
@@ -50,9 +50,9 @@ class Retrying:
                 self._make_parts(h, error)
 
     def branch(self) -> Retrying:
-        """An independent copy."""
+        """Return an independent copy."""
         twin = Retrying(self.session.branch(), self.most)
-        twin.retried, twin._more = list(self.retried), self._more
+        twin.retried, twin._extra = list(self.retried), self._extra
         return twin
 
     def _make_parts(self, h: float, error: BackendError) -> None:
@@ -63,7 +63,7 @@ class Retrying:
                 copy.advance(h / 2**k, 2**k)
             except BackendError:
                 continue
-            self.session, self._more = copy, self._more + 2**k - 1
+            self.session, self._extra = copy, self._extra + 2**k - 1
             self.retried.append(step)
             return
         raise error

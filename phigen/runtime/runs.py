@@ -24,7 +24,7 @@ from phigen.spec.runs import with_step
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a run that a caller gives in place of those of the spec; None keeps the spec's."""
+    """Settings of a run that replace those of the spec; None leaves the setting of the spec."""
 
     step: float | None = None
     steps: int | None = None

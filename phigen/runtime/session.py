@@ -1,4 +1,4 @@
-"""A solver on its way along one trajectory, step by step."""
+"""Protocols of sessions: one trajectory that is computed step by step."""
 
 from __future__ import annotations
 
@@ -9,89 +9,92 @@ import numpy as np
 
 from phigen.runtime.interface import BackendError, Floats, Progress, row_steps
 
-#: How often `rows_along` tells about its progress, at most.
+#: Largest number of progress reports of `rows_along`, so that reports cost nothing beside the steps.
 _REPORTS = 200
 
 
 class Course(Protocol):
-    """A trajectory being computed, by whatever method: its state, and all that the next step depends on.
+    """A trajectory being computed by any method: its state, and everything that the next step depends on.
 
     A failing step raises `BackendError` and leaves the state before it.
     """
 
     @property
     def steps(self) -> int:
-        """Good steps since the start."""
+        """The number of successful steps since the start."""
         ...
 
     def state(self) -> Floats:
-        """A copy of the state (DIM,)."""
+        """Return a copy of the state (DIM,)."""
         ...
 
     def advance(self, h: float, steps: int) -> None:
-        """Make so many steps."""
+        """Make ``steps`` steps of size ``h``."""
         ...
 
     def branch(self) -> Self:
-        """An independent copy."""
+        """Return an independent copy."""
         ...
 
 
 class Followed(Course, Protocol):
-    """A trajectory of a generated solver, with the time and the attitude that it keeps."""
+    """A `Course` of a generated solver, which also has a time and an attitude."""
 
     @property
     def rounding(self) -> float:
-        """The spacing of the numbers it computes with, beside 1."""
+        """The machine epsilon of the solver's numbers: the distance from 1 to the next larger number."""
         ...
 
     def time(self) -> float:
-        """The physical time since the start, where steps are equal in τ and the solver keeps it; NaN elsewhere."""
+        """Return the physical time since the start for steps equal in τ, which the solver sums up; else NaN."""
         ...
 
     def element(self) -> Floats:
-        """A copy of the numbers of the attitude, and of the position; none if they are not followed."""
+        """Return a copy of the numbers of the attitude and of the position; empty if the spec has none."""
         ...
 
 
 class Session(Followed, Protocol):
     """A trajectory being computed by a generated solver.
 
-    Steps are those of one integration, to the last bit, however they are split into calls.
+    The states have the same bits however the steps are divided into calls.
     """
 
     def advance_along(self, h: float, increments: Floats) -> None:
-        """Make a step with each row of increments of the noise (steps, draws), in place of random ones."""
+        """Make one step for each row of the increments of the noise (steps, draws), which replace random ones."""
         ...
 
     def advance_tangent(self, h: float) -> Floats:
-        """Make one step; its derivative (DIM, DIM). Raises `MissingExtraError` without the extra ``tangent``."""
+        """Make one step, and return its derivative (DIM, DIM).
+
+        Raises `MissingExtraError` without the extra ``tangent``.
+        """
         ...
 
     def placed(self, x: Floats) -> Self:
-        """A copy of a session that stands at its start, moved to ``x`` (DIM,): what it holds fixed stays."""
+        """Return a copy of a session that is at its start, with the state ``x`` (DIM,) and the same gauge."""
         ...
 
     def place(self, x: Floats) -> None:
-        """Stand at ``x`` (DIM,), with all else as it is; raises `BackendError` where that is not allowed."""
+        """Replace the state by ``x`` (DIM,), and nothing else; raises `BackendError` if ``x`` is not admissible."""
         ...
 
     def kick(self, change: Floats) -> None:
-        """Move the state by ``change`` (DIM,), else as `place`."""
+        """Add ``change`` (DIM,) to the state; else as `place`."""
         ...
 
     def saved(self) -> bytes:
-        """All there is to know, for `Backend.restored`."""
+        """Return the session as bytes, for `Backend.restored`."""
         ...
 
 
 def rows_along(
     session: Course, h: float, steps: int, stride: int, progress: Progress | None, see: Callable[[int], object] = id
 ) -> Floats:
-    """States (rows, DIM) after 0, stride, 2·stride, … steps and the last, of a session that stands at its start.
+    """Return the states (rows, DIM) after 0, stride, 2·stride, … steps and the last, of a session at its start.
 
-    ``see`` is told the number of each row when the session stands there. Raises `BackendError`, whose rows end with
-    the last good state.
+    ``see`` is called with the number of each row while the session is at that row. Raises `BackendError`, whose rows
+    end with the state before the failing step.
     """
     marks = row_steps(steps, stride)
     start = session.state()
@@ -104,11 +107,11 @@ def rows_along(
             session.advance(h, mark - session.steps)
         except BackendError as error:
             good = session.steps
-            kept = states[: len(row_steps(good, stride))].copy()
+            complete_rows = states[: len(row_steps(good, stride))].copy()
             # The last row of a trajectory is its last state, whether or not a stride ends there.
-            kept[-1] = session.state()
-            see(len(kept) - 1)
-            raise BackendError(error.status, good, kept) from error
+            complete_rows[-1] = session.state()
+            see(len(complete_rows) - 1)
+            raise BackendError(error.status, good, complete_rows) from error
         states[row] = session.state()
         see(row)
         if progress and (mark - reported >= report_every or mark == steps):

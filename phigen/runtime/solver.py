@@ -1,4 +1,4 @@
-"""The solver users hold: checked arguments in, trajectories out, whatever the back end."""
+"""Solvers of ordinary systems: they check arguments, call a back end, and return trajectories."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from phigen.runtime import arguments, gradients, runs
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.backend import Backend
 from phigen.runtime.crossings import SIGNS, CrossingFinder, Function, Section
-from phigen.runtime.given import Given
 from phigen.runtime.gradients import Jacobian, Pullback
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 from phigen.runtime.live import LiveSession
 from phigen.runtime.members import Members
 from phigen.runtime.named import Named
+from phigen.runtime.prescribed_noise import PrescribedNoise
 from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Followed, Session, rows_along
 from phigen.runtime.timed import along_until, states_at
@@ -38,9 +38,11 @@ _ADVICE = {
 
 @dataclass(frozen=True)
 class Marks:
-    """Where the rows of a trajectory are: in τ, and in the time that has ``passed`` if steps are equal in τ.
+    """Values at the rows of a trajectory beside the states.
 
-    ``turned`` are the numbers of their attitudes and positions.
+    ``tau`` (rows,) are the times from the start in τ, ``passed`` (rows,) the physical times from the start if steps are
+    equal in τ, ``turned`` (rows, numbers) the values of attitudes and positions. ``steps`` is the number of all steps,
+    ``retried`` are the numbers of those made in parts.
     """
 
     tau: Floats
@@ -53,11 +55,11 @@ class Marks:
 class Solver(Named[Backend, Interface]):
     """A compiled system: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, mass=2)``.
 
-    Parameters of the system are keyword arguments; where a name clashes with an argument, or to pass many, give
-    ``parameters={…}``. What is not given has its default of the spec. Wrong arguments raise `ValueError` or
-    `TypeError`, a step that cannot be made `phigen.StepError`, parameters with which no step can be made, such as a
-    zero that something is divided by, `phigen.ParameterError`, which is both. Safe to use from several threads.
-    Solvers can be copied and pickled; compiled C is compiled again where the cache does not have it.
+    Parameters of the system are keyword arguments, or entries of ``parameters={…}``, which also takes names that clash
+    with other arguments. Parameters that are not passed have their defaults of the spec. Wrong arguments raise
+    `ValueError` or `TypeError`, and a failing step `phigen.StepError`. Parameters with which no step is possible, such
+    as a zero divisor, raise `phigen.ParameterError`, which is a `ValueError` and a `StepError`. Several threads may use
+    a solver. Solvers can be copied and pickled; C that is not in the cache is then compiled again.
     """
 
     def __init__(self, backend: Backend, interface: Interface, spec: Spec | None = None) -> None:
@@ -91,14 +93,14 @@ class Solver(Named[Backend, Interface]):
     ) -> Trajectory:
         """Make ``steps`` steps of size ``h`` from ``x0`` (DIM,), storing every ``stride``-th state and the last.
 
-        A negative ``h`` goes back in time. ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on
-        the time. With ``until`` in place of ``steps``, the last step is the part of one that ends at that time. A step
-        that fails is made in 2, 4, …, 2**retry equal parts; then it is another map than the others, as Poisson as they
-        are, on the same leaf. ``attitude0`` and ``position0`` are those at the start, the identity and the origin by
-        default, for systems that reconstruct them. With noise, the random numbers are a function of ``seed``,
-        ``member`` and the number of the step, which begins with ``step0``, all 0 by default; ``increments`` (steps,
-        draws) takes their place. ``progress`` is called now and then with the number of steps done.
-        Raises `StepError`, whose ``trajectory`` ends with the state before the failing step.
+        A negative ``h`` integrates backwards in time. ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that
+        depend on the time. With ``until`` in place of ``steps``, the last step is shortened to end at that time. A
+        failing step is repeated in 2, 4, …, 2**retry equal parts; this is a different map, which is Poisson too and
+        stays on the same leaf. ``attitude0`` and ``position0`` are initial values for systems that reconstruct them,
+        by default the identity and the origin. With noise, the random numbers are a function of ``seed``, ``member``
+        and the number of the step, which begins with ``step0``, all 0 by default; ``increments`` (steps, draws)
+        replaces them. ``progress`` is called from time to time with the number of steps done. Raises `StepError`, whose
+        ``trajectory`` ends with the state before the failing step.
         """
         drawn = {"seed": seed, "member": member, "step0": step0}
         at = self._beginning(x0, "x0", h, parameters, more, t0, drawn, (attitude0, position0))
@@ -108,17 +110,17 @@ class Solver(Named[Backend, Interface]):
         session = self._started(at)
         followed: Followed = session
         if increments is not None:
-            given = arguments.increments(increments, self.interface)
-            followed, steps = Given(session, given), len(given) if steps is None else steps
-            if steps > len(given) or until is not None:
-                raise ValueError(f"increments are those of {len(given)} steps")
+            rows = arguments.increments(increments, self.interface)
+            followed, steps = PrescribedNoise(session, rows), len(rows) if steps is None else steps
+            if steps > len(rows) or until is not None:
+                raise ValueError(f"increments are those of {len(rows)} steps")
         course = Retrying(followed, retry)
         passed, elements = dict[int, float](), dict[int, Floats]()
 
         def see(row: int) -> None:
             passed[row], elements[row] = course.time(), course.element()
 
-        def made(states: Floats, done: int) -> Trajectory:
+        def trajectory(states: Floats, done: int) -> Trajectory:
             tau: Floats = at.h * row_steps(done, stride).astype(np.float64)
             turned = np.array(list(elements.values()))
             marks = Marks(tau, np.array(list(passed.values())), turned, done, tuple(course.retried))
@@ -134,8 +136,8 @@ class Solver(Named[Backend, Interface]):
         try:
             states = rows_along(course, at.h, steps, stride, progress, see)
         except BackendError as error:
-            raise self.failure(error, at.h, made(error.states, error.step), at.values) from error
-        return made(states, steps)
+            raise self.failure(error, at.h, trajectory(error.states, error.step), at.values) from error
+        return trajectory(states, steps)
 
     def run(
         self,
@@ -154,10 +156,10 @@ class Solver(Named[Backend, Interface]):
     ) -> Trajectory:
         """Integrate a run of the spec, the first by default, and return what `integrate` returns.
 
-        Arguments take the place of the settings of the spec: the start ``x0`` (DIM,), the ``step``, the number of
-        ``steps`` or the time ``until`` where it ends, the ``stride`` or the time ``every`` between rows, the ``seed``
-        of the noise, and parameters. A run with ``stop`` ends where that expression first passes through zero. Raises
-        `ValueError` for a name that is no run; `runs` lists them.
+        Arguments replace the settings of the spec: the initial state ``x0`` (DIM,), the ``step``, the number of
+        ``steps`` or the time ``until`` the end, the ``stride`` or the time ``every`` between rows, the ``seed`` of the
+        noise, and parameters. A run with ``stop`` ends at the first zero of that expression. Raises `ValueError` if
+        there is no run of that name; `runs` lists the names.
         """
         spec, settings = self.spec, runs.Settings(step, steps, until, stride, every)
         base = runs.run_named(spec, name)
@@ -178,7 +180,7 @@ class Solver(Named[Backend, Interface]):
         return self._rows(chosen, self._beginning(start, "x0", float(chosen.step), values, {}, t0, drawn))
 
     def _rows(self, run: Run, at: Beginning) -> Trajectory:
-        """Return the trajectory of a run that stops at a zero, or whose rows are equal times apart."""
+        """Return the trajectory of a run that ends at a zero, or whose rows have equal distances in time."""
         from phigen.study.sections import function_of
 
         names = self.interface
@@ -199,13 +201,13 @@ class Solver(Named[Backend, Interface]):
         return trajectory()
 
     def _until(self, course: Retrying, span: float, stride: int, at: Beginning) -> Trajectory:
-        """`integrate` for a span of time."""
+        """Return the trajectory of `integrate` over a span of time."""
         seen: list[tuple[Floats, float, float, Floats, int, tuple[int, ...]]] = []
 
         def see(now: Retrying, tau: float) -> None:
             seen.append((now.state(), tau, now.time(), now.element(), now.steps, tuple(now.retried)))
 
-        def made() -> Trajectory:
+        def trajectory() -> Trajectory:
             x, tau, passed, turned, steps, retried = zip(*seen, strict=True)
             marks = Marks(np.array(tau), np.array(passed), np.array(turned), steps[-1], retried[-1])
             return self._trajectory(np.array(x), marks, at)
@@ -213,8 +215,8 @@ class Solver(Named[Backend, Interface]):
         try:
             along_until(course, at.h, span, stride, see)
         except BackendError as error:
-            raise self.failure(error, at.h, made(), at.values) from error
-        return made()
+            raise self.failure(error, at.h, trajectory(), at.values) from error
+        return trajectory()
 
     def session(
         self,
@@ -229,7 +231,7 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> LiveSession:
-        """A trajectory from ``x0`` (DIM,) in the hands of the caller: ``.step(h)``, ``.kick(dx)``, ``.x``.
+        """Return a session at ``x0`` (DIM,), whose steps the caller makes: ``.step(h)``, ``.kick(dx)``, ``.x``.
 
         The other arguments are those of `integrate`.
         """
@@ -238,7 +240,7 @@ class Solver(Named[Backend, Interface]):
         return LiveSession(self, self._started(at), at.values, at.t0)
 
     def states_at(self, trajectory: Trajectory, times: Floats) -> Floats:
-        """The states (times, DIM) of a trajectory of this solver at given times; see `Trajectory.at`."""
+        """Return the states (times, DIM) of a trajectory of this solver at given times; see `Trajectory.at`."""
         if self.interface.noise:
             return arguments.rows_at(trajectory.t, trajectory.x, times)
         values, h = dict(trajectory.parameters), trajectory.h
@@ -266,7 +268,7 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Floats:
-        """The state (DIM,) one step of size ``h`` after ``x`` (DIM,), whose time is ``t0``; raises `StepError`."""
+        """Return the state (DIM,) one step of size ``h`` after ``x`` (DIM,) at the time ``t0``. Raises `StepError`."""
         at = self._beginning(x, "x", h, parameters, more, t0, {"seed": seed, "step0": step0})
         session = self._started(at)
         try:
@@ -286,10 +288,10 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> tuple[Floats, Floats]:
-        """The state (DIM,) one step after ``x`` (DIM,), and its derivative (DIM, DIM), row i along the old coordinates.
+        """Return the state (DIM,) one step after ``x`` (DIM,), and its derivative by ``x`` (DIM, DIM).
 
-        The derivative is exact to round-off; a gauge chosen by the solver is held fixed. Raises `StepError`, and
-        `TypeError` if the solver was compiled without ``tangent=True``.
+        Row i of the derivative is the gradient of the new coordinate i. It is exact to round-off, for a fixed gauge if
+        the solver chooses one. Raises `StepError`, and `TypeError` if the solver was compiled without ``tangent=True``.
         """
         at = self._beginning(x, "x", h, parameters, more, t0, {"seed": seed, "step0": step0})
         session = self._started(at)
@@ -309,9 +311,9 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Iterator[tuple[Floats, Floats]]:
-        """After each step of a trajectory, its state (DIM,) and the derivative (DIM, DIM) of that step.
+        """Yield the state (DIM,) after each step of a trajectory, and the derivative (DIM, DIM) of that step.
 
-        The steps are those of `integrate`. Raises what `step_tangent` does.
+        The steps are those of `integrate`. Raises the same as `step_tangent`.
         """
         at = self._beginning(x0, "x0", h, parameters, more, t0, {"seed": seed, "member": member, "step0": step0})
         steps = arguments.count(steps, "steps", 0)
@@ -333,29 +335,29 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Section:
-        """Where ``g`` passes through zero along the trajectory of ``steps`` steps of size ``h`` from ``x0`` (DIM,).
+        """Return the zeros of ``g`` along the trajectory of ``steps`` steps of size ``h`` from ``x0`` (DIM,).
 
-        ``g`` takes states (rows, DIM), and their times (rows,) where there is a time, and gives (rows,). Each crossing
-        is found to round-off by steps of the solver itself, from the state before it. ``direction`` is ``rising``,
-        ``falling`` or ``both``. A start with g = 0 counts if g leaves it in that direction. Raises `StepError`, whose
-        ``trajectory`` is the `Section` so far.
+        ``g`` maps states (rows, DIM), and their times (rows,) if the Hamiltonian depends on the time, to values
+        (rows,). Each zero is located to round-off by steps of the solver from the state before it. ``direction`` is
+        ``rising``, ``falling`` or ``both``. A start with g = 0 counts if g leaves zero in that direction. Raises
+        `StepError`, whose ``trajectory`` is the `Section` until the failure.
         """
         arguments.expect_no_noise("section", self.interface)
         at = self._beginning(x0, "x0", h, parameters, more, t0)
         steps = arguments.count(steps, "steps", 0)
-        found: list[tuple[float, Floats]] = []
+        zeros: list[tuple[float, Floats]] = []
         if direction not in SIGNS:
             raise ValueError(f"direction must be {', '.join(SIGNS)}, not {direction!r}")
         finder = CrossingFinder[Session](g, at.h, at.t0, timed=bool(self.interface.time), direction=direction)
         session = self._started(at)
         try:
             for _, crossings in finder.follow(session, steps, lambda: session.advance(at.h, 1)):
-                found += crossings
+                zeros += crossings
                 if progress:
                     progress(session.steps)
         except BackendError as error:
-            raise self.failure(error, at.h, self._section(found), at.values) from error
-        return self._section(found)
+            raise self.failure(error, at.h, self._section(zeros), at.values) from error
+        return self._section(zeros)
 
     def ensemble(
         self,
@@ -372,15 +374,15 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, ArrayLike] | None = None,
         **more: ArrayLike,
     ) -> Floats:
-        """Final states (members, DIM) of the initial states ``X0`` (members, DIM), or of one (DIM,) for all.
+        """Return the final states (members, DIM) of an ensemble with the initial states ``X0`` (members, DIM).
 
-        Parameters, ``h`` and the time ``t0`` of the start are numbers, or arrays (members,) with one for each. With a
-        ``stride`` the result is (rows, members, DIM): the states at steps 0, stride, 2·stride, … and at the last.
-        With noise, the first takes the random numbers of ``member``, the next those of the next, all from those of
-        ``step0`` on, as in `integrate`: to go on with an ensemble, give the number of steps that it has made.
-        Members are shared out between ``threads``, by default one on each core; their number changes no bit. Raises
-        `StepError` if any member fails: its ``members`` are those that did, its ``trajectory`` the array of states as
-        far as each came, with NaN in the rows after that.
+        ``X0`` may be one state (DIM,) for all members. Parameters, ``h`` and the initial time ``t0`` are numbers, or
+        arrays (members,). With a ``stride`` the result is (rows, members, DIM): the states at steps 0, stride,
+        2·stride, … and at the last. With noise, member k takes the random numbers of ``member`` + k, from ``step0`` on;
+        to continue an ensemble, pass the number of its steps as ``step0``. Members are shared out between ``threads``,
+        by default one for each core; the result has the same bits for any number of threads. Raises `StepError` if a
+        member fails: its ``members`` are the failed ones, its ``trajectory`` the array of states, in which failed
+        members have their last state, or NaN in the rows after it.
         """
         drawn = {"seed": seed, "member": member, "step0": step0}
         asked = self._members(X0, h, steps, stride, t0, drawn, parameters, more)
@@ -403,12 +405,13 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, ArrayLike] | None = None,
         **more: ArrayLike,
     ) -> Turned:
-        """`ensemble` with the attitudes of its members: (x, attitude, position), position None where there is none.
+        """Return the states of `ensemble` with attitudes and positions: (x, attitude, position).
 
-        These are (members, …) at the end, with a ``stride`` (rows, members, …): quaternions (4,) or matrices (n, n),
-        and positions (3,). Members begin with ``attitude0`` and ``position0``, one for all or (members, …), by default
-        with the identity and at the origin. Each is integrated by itself, with the bits of `integrate`. Raises the same
-        as `ensemble`, with all three in ``trajectory``, and `TypeError` where the spec does not say ``reconstruct``.
+        Attitudes are quaternions (4,) or matrices (n, n), positions are (3,), or None if the spec has none. Their
+        leading axes are those of x: (members, …), with a ``stride`` (rows, members, …). ``attitude0`` and ``position0``
+        are initial values, one for all members or (members, …), by default the identity and the origin. Each member has
+        the same bits as in `integrate`. Raises the same as `ensemble`, with all three results in ``trajectory``, and
+        `TypeError` if the spec does not say ``reconstruct``.
         """
         drawn = {"seed": seed, "member": member, "step0": step0}
         asked = self._members(X0, h, steps, stride, t0, drawn, parameters, more)
@@ -416,16 +419,17 @@ class Solver(Named[Backend, Interface]):
         turned = np.full((rows, len(asked), self.interface.element), np.nan)
         turned[0] = arguments.firsts(attitude0, position0, self.interface, len(asked))
 
-        def told(x: Floats) -> Turned:
+        def with_attitudes(x: Floats) -> Turned:
             attitude, position = turned_into(self.interface, turned if asked.stride else turned[-1])
             assert attitude is not None
             return Turned(x, attitude, position)
 
         try:
-            return told(self._together(asked, threads, lambda given, most: self.backend.ensemble(given, most, turned)))
+            x = self._together(asked, threads, lambda members, most: self.backend.ensemble(members, most, turned))
         except StepError as error:
-            error.trajectory = told(error.trajectory)
+            error.trajectory = with_attitudes(error.trajectory)
             raise
+        return with_attitudes(x)
 
     def pullback(
         self,
@@ -440,20 +444,21 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, ArrayLike] | None = None,
         **more: ArrayLike,
     ) -> Pullback:
-        """The state after ``steps`` steps, and the derivatives of its product with a ``cotangent``: (x1, x0_bar,
-        parameters_bar), x0_bar along ``x0``, parameters_bar by name along the parameters.
+        """Return the state after ``steps`` steps, and the derivatives of its scalar product with a ``cotangent``.
 
-        ``x0`` is (DIM,) or (members, DIM), x1 and the cotangent have its shape; a state (DIM,) is that of all members
-        where there are several parameters, and is derived along by each. With a ``stride``, x1 are all rows of
-        `integrate`, (rows, …), and so is the cotangent. Parameters, h and t0 are numbers, or (members,); of a number
-        that all members share, the derivative is the sum over members. ``threads`` are as for `ensemble`. All is exact
-        to round-off for the steps as they are made: the choice of a gauge is held fixed, that of e = −H(x0) with a
-        monitor is not; times and attitudes have no part.
-        Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
+        The result is (x1, x0_bar, parameters_bar): the state, its product's derivative by ``x0``, and those by the
+        parameters, by name. ``x0`` is (DIM,) or (members, DIM); x1 and the cotangent have its shape. One state (DIM,)
+        with arrays of parameters is the initial state of all members, and x0_bar has a row for each. With a ``stride``,
+        x1 and the cotangent are (rows, …), for all rows of `integrate`. Parameters, h and t0 are numbers or (members,);
+        the derivative by a number that all members share is the sum over members. ``threads`` are as for `ensemble`.
+
+        Derivatives are exact to round-off. A gauge is held fixed, but the dependence of e = −H(x0) on x0 with a monitor
+        is included. There are no derivatives of times and attitudes. Raises `StepError`, and `TypeError` if the solver
+        was compiled without ``adjoint=True``.
         """
-        given = arguments.together(parameters, more)
+        values = arguments.together(parameters, more)
         threads = threads if threads is None else arguments.count(threads, "threads", 1)
-        return gradients.pullback(self, x0, h, steps, cotangent, stride, t0, threads, given)
+        return gradients.pullback(self, x0, h, steps, cotangent, stride, t0, threads, values)
 
     def jacobian(
         self,
@@ -465,16 +470,16 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Jacobian:
-        """The state (DIM,) after ``steps`` steps from ``x0`` (DIM,), and its derivatives along x0 and the parameters.
+        """Return the state (DIM,) after ``steps`` steps from ``x0`` (DIM,), and its derivatives by x0 and parameters.
 
-        These are (DIM, DIM), row i of x_i, and (DIM,) for each parameter, by name. One `pullback` for each coordinate,
-        with what is said there. Raises the same.
+        The derivative by x0 is (DIM, DIM), with row i for coordinate i; those by parameters are (DIM,), by name. Takes
+        one `pullback` for each coordinate, with the same conventions and errors.
         """
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         for name, value in arguments.together(parameters, more).items():
             arguments.number(value, f"parameter {name!r}")
-        given: dict[str, Any] = {"t0": t0, "parameters": parameters, **more}
-        rows = [self.pullback(start, h, steps, side, **given) for side in np.eye(len(start))]
+        options: dict[str, Any] = {"t0": t0, "parameters": parameters, **more}
+        rows = [self.pullback(start, h, steps, side, **options) for side in np.eye(len(start))]
         names = rows[0].parameters_bar
         return Jacobian(
             rows[0].x1,
@@ -490,9 +495,9 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Floats:
-        """H of the states ``x`` (…, DIM), shape (…).
+        """Return H of the states ``x`` (…, DIM), shape (…).
 
-        Where H depends on the time, ``t`` is that of the states, a number or one for each.
+        If H depends on the time, ``t`` are the times of the states, a number or an array (…).
         """
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
@@ -502,7 +507,7 @@ class Solver(Named[Backend, Interface]):
     def casimirs(
         self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float
     ) -> dict[str, Floats]:
-        """The Casimirs of the states ``x`` (…, DIM), by name, each of shape (…)."""
+        """Return the Casimirs of the states ``x`` (…, DIM), by name, each of shape (…)."""
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
         values = self.backend.casimirs(rows, self.values(parameters, more))
@@ -516,7 +521,7 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Floats:
-        """π∇H at the states ``x`` (…, DIM), the same shape; ``t`` as for `hamiltonian`."""
+        """Return π∇H at the states ``x`` (…, DIM), the same shape; ``t`` as for `hamiltonian`."""
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
         when = arguments.times(t, self.interface, states.shape[:-1], more)
@@ -530,12 +535,12 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Floats:
-        """σπ∇g of each source of noise at the states ``x`` (…, DIM), shape (…, sources, DIM)."""
+        """Return σπ∇g of each source of noise at the states ``x`` (…, DIM), shape (…, sources, DIM)."""
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
         when = arguments.times(t, self.interface, states.shape[:-1], more)
-        found = self.backend.noise_fields(rows, self.values(parameters, more), when)
-        return found.reshape(*states.shape[:-1], len(self.interface.noise), self.interface.dimension)
+        fields = self.backend.noise_fields(rows, self.values(parameters, more), when)
+        return fields.reshape(*states.shape[:-1], len(self.interface.noise), self.interface.dimension)
 
     def observables(
         self,
@@ -556,11 +561,11 @@ class Solver(Named[Backend, Interface]):
         return {name: values[:, i].reshape(states.shape[:-1]) for i, name in enumerate(self.interface.observables)}
 
     def observed(self, x: Floats, t: Floats, parameters: Mapping[str, float]) -> Floats:
-        """Return the observables along a trajectory: of the states (rows, DIM) at the times (rows,), a column each."""
+        """Return the observables (rows, observables) of the states (rows, DIM) of a trajectory at its times (rows,)."""
         return self.backend.observables(x, parameters, t if self.interface.time else None)
 
     def energies(self, x: Floats, t: Floats, parameters: Mapping[str, float]) -> Floats:
-        """H along a trajectory: of the states (rows, DIM) at the times (rows,)."""
+        """Return H (rows,) of the states (rows, DIM) of a trajectory at its times (rows,)."""
         return self.backend.hamiltonian(x, parameters, t if self.interface.time else None)
 
     def _trajectory(self, x: Floats, marks: Marks, at: Beginning) -> Trajectory:
@@ -596,7 +601,7 @@ class Solver(Named[Backend, Interface]):
         drawn: Mapping[str, int | None] = arguments.NONE_DRAWN,
         first: tuple[ArrayLike | None, ArrayLike | None] = (None, None),
     ) -> Beginning:
-        """What the user gave for a trajectory, checked; None for a step that he gives later."""
+        """Return the checked arguments of a trajectory; the step size is NaN if it is not known yet."""
         begin = arguments.start_time(t0, self.interface, more)
         draws = arguments.draws(self.interface, more, drawn)
         values = self.values(parameters, more)
@@ -615,13 +620,13 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, ArrayLike] | None,
         more: Mapping[str, ArrayLike],
     ) -> Members:
-        """What the user gave for an ensemble, checked."""
-        own: dict[str, Any] = dict(more)
-        draws = arguments.draws(self.interface, own, drawn)
-        return arguments.ensemble(X0, h, steps, stride, t0, parameters, own, self.interface, draws)
+        """Return the checked arguments of an ensemble."""
+        keywords: dict[str, Any] = dict(more)
+        draws = arguments.draws(self.interface, keywords, drawn)
+        return arguments.ensemble(X0, h, steps, stride, t0, parameters, keywords, self.interface, draws)
 
     def _together(self, asked: Members, threads: int | None, make: Callable[[Members, int | None], Floats]) -> Floats:
-        """States of members that ``make`` integrates; raises `StepError` for those that fail."""
+        """Return the states of members that ``make`` integrates. Raises `StepError` if members fail."""
         most = threads if threads is None else arguments.count(threads, "threads", 1)
         try:
             return make(asked, most)
@@ -645,8 +650,8 @@ class Solver(Named[Backend, Interface]):
         except BackendError as error:
             raise self.failure(error, at.h, None, at.values) from error
 
-    def _section(self, found: Sequence[tuple[float, Floats]]) -> Section:
-        t, x = np.array([t for t, _ in found]), np.array([x for _, x in found])
+    def _section(self, crossings: Sequence[tuple[float, Floats]]) -> Section:
+        t, x = np.array([t for t, _ in crossings]), np.array([x for _, x in crossings])
         return Section(t, x.reshape(-1, self.interface.dimension), self.coordinates)
 
     def failure(
@@ -657,9 +662,10 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float],
         start: Floats | None = None,
     ) -> StepError:
-        """What the user is told of a failure in the back end, with his step, what was computed, and his parameters.
+        """Return the exception for users after a failure in the back end.
 
-        ``start`` (DIM,) is the state that it began at, of the first member that failed.
+        Its message names the step and the parameters; ``trajectory`` are the results until then. ``start`` (DIM,) is
+        the initial state, for ensembles that of the first failed member.
         """
         name = self.interface.name
         if error.status == "BAD_ARGUMENT":
@@ -670,12 +676,12 @@ class Solver(Named[Backend, Interface]):
                     message, step=0, status=error.status, trajectory=trajectory, members=error.members
                 )
             # The other arguments were checked.
-            given = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
+            settings = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
             message = f"{name}: no step can be made"
-            if given:
-                message += f" with {given}: a coefficient computed from parameters alone is not finite"
+            if settings:
+                message += f" with {settings}: a coefficient computed from parameters alone is not finite"
             if self.interface.monitored:
-                message += f"{', or' if given else ':'} where it starts the monitor is not positive"
+                message += f"{', or' if settings else ':'} where it starts the monitor is not positive"
             return ParameterError(message, step=0, status=error.status, trajectory=trajectory, members=error.members)
         where = f"{name}: step {error.step} of size {h!r} failed" if error.step >= 0 else f"{name}: a step failed"
         if error.members:
@@ -687,6 +693,6 @@ class Solver(Named[Backend, Interface]):
         message = f"{where}: {error.status}" + (f", {_ADVICE[error.status]}" if error.status in _ADVICE else "")
         return StepError(message, step=error.step, status=error.status, trajectory=trajectory, members=error.members)
 
-    def values(self, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
-        """The values of all parameters. Raises `TypeError` and `ValueError`."""
-        return arguments.parameters(self.interface, given, more)
+    def values(self, mapped: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
+        """Return the values of all parameters. Raises the same as `arguments.parameters`."""
+        return arguments.parameters(self.interface, mapped, more)

@@ -1,7 +1,7 @@
-"""Tables of floats in files, written piece by piece: ``.csv`` text, or ``.npz`` arrays of NumPy.
+"""Tables of floats in files that grow by appended rows: ``.csv`` text, or ``.npz`` arrays of NumPy.
 
-What was flushed is on the disk whatever happens to the process, and a table can be gone on with from there. A ``.csv``
-is complete at every time. The pieces of a ``.npz`` are collected in ``FILE.part``, plain rows of doubles.
+Flushed rows survive the end of the process, and a table can be resumed after them. A ``.csv`` can be read at any time.
+The rows of a ``.npz`` are collected in ``FILE.part``, as rows of doubles, until the table is closed.
 """
 
 from __future__ import annotations
@@ -44,26 +44,26 @@ class Table(Protocol):
         ...
 
     def flush(self) -> int:
-        """Hand what was written over to the disk; its size in bytes, which `opened` takes to go on from here."""
+        """Write buffered rows to the disk, and return the size of the file in bytes, from which `opened` can resume."""
         ...
 
     def close(self, scalars: Mapping[str, Any]) -> None:
-        """Make the file complete; ``scalars`` are further arrays of a ``.npz``."""
+        """Complete the file; ``scalars`` are further arrays of a ``.npz``."""
         ...
 
     def clean(self) -> None:
-        """Remove what is needed only to go on."""
+        """Remove the files that only serve to resume."""
         ...
 
     def discard(self) -> None:
-        """Leave nothing of the table."""
+        """Remove all files of the table."""
         ...
 
 
 def opened(path: str | Path, columns: Sequence[Column], size: int | None = None) -> Table:
-    """A new table, or one to go on with from where `Table.flush` gave that size.
+    """Return a new table, or one that is resumed after the first ``size`` bytes, a result of `Table.flush`.
 
-    Raises `ValueError` for other suffixes than those of `SUFFIXES` and for files shorter than that, and `OSError`.
+    Raises `ValueError` for suffixes that are not in `SUFFIXES` and for files shorter than ``size``, and `OSError`.
     """
     kinds: dict[str, Callable[[Path, Sequence[Column], int | None], Table]] = {".csv": CsvTable, ".npz": NpzTable}
     suffix = Path(path).suffix.lower()
@@ -99,12 +99,12 @@ class CsvTable:
             return _flushed(self._file)
 
     def close(self, scalars: Mapping[str, Any]) -> None:
-        """See `Table`; there is no place for scalars."""
+        """See `Table`; scalars are not written."""
         with naming(self._path):
             self._file.close()
 
     def clean(self) -> None:
-        """See `Table`; the file itself is all there is."""
+        """See `Table`; there are no further files."""
 
     def discard(self) -> None:
         """See `Table`."""
@@ -177,7 +177,7 @@ def _opened(path: Path, size: int | None) -> BinaryIO:
 
 
 def _discarded(file: BinaryIO, path: Path) -> None:
-    with suppress(OSError):  # the rows that a full disk has not taken
+    with suppress(OSError):  # closing flushes rows that a full disk cannot take
         file.close()
     with suppress(OSError):
         path.unlink()

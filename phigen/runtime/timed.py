@@ -1,7 +1,7 @@
-"""States at given times, by a further step of the same method from a state nearby; ends in time.
+"""States at given times, each by a further step of the same method from a state nearby.
 
-A step of any size is a Poisson map, and stays on the leaf that it started from. With a monitor steps are of given size
-in τ, and the one that takes a given time is found by secants, to rounding.
+A step of any size is a Poisson map and stays on its leaf. With a monitor, steps have a given size in τ; the size that
+takes a given time is found by the secant method, to rounding.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from phigen.runtime.session import Session
 
 
 class Clocked(Protocol):
-    """What is asked of a session."""
+    """A session as this module needs it: see `phigen.runtime.session.Followed`."""
 
     @property
     def steps(self) -> int: ...
@@ -30,17 +30,17 @@ class Clocked(Protocol):
 
 C = TypeVar("C", bound=Clocked)
 
-#: Most secants; they converge in four to seven.
-MOST = 30
-#: Times that differ by less, in their own size, are one: so many roundings, here in double precision.
+#: Largest number of secant iterations; they converge in four to seven.
+MAX_SECANTS = 30
+#: Times are equal if they differ by at most this number of roundings, relative to their size.
 _ROUNDINGS = 8
 EQUAL = float(_ROUNDINGS * np.finfo(float).eps)
 
 
 def reached(session: C, h: float, span: float) -> tuple[C, float]:
-    """A copy that made one step more, the one that takes the time ``span``, and its size; h is a whole step.
+    """Return a copy of a session after one further step that takes the time ``span``, and the size of that step.
 
-    Raises `BackendError`.
+    ``h`` is the size of a whole step. Raises `BackendError`.
     """
     if not np.isfinite(session.time()):
         return _moved(session, span), span
@@ -48,7 +48,7 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
     target = begin + span
     rounded = _ROUNDINGS * session.rounding * max(abs(begin), abs(span))
     size, before, missed_before = h, 0.0, -span
-    while True:  # a step that does not fail, from which to begin
+    while True:  # halve the first step until it succeeds
         try:
             copy = _moved(session, size)
             break
@@ -57,28 +57,31 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
             if abs(size) < 1e-3 * abs(h):
                 raise
     missed = copy.time() - target
-    for _ in range(MOST):
+    for _ in range(MAX_SECANTS):
         if missed == 0 or size == before or missed == missed_before:
             break
         following = size - missed * (size - before) / (missed - missed_before)
         if abs(following - size) <= 1e-16 * abs(size):
             break
         try:
-            found = _moved(session, following)
+            candidate = _moved(session, following)
         except BackendError:
             break
-        ahead = found.time() - target
+        ahead = candidate.time() - target
         if abs(ahead) >= abs(missed) and abs(missed) <= rounded:
             break
         before, missed_before = size, missed
-        size, missed, copy = following, ahead, found
+        size, missed, copy = following, ahead, candidate
     if abs(missed) > max(1e-9 * max(abs(begin), abs(span)), rounded):
         raise BackendError("NO_CONVERGENCE", session.steps, session.state()[np.newaxis])
     return copy, size
 
 
 def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
-    """How many whole steps fit into a span of time, and what they leave; where one fails before, that one as well."""
+    """Return the number of whole steps in a span of time, and the rest of the span.
+
+    If a step fails within the span, the number includes that step, so that the caller meets the same failure.
+    """
     if not np.isfinite(session.time()):
         whole = _whole_steps(h, span)
         return whole, span - whole * h
@@ -102,9 +105,9 @@ def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
 
 
 def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C, float], object]) -> None:
-    """Go on for a span of time, the last step being part of one; ``see`` every stride-th state and the last, with τ.
+    """Advance a session by a span of time; the last step is a part of one.
 
-    Raises `BackendError`.
+    ``see`` receives every stride-th session and the last, each with its τ. Raises `BackendError`.
     """
     see(session, 0.0)
     done = 0
@@ -140,9 +143,10 @@ def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C
 
 
 def states_at(place: Callable[[int], Session], t: Floats, x: Floats, h: float, times: Floats) -> Floats:
-    """The states (times, DIM) at given times of a trajectory with rows ``t`` and ``x``, where ``place`` puts sessions.
+    """Return the states (times, DIM) at given times of a trajectory with rows ``t`` and ``x``.
 
-    Each is reached from the nearest row by steps of size h, of either sign, and part of one. Raises `BackendError`.
+    Each is reached from the nearest row by steps of size h or −h and a part of one. ``place`` returns a session at the
+    row of that number. Raises `BackendError`.
     """
     states = np.empty((len(times), x.shape[1]))
     for k, time in enumerate(np.asarray(times, dtype=np.float64).tolist()):
@@ -155,7 +159,7 @@ def states_at(place: Callable[[int], Session], t: Floats, x: Floats, h: float, t
 
 
 def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -> None:
-    """Steps for the time ``span``, whole ones of h as far as they go, where steps are equal in time."""
+    """Make steps for the time ``span``: whole steps of size h, then a part of one. For steps equal in time."""
     step = float(np.copysign(h, span))
     whole = _whole_steps(step, span)
     advance(step, whole)
@@ -165,7 +169,7 @@ def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -
 
 
 def _from(session: Session, h: float, span: float) -> Session:
-    """The session after the time ``span``, in whole steps as far as they go."""
+    """Return the session after the time ``span``, in whole steps and a part of one."""
     step = np.copysign(h, span)
     if not np.isfinite(session.time()):
         advance_by(span, h, session.advance)
@@ -184,7 +188,7 @@ def _from(session: Session, h: float, span: float) -> Session:
 
 
 def _whole_steps(h: float, span: float) -> int:
-    """How many steps fit into a span of time; one that it falls short of by rounding does."""
+    """Return the number of whole steps in a span of time; a step that the span misses only by rounding counts."""
     ratio = span / h
     return round(ratio) if abs(ratio - round(ratio)) <= 1e-12 * max(1.0, abs(ratio)) else max(0, int(np.floor(ratio)))
 

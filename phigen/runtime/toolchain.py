@@ -1,6 +1,6 @@
-"""The C compiler of this machine: finding it, and making a shared library of generated code.
+"""The C compiler of this machine: search for it, and compilation of generated code into shared libraries.
 
-The flags are for libraries that stay on this machine. Code that is shipped needs C99 and libm, nothing else.
+The flags are for libraries that are used on this machine only. The generated code itself needs C99 and libm.
 """
 
 from __future__ import annotations
@@ -24,22 +24,23 @@ from typing import BinaryIO
 from phigen import progress
 from phigen.errors import ToolchainError
 
-#: Every C99 compiler of interest takes these.
+#: Flags that gcc, clang and zig all accept.
 BASE_FLAGS = ("-std=c99", "-O3", "-fPIC", "-shared")
 
-#: Tuning for this processor, each used if the compiler takes it. Fused products change results by round-off only:
-#: the compensated sums of the generated code contain no product that could be fused. Nobody asks which exceptions were
-#: raised: so gcc may divide by 0 in a lane whose value is not taken, and pairs go in vectors without AVX-512 too.
+#: Flags for this processor, each used if the compiler accepts it. Fused multiply-adds change results by round-off only:
+#: the compensated sums of the generated code contain no product that could be fused. The generated code does not read
+#: floating-point exceptions. Without traps, gcc may divide by 0 in a SIMD lane whose value is not used, and vectorises
+#: loops over pairs without AVX-512 too.
 TUNING_FLAGS = ("-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
 
-#: For threads, which only lattices use.
+#: Flag for threads, which only lattices use.
 OPENMP = "-fopenmp"
 
-#: Seconds after which a compilation is given up.
+#: Time limit of a compilation in seconds.
 TIMEOUT = 300.0
 
 _CANDIDATES = ("cc", "gcc", "clang")
-#: A C compiler that comes as a Python package, and how its trial may take longer: it first builds its own runtime.
+#: Python package with a C compiler, and the time limit of its trial in seconds: its first run compiles its runtime.
 _PACKAGE, _FIRST_TRIAL = "ziglang", 120.0
 _HINT = (
     "install gcc or clang, or the compiler of the package ziglang (pip install ziglang), or name one in the "
@@ -47,12 +48,12 @@ _HINT = (
 )
 _MESSAGE_LINES = 8
 _MESSAGE_BYTES = 1 << 16
-_TRIAL_TIMEOUT = 20.0  # for --version, and for a library of one line
-_GRACE = 1.0  # for what a compiler started, to end after it
+_TRIAL_TIMEOUT = 20.0  # seconds for --version, and for the compilation of a one-line library
+_GRACE = 1.0  # seconds that processes started by a compiler may outlive it
 _TRIAL = "#include <math.h>\ndouble trial(double x);\ndouble trial(double x) { return sin(x); }\n"
 _TRIAL_OF_THREADS = "#include <omp.h>\nint trial(void);\nint trial(void) { return omp_get_max_threads(); }\n"
 
-#: How files of shared libraries begin: ELF, Mach-O of both byte orders and universal, PE.
+#: First bytes of the files of shared libraries: ELF, Mach-O of both byte orders and universal, PE.
 _ELF = b"\x7fELF"
 _LIBRARIES = (_ELF, b"\xfe\xed\xfa", b"\xce\xfa\xed\xfe", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"MZ")
 _ELF_SHARED = 3
@@ -60,7 +61,7 @@ _ELF_SHARED = 3
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C compiler that works: its command, the first line of its ``--version``, and further flags that it takes."""
+    """A working C compiler: its command, the first line of its ``--version``, and the TUNING_FLAGS that it accepts."""
 
     command: tuple[str, ...]
     version: str
@@ -68,7 +69,7 @@ class Compiler:
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """The flags for a library that is used on this machine only."""
+        """All flags for a library that is used on this machine only."""
         return BASE_FLAGS + self.tuning
 
     def __str__(self) -> str:
@@ -76,33 +77,32 @@ class Compiler:
 
 
 class NoCompilerError(ToolchainError):
-    """None is named in CC, and none of the usual ones works."""
+    """CC names no compiler, and none of the usual compilers works."""
 
 
 def find() -> Compiler:
-    """The compiler named in CC, else the first of cc, gcc, clang and zig that works: that makes a library of one line.
+    """Return the compiler named in CC, else the first of cc, gcc, clang and zig that compiles a one-line library.
 
-    zig is that of the Python package ziglang.
-
-    Raises `ToolchainError` saying what is wrong with the one that is named, else `NoCompilerError` about all.
+    zig is that of the Python package ziglang. Raises `ToolchainError` if the compiler named in CC does not work, and
+    `NoCompilerError` if none of the others does; the messages say why.
     """
     named = os.environ.get("CC", "").strip()
     if named:
-        found = _examined(_command(named))
-        if isinstance(found, str):
-            raise ToolchainError(f"the C compiler named in CC, {named}, {found}\n  hint: {_HINT}")
-        return found
+        compiler = _examined(_command(named))
+        if isinstance(compiler, str):
+            raise ToolchainError(f"the C compiler named in CC, {named}, {compiler}\n  hint: {_HINT}")
+        return compiler
     reasons = []
     for candidate in _CANDIDATES:
-        found = _examined((candidate,))
-        if isinstance(found, Compiler):
-            return found
-        reasons.append(f"{candidate} {found}")
+        compiler = _examined((candidate,))
+        if isinstance(compiler, Compiler):
+            return compiler
+        reasons.append(f"{candidate} {compiler}")
     if find_spec(_PACKAGE):
-        found = _answering((sys.executable, "-m", _PACKAGE, "cc"))
-        if isinstance(found, Compiler):
-            return found
-        reasons.append(f"{_PACKAGE} {found}")
+        compiler = _answering((sys.executable, "-m", _PACKAGE, "cc"))
+        if isinstance(compiler, Compiler):
+            return compiler
+        reasons.append(f"{_PACKAGE} {compiler}")
     if set(reasons) == {f"{c} {_NOT_FOUND}" for c in _CANDIDATES}:
         reasons = [f"none of {', '.join(_CANDIDATES)} was found"]
     apart = "\n  " if any("\n" in reason for reason in reasons) else " "
@@ -110,7 +110,7 @@ def find() -> Compiler:
 
 
 def available() -> bool:
-    """Whether there is a C compiler. Raises `ToolchainError` if one is named that does not work."""
+    """Whether there is a C compiler. Raises `ToolchainError` if CC names one that does not work."""
     try:
         find()
     except NoCompilerError:
@@ -120,25 +120,25 @@ def available() -> bool:
 
 @cache
 def threaded(compiler: Compiler) -> Compiler:
-    """The compiler with OpenMP, if it has that."""
+    """Return the compiler with the flag of OpenMP if it has OpenMP, else unchanged."""
     with tempfile.TemporaryDirectory(prefix="phigen-") as folder:
         source, library = Path(folder) / "trial.c", Path(folder) / "trial.so"
         source.write_text(_TRIAL_OF_THREADS, encoding="utf-8")
         flags = (*BASE_FLAGS, "-Werror", OPENMP)
         try:
-            found = not _made(compiler.command, flags, [source], library, _TRIAL_TIMEOUT)
+            has_openmp = not _made(compiler.command, flags, [source], library, _TRIAL_TIMEOUT)
         except (OSError, subprocess.TimeoutExpired):
-            found = False
-    return replace(compiler, tuning=(*compiler.tuning, OPENMP)) if found else compiler
+            has_openmp = False
+    return replace(compiler, tuning=(*compiler.tuning, OPENMP)) if has_openmp else compiler
 
 
 def compile_library(
     sources: Sequence[Path], output: Path, compiler: Compiler | None = None, timeout: float = TIMEOUT
 ) -> None:
-    """Compile C files into one shared library; headers are looked for beside the sources.
+    """Compile C files into one shared library; headers lie beside the sources.
 
-    Raises `ToolchainError` with the first lines the compiler said, or if ``timeout`` seconds were not enough, or if
-    there is no library although the compiler says so.
+    Raises `ToolchainError` with the first lines of the compiler's messages if it fails, if it takes more than
+    ``timeout`` seconds, or if it reports success but wrote no library.
     """
     compiler = compiler or find()
     output.unlink(missing_ok=True)
@@ -168,7 +168,7 @@ def _command(named: str) -> tuple[str, ...]:
 
 
 def _examined(command: tuple[str, ...]) -> Compiler | str:
-    """The compiler behind a command, or why it is none: the end of a sentence about it."""
+    """Return the compiler of a command, or why it does not work, as the end of a sentence about it."""
     path = shutil.which(command[0])
     if path is None:
         return "is not a program" if shutil.which(command[0], os.F_OK) else _NOT_FOUND
@@ -191,7 +191,10 @@ def _answering(command: tuple[str, ...]) -> Compiler | str:
 
 
 def _tried(command: tuple[str, ...], version: str, folder: Path) -> Compiler | str:
-    """The compiler with those flags that it takes; all are tried at once, one by one only if that fails."""
+    """Return the compiler with the tuning flags that it accepts, or why it compiles no library.
+
+    All flags are tried at once, and one by one if that fails.
+    """
     patience = _FIRST_TRIAL if _PACKAGE in command else _TRIAL_TIMEOUT
     source, library = folder / "trial.c", folder / "trial.so"
     source.write_text(_TRIAL, encoding="utf-8")
@@ -210,7 +213,7 @@ def _tried(command: tuple[str, ...], version: str, folder: Path) -> Compiler | s
 
 
 def _made(command: Sequence[str], flags: Sequence[str], sources: Sequence[Path], output: Path, timeout: float) -> str:
-    """Make a library; why there is none, the end of a sentence about the compiler, or nothing."""
+    """Compile a library; return "", or why there is none, as the end of a sentence about the compiler."""
     code, said = _run([*command, *flags, *map(str, sources), "-o", str(output), "-lm"], timeout)
     if code:
         return _ended(code, said)
@@ -233,7 +236,7 @@ def _head(path: Path) -> bytes | None:
 
 
 def _ended(code: int, said: str) -> str:
-    """How a compiler failed, with the first lines of what it said."""
+    """Return the failure of a compiler as the end of a sentence, with the first lines of its messages."""
     how = f"failed with exit code {code}" if code > 0 else f"was ended by {signal.Signals(-code).name}"
     lines = said.strip().splitlines()
     if not lines:
@@ -244,9 +247,9 @@ def _ended(code: int, said: str) -> str:
 
 
 def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tuple[int, str]:
-    """The exit code of a compiler, and the beginning of what it said, on stderr too if ``errors``.
+    """Return the exit code of a compiler and the beginning of its output, with stderr if ``errors``.
 
-    Giving up ends the compiler proper as well, not only the driver that started it.
+    At the time limit, all processes that the compiler started are killed too.
     """
     heard = bytearray()
 

@@ -1,4 +1,4 @@
-"""What an integration gives back."""
+"""Trajectories: the results of integrations."""
 
 from __future__ import annotations
 
@@ -28,14 +28,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """States of one integration: row 0 is the initial state, the last row always the final one.
+    """States of one integration. Row 0 is the initial state, the last row the final state.
 
-    ``t`` (rows,), ``x`` (rows, DIM), ``energy`` (rows,): H of the rows, ``casimirs`` and ``observables``: name →
-    (rows,).
-    ``steps`` were made with step size ``h``; the rows are those of every stride-th step and of the last. With a monitor
-    h is a step in τ, and ``tau`` (rows,) its values; else that is t. ``retried`` are the numbers of the steps that were
-    made in parts. ``attitude`` (rows, 4), a quaternion (w, x, y, z), or (rows, n, n), and ``position`` (rows, 3)
-    are there if the spec asks for them.
+    ``t`` (rows,) are the times, ``x`` (rows, DIM) the states, ``energy`` (rows,) the values of H; ``casimirs`` and
+    ``observables`` map names to values (rows,). There is a row for every stride-th of the ``steps`` steps of size
+    ``h``, and for the last. With a monitor, h is a step in τ and ``tau`` (rows,) the values of τ; else ``tau`` is
+    ``t``. ``retried`` are the numbers of steps that were made in parts. If the spec says ``reconstruct``, ``attitude``
+    is a quaternion (w, x, y, z) in each row (rows, 4), or a matrix (rows, n, n), and ``position`` is (rows, 3).
     """
 
     t: Floats
@@ -65,29 +64,27 @@ class Trajectory:
         return f"<Trajectory of ({names}): {self.steps} steps of {self.h!r}, {len(self)} rows>"
 
     def _repr_html_(self) -> str:
-        """First and last row, and what was conserved, for notebooks."""
+        """Return a table for notebooks: the first and the last row, and the errors of conserved quantities."""
         return cast(str, display("page of a trajectory")(self))
 
     def plot(self) -> Figure:
-        """A figure of the orbit in phase space, and below it the errors of energy and Casimirs over time.
+        """Return a figure of the orbit in phase space, and of the errors of energy and Casimirs over time.
 
         Notebooks show it; ``.savefig(path)`` writes it. Raises `MissingPackageError` without matplotlib.
         """
         return cast("Figure", display("figure of runs")({"phigen": self}, {}))
 
     def to_xarray(self) -> xr.Dataset:
-        """An `xarray.Dataset`: ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and observables (t).
+        """Return an `xarray.Dataset`: ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and observables (t).
 
-        Step and parameters are attributes.
-
-        Raises `MissingPackageError` without xarray.
+        Step and parameters are attributes. Raises `MissingPackageError` without xarray.
         """
         from phigen.runtime.exchange import to_xarray
 
         return to_xarray(self)
 
     def to_pandas(self) -> pd.DataFrame:
-        """A `pandas.DataFrame` with the columns of a ``.csv``, indexed by t.
+        """Return a `pandas.DataFrame` with the columns of a ``.csv``, indexed by t.
 
         Raises `MissingPackageError` without pandas.
         """
@@ -96,24 +93,24 @@ class Trajectory:
         return to_pandas(self)
 
     def column(self, coordinate: str) -> Floats:
-        """The values (rows,) of one coordinate; raises `KeyError` for a name that is none."""
+        """Return the values (rows,) of one coordinate. Raises `KeyError` if there is no coordinate of that name."""
         if coordinate not in self.coordinates:
             raise KeyError(f"{coordinate!r} is not a coordinate; there are {', '.join(self.coordinates)}")
         return self.x[:, self.coordinates.index(coordinate)]
 
     def at(self, times: ArrayLike) -> Floats:
-        """The states (times, DIM) at given times, by steps of the same method from the nearest row.
+        """Return the states (times, DIM) at given times, by steps of the same method from the nearest row.
 
-        No interpolation: each state is one further step, of the size that takes the rest of the time, so it lies on the
-        leaf. With noise only times of rows can be asked for. Raises `ValueError` for other times, and for those out of
-        the range of t, and `StepError`.
+        States are not interpolated. The last step to each has the size that takes the remaining time, so the state lies
+        on the leaf. With noise, times must be those of rows. Raises `ValueError` for other times and for times outside
+        of the range of t, and `StepError`.
         """
         if self.solver is None:
             raise TypeError("this trajectory was not made by a solver of phigen")
         return self.solver.states_at(self, arguments.times_within(times, self.t))
 
     def save(self, path: str | Path) -> None:
-        """Write a file by the suffix of the path; raises `ValueError` for any other.
+        """Write a file whose format is the suffix of the path. Raises `ValueError` for other suffixes.
 
         ``.csv``: ``t,x1,…,energy,C…``, one line per row; every float reads back as the same float. ``.npz``: the arrays
         t, x, energy, casimir_NAME, observable_NAME, coordinates, and steps, h, parameter_NAME as scalars. With a
@@ -128,18 +125,18 @@ class Trajectory:
 
     @property
     def moving(self) -> frozenset[str]:
-        """Of energy and Casimirs, those that time or forces change: what they differ by is no error."""
+        """The names among energy and Casimirs that time or forces change, so that their changes are not errors."""
         return self.solver.interface.moving if self.solver else frozenset()
 
     def columns(self) -> list[Column]:
-        """What `rows` has side by side."""
+        """Return the columns of `rows`."""
         shape = () if self.attitude is None else self.attitude.shape[1:]
         turned = element_columns(shape, position=self.position is not None)
         observed = tuple(self.observables)
         return trajectory_columns(self.coordinates, tuple(self.casimirs), turned, observed, monitored=self.monitored)
 
     def rows(self) -> Floats:
-        """All columns side by side, (rows, columns), as they are written to files."""
+        """Return all values (rows, columns) as they are written to files, in the order of `columns`."""
         turned = [] if self.attitude is None else [self.attitude.reshape(len(self), -1)]
         turned += [] if self.position is None else [self.position]
         times = [self.t, self.tau] if self.monitored else [self.t]
@@ -148,13 +145,13 @@ class Trajectory:
         )
 
     def scalars(self) -> dict[str, Any]:
-        """What a ``.npz`` holds beside the columns."""
+        """Return the entries of a ``.npz`` beside the columns: names of coordinates, steps, h and parameters."""
         about = {"coordinates": np.array(self.coordinates), "steps": self.steps, "h": self.h}
         return {**about, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
 
 
 class Turned(NamedTuple):
-    """What `Solver.attitudes` gives: states, attitudes, and positions, if there are such."""
+    """Result of `Solver.attitudes`: states, attitudes, and positions, None if the spec has none."""
 
     x: Floats
     attitude: Floats
@@ -162,8 +159,7 @@ class Turned(NamedTuple):
 
 
 def turned_into(interface: Interface, elements: Floats) -> tuple[Floats | None, Floats | None]:
-    """Attitudes (rows, …) and positions (rows, 3) of rows of their numbers, of any shape in front; None for what is not
-    followed."""
+    """Split ``elements`` (…, numbers) into attitudes (…, *shape) and positions (…, 3), None if the system has none."""
     if not interface.attitude:
         return None, None
     size = math.prod(interface.attitude)
@@ -172,13 +168,13 @@ def turned_into(interface: Interface, elements: Floats) -> tuple[Floats | None, 
 
 
 def element_columns(shape: tuple[int, ...], *, position: bool) -> list[Column]:
-    """The columns of attitudes of that shape, none for (), and of positions."""
+    """Return the columns of attitudes of the given shape, none for (), and of positions."""
     if not shape:
         return []
     rows = range(1, shape[0] + 1)
     letters = "wxyz" if len(shape) == 1 else [f"{i}_{j}" for i in rows for j in rows]
-    found = [Column("attitude", tuple(f"attitude_{a}" for a in letters))]
-    return found + ([Column("position", tuple(f"position_{a}" for a in "xyz"))] if position else [])
+    columns = [Column("attitude", tuple(f"attitude_{a}" for a in letters))]
+    return columns + ([Column("position", tuple(f"position_{a}" for a in "xyz"))] if position else [])
 
 
 def trajectory_columns(
@@ -191,14 +187,14 @@ def trajectory_columns(
 ) -> list[Column]:
     """Return the columns of a table of states, the observables last.
 
-    No two have one name, so a coordinate ``t`` is in the column ``t_``.
+    Names are distinct: a coordinate ``t`` is in the column ``t_``.
     """
     times = [Column(name, (name,), flat=True) for name in (["t", "tau"] if monitored else ["t"])]
-    taken = [name for column in [*times, *turned] for name in column.names]
-    own = Reserved(frozenset(["energy", *taken]))
-    named = tuple(identifiers(coordinates, own).values())
+    reserved_names = [name for column in [*times, *turned] for name in column.names]
+    reserved = Reserved(frozenset(["energy", *reserved_names]))
+    named = tuple(identifiers(coordinates, reserved).values())
     first = [*times, Column("x", named), Column("energy", ("energy",), flat=True)]
-    given = identifiers(casimirs, own | named)
-    listed = [Column(f"casimir_{name}", (given[name],), flat=True) for name in casimirs]
-    observed = identifiers(observables, own | named | given.values())
+    casimir_names = identifiers(casimirs, reserved | named)
+    listed = [Column(f"casimir_{name}", (casimir_names[name],), flat=True) for name in casimirs]
+    observed = identifiers(observables, reserved | named | casimir_names.values())
     return [*first, *listed, *turned, *(Column(f"observable_{o}", (observed[o],), flat=True) for o in observables)]

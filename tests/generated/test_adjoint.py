@@ -221,7 +221,7 @@ def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
     made = solver(compilation("newton"), target)
     x, bar = start("newton"), weights((11, 3))
     whole = made.pullback(x, H, 150, bar[:6], 30)
-    monkeypatch.setattr(c_solver, "KEPT", 3 * 47)  # 47 steps
+    monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 3 * 47)  # 47 steps
     if target == "numpy":
         monkeypatch.setattr(made.backend.module, "KEPT", 3 * 3 * 47)
     for stride in (30, 100):
@@ -284,8 +284,8 @@ def test_one_start_is_that_of_all_members_and_there_may_be_none(target):
 def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypatch):
     """Those that are not in lanes. Steps, parameters and times of their own; long runs are those of segments."""
     made, rng = solver(compilation(kind), "c"), np.random.default_rng(2)
-    monkeypatch.setattr(runs, "LEAST", 2)
-    monkeypatch.setattr(runs, "_REPAID", 1)
+    monkeypatch.setattr(runs, "PART_GRANULARITY", 2)
+    monkeypatch.setattr(runs, "_STEPS_PER_THREAD", 1)
     many, h = start(kind) + 0.1 * rng.random((5, len(start(kind)))), H * (1 + 0.1 * rng.random(5))
     own = {name: value * (1 + 0.1 * rng.random(5)) for name, value in made.interface.parameters.items()}
     t0 = rng.random(5) if made.interface.time else None
@@ -299,7 +299,7 @@ def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypat
             assert np.array_equal(found.x1[:, m], alone.x1)
             assert np.array_equal(found.x0_bar[m], alone.x0_bar)
             assert all(found.parameters_bar[name][m] == alone.parameters_bar[name] for name in own)
-    monkeypatch.setattr(c_solver, "KEPT", 1)
+    monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 1)
     cut = made.pullback(many, h, STEPS, bar, 2, t0=t0, threads=3, parameters=own)
     assert np.max(np.abs(cut.x0_bar - together.x0_bar)) <= 1e-12 * np.max(np.abs(cut.x0_bar))
     for name, bars in cut.parameters_bar.items():
@@ -341,7 +341,7 @@ def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
     code = files(compiled, "c")["t.c"]
     assert "t_pull_group(" in code
     assert ("t_pull_arrive(" in code) == (bool(scheme) and "damped" not in kind)
-    monkeypatch.setattr(runs, "_REPAID", 1)
+    monkeypatch.setattr(runs, "_STEPS_PER_THREAD", 1)
     made, rng, count, far = solver(compiled, "c"), np.random.default_rng(3), 43, 5
     first = np.array([0.4, 0.9, 0.3][: compiled.program.dimension])
     many, h = first + 0.1 * rng.random((count, len(first))), H * (1 + 0.1 * rng.random(count))
@@ -357,7 +357,7 @@ def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
         assert np.max(np.abs(one.x1[:, m] - alone.x1)) <= near
         assert np.max(np.abs(one.x0_bar[m] - alone.x0_bar)) <= near
         assert max(abs(one.parameters_bar[k][m] - alone.parameters_bar[k]) for k in own) <= near
-    monkeypatch.setattr(c_solver, "KEPT", 7 * int(made.backend._c.trail_size_each()))
+    monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 7 * int(made.backend._c.trail_size_each()))
     cut, others = made.pullback(many, h, 23, bar, 9, threads=2, parameters=own), np.arange(count) != far
     for whole, found in ((one.x0_bar, cut.x0_bar), *((one.parameters_bar[k], cut.parameters_bar[k]) for k in own)):
         assert np.max(np.abs(whole - found)[others]) <= 1e-12 * np.max(np.abs(whole[others]))

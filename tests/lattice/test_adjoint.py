@@ -462,9 +462,9 @@ def test_c_has_the_same_bits_for_any_memory(monkeypatch, name, steps, stride):
     bar, given = random.normal(size=(1 + -(-steps // stride), *x.shape)), LATTICES.get(name, {})
     whole = solver.pullback(x, H, steps, bar, stride, parameters=given)
     for kept, states in ((0, 1), (0, 4), (1200, 1)):
-        monkeypatch.setattr(c_lattice, "TWICE", 0)
-        monkeypatch.setattr(c_lattice, "KEPT", kept)
-        monkeypatch.setattr(c_lattice, "STATES", states)
+        monkeypatch.setattr(c_lattice, "MAX_TAPE_BYTES", 0)
+        monkeypatch.setattr(c_lattice, "MIN_TAPE_VALUES", kept)
+        monkeypatch.setattr(c_lattice, "MIN_CHECKPOINTS", states)
         part = solver.pullback(x, H, steps, bar, stride, parameters=given)
         assert np.array_equal(part.x1, whole.x1)
         assert np.array_equal(part.x0_bar, whole.x0_bar)
@@ -477,9 +477,9 @@ def test_segments_of_the_series_in_c_are_made_again_to_round_off(monkeypatch):
     whole = solver.pullback(x, H, 17, bar, 7)
     assert np.array_equal(whole.x1, solver.integrate(x, H, 17, 7).x)
     for kept, states in ((0, 1), (1200, 1)):
-        monkeypatch.setattr(c_lattice, "TWICE", 0)
-        monkeypatch.setattr(c_lattice, "KEPT", kept)
-        monkeypatch.setattr(c_lattice, "STATES", states)
+        monkeypatch.setattr(c_lattice, "MAX_TAPE_BYTES", 0)
+        monkeypatch.setattr(c_lattice, "MIN_TAPE_VALUES", kept)
+        monkeypatch.setattr(c_lattice, "MIN_CHECKPOINTS", states)
         part = solver.pullback(x, H, 17, bar, 7)
         assert part.x1 == pytest.approx(whole.x1, abs=1e-14)
         assert part.x0_bar == pytest.approx(whole.x0_bar, abs=1e-13)
@@ -490,7 +490,7 @@ def test_all_of_a_run_is_kept_where_steps_are_dear(monkeypatch):
     """As those of the series are; of a longer run as much as there is room for."""
     solver, kept = made("driven composed", "c"), []
     x = 0.3 * beginning(solver)
-    monkeypatch.setattr(c_lattice, "KEPT", 0)
+    monkeypatch.setattr(c_lattice, "MIN_TAPE_VALUES", 0)
     monkeypatch.setattr(c_lattice, "expect_room", lambda what, size: kept.append(size))
 
     def room(steps):
@@ -499,7 +499,7 @@ def test_all_of_a_run_is_kept_where_steps_are_dear(monkeypatch):
 
     whole, half = room(1000), room(500)
     assert whole - half == pytest.approx(half - room(1), rel=0.01)
-    monkeypatch.setattr(c_lattice, "TWICE", half)
+    monkeypatch.setattr(c_lattice, "MAX_TAPE_BYTES", half)
     assert room(1000) == half
 
 

@@ -93,7 +93,7 @@ TAKING = [
     ("the states of 9 members", "c", 8, 18, lambda solver, x: solver.ensemble(x, np.full(9, 0.05), 1)),
     ("2 frames of 9 members", "c", 17, 18, alike),
     ("501 frames", "numpy", 500, 1046, back),
-    ("the states that are kept to go back", "numpy", 1045, 1046, back),
+    ("the stored states of the reverse pass", "numpy", 1045, 1046, back),
 ]
 
 
@@ -119,7 +119,7 @@ def test_there_is_room_for_one_step_to_go_back_or_it_is_refused(chain, steps, mo
     monkeypatch.setattr(memory, "available", lambda: least)
     solver.pullback(x, 0.05, steps, x)
     monkeypatch.setattr(memory, "available", lambda: least - 1)
-    with pytest.raises(LimitError, match="what is kept of steps to go back"):
+    with pytest.raises(LimitError, match="the stored data of the reverse pass"):
         solver.pullback(x, 0.05, steps, x)
 
 

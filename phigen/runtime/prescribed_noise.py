@@ -1,4 +1,4 @@
-"""A session along given increments of the noise, in place of random ones."""
+"""Sessions whose noise has prescribed increments in place of random ones."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ from phigen.runtime.interface import Floats
 from phigen.runtime.session import Session
 
 
-class Given:
-    """A course (`phigen.runtime.session.Followed`) whose k-th step has the increments of row k (steps, draws)."""
+class PrescribedNoise:
+    """A `phigen.runtime.session.Followed` whose k-th step takes row k of the increments (steps, draws)."""
 
     def __init__(self, session: Session, increments: Floats) -> None:
         self.session, self.increments = session, increments
 
     @property
     def steps(self) -> int:
-        """Good steps since the start."""
+        """The number of successful steps since the start."""
         return self.session.steps
 
     def advance(self, h: float, steps: int) -> None:
-        """Make so many steps."""
+        """Make ``steps`` steps."""
         done = self.steps
         self.session.advance_along(h, self.increments[done : done + steps])
 
-    def branch(self) -> Given:
-        """An independent copy."""
-        return Given(self.session.branch(), self.increments)
+    def branch(self) -> PrescribedNoise:
+        """Return an independent copy."""
+        return PrescribedNoise(self.session.branch(), self.increments)
 
     def state(self) -> Floats:
         """See `Followed`."""
