@@ -65,7 +65,7 @@ def test_parts_of_ensembles_end_where_groups_do(monkeypatch):
     sharing.shared_out(asked, None, made.append)
     made.sort(key=lambda part: part.start)
     assert [part.start for part in made] == list(range(0, 1000, made[0].stop))
-    assert made[0].stop % sharing.LEAST == 0
+    assert made[0].stop % sharing.PART_GRANULARITY == 0
     assert made[-1].stop == 1000
     assert len(made) > 3
 
