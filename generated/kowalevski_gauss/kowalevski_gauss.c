@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; Several steps or members at once; The implicit step, by Gauss
  *   collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: c831b6ad09a9141ad0eed468635379bc94b97c8c217c6f3ad75f81c5bfcd470f
+ * body-sha256: 7a5d041c53b19f4b603d409d7081e910b07ace833b82fa1de08fcda04ade7620
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -277,6 +277,15 @@ static void kowalevski_gauss_start(const kowalevski_gauss_solver *s, double poin
     memcpy(point, s->x, sizeof s->x);
 }
 
+/* The sum of the moves of all stages. */
+static void kowalevski_gauss_end(kowalevski_gauss_lanes *moves, double end[kowalevski_gauss_UNKNOWNS])
+{
+    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
+        end[k] = 0.0;
+        for (int i = 0; i < kowalevski_gauss_NODES; ++i) end[k] += moves[k][i];
+    }
+}
+
 /* h b_j times the vector field at all stages, where the unknowns are z; the weights are h b_j. */
 static inline void kowalevski_gauss_slopes(const kowalevski_gauss_solver *s,
     double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *weights, kowalevski_gauss_lanes *z,
@@ -315,6 +324,16 @@ static double kowalevski_gauss_change_of(double square, kowalevski_gauss_lanes *
     return sqrt(largest);
 }
 
+/* The moves of the last step, as seen from its end, where this one starts. */
+static void kowalevski_gauss_seen(const kowalevski_gauss_solver *s, kowalevski_gauss_lanes *seen)
+{
+    double end[kowalevski_gauss_UNKNOWNS];
+    kowalevski_gauss_lanes moves[kowalevski_gauss_UNKNOWNS];
+    memcpy(moves, s->history.moves, sizeof moves); /* which need not be aligned as lanes are */
+    kowalevski_gauss_end(moves, end);
+    kowalevski_gauss_next_frame_lanes(s->coef, end, moves, seen);
+}
+
 enum {
     /* sweeps that change more than those before, beyond transients: the step is too large */
     kowalevski_gauss_MOST_RISING = 3,
@@ -340,7 +359,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
     int rising = 0, rises = 0;
     for (int i = 0; i < kowalevski_gauss_NODES; ++i) weights[0][i] = s->h * kowalevski_gauss_weights[i];
     if (past->count > 0) {
-        memcpy(next, past->moves, sizeof next); /* which need not be aligned as lanes are */
+        kowalevski_gauss_seen(s, next);
         kowalevski_gauss_mixed(kowalevski_gauss_prediction, next, z);
     } else {
         memset(z, 0, sizeof z);
@@ -390,15 +409,10 @@ static kowalevski_gauss_status kowalevski_gauss_attempt(kowalevski_gauss_solver 
     kowalevski_gauss_start(s, point);
     const kowalevski_gauss_status status = kowalevski_gauss_collocate(s, point, moves);
     if (status != kowalevski_gauss_OK) return status;
-    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
-        end[k] = 0.0;
-        for (int i = 0; i < kowalevski_gauss_NODES; ++i) end[k] += moves[k][i];
-    }
+    kowalevski_gauss_end(moves, end);
     kowalevski_gauss_stage_change(s->coef, point, end, change);
     if (!kowalevski_gauss_advance(s, change, s->carry)) return kowalevski_gauss_NOT_FINITE;
-    kowalevski_gauss_lanes seen[kowalevski_gauss_UNKNOWNS];
-    kowalevski_gauss_next_frame_lanes(s->coef, end, moves, seen);
-    memcpy(past->moves, seen, sizeof seen);
+    memcpy(past->moves, moves, sizeof moves);
     past->count = 1;
     return kowalevski_gauss_OK;
 }

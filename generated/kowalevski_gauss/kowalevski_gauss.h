@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 23ae19bffaa18b495491c5348a1feb02530b78a67a48d067d6f76135eec2dc12
+ * body-sha256: 470848111f126edf505752a03d7d7a79568f360123aeafc717e7be051b5af3a7
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -38,7 +38,7 @@ typedef struct {
     int count;   /* 0 before the first step */
     int sweeps;  /* that the last step took */
     double rate; /* at which changes of sweeps shrink */
-    /* of the stages of the last step, as seen from its end */
+    /* of the stages of the last step, in the frame of its start */
     double moves[kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
 } kowalevski_gauss_history;
 

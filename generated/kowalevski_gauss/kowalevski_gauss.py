@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 72 additions, 95 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: f76776a83849449c5bd3e51363155db9c242b41b95152aef5538d2f6d768a601
+# body-sha256: ea98fb1758a05abc460981ea4fcaabfcdbe7933ea36fb6cd381581b759d10b31
 import numpy as np
 
 VERSION = "0.1.0"
@@ -294,7 +294,7 @@ def _solved(stage, x, z):
 
 
 def _advance(stage, x, carry, memory):
-    """One step of all members; `memory[1]` holds the moves of the last step, as seen from its end, once there was one."""
+    """One step of all members; `memory` holds the moves of the last step, and these as seen from its end, once there was one."""
     predicted = memory[1].ndim == 3
     anew = np.zeros((8, len(x), len(WEIGHTS)))
     moves, status = _solved(stage, x, memory[1] @ PREDICTION.T if predicted else anew)
@@ -305,9 +305,9 @@ def _advance(stage, x, carry, memory):
     end = np.sum(moves, axis=-1)
     following, rest = _sum(x, carry, _stage_change(stage[0], _point(stage, x)[:, 0], end))
     good = np.isfinite(following).all(axis=-1)
-    moves = np.array(_next_frame(stage[0][:, :, np.newaxis], end[:, :, np.newaxis], moves))
-    seen = np.where((good & (status == ""))[:, np.newaxis], moves, 0.0)
-    return following, rest, (memory[0], seen), np.where(good | (status != ""), status, "NOT_FINITE")
+    seen = np.array(_next_frame(stage[0][:, :, np.newaxis], end[:, :, np.newaxis], moves))
+    seen = np.where((good & (status == ""))[:, np.newaxis], seen, 0.0)
+    return following, rest, (moves, seen), np.where(good | (status != ""), status, "NOT_FINITE")
 
 
 def _choose_gauge(parameters, x):

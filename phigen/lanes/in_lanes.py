@@ -228,10 +228,13 @@ def _called_in_forms(step: Sweeps) -> set[str]:
 
 
 def _stages(step: Gauss) -> Stages:
-    """The vector field of a Gauss method at all stages; what lies where a step starts is the same for all of them."""
+    """The vector field of a Gauss method at all stages, with its transposes; what lies where a step starts is the same
+    for all of them."""
     kernels = [LaneKernel(step.slope, ("coef", "x"))]
     kernels += [LaneKernel(step.frame, ("coef", "z"))] if step.frame else []
-    return Stages(tuple(kernels), with_formulas(operations([step.slope])), step.tableau.stages <= LANES // 2)
+    kernels += [LaneKernel(kernel, ("coef", "x")) for kernel in step.stage_transposes]
+    called = with_formulas(operations([step.slope, *step.stage_transposes]))
+    return Stages(tuple(kernels), called, step.tableau.stages <= LANES // 2)
 
 
 def _newton(program: Program, step: Newton) -> Blocks | None:

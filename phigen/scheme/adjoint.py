@@ -4,6 +4,7 @@ From the cotangent of x' follow the cotangents of x and of the coefficients of t
 steps of a run, and ``prepare`` is pulled back once. *newton*: let a(y) + y = x, x' = x + d(y), J = 1 + a' and M = d',
 with J and M of ``linearise``. If λ is the cotangent of x' and μ = J⁻ᵀ Mᵀ λ, the cotangent of x is λ + μ, and that of a
 coefficient is the derivative of λ·d − μ·a along it. *explicit* and flows: one reverse sweep. *path*: `adjoint_path`.
+*gauss*: `gauss_adjoint`.
 """
 
 from __future__ import annotations
@@ -89,6 +90,31 @@ def explicit_adjoint(explicit: Kernel, coefficients: Coefficients, name: str = "
         {"state": kernel.inputs["state"], TABLE: coefficients.table},
         "cotangents of the state and of the coefficients, from that of the increment",
     )
+
+
+def gauss_adjoint(
+    field: Kernel, change: Kernel, coordinates: Sequence[str], coefficients: Coefficients
+) -> list[Kernel]:
+    """The transposes of the kernels of a Gauss step.
+
+    With Z_i = Σ_j μ_ij L_j, L_j = w_j f(x, Z_j) and x' = x + D(x, Σ_j L_j), the cotangent λ of x' gives ε = (∂D/∂z)ᵀ λ,
+    and those of the unknowns, ζ_i = w_i (∂f/∂z)ᵀ κ_i, with those of the moves, κ_i = ε + Σ_j μ_ji ζ_j: equations that
+    sweeps solve as well as those of the stages. The first kernel is that of a sweep, and the second gives what a stage
+    adds to the cotangents of the start of the step and of the coefficients. The third is the transpose of D.
+    """
+    seeds = {"move_bar": field.outputs[0].values}
+    start = {"x": tuple(coordinates), TABLE: coefficients.table}
+    at_stages = (
+        ("stage_field_adjoint", {"z": field.inputs["z"]}, "cotangents of the unknowns of a stage"),
+        ("stage_start_adjoint", start, "cotangents of the start of the step and of the coefficients"),
+    )
+    kernels = [
+        pulled_back(field, name, seeds, along, f"{what}, from that of its move") for name, along, what in at_stages
+    ]
+    purpose = "cotangents of the start, of the sum of all moves and of the coefficients, from that of the change"
+    along = {"x": tuple(coordinates), "z": change.inputs["z"], TABLE: coefficients.table}
+    seeds = {"change_bar": change.outputs[0].values}
+    return [*kernels, pulled_back(change, "stage_change_adjoint", seeds, along, purpose)]
 
 
 def completed(

@@ -17,6 +17,7 @@ from phigen.gauss.kernels import (
 from phigen.gauss.realisation import Realisation, collective, direct
 from phigen.gauss.tableau import MOST_STAGES, tableau
 from phigen.geometry.system import System
+from phigen.scheme.adjoint import completed, gauss_adjoint
 from phigen.scheme.discretisation import expect_few
 from phigen.scheme.forces import force_facts
 from phigen.scheme.gauge import Gauge
@@ -54,8 +55,6 @@ def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
         yield ("noise",), "not with noise", "scheme: series or splitting"
     if spec.monitor is not None:
         yield ("monitor",), "not with a monitor", "scheme: series or splitting"
-    if extras.adjoint:
-        yield ("adjoint",), "its transpose is not offered", "scheme: series or splitting, for gradients"
     if extras.modified_hamiltonian:
         yield ("modified_hamiltonian",), "the modified Hamiltonian is not computed", series
     if spec.reconstruct:
@@ -112,15 +111,21 @@ def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: O
         {"params": system.parameter_names, "h": (STEP,)},
         (Output("coef", tuple(coefficients.values)),),
     )
+    slope, change = _full(slope, coefficients), _full(change, coefficients)
+    adjoint = None
+    if spec.extras.adjoint:
+        transposed = gauss_adjoint(slope, change, system.coordinates, coefficients)
+        adjoint = completed(coefficients, transposed, prepare, None)
     step = Gauss(
         prepare,
-        _full(slope, coefficients),
-        _full(change, coefficients),
+        slope,
+        change,
         tableau(order.terms),
         len(points.moved) + len(system.times),
         _full(frame, coefficients) if frame else None,
         spec.solver.max_iterations if ("solver", "max_iterations") in spec.locations else MOST_SWEEPS,
         tangent,
+        adjoint=adjoint,
     )
     for kernel in step.kernels:
         expect_few(system, kernel, other="")

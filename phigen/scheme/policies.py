@@ -143,6 +143,15 @@ class GaussTangentPolicy(Policy):
 
 
 @dataclass(frozen=True)
+class GaussAdjointPolicy(Policy):
+    """Sweeps of the transposed equations of Gauss stages."""
+
+    adjoint_solved: float = number(1e-17, "what a next sweep may change, in sizes of the cotangents;")
+    adjoint_stalled: float = number(0.8, "a sweep that changes more than this part of the one before ...")
+    adjoint_rounding: float = number(1e-12, "... and no more than this is rounding: the second such one is the last")
+
+
+@dataclass(frozen=True)
 class PathTangentPolicy(Policy):
     """The Taylor series of a path with its variation."""
 
@@ -196,6 +205,7 @@ POLICIES: dict[str, Policy] = {
     "gauge_search": GaugeSearch(),
     "tangent_policy": TangentPolicy(),
     "gauss_tangent_policy": GaussTangentPolicy(),
+    "gauss_adjoint_policy": GaussAdjointPolicy(),
     "path_tangent_policy": PathTangentPolicy(),
     "lattice_sweep_policy": LatticeSweepPolicy(),
     "lattice_newton_policy": LatticeNewtonPolicy(),

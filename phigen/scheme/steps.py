@@ -259,10 +259,15 @@ class Gauss(_Staged):
         return len(self.slope.roots)
 
     @property
+    def stage_transposes(self) -> tuple[Kernel, ...]:
+        """Transposed kernels of a stage: those that read its weight w."""
+        return tuple(k for k in (self.adjoint.steps if self.adjoint else ()) if "w" in k.inputs)
+
+    @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         varied = (self.tangent.slope, self.tangent.change) if self.tangent else ()
-        return _present((self.prepare, self.slope, self.change, self.frame, *varied))
+        return _present((self.prepare, self.slope, self.change, self.frame, *varied, *self.transposed))
 
 
 @dataclass(frozen=True)

@@ -222,7 +222,7 @@ def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:
     drawn = Ordinary(seed, structure, tuple(terms), start, parameters)
     drawn = _acted_upon(source, drawn, scheme, weight)
     drawn = replace(drawn, options=_options(source, drawn, scheme))
-    return _extras(source, drawn)
+    return _collocated(random.Random(f"gauss {seed} {attempt}"), _extras(source, drawn))
 
 
 def _any_terms(source: random.Random, structure: Structure, weight: Callable[[], Expr]) -> list[Expr]:
@@ -378,3 +378,20 @@ def _extras(source: random.Random, drawn: Ordinary) -> Ordinary:
             else:
                 asked[name] = True
     return replace(drawn, options=options, asked=asked)
+
+
+#: Options of other schemes.
+_NOT_OF_GAUSS = ("birealisation", "composition", "reconstruct", "real", "solver")
+
+
+def _collocated(source: random.Random, drawn: Ordinary) -> Ordinary:
+    """The system, now and then with Gauss collocation in place of its scheme."""
+    if source.random() > 0.25 or drawn.noise or drawn.monitor is not None:
+        return drawn
+    options = {k: v for k, v in drawn.options.items() if k not in _NOT_OF_GAUSS}
+    options |= {"scheme": "gauss", "order": source.choice([2, 4, 6, 8, 12, 16])}
+    if source.random() < 0.4:
+        options["structure"] = "to truncation"
+    if source.random() < 0.2:
+        options["solver"] = {"lanes": False}
+    return replace(drawn, options=options)

@@ -160,7 +160,6 @@ REFUSED = {
     "structure": (f"{SPECIES}scheme: gauss\n", "no exact Poisson map is known", "to truncation"),
     "noise": (f"{BODY}noise: {{w: {{hamiltonian: x1}}}}\nscheme: gauss\n", "not with noise", "series"),
     "monitor": (f"{BODY}monitor: 1 + x1**2\nscheme: gauss\n", "not with a monitor", "series"),
-    "adjoint": (f"{BODY}adjoint: true\nscheme: gauss\n", "transpose is not offered", "series"),
     "modified": (f"{BODY}modified_hamiltonian: 1\nscheme: gauss\n", "belongs to scheme: series", "remove"),
     "attitude": (f"{BODY}reconstruct: quaternion\nscheme: gauss\n", "attitudes are not offered", "series"),
     "float": (f"{BODY}real: float\nscheme: gauss\n", "single precision", "series"),

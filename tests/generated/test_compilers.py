@@ -109,7 +109,7 @@ def test_fast_code_with_derivatives_is_cpp_as_well(name, tmp_path):
     """By one standard of each compiler, `test_all_c_is_cpp_as_well` has both of both. clang alone says which inline
     functions nothing calls."""
     found = spec_of(name)
-    extras = {"tangent": not found.lattice, "adjoint": not found.noise and found.scheme != "gauss"}
+    extras = {"tangent": not found.lattice, "adjoint": not found.noise}
     write(tmp_path, emit(compile_spec(found, **extras, profile="fast").program, "c", "phigen"))
     for compiler, language, standard in (("clang", "c", "c99"), ("clang++", "c++", "c++17"), ("g++", "c++", "c++20")):
         run([tool(compiler), "-x", language, f"-std={standard}", *WARNINGS, "-fsyntax-only", f"{name}.c"], tmp_path)

@@ -40,7 +40,7 @@ IMPLICIT = [
     ("NEWTON", "FAST", "ADJOINT"),
 ]
 IMPLICIT += [("PATH", *more) for _, *more in IMPLICIT]
-IMPLICIT += [("NEWTON", "GAUGE"), ("NEWTON", "GAUGE", "FAST", "ADJOINT")]
+IMPLICIT += [("NEWTON", "GAUGE"), ("NEWTON", "GAUGE", "FAST", "ADJOINT"), ("GAUSS", "ADJOINT")]
 EXPLICIT = [(kind, *more) for kind in ("EXPLICIT", "SPLITTING") for more in ((), ("FAST",), ("TANGENT",), ("ADJOINT",))]
 EXPLICIT += [(kind, "FAST", "ADJOINT") for kind in ("EXPLICIT", "SPLITTING")]
 
@@ -70,7 +70,7 @@ def defined(switches):
 #: has the fast code of implicit steps looked at.
 FEW = [(kind, *more) for kind in ("NEWTON", "PATH") for more in ((), ("COMPOSED", "ADJOINT", "TANGENT"))]
 FEW += [("NEWTON", "GAUGE"), ("NEWTON", "FAST", "ADJOINT"), ("EXPLICIT",), ("EXPLICIT", "FAST", "ADJOINT")]
-FEW += [("EXPLICIT", "ADJOINT"), ("SPLITTING", "FAST", "ADJOINT"), ("SPLITTING", "TANGENT")]
+FEW += [("EXPLICIT", "ADJOINT"), ("SPLITTING", "FAST", "ADJOINT"), ("SPLITTING", "TANGENT"), ("GAUSS", "ADJOINT")]
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,8 @@ def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
 )
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
     kinds = {"packs.c": "SPLITTING", "adjoint_segments.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH"}
-    kinds |= dict.fromkeys(("path_lanes.c", "expansion_lanes.c", "adjoint_lanes.c"), "PATH") | {"gauss.c": "GAUSS"}
+    kinds |= dict.fromkeys(("path_lanes.c", "expansion_lanes.c", "adjoint_lanes.c"), "PATH")
+    kinds |= dict.fromkeys(("gauss.c", "adjoint_gauss.c"), "GAUSS")
     own = {
         "gauge.c": ["GAUGE"],
         "level.c": ["GAUGE"],
@@ -147,8 +148,7 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
         "philox.c": ["NOISE"],
     }
     kind = kinds.get(path.name, "NEWTON")
-    adjoint = () if kind == "GAUSS" else ("ADJOINT",)
-    switches = defined((kind, "FAST", "TANGENT", *adjoint, *own.get(path.name, ())))
+    switches = defined((kind, "FAST", "TANGENT", "ADJOINT", *own.get(path.name, ())))
     run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, path], tmp_path)
 
 

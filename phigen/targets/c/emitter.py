@@ -156,8 +156,7 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         sizes.append(("GAUGES", len(program.held), "that a trajectory holds fixed: e" if program.monitor else whose))
     sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["ADJOINT"]:
-        points = program.step.schedule.flows if isinstance(program.step, Splitting) else program.fractions
-        trail = program.dimension * len(points)
+        trail = _trail(program, lanes)
         sizes.append(("TRAIL", trail, "numbers of a step that its transpose needs"))
         if has["EACH"]:
             kept = 1 if isinstance(program.step, Splitting) else LANES * _packs_back(lanes, has)
@@ -192,6 +191,14 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
             for said, kernels in _observables(program)
         ],
     }
+
+
+def _trail(program: Program, lanes: Lanes | None) -> int:
+    """Numbers of a step that its transpose needs."""
+    step = program.step
+    if isinstance(step, Gauss):
+        return gauss.trail(program, step, lanes)
+    return program.dimension * len(step.schedule.flows if isinstance(step, Splitting) else program.fractions)
 
 
 #: Kernels that are functions of the API: each with its name there, and whether it returns its only value.
@@ -328,7 +335,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     if step.refresh and not isinstance(step, Splitting):
         body.append(function(program, step.refresh, name="at_step" if program.noise else "at_time"))
     if step.adjoint:
-        own += [] if isinstance(step, Splitting) else step.adjoint.steps
+        own += [] if isinstance(step, Splitting | Gauss) else step.adjoint.steps
         own += _of_adjoint(program, step.adjoint)
         if step.adjoint.refresh:
             body.append(function(program, step.adjoint.refresh, name="at_time_adjoint"))

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 CONDITIONS = {
     "adjoint.c": "ADJOINT",
     "adjoint_each.c": "ADJOINT && EACH",
+    "adjoint_gauss.c": "GAUSS",
     "adjoint_groups.c": "ABREAST",
     "adjoint_kept.c": "!SPLITTING",
     "adjoint_lanes.c": "TRACED",

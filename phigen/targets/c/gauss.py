@@ -39,7 +39,14 @@ def scalar_kernels(step: Gauss, *, staged: bool) -> list[Kernel | None]:
     """The kernels that are evaluated at one stage; with ``staged`` most are evaluated at all stages at once."""
     at_stages = [] if staged else [step.slope, step.frame]
     varied = [step.tangent.slope, step.tangent.change] if step.tangent else []
-    return [step.prepare, *at_stages, step.change, *varied]
+    transposed = step.adjoint.steps if step.adjoint else ()
+    back = [k for k in transposed if not (staged and k in step.stage_transposes)]
+    return [step.prepare, *at_stages, step.change, *varied, *back]
+
+
+def trail(program: Program, step: Gauss, lanes: Lanes | None) -> int:
+    """Numbers of a step that its transpose needs: where it starts, and its moves."""
+    return program.dimension + step.unknowns * _width(step, lanes)
 
 
 def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:

@@ -188,6 +188,9 @@ def _adjoint(program: Program, adjoint: Adjoint) -> list[str]:
         values |= _splitting_values(step) | {"kicks": bool(step.schedule.multiples)}
         values["adjoints"] = ", ".join(f"_{kernel.name}" for kernel in adjoint.steps)
         parts = ["splitting"]
+    if isinstance(step, Gauss):
+        values |= _gauss_values(step)
+        parts = ["gauss"]
     if adjoint.path and isinstance(step, Path):
         values |= _varied(program, step, adjoint.path)
         kernels += [] if program.extras.tangent else [adjoint.path.curvature]
@@ -230,6 +233,8 @@ def _of_pullback(program: Program, step: Step) -> dict[str, object]:
         "parameters": len(program.parameters),
         "levels": int(program.monitor is not None),
         "early": step.prepared * rows,
+        "kept": 2 * program.dimension
+        + (step.unknowns * step.tableau.stages if isinstance(step, Gauss) else program.dimension),
         "gauge_passed": "gauge.T, " * bool(program.held),
         "t0_too": ", t0" * bool(program.time),
         "found": f"_early(stage, found{moment})" if step.refresh else "found",

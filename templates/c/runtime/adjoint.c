@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "adjoint_stage.c"
+#include "adjoint_gauss.c"
 #include "algebra.c"
 #include "model.h"
 #include "solver.c"
@@ -88,6 +89,8 @@ static phi_status phi_back_step(phi_solver *s, phi_kept trail, phi_cotangent *ba
     phi_go_back(s);
 #if PHI_SPLITTING
     status = phi_stage_adjoint(s->coef, trail, bar, bar->coef);
+#elif PHI_GAUSS
+    status = phi_stage_adjoint(s, trail, bar);
 #else
     PHI_EACH_STAGE_BACK
         if (status == PHI_OK) status = phi_stage_adjoint(PHI_OF(s->coef, stage), PHI_OF(trail, stage), bar, PHI_OF(bar->coef, stage));
@@ -154,7 +157,10 @@ static phi_status phi_leave_few(phi_solver *s, size_t steps, phi_kept *trail)
     status = phi_integrate_leaving(s, s->h, steps, trail[0]);
 #else
     status = phi_integrate(s, s->h, steps);
-#if PHI_COMPOSED
+#if PHI_GAUSS
+    memcpy(trail[0], before.x, sizeof before.x);
+    memcpy(trail[0] + PHI_DIM, s->history.moves, sizeof s->history.moves);
+#elif PHI_COMPOSED
     double x[PHI_DIM], change[PHI_DIM];
     memcpy(x, before.x, sizeof x);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {

@@ -29,6 +29,8 @@ typedef struct {
    begun at. */
 #if PHI_SPLITTING
 typedef double phi_kept[PHI_FLOWS][PHI_DIM];
+#elif PHI_GAUSS
+typedef double phi_kept[PHI_TRAIL]; /* where it starts, and the moves of its stages */
 #else
 typedef double PHI_OF(phi_kept, PHI_STAGES)[PHI_DIM];
 #endif
@@ -219,7 +221,7 @@ static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM],
     return PHI_OK;
 }
 
-#else
+#elif PHI_SPLITTING
 /* Pull a cotangent back through a step whose flows began at y. */
 static phi_status phi_stage_adjoint(const double *coef, phi_kept y, phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])

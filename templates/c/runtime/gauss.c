@@ -28,6 +28,15 @@ static void phi_start(const phi_solver *s, double point[PHI_POINT])
 #endif
 }
 
+/* The sum of the moves of all stages. */
+static void phi_end(phi_lanes *moves, double end[PHI_UNKNOWNS])
+{
+    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
+        end[k] = 0.0;
+        for (int i = 0; i < PHI_NODES; ++i) end[k] += moves[k][i];
+    }
+}
+
 /* h b_j times the vector field at all stages, where the unknowns are z; the weights are h b_j. */
 static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z, phi_lanes *moves)
 {
@@ -69,6 +78,29 @@ static double phi_change_of(double square, phi_lanes *before, phi_lanes *after)
     return sqrt(largest);
 }
 
+/* The moves of the last step, as seen from its end, where this one starts. */
+static void phi_seen(const phi_solver *s, phi_lanes *seen)
+{
+#if PHI_FRAMED
+    double end[PHI_UNKNOWNS];
+    phi_lanes moves[PHI_UNKNOWNS];
+    memcpy(moves, s->history.moves, sizeof moves); /* which need not be aligned as lanes are */
+    phi_end(moves, end);
+#if PHI_STAGED
+    phi_next_frame_lanes(s->coef, end, moves, seen);
+#else
+    double move[PHI_UNKNOWNS], found[PHI_UNKNOWNS];
+    for (int i = 0; i < PHI_NODES; ++i) {
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) move[k] = moves[k][i];
+        phi_next_frame(s->coef, end, move, found);
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) seen[k][i] = found[k];
+    }
+#endif
+#else
+    memcpy(seen, s->history.moves, sizeof s->history.moves); /* which need not be aligned as lanes are */
+#endif
+}
+
 #include "gauss_policy.h"
 
 /* Solve for the moves of all stages by sweeps, from those that the last step predicts. The change by a sweep is looked at from
@@ -81,7 +113,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
     int rising = 0, rises = 0;
     for (int i = 0; i < PHI_NODES; ++i) weights[0][i] = s->h * phi_weights[i];
     if (past->count > 0) {
-        memcpy(next, past->moves, sizeof next); /* which need not be aligned as lanes are */
+        phi_seen(s, next);
         phi_mixed(phi_prediction, next, z);
     } else {
         memset(z, 0, sizeof z);
@@ -127,26 +159,10 @@ static phi_status phi_attempt(phi_solver *s)
     phi_start(s, point);
     const phi_status status = phi_collocate(s, point, moves);
     if (status != PHI_OK) return status;
-    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        end[k] = 0.0;
-        for (int i = 0; i < PHI_NODES; ++i) end[k] += moves[k][i];
-    }
+    phi_end(moves, end);
     phi_stage_change(s->coef, point, end, change);
     if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
-#if PHI_FRAMED && PHI_STAGED
-    phi_lanes seen[PHI_UNKNOWNS];
-    phi_next_frame_lanes(s->coef, end, moves, seen);
-    memcpy(past->moves, seen, sizeof seen);
-#elif PHI_FRAMED
-    double move[PHI_UNKNOWNS], seen[PHI_UNKNOWNS];
-    for (int i = 0; i < PHI_NODES; ++i) {
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) move[k] = moves[k][i];
-        phi_next_frame(s->coef, end, move, seen);
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) past->moves[k][i] = seen[k];
-    }
-#else
     memcpy(past->moves, moves, sizeof moves);
-#endif
     past->count = 1;
     return PHI_OK;
 }

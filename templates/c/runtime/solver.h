@@ -11,7 +11,7 @@ typedef struct {
     int count;   /* 0 before the first step */
     int sweeps;  /* that the last step took */
     double rate; /* at which changes of sweeps shrink */
-    double moves[PHI_UNKNOWNS][PHI_WIDTH]; /* of the stages of the last step, as seen from its end */
+    double moves[PHI_UNKNOWNS][PHI_WIDTH]; /* of the stages of the last step, in the frame of its start */
 } phi_history;
 
 #elif PHI_GUESSED && !PHI_RECURRENCES

@@ -123,18 +123,12 @@ static phi_status phi_tangent_stage(const phi_solver *s, const phi_solver *at, d
         for (int k = 0; k < PHI_UNKNOWNS; ++k) node[k] = z[k][i];
         phi_stage_slope_jacobian(s->coef, point, node, slopes[i]);
     }
-    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        end[k] = 0.0;
-        for (int i = 0; i < PHI_NODES; ++i) end[k] += moves[k][i];
-    }
+    phi_end(moves, end);
     phi_stage_change(s->coef, point, end, change);
     phi_stage_change_jacobian(s->coef, point, end, outer);
     for (int j = 0; j < PHI_DIM; ++j) {
         if (!phi_vary(s, slopes, j, moves)) return PHI_NO_CONVERGENCE;
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-            along[k] = 0.0;
-            for (int i = 0; i < PHI_NODES; ++i) along[k] += moves[k][i];
-        }
+        phi_end(moves, along);
         for (int i = 0; i < PHI_DIM; ++i) {
             const double *row = outer + i * (PHI_DIM + PHI_UNKNOWNS);
             double sum = row[j] + (i == j ? 1.0 : 0.0);

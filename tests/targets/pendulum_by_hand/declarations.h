@@ -104,7 +104,7 @@ void phi_vector_field(const phi_params *params, const double x[2], double out[2]
 #if PHI_COMPOSED
 enum { PHI_STAGES = 3 };
 #endif
-enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2, PHI_TRAIL = (PHI_SPLITTING || PHI_COMPOSED ? 3 : 1) * PHI_DIM };
+enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2, PHI_TRAIL = (PHI_SPLITTING || PHI_COMPOSED ? 3 : PHI_GAUSS ? 2 : 1) * PHI_DIM };
 enum { PHI_TRAIL_EACH = PHI_TRAIL * (PHI_SPLITTING || !PHI_ABREAST ? 1 : PHI_EXPLICIT ? 32 : 8) };
 #if PHI_GAUGE
 enum { PHI_GAUGES = 2 };

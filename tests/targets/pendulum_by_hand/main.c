@@ -63,7 +63,7 @@ static void keeps_energy(void)
 }
 
 /* A kick there and back, and a state set to what it is, leave a trajectory that differs by rounding only; time, gauge and
-   steps go on. Guesses move along, so that a small kick costs no more evaluations than two steps do. */
+   steps go on. Guesses move along, so that a small kick costs no more evaluations than two steps do; those of Gauss methods begin anew. */
 static void is_moved_from_outside(void)
 {
     const double there[2] = { 0.01, -0.02 }, back[2] = { -0.01, 0.02 }, nowhere[2] = { 0.0, (double)NAN };
@@ -76,7 +76,7 @@ static void is_moved_from_outside(void)
     EXPECT(phi_set_state(&kicked, kicked.x) == PHI_OK);
     const size_t before = kicked.evaluations;
     EXPECT(phi_step(&kicked, H) == PHI_OK && phi_step(&s, H) == PHI_OK);
-    EXPECT(kicked.evaluations - before <= 2 * PHI_ALL_STAGES(1));
+    EXPECT(PHI_GAUSS || kicked.evaluations - before <= 2 * PHI_ALL_STAGES(1));
     EXPECT(phi_integrate(&kicked, H, 300) == PHI_OK && phi_integrate(&s, H, 300) == PHI_OK);
     EXPECT(apart(kicked.x, s.x) < 1e-12 && kicked.steps == s.steps && fabs(kicked.t - s.t) <= 0.0);
     EXPECT(phi_kick(&kicked, start) == PHI_OK && phi_integrate(&kicked, H, 100) == PHI_OK);

@@ -41,6 +41,34 @@ static void phi_stage_change(const double *coef, const double x[2], const double
     out[1] = z[1];
 }
 
+#if PHI_ADJOINT
+static void phi_stage_field_adjoint(const double *coef, const double x[2], const double z[2], const double w[1],
+    const double move_bar[2], double z_bar[2])
+{
+    z_bar[0] = -w[0] * coef[1] / coef[0] * cos(x[0] + z[0]) * move_bar[1];
+    z_bar[1] = w[0] * move_bar[0];
+}
+
+static void phi_stage_start_adjoint(const double *coef, const double x[2], const double z[2], const double w[1],
+    const double move_bar[2], double x_bar[2], double coef_bar[2])
+{
+    const double slope = -w[0] * sin(x[0] + z[0]) * move_bar[1];
+    phi_stage_field_adjoint(coef, x, z, w, move_bar, x_bar);
+    coef_bar[0] = -slope * coef[1] / (coef[0] * coef[0]);
+    coef_bar[1] = slope / coef[0];
+}
+
+static void phi_stage_change_adjoint(const double *coef, const double x[2], const double z[2], const double change_bar[2],
+    double x_bar[2], double z_bar[2], double coef_bar[2])
+{
+    (void)coef, (void)x, (void)z;
+    memset(x_bar, 0, 2 * sizeof x_bar[0]);
+    memset(coef_bar, 0, 2 * sizeof coef_bar[0]);
+    memcpy(z_bar, change_bar, 2 * sizeof z_bar[0]);
+}
+
+#endif
+
 #endif
 static int phi_allowed(const phi_params *params) { return isfinite(params->g) && params->g > 0.0; }
 

@@ -1,0 +1,125 @@
+#ifndef PHI_FILE_ADJOINT_GAUSS
+#define PHI_FILE_ADJOINT_GAUSS
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "adjoint_stage.c"
+#include "gauss.c"
+#include "model.h"
+
+#include "gauss_adjoint_policy.h"
+
+/* Cotangents of the unknowns at all stages, from those of the moves: the transpose of phi_slopes. */
+static void phi_unknowns_bar(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
+    phi_lanes *moves_bar, phi_lanes *z_bar)
+{
+#if PHI_STAGED
+    phi_stage_field_adjoint_lanes(s->coef, point, z, weights, moves_bar, z_bar);
+#else
+    double at[PHI_UNKNOWNS], move_bar[PHI_UNKNOWNS], found[PHI_UNKNOWNS];
+    for (int i = 0; i < PHI_NODES; ++i) {
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) at[k] = z[k][i];
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) move_bar[k] = moves_bar[k][i];
+        phi_stage_field_adjoint(s->coef, point, at, &weights[0][i], move_bar, found);
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) z_bar[k][i] = found[k];
+    }
+#endif
+}
+
+/* Add what all stages give to the cotangents of the start of the step and of coefficients, from those of the moves. */
+static void phi_add_stages(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
+    phi_lanes *moves_bar, phi_cotangent *bar)
+{
+#if PHI_STAGED
+    phi_lanes x[PHI_DIM], coef[PHI_COEFFICIENTS];
+    memset(coef, 0, sizeof coef); /* which may be none */
+    phi_stage_start_adjoint_lanes(s->coef, point, z, weights, moves_bar, x, coef);
+    for (int i = 0; i < PHI_NODES; ++i) {
+        for (int k = 0; k < PHI_DIM; ++k) bar->x[k] += x[k][i];
+        for (int k = 0; k < PHI_COEFFICIENTS; ++k) bar->coef[k] += coef[k][i];
+    }
+#else
+    double at[PHI_UNKNOWNS], move_bar[PHI_UNKNOWNS], x[PHI_DIM], coef[PHI_COEFFICIENTS] = { 0.0 };
+    for (int i = 0; i < PHI_NODES; ++i) {
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) at[k] = z[k][i];
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) move_bar[k] = moves_bar[k][i];
+        phi_stage_start_adjoint(s->coef, point, at, &weights[0][i], move_bar, x, coef);
+        for (int k = 0; k < PHI_DIM; ++k) bar->x[k] += x[k];
+        for (int k = 0; k < PHI_COEFFICIENTS; ++k) bar->coef[k] += coef[k];
+    }
+#endif
+}
+
+/* Cotangents of the moves, from that of their sum and those of the unknowns: sums by the transpose of mu, 1 - mu. */
+static void phi_mixed_back(const double end_bar[PHI_UNKNOWNS], phi_lanes *z_bar, phi_lanes *moves_bar)
+{
+    phi_mixed(phi_mixing, z_bar, moves_bar);
+    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
+        double *move_bar = moves_bar[k], sum = end_bar[k];
+        for (int i = 0; i < PHI_NODES; ++i) sum += z_bar[k][i];
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_WIDTH; ++lane) move_bar[lane] = sum - move_bar[lane];
+    }
+}
+
+/* The largest change at any stage: of cotangents, whose squares may be too small. */
+static double phi_change_back(phi_lanes *before, phi_lanes *after)
+{
+    double largest = 0.0;
+    phi_lanes sum = { 0.0 };
+    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
+        const double *old = before[k], *now = after[k];
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] += fabs(now[lane] - old[lane]);
+    }
+    for (int i = 0; i < PHI_NODES; ++i)
+        if (!(sum[i] <= largest)) largest = sum[i]; /* or not a number */
+    return largest;
+}
+
+/* Solve for the cotangents of the moves by sweeps, from that of their sum. */
+static phi_status phi_collocate_back(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
+    const double end_bar[PHI_UNKNOWNS], phi_lanes *moves_bar)
+{
+    phi_lanes z_bar[PHI_UNKNOWNS], next[PHI_UNKNOWNS];
+    double last = HUGE_VAL, size = 0.0;
+    int stalls = 0;
+    for (int k = 0; k < PHI_UNKNOWNS; ++k) size += fabs(end_bar[k]);
+    memset(z_bar, 0, sizeof z_bar);
+    memset(next, 0, sizeof next);
+    phi_mixed_back(end_bar, z_bar, moves_bar);
+    for (int sweep = 0; sweep < PHI_MAX_SWEEPS; ++sweep) {
+        phi_unknowns_bar(s, point, weights, z, moves_bar, next);
+        const double change = phi_change_back(z_bar, next), rate = change / fmax(last, DBL_MIN);
+        if (!isfinite(change)) return PHI_NOT_FINITE;
+        memcpy(z_bar, next, sizeof next);
+        phi_mixed_back(end_bar, z_bar, moves_bar);
+        if (rate > PHI_ADJOINT_STALLED && change <= PHI_ADJOINT_ROUNDING * size) ++stalls;
+        if (stalls > 1 || (sweep > 0 && change * rate <= PHI_ADJOINT_SOLVED * size)) return PHI_OK;
+        last = change;
+    }
+    return PHI_NO_CONVERGENCE;
+}
+
+/* Pull a cotangent back through the step that s has made from the start of the trail. */
+static phi_status phi_stage_adjoint(const phi_solver *s, const double *trail, phi_cotangent *bar)
+{
+    double point[PHI_POINT], end[PHI_UNKNOWNS], end_bar[PHI_UNKNOWNS], x[PHI_DIM], coef[PHI_COEFFICIENTS] = { 0.0 };
+    phi_lanes weights[1] = { { 0.0 } }, moves[PHI_UNKNOWNS], z[PHI_UNKNOWNS];
+    memcpy(point, trail, sizeof x);
+#if PHI_TIMED
+    point[PHI_DIM] = s->t;
+#endif
+    memcpy(moves, trail + PHI_DIM, sizeof moves);
+    for (int i = 0; i < PHI_NODES; ++i) weights[0][i] = s->h * phi_weights[i];
+    phi_end(moves, end);
+    phi_mixed(phi_mixing, moves, z);
+    phi_stage_change_adjoint(s->coef, point, end, bar->x, x, end_bar, coef);
+    for (int k = 0; k < PHI_DIM; ++k) bar->x[k] += x[k];
+    for (int k = 0; k < PHI_COEFFICIENTS; ++k) bar->coef[k] += coef[k];
+    const phi_status status = phi_collocate_back(s, point, weights, z, end_bar, moves);
+    if (status == PHI_OK) phi_add_stages(s, point, weights, z, moves, bar);
+    return status;
+}
+#endif

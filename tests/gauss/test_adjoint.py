@@ -1,0 +1,152 @@
+"""Gradients through Gauss steps: against differences, against tangents, in all targets and profiles."""
+
+import ctypes
+from functools import cache
+
+import numpy as np
+import pytest
+from support import SCALED, RawC, small, solver
+
+from phigen import spec
+from phigen.compiler import compile_spec
+from phigen.runtime import c_solver
+
+TOP = """coordinates: [P1, P2, P3, G1, G2, G3]
+parameters: {a: 1.2, b: 0.8, c: 0.7, unused: 3}
+poisson: {lie_algebra: {name: se(3), sign: minus}}
+hamiltonian: (P1**2*a + P2**2*b + P3**2)/2 + c*G1 + sin(b*G2)
+"""
+MIXED = """coordinates: [x, y, z, q, p]
+parameters: {a: 1.1, s: 1.3}
+poisson: {brackets: {x: {y: s*z, z: -s*y}, y: {z: s*x}, q: {p: 1}}}
+hamiltonian: x**2/2 + a*y**2/3 + z**2/5 + p**2/2 + q**2/2 + cos(q)*x + sin(a*q)*y*z/4
+"""
+DRIVEN = """coordinates: [q, p]
+time: t
+parameters: {g: 1.3, w: 1.7, d: 0.2}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - g*cos(q)*(1 + cos(w*t)/5)
+forces: {vector: {p: -d*p*sin(t)}, covector: {p: -d*q*p/9}}
+"""
+SPECIES = """coordinates: [x, y, z]
+parameters: {r: {value: 1.1, positive: true}, k: 0.6}
+poisson: {brackets: {x: {y: k*x*y, z: -x*z}, y: {z: y*z}}}
+hamiltonian: r*x + y + z + k*log(x)
+structure: to truncation
+"""
+#: Spec, order and start: momentum maps, coefficients by parameters, products, time and forces; steps to truncation.
+KINDS = {
+    "top": (TOP, 16, [0.9, 0.5, 0.8, 0.6, 0.1, 0.8]),
+    "mixed": (MIXED, 4, [0.4, -0.8, 0.5, 0.3, 0.7]),
+    "scaled": (SCALED, 6, [0.3, -0.2, 0.4]),
+    "driven": (DRIVEN, 12, [0.4, 0.3]),
+    "species": (SPECIES, 10, [0.9, 1.2, 0.7]),
+}
+H, STEPS = 0.4, 5
+pytestmark = pytest.mark.few("mixed", "driven", of=KINDS)
+
+
+@cache
+def compilation(kind):
+    text, order, _ = KINDS[kind]
+    given = spec.loads(f"phigen: 1\nname: t\n{text}scheme: gauss\ngauge: none\n")
+    return compile_spec(given.overridden(order=order, tangent=True, adjoint=True))
+
+
+@cache
+def method(kind, target):
+    made = compilation(kind)
+    return solver(small(made), "c") if target == "small" else solver(made, target)
+
+
+def start(kind):
+    return np.array(KINDS[kind][2])
+
+
+def given(kind):
+    """Parameters other than the defaults."""
+    return {name: 1.07 * value for name, value in method(kind, "c").interface.parameters.items()}
+
+
+def weights(shape):
+    return np.random.default_rng(7).normal(size=shape)
+
+
+def difference(f, width=1e-3):
+    """The derivative at 0, by central differences of order 6."""
+    return sum(w * (f(k * width) - f(-k * width)) for k, w in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))) / width
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pullback_is_the_gradient_of_the_run(kind):
+    """All rows have a cotangent. NumPy and the small C agree with the fast C."""
+    fast, x, parameters, stride = method(kind, "c"), start(kind), given(kind), 2
+    bar = weights((4, len(x)))
+    rows, x0_bar, by = fast.pullback(x, H, STEPS, bar, stride, parameters=parameters)
+
+    def weighed(x, **changed):
+        return np.sum(bar * fast.integrate(x, H, STEPS, stride, parameters={**parameters, **changed}).x)
+
+    for j, unit in enumerate(np.eye(len(x))):
+        assert x0_bar[j] == pytest.approx(difference(lambda e, u=unit: weighed(x + e * u)), abs=1e-9)
+    for name, value in parameters.items():
+        slope = difference(lambda e, n=name, v=value: weighed(x, **{n: v + e}))
+        assert by[name] == pytest.approx(slope, abs=1e-9), name
+    for target in ("numpy", "small"):
+        again = method(kind, target).pullback(x, H, STEPS, bar, stride, parameters=parameters)
+        assert again.x1 == pytest.approx(rows, abs=1e-13)
+        assert again.x0_bar == pytest.approx(x0_bar, rel=0, abs=1e-13 * np.abs(x0_bar).max())
+        assert list(again.parameters_bar.values()) == pytest.approx(list(by.values()), rel=1e-12, abs=1e-14)
+
+
+@pytest.mark.parametrize("target", ["c", "numpy", "small"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_pullback_is_the_transpose_of_the_tangent_map(kind, target):
+    made, x = method(kind, target), start(kind)
+    bar, product = weights(len(x)), np.eye(len(x))
+    for _, tangent in made.tangents(x, H, STEPS):
+        product = tangent @ product
+    x0_bar = made.pullback(x, H, STEPS, bar).x0_bar
+    assert np.abs(x0_bar - bar @ product).max() <= 1e-14 * np.abs(x0_bar).max()
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_gradients_of_members_are_those_of_single_runs(target):
+    """With steps, parameters and times of their own."""
+    made, rng, x = method("driven", target), np.random.default_rng(2), start("driven")
+    many, h, t0 = x + 0.1 * rng.normal(size=(3, 2)), H * (1 + 0.1 * rng.random(3)), rng.random(3)
+    own = {name: value * (1 + 0.1 * rng.random(3)) for name, value in given("driven").items()}
+    bar = rng.normal(size=(3, 2))
+    together = made.pullback(many, h, STEPS, bar, t0=t0, parameters=own)
+    for m in range(3):
+        alone = made.pullback(
+            many[m], h[m], STEPS, bar[m], t0=t0[m], parameters={name: value[m] for name, value in own.items()}
+        )
+        assert together.x0_bar[m] == pytest.approx(alone.x0_bar, rel=1e-13)
+        assert [b[m] for b in together.parameters_bar.values()] == pytest.approx(
+            [*alone.parameters_bar.values()], rel=1e-13
+        )
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
+    """Steps of later segments begin without what earlier ones predict, so digits are lost to rounding only."""
+    made, x, bar = method("mixed", target), start("mixed"), weights((4, 5))
+    whole = made.pullback(x, H, 30, bar, 10)
+    monkeypatch.setattr(c_solver, "KEPT", 7 * 29)  # seven steps
+    if target == "numpy":
+        monkeypatch.setattr(made.backend.module, "KEPT", 7 * 22)
+    part = made.pullback(x, H, 30, bar, 10)
+    assert part.x1 == pytest.approx(whole.x1, abs=1e-13)
+    assert part.x0_bar == pytest.approx(whole.x0_bar, rel=0, abs=1e-12 * np.abs(whole.x0_bar).max())
+
+
+def test_transpose_of_a_step_that_fails_leaves_the_state():
+    raw = RawC(compilation("driven"))
+    raw.init(start("driven"))
+    bar, before = np.array([1.0, 2.0]), bytes(raw.memory)
+    here = ctypes.c_void_p(bar.ctypes.data)
+    assert raw.call("step_adjoint", ctypes.c_int, raw.here, ctypes.c_double(5e3), here, here, None) != 0
+    assert (bytes(raw.memory), bar.tolist()) == (before, [1, 2])
+    assert raw.call("step_adjoint", ctypes.c_int, raw.here, ctypes.c_double(0.1), here, here, None) == 0
+    assert bar.tolist() != [1, 2]
