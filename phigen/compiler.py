@@ -31,7 +31,7 @@ from phigen.scheme.assemble import build_program
 from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.choosing import planned as plan_without_kicks
 from phigen.scheme.discretisation import discretise, expect_affordable, is_large
-from phigen.scheme.gauge import Gauge, choose, fixed_gauge_named, given
+from phigen.scheme.gauge import Gauge, choose, fixed_gauge, fixed_gauge_named
 from phigen.scheme.gauss import build_gauss, expect_offered, plan_gauss, realise_gauss
 from phigen.scheme.logarithmic import composition_of, logarithmic_of
 from phigen.scheme.monitor import monitor_of
@@ -229,7 +229,7 @@ def _compiled(spec: Spec, source: System, clock: _Clock, early: BiRealisation | 
 
 def _split(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
     """Compile to a splitting."""
-    gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
+    gauge = Gauge() if isinstance(spec.gauge, str) else fixed_gauge(source, spec.gauge)
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: _parts(spec, discretised.frozen))
     pushing = clock.timed("splitting", lambda: force_flows(source.frozen))
@@ -274,7 +274,7 @@ def _collocated(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
     if isinstance(spec.gauge, str):
         gauge = slowest(source, realisation) if spec.gauge == "auto" else Gauge()
     else:
-        gauge = given(source, spec.gauge)
+        gauge = fixed_gauge(source, spec.gauge)
     program = clock.timed("program", lambda: build_gauss(source, gauge, realisation, plan, spec))
     return CompiledGauss(
         spec=spec, system=source, order=plan, program=program, gauge=gauge, seconds=clock.seconds, gauss=realisation

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from phigen.scheme.kernel import Kernel, Output
-from phigen.scheme.path import PathSlopes, Series
+from phigen.scheme.path import NodeSeries, PathSlopes
 from phigen.scheme.steps import Path, PathAdjoint, PathLanes
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, momentum
@@ -77,7 +77,7 @@ def _symbols(kind: str, values: Sequence[object]) -> tuple[Symbol, ...]:
 
 
 def _resolved(
-    series: Sequence[Series],
+    series: Sequence[NodeSeries],
     fixed: Sequence[Expression],
     known: Mapping[str, Expression],
     first: int = 0,

@@ -43,11 +43,11 @@ from phigen.lattice.variations import along, with_variations
 from phigen.scheme.alternation import Alternation, Schedule, with_clock
 from phigen.scheme.alternation import schedule as alternating
 from phigen.scheme.choosing import Choice, is_dated, planned, with_carrier
-from phigen.scheme.forces import forces_said
+from phigen.scheme.forces import forced_lines
 from phigen.scheme.gathering import staged
 from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.lowering import operation_counts
-from phigen.scheme.noise import noise_said, with_noise
+from phigen.scheme.noise import noise_lines, with_noise
 from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.order import Order
 from phigen.scheme.program import About, Noise, Program
@@ -475,8 +475,8 @@ def _lattice_fact(cell: Cell, colouring: Colouring) -> str:
 
 def _acting_facts(cell: Cell, plan: LatticePlan) -> Iterator[str]:
     """Yield the lines of the header on forces and noise."""
-    yield from forces_said(bool(cell.forces), pushed_casimirs(cell), plan.acting(cell.forces))
-    yield from noise_said(tuple(cell.noise), weak=plan.weak_order)
+    yield from forced_lines(bool(cell.forces), pushed_casimirs(cell), plan.acting(cell.forces))
+    yield from noise_lines(tuple(cell.noise), weak=plan.weak_order)
 
 
 def _operations(step: Sweeps) -> dict[str, int]:

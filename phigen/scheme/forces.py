@@ -1,4 +1,4 @@
-"""What headers say of forces: with them a step is no Poisson map."""
+"""Header lines on forces: with forces a step is no Poisson map."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from phigen.symbolic.expression import Expression
 
 
 def force_facts(system: System, how: str) -> Iterator[str]:
-    """The lines of a header; ``how`` they enter the step, where that is to be said."""
-    yield from forces_said(system.forces is not None, system.pushed, how)
+    """Yield the lines of a header; ``how`` says how forces enter the step, or is empty."""
+    yield from forced_lines(system.forces is not None, system.pushed, how)
 
 
-def forces_said(there: bool, pushed: Sequence[str], how: str) -> Iterator[str]:
-    """The same where they are ``there`` and change the Casimirs that are ``pushed``."""
-    if not there:
+def forced_lines(forced: bool, pushed: Sequence[str], how: str) -> Iterator[str]:
+    """Yield the lines of a header if the system is ``forced``, by forces that change the Casimirs ``pushed``."""
+    if not forced:
         return
     if how:
         yield f"forces: {how}"
-    kept = f"they change {', '.join(pushed)}" if pushed else "they keep all Casimirs"
-    yield f"with forces a step is no Poisson map; {kept}"
+    effect = f"they change {', '.join(pushed)}" if pushed else "they keep all Casimirs"
+    yield f"with forces a step is no Poisson map; {effect}"
 
 
 def acts(force: Sequence[Expression]) -> bool:
-    """Whether a force is there."""
+    """Whether a force differs from 0."""
     return any(not f.is_zero for f in force)

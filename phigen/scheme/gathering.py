@@ -1,8 +1,9 @@
-"""Constant factors gathered, so that they are multiplied with one another before the steps.
+"""Gathering of constant factors, so that they are multiplied with one another before the steps.
 
 Every value is written as q·s·c, with a number q, a static s (of parameters and the step size) and a core c of the
-state. Products multiply the q and the s; a sum of terms with the same s keeps it outside: (h²x²)/4 + (h²y²)/4 is
-(h²/4)(x² + y²), with one coefficient and four operations. Numbers leave a sum too, and find a coefficient further out.
+state. Products multiply the q and the s; a sum of terms with the same s has it as a factor: (h²x²)/4 + (h²y²)/4 is
+(h²/4)(x² + y²), with one coefficient and four operations. Numbers are factors of a sum too, and become part of the
+coefficient of the next product.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from phigen.symbolic.expression import ONE, Expression, add, fold, neg, number, 
 
 @dataclass(frozen=True)
 class _Value:
-    """q·s·c; c is 1 for what does not depend on the state."""
+    """The value q·s·c; c is 1 if the value does not depend on the state."""
 
     number: Fraction
     static: Expression
@@ -30,9 +31,9 @@ def _sum(a: Expression, ratio: Fraction, b: Expression) -> Expression:
 
 
 def gather(coefficients: Coefficients, roots: Sequence[Expression]) -> list[Expression]:
-    """The roots with all static factors replaced by coefficients, gathered."""
+    """Return the roots with their gathered static factors replaced by coefficients."""
 
-    def whole(v: _Value) -> Expression:
+    def product(v: _Value) -> Expression:
         if v.static is ONE and v.number in (1, -1):
             return v.core if v.number == 1 else neg(v.core)
         factor = coefficients.slot(number(v.number) * v.static)
@@ -53,15 +54,15 @@ def gather(coefficients: Coefficients, roots: Sequence[Expression]) -> list[Expr
             if a.static is b.static:
                 return _Value(a.number, a.static, _sum(a.core, b.number / a.number, b.core))
             if a.static is ONE:
-                return _Value(a.number, ONE, _sum(a.core, Fraction(1), whole(replace(b, number=b.number / a.number))))
+                return _Value(a.number, ONE, _sum(a.core, Fraction(1), product(replace(b, number=b.number / a.number))))
             if b.static is ONE:
-                return _Value(b.number, ONE, _sum(whole(replace(a, number=a.number / b.number)), Fraction(1), b.core))
-        return _Value(Fraction(1), ONE, rebuild(e, [whole(a) for a in args]))
+                return _Value(b.number, ONE, _sum(product(replace(a, number=a.number / b.number)), Fraction(1), b.core))
+        return _Value(Fraction(1), ONE, rebuild(e, [product(a) for a in args]))
 
-    return [whole(v) for v in fold(roots, visit)]
+    return [product(v) for v in fold(roots, visit)]
 
 
 def staged(increment: Sequence[Expression], coefficients: Coefficients) -> list[Expression]:
-    """The increments with coefficients for what does not depend on the state, in the cheaper of two ways."""
+    """Return the increments with coefficients for state-independent values, in the cheaper of two ways."""
     hoisted, gathered = (cost(way(coefficients.empty(), increment)) for way in (Coefficients.hoist, gather))
     return gather(coefficients, increment) if gathered < hoisted else coefficients.hoist(increment)

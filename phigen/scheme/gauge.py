@@ -1,9 +1,9 @@
 """The Casimir gauge: H and H − Σ λ_c C_c have the same flow, but not the same discretisation.
 
-Casimirs subtracted from H before discretising change S_h, hence the error constant: the leading local error of a
-symmetric method is h³ π∇S_3 at order 2, and |π∇S_3| is a good guide for higher orders. ``auto`` leaves λ open and
-lets the solver fix it at the start of each trajectory by minimising |π∇S_3| along a short piece of it. For each
-fixed λ the step is an exact Poisson map; trajectories with different λ are steps of different maps.
+Casimirs subtracted from H before discretising change S_h, hence the error constant. The leading local error of a
+symmetric method is h³ π∇S_3 at order 2, and |π∇S_3| is a good guide for higher orders. ``auto`` leaves λ open. The
+solver then chooses λ at the start of each trajectory: it minimises |π∇S_3| along a short piece of the trajectory. For
+each fixed λ the step is an exact Poisson map; trajectories with different λ are steps of different maps.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from phigen.symbolic.expression import Expression, gradient, symbol, symbols_of,
 from phigen.symbolic.symbols import GAUGE, LEVEL, Symbol
 from phigen.symbolic.tower import Tower
 
-#: Gauged series may have this many times the terms of the plain one; beyond, the gauge costs more than it gains.
-MOST_GROWTH = 1.3
+#: Largest ratio of the numbers of terms with a gauge and without; beyond, the gauge costs more than it gains.
+MAX_TERM_RATIO = 1.3
 
 #: The error term whose size the gauge minimises.
 GUIDE = 3
@@ -37,10 +37,10 @@ MOST_GUIDE_OPERATIONS = 10_000
 
 @dataclass(frozen=True)
 class Gauge:
-    """``free``: Casimirs whose λ the solver chooses; ``fixed``: the part subtracted once for all.
+    """The Casimirs ``free``, whose λ the solver chooses, and the part ``fixed`` that is always subtracted.
 
-    A ``monitor`` g makes K = g(H + e) of H before that (`phigen.scheme.monitor`); then no λ is free. ``omitted`` maps
-    Casimirs whose λ would cost more to choose than it gains to the reason.
+    A ``monitor`` g replaces H by K = g(H + e) before the subtraction (`phigen.scheme.monitor`); then no λ is free.
+    ``omitted`` maps Casimirs whose λ would cost more to choose than it gains to the reason.
     """
 
     free: tuple[str, ...] = ()
@@ -50,7 +50,7 @@ class Gauge:
 
     @property
     def symbols(self) -> tuple[str, ...]:
-        """What each trajectory holds fixed at a value of its own: the free λ, or e."""
+        """The symbols with a fixed value for each trajectory: the free λ, or e."""
         return (LEVEL,) if self.monitor else self.multiples
 
     @property
@@ -72,7 +72,7 @@ class Gauge:
 
     @property
     def notes(self) -> list[str]:
-        """A line for each reason why Casimirs are left out of an automatic gauge for their cost."""
+        """A line for each reason why the automatic gauge omits Casimirs."""
         names: dict[str, list[str]] = {}
         for name, reason in self.omitted.items():
             names.setdefault(reason, []).append(name)
@@ -80,17 +80,17 @@ class Gauge:
 
     @property
     def letter(self) -> str:
-        """What the Casimirs are taken from."""
+        """The letter of the function from which the Casimirs are subtracted."""
         return "K" if self.monitor else "H"
 
     def timed(self, hamiltonian: Expression) -> Expression:
-        """H, or K = g(H + e)."""
+        """Return H, or K = g(H + e)."""
         return self.monitor * (hamiltonian + symbol(LEVEL)) if self.monitor else hamiltonian
 
     def applied(self, system: System) -> System:
-        """The system with H − Σ λ_c C_c, or K − Σ λ_c C_c, for H, to be discretised.
+        """Return the system with H − Σ λ_c C_c, or K − Σ λ_c C_c, in place of H, to be discretised.
 
-        With forces there is no K: H stays, and p = τg(∇H + ζ) is made of it; the impulse of a vector f is τgf.
+        With forces there is no K: H stays, and p = τg(∇H + ζ) is made from it; the impulse of a vector f is τgf.
         """
         if self.monitor and system.forces:
             vector = tuple(self.monitor * f for f in system.forces.vector)
@@ -104,7 +104,7 @@ class Gauge:
 
 @dataclass(frozen=True)
 class Gauged:
-    """What is discretised: the system with H less the Casimirs of the gauge, and its Hamilton–Jacobi series."""
+    """The system to discretise, with H less the Casimirs of the gauge, and its Hamilton–Jacobi series."""
 
     gauge: Gauge
     system: System
@@ -117,31 +117,31 @@ def choose(
     setting: str | Mapping[str, Expression],
     monitor: Expression | None = None,
 ) -> Gauged:
-    """The system in the gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
+    """Return the system in the gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
 
-    ``auto`` frees a Casimir if S_3 depends on its λ (in log-canonical structures it never does) and has hardly
-    more terms with it (on tops it has many more, for little), and if π∇S_3 is cheap enough to search for λ; none where
-    H depends on the time, forces act or there is noise, or with a monitor.
+    ``auto`` frees the λ of a Casimir on three conditions. S_3 depends on λ, which it never does in log-canonical
+    structures; S_3 has hardly more terms with λ, unlike on tops; and π∇S_3 is cheap enough for a search. No λ is free
+    where H depends on the time, forces act, there is noise, or with a monitor.
     """
     if not isinstance(setting, str):
-        return _gauged(system, realisation, replace(given(system, setting), monitor=monitor))
-    chosen = plain = _gauged(system, realisation, Gauge(monitor=monitor))
-    open_ = setting != "none" and realisation.exact and realisation.symmetric
-    if not open_ or system.driven or monitor:
+        return _gauged(system, realisation, replace(fixed_gauge(system, setting), monitor=monitor))
+    best = plain = _gauged(system, realisation, Gauge(monitor=monitor))
+    allowed = setting != "none" and realisation.exact and realisation.symmetric
+    if not allowed or system.driven or monitor:
         return plain
     omitted: dict[str, str] = {}
     for name in system.casimirs:
-        candidate = _gauged(system, realisation, Gauge((*chosen.gauge.free, name)))
+        candidate = _gauged(system, realisation, Gauge((*best.gauge.free, name)))
         reason = unaffordable(candidate.system)
         if reason:
             omitted[name] = reason
         elif _worthwhile(plain, candidate, Symbol(GAUGE, name)):
-            chosen = candidate
-    return replace(chosen, gauge=replace(chosen.gauge, omitted=omitted)) if omitted else chosen
+            best = candidate
+    return replace(best, gauge=replace(best.gauge, omitted=omitted)) if omitted else best
 
 
 def unaffordable(system: System) -> str:
-    """The reason why λ is not searched for with this H, which contains λ; empty if the search is cheap enough."""
+    """Return the reason not to search for λ with this H, which contains λ; "" if the search is cheap enough."""
     try:
         operations = guide_operations(system)
     except OverflowError as error:
@@ -155,10 +155,10 @@ def unaffordable(system: System) -> str:
 
 
 def guide_operations(system: System) -> int:
-    """An estimate of the operations of π∇S_3, counted from H and π before S_3 is computed.
+    """Return an estimate of the operations of π∇S_3, from H and π, before S_3 is computed.
 
     Up to factors, S_3 is the sum of ∂_i∂_jH v_i v_j with v = π∇H: the estimate is the number of products of monomials
-    in it. Where it matters, with thousands of them, the operations were 0.6 to 1 of the estimate (measured). Raises
+    in this sum. For sums of thousands of products the measured operations were 0.6 to 1 of the estimate. Raises
     `OverflowError` if H or its derivatives are too large to be counted.
     """
     h, tensor = system.hamiltonian, system.poisson
@@ -180,7 +180,7 @@ def guide_operations(system: System) -> int:
 
 @contextmanager
 def fixed_gauge_named(gauge: Gauge, system: System) -> Iterator[None]:
-    """Errors about the size of the program name the gauge that the spec gives, if it gives one."""
+    """Name the gauge of the spec in errors about the size of the program that are raised inside this context."""
     try:
         yield
     except (LimitError, OverflowError) as error:
@@ -201,8 +201,8 @@ def _gauged(system: System, realisation: BiRealisation, gauge: Gauge) -> Gauged:
     return Gauged(gauge, discretised, hamilton_jacobi(discretised, realisation, GUIDE, gauge.symbols))
 
 
-def given(system: System, values: Mapping[str, Expression]) -> Gauge:
-    """The gauge with these multiples of Casimirs. Raises `SpecError` for names of other functions."""
+def fixed_gauge(system: System, values: Mapping[str, Expression]) -> Gauge:
+    """Return the gauge with these multiples of Casimirs. Raises `SpecError` for names of other functions."""
     for name in values:
         if name not in system.casimirs:
             known = ", ".join(system.casimirs) or "none"
@@ -213,33 +213,33 @@ def given(system: System, values: Mapping[str, Expression]) -> Gauge:
 
 def _worthwhile(plain: Gauged, gauged: Gauged, name: str) -> bool:
     try:
-        most = MOST_GROWTH * _state_terms(plain.series.polynomial(GUIDE), plain.system)
-        if _state_terms(_first_term(gauged), plain.system) > most:
-            return False  # before the series of a long Casimir is begun
-        after = gauged.series.polynomial(GUIDE)
+        limit = MAX_TERM_RATIO * _state_terms(plain.series.polynomial(GUIDE), plain.system)
+        if _state_terms(_first_term(gauged), plain.system) > limit:
+            return False  # without the series, which is slow for a long Casimir
+        polynomial = gauged.series.polynomial(GUIDE)
     except OverflowError:
         return False
-    if not after.tower.depends_on(after.terms[GUIDE - 1], [name]):
+    if not polynomial.tower.depends_on(polynomial.terms[GUIDE - 1], [name]):
         return False
-    return _state_terms(after, plain.system) <= most
+    return _state_terms(polynomial, plain.system) <= limit
 
 
 def _first_term(gauged: Gauged) -> PolynomialSeries:
-    """S_1, which is H, in a ring of its own."""
+    """Return S_1 = H in a ring of its own."""
     h = gauged.system.hamiltonian
     tower = Tower(symbols_of(h), [h])
     return PolynomialSeries(tower, (tower.convert(h),))
 
 
 def _state_terms(series: PolynomialSeries, system: System) -> int:
-    """Number of monomials in the coordinates in all terms together."""
+    """Return the number of monomials in the coordinates in all terms together."""
     tower = series.tower
     state = [i for i in range(len(tower.names)) if tower.depends_on(tower.gens[i], system.coordinates)]
     return len({tuple(int(m[i]) for i in state) for s in series.terms for m in s.to_dict()})
 
 
 def free_gauge(system: System, gauged: Gauged) -> FreeGauge | None:
-    """What the solver needs to choose λ: the error π∇S_3, and products of ∇H and the ∇C, which set the scale."""
+    """Return the kernels for the choice of λ: the error π∇S_3, and the products of ∇H and ∇C, which set the scale."""
     gauge = gauged.gauge
     if not gauge.free:
         return None

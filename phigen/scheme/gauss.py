@@ -1,4 +1,4 @@
-"""From a system to a program that steps by Gauss collocation."""
+"""Programs that step by Gauss collocation."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ from phigen.spec.model import Spec
 from phigen.symbolic.expression import derivatives
 from phigen.symbolic.symbols import STEP
 
-#: Sweeps after which the solve of a step is given up, unless the spec says another number.
-MOST_SWEEPS = 100
+#: Largest number of sweeps in the solve of a step, after which it has failed; the spec may set another.
+MAX_SWEEPS = 100
 
-#: What to write where a step cannot be made an exact Poisson map.
-TRUNCATED = "structure: to truncation takes every bracket, and is no Poisson map; scheme: series is one"
+#: Hint where no exact Poisson map is known.
+TRUNCATION_HINT = "structure: to truncation takes every bracket, and is no Poisson map; scheme: series is one"
 
 
 def expect_offered(spec: Spec) -> None:
-    """Raise `SpecError` for what is not offered with Gauss methods."""
-    found = [spec.diagnostic(path, f"scheme gauss: {message}", hint) for path, message, hint in _refused(spec)]
-    if found:
-        raise SpecError(found)
+    """Raise `SpecError` for options that Gauss methods do not have."""
+    diagnostics = [spec.diagnostic(path, f"scheme gauss: {message}", hint) for path, message, hint in _refused(spec)]
+    if diagnostics:
+        raise SpecError(diagnostics)
 
 
 def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
-    """Yield the options that are not offered: path of keys, message, hint."""
+    """Yield the options of a spec that Gauss methods do not have: path of keys, message, hint."""
     extras, series = spec.extras, "scheme: series has it"
     if spec.lattice:
         yield ("lattice",), "not for lattices", "scheme: auto, splitting or series"
@@ -68,7 +68,7 @@ def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
 
 
 def plan_gauss(spec: Spec) -> Order:
-    """The order of the method, and its stages. Raises `SpecError` for orders that it does not have."""
+    """Return the order of the method, and its stages. Raises `SpecError` for orders that it does not have."""
     order = spec.wanted_order
     if order > 2 * MOST_STAGES:
         hint = f"order: {2 * MOST_STAGES}"
@@ -81,16 +81,16 @@ def realise_gauss(spec: Spec, system: System) -> Realisation:
     """Return the realisation of the coordinates. Raises `SpecError` for `structure: exact` where none is known."""
     if spec.structure == "to truncation":
         return direct(system)
-    found = collective(system)
-    if found is None:
+    realisation = collective(system)
+    if realisation is None:
         message = f"scheme gauss: no exact Poisson map is known for this bracket ({system.shape})"
         place = ("structure",) if ("structure",) in spec.locations else ("scheme",)
-        raise SpecError([spec.diagnostic(place, message, TRUNCATED)])
-    pushed = [system.coordinates[i] for g in found.groups for i in g.indices if _is_pushed(system, i)]
+        raise SpecError([spec.diagnostic(place, message, TRUNCATION_HINT)])
+    pushed = [system.coordinates[i] for g in realisation.groups for i in g.indices if _is_pushed(system, i)]
     if pushed:
         message = f"scheme gauss: a vector force on {', '.join(pushed)} leaves the coadjoint orbits"
         raise SpecError([spec.diagnostic(("forces",), message, "structure: to truncation, or scheme: series")])
-    return found
+    return realisation
 
 
 def _is_pushed(system: System, i: int) -> bool:
@@ -98,7 +98,7 @@ def _is_pushed(system: System, i: int) -> bool:
 
 
 def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: Order, spec: Spec) -> Program:
-    """The solver as a program; multiples of Casimirs in the gauge are taken from H. LimitError if it is too large."""
+    """Return the solver as a program, with H less the Casimirs of the gauge. `LimitError` if it is too large."""
     discretised = gauge.applied(system)
     points = stage_map(discretised, realisation)
     coefficients = Coefficients(system.parameter_names)
@@ -123,7 +123,7 @@ def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: O
         tableau(order.terms),
         len(points.moved) + len(system.times),
         _full(frame, coefficients) if frame else None,
-        spec.solver.max_iterations if ("solver", "max_iterations") in spec.locations else MOST_SWEEPS,
+        spec.solver.max_iterations if ("solver", "max_iterations") in spec.locations else MAX_SWEEPS,
         tangent,
         adjoint=adjoint,
     )
@@ -151,14 +151,14 @@ def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: O
 
 
 def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
-    """The kernel, which reads the table of coefficients as it is in the end."""
+    """Return the kernel with the final table of coefficients as input."""
     return Kernel(
         kernel.name, kernel.purpose, {**kernel.inputs, "coef": coefficients.slots}, kernel.outputs, kernel.named
     )
 
 
 def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
-    """The Jacobians along coordinates, not the time, then along the unknowns."""
+    """Return the Jacobians along coordinates, without the time, then along the unknowns."""
     names = (*points.system.coordinates, *points.unknowns)
     kernels = []
     for values, name, subject in (
@@ -174,7 +174,7 @@ def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
 
 
 def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge, step: Gauss) -> Iterator[str]:
-    """The lines of the header."""
+    """Yield the lines of the header."""
     stages = order.terms
     yield f"scheme: Gauss collocation, {stages} stage{'s' * (stages > 1)}"
     if not realisation.exact:

@@ -1,10 +1,9 @@
 """The generating function S_h = Σ h^i S_i as code: gradient and Hessian in the cheapest form.
 
-Two forms compete. *Collected*: S_h as one polynomial in coordinates and function values whose coefficients
-depend on parameters and h only, so that ``prepare`` collapses all orders into one set of numbers; each
-derivative is a nested Horner form. *Graph*: the recursion itself, never expanded, differentiated as a
-graph. In low dimension collected polynomials win by far; in high dimension expansion explodes and the
-graph wins. The decision is by operation count.
+Two forms compete. *Collected*: S_h as one polynomial in coordinates and function values whose coefficients depend on
+parameters and h only, so ``prepare`` collapses all orders into one set of numbers; each derivative is a nested Horner
+form. *Graph*: the recursion itself, never expanded, differentiated as a graph. In low dimension collected polynomials
+are much cheaper; in high dimension their expansion explodes. The operation count decides.
 """
 
 from __future__ import annotations
@@ -26,10 +25,10 @@ from phigen.symbolic.symbols import LEVEL, STEP
 
 @dataclass(frozen=True)
 class GeneratingFunction:
-    """∇S_h (``slope``) and Hess S_h (``hessian``, full n×n) as expressions, and how they were written.
+    """∇S_h (``slope``) and Hess S_h (``hessian``, full n×n) as expressions, and the ``form`` that they are written in.
 
-    ``coefficients`` is the table that their symbols ``c:k`` refer to, those that are renewed in every step included.
-    Of a monitored system, ``elapsed`` is ∂S_h/∂e, the time that a step takes. With forces, ``free`` is p without them.
+    ``coefficients`` is the table for their symbols ``c:k``, including coefficients that are renewed in every step. Of
+    a monitored system, ``elapsed`` is ∂S_h/∂e, the time that a step takes. With forces, ``free`` is p without them.
     """
 
     slope: tuple[Expression, ...]
@@ -42,18 +41,18 @@ class GeneratingFunction:
 
     @property
     def turning(self) -> tuple[Expression, ...]:
-        """What turns a body: p without the forces, which change its momentum only."""
+        """The covector that rotates a body: p without the forces, which change its momentum only."""
         return self.free or self.slope
 
     def pushed(self, push: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:
-        """With p = ∇S_h + a covector field in place of p = ∇S_h; then the Hessian need not be symmetric."""
+        """Return the function with p = ∇S_h + a covector field; then the Hessian need not be symmetric."""
         columns = [derivatives(push, c) for c in coordinates]
         slope = tuple(s + z for s, z in zip(self.slope, push, strict=True))
         rows = [[e + columns[j][i] for j, e in enumerate(row)] for i, row in enumerate(self.hessian)]
         return replace(self, slope=slope, hessian=tuple(map(tuple, rows)))
 
     def cost(self) -> int:
-        """Cost of one evaluation of gradient and Hessian, after staging."""
+        """Return the cost of one evaluation of gradient and Hessian, after staging."""
         return self._cost
 
     @cached_property
@@ -70,18 +69,17 @@ def collected_form(
     times: Sequence[str] = (),
     increments: Sequence[str] = (),
 ) -> list[GeneratingFunction]:
-    """The collected gradient, with the Hessian collected entry by entry, and with the Hessian by differentiation.
+    """Return the collected gradient with the Hessian, collected entry by entry or by differentiation.
 
-    ``increments`` are inputs of a step beside the time, which the series does not know.
-
-    Empty if even a gradient of one operation per term would cost more than ``worth``, or if the monomials would take
-    more than `limits.CELLS`. Raises `OverflowError` if it is too large to be counted.
+    ``increments`` are inputs of a step that the series does not contain, besides the time. Empty if a gradient of one
+    operation per term would cost more than ``worth``, or if the monomials would take more than `limits.CELLS`. Raises
+    `OverflowError` if the polynomial is too large to be counted.
     """
     tower, n = series.tower, len(coordinates)
     h = tower.variable(STEP)
     s = tower.combine(term * h ** (i + 1) for i, term in enumerate(series.terms))
     worth = max(worth, 200)
-    if len(s) > 10 * worth:  # many terms may share a monomial in the coordinates, but not that many
+    if len(s) > 10 * worth:  # terms share monomials in the coordinates, but rarely ten of them
         return []
     slopes = tower.gradient(s, coordinates)
     if cells(tower, [s, *slopes]) > limits.CELLS or exceeds(tower, slopes, coordinates, min(worth, MOST_SLOPES)):
@@ -89,8 +87,8 @@ def collected_form(
     monitored = [tower.partial(s, LEVEL)] if LEVEL in static else []
     ring, (terms, *elapsed) = collect(tower, [s, *monitored], coordinates, times)
     first = [ring.derivative(terms, j) for j in range(n)]
-    found, several = [], sum(ring.cells(first[i], j) for j in range(n) for i in range(j + 1)) <= limits.CELLS
-    for entrywise in (True, False) if several else (False,):
+    forms, both_affordable = [], sum(ring.cells(first[i], j) for j in range(n) for i in range(j + 1)) <= limits.CELLS
+    for entrywise in (True, False) if both_affordable else (False,):
         table = Coefficients(static, [*times, *increments])
         slope = tuple(ring.expression(g, table) for g in first)
         if entrywise:
@@ -103,18 +101,17 @@ def collected_form(
         else:
             hessian = _differentiated(slope, coordinates)
         duration = ring.expression(elapsed[0], table) if elapsed else None
-        found.append(GeneratingFunction(slope, hessian, "collected polynomial", len(terms), table, duration))
-    return found
+        forms.append(GeneratingFunction(slope, hessian, "collected polynomial", len(terms), table, duration))
+    return forms
 
 
 def graph_form(
     series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str], inputs: Sequence[str] = ()
 ) -> GeneratingFunction:
-    """Gradient by reverse, Hessian by repeated reverse differentiation of the shared graph.
+    """Return the gradient by reverse, the Hessian by repeated reverse differentiation of the shared graph.
 
-    ``inputs`` are those of a step, such as the time.
-
-    Raises `OverflowError` as soon as what has been differentiated is more than one kernel may have.
+    ``inputs`` are those of a step, such as the time. Raises `OverflowError` as soon as the derivatives so far exceed
+    the budget of one kernel.
     """
     h = symbol(STEP)
     s = total(h ** (i + 1) * term for i, term in enumerate(series) if not term.is_zero)
@@ -133,7 +130,7 @@ def graph_form(
 def forced_form(
     system: System, monitor: Expression, static: Sequence[str], inputs: Sequence[str] = ()
 ) -> GeneratingFunction:
-    """p = τg(∇H + ζ) of a monitored system with forces; no function has it for gradient, and e has no part in it."""
+    """Return p = τg(∇H + ζ) of a monitored system with forces, which is no gradient and does not depend on e."""
     assert system.forces is not None
     rate = symbol(STEP) * monitor
     slope = gradient(system.hamiltonian, system.coordinates)
@@ -151,6 +148,6 @@ def _differentiated(slope: Sequence[Expression], coordinates: Sequence[str]) -> 
 
 
 def _symmetric(rows: Sequence[Sequence[Expression]]) -> tuple[tuple[Expression, ...], ...]:
-    """The full matrix of upper-triangular rows: ``rows[i][j - i]`` for j ≥ i."""
+    """Return the full matrix of upper-triangular rows: ``rows[i][j - i]`` for j ≥ i."""
     n = len(rows)
     return tuple(tuple(rows[min(i, j)][abs(i - j)] for j in range(n)) for i in range(n))

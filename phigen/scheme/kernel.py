@@ -1,6 +1,6 @@
 """Kernels: the straight-line functions that a program consists of, as expression graphs.
 
-`phigen.scheme.lowering` turns one into a list of assignments.
+`phigen.scheme.lowering` turns a kernel into a list of assignments.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ EXPONENTS = "exponents_bar"
 
 
 class Role(Enum):
-    """Purpose of a kernel at a site of a lattice, by which loops choose the arrays that they read and write."""
+    """Purpose of a kernel at a site of a lattice, from which loops derive the arrays that they read and write."""
 
     OTHER = auto()
-    SWEEP = auto()  # the change of a state by a flow
-    SWEEP_TANGENT = auto()  # its derivative, the change of a variation
+    SWEEP = auto()  # the increment of a state by a flow
+    SWEEP_TANGENT = auto()  # its derivative, the increment of a variation
     RELAX = auto()  # the right-hand side of the equation of a stage
-    ADVANCE = auto()  # what the stage adds to the state
+    ADVANCE = auto()  # the increment of the state by a stage
     SLOPE = auto()  # the derivative of RELAX along a variation of y
-    OWN_SLOPE = auto()  # its part at the site itself, as a matrix
+    OWN_SLOPE = auto()  # the part of SLOPE at the site itself, as a matrix
     SIDE = auto()  # the derivative of RELAX along a variation of x
     FOLLOW = auto()  # the derivative of ADVANCE along a variation of y
 
@@ -49,12 +49,13 @@ class Output:
 class Kernel:
     """A pure function from named vectors of symbols to named arrays.
 
-    ``inputs`` maps the name of an argument to the symbols that its entries stand for. ``named`` are values
-    worth a name of their own in the output (momenta, second derivatives).
+    ``inputs`` maps the name of an argument to the symbols of its entries. ``named`` are values that get a name in the
+    generated code (momenta, second derivatives).
 
-    ``exponentials`` are the parts of the first output, by start and number of rows, that hold a matrix A, in whose
-    place exp(A) − 1 is returned. Of the transpose of such a kernel, ``exponents`` computes these A one after the other;
-    their cotangents, from those of exp(A) − 1 in the input ``coef_bar``, are the input `EXPONENTS`.
+    ``exponentials`` are parts of the first output, by start and number of rows, that hold a matrix A; exp(A) − 1 is
+    returned in its place. In the transpose of such a kernel, ``exponents`` computes the matrices A one after the
+    other, and the input `EXPONENTS` has their cotangents, which follow from those of exp(A) − 1 in the input
+    ``coef_bar``.
     """
 
     name: str
@@ -68,12 +69,12 @@ class Kernel:
 
     @property
     def reads_start(self) -> bool:
-        """Whether the loop of the kernel has the start of a stage at hand."""
+        """Whether the kernel reads the start of a stage."""
         return self.role in _OF_STARTS
 
     @property
     def reads_variations(self) -> bool:
-        """Whether the loop of the kernel has a variation at hand."""
+        """Whether the kernel reads a variation."""
         return self.role in _OF_VARIATIONS
 
     @property
@@ -82,6 +83,6 @@ class Kernel:
         return [v for o in self.outputs for v in o.values]
 
     def along(self, array: str) -> list[tuple[str, Expression]]:
-        """Of a transpose: the symbols of an input with their cotangents."""
+        """Return, for a transpose, the symbols of an input with their cotangents."""
         values = next((o.values for o in self.outputs if o.name == f"{array}_bar"), ())
         return list(zip(self.inputs[array] if values else (), values, strict=True))

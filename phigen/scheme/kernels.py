@@ -28,25 +28,26 @@ from phigen.spec import limits
 from phigen.symbolic.expression import ONE, ZERO, Expression, number, sparse_derivatives, symbol, total
 from phigen.symbolic.symbols import STEP, Symbol, momentum
 
-#: Largest dimension whose elimination is unrolled in any case; beyond, where zeros leave no more than such a part of n³
-#: operations (a full matrix takes 0.7), and that is no more than one function may have.
-UNROLLED, SPARSE = 4, 0.6
+#: Largest dimension whose elimination is unrolled for every pattern.
+UNROLLED_DIMENSION = 4
+#: Largest share of n³ operations with which the elimination of a larger matrix is unrolled; a full matrix takes 0.7 n³.
+MAX_SPARSE_SHARE = 0.6
 
 
 def ends(system: System, realisation: BiRealisation) -> tuple[Sequence[Expression], Sequence[Expression]]:
-    """α − y and β − α; with a vector force f, half of whose impulse hf is given before and half after the motion.
+    """Return α − y and β − α; half of the impulse hf of a vector force f acts before and half after the motion.
 
     That is α(y, p) = x + hf(y)/2 and x' = β(y, p) + hf(y)/2: symmetric if the bi-realisation is, hence of order 2.
     """
     if system.forces is None:
         return realisation.displacement, realisation.increment
     impulse, half = [symbol(STEP) * f for f in system.forces.vector], number(Fraction(1, 2))
-    apart = [a - half * f for a, f in zip(realisation.displacement, impulse, strict=True)]
-    return apart, [d + f for d, f in zip(realisation.increment, impulse, strict=True)]
+    displacement = [a - half * f for a, f in zip(realisation.displacement, impulse, strict=True)]
+    return displacement, [d + f for d, f in zip(realisation.increment, impulse, strict=True)]
 
 
 def is_centred(system: System, realisation: BiRealisation) -> bool:
-    """Whether y is seen to be the mean of the ends of a step: then the Jacobian of the increment is 2(1 − J)."""
+    """Whether y is the mean of the ends of a step; then the Jacobian of the increment is 2(1 − J)."""
     half = number(Fraction(1, 2))
     means = [a + half * d for a, d in zip(*ends(system, realisation), strict=True)]
     names = [*system.coordinates, *map(momentum, system.coordinates)]
@@ -56,14 +57,14 @@ def is_centred(system: System, realisation: BiRealisation) -> bool:
 def explicit_kernel(
     system: System, realisation: BiRealisation, generating: GeneratingFunction, coefficients: Coefficients
 ) -> Kernel | None:
-    """The increment of a step, where y can be found by substitution; else None."""
+    """Return the increment of a step if the equation for y is solved by substitution; else None."""
     coordinates = system.coordinates
-    apart, across = ends(system, realisation)
-    displacement = at_momenta(apart, coordinates, generating.slope)
+    to_start, to_end = ends(system, realisation)
+    displacement = at_momenta(to_start, coordinates, generating.slope)
     sequence = explicit_order(displacement, coordinates)
     if sequence is None:
         return None
-    increment = at_momenta(across, coordinates, generating.slope)
+    increment = at_momenta(to_end, coordinates, generating.slope)
     values = coefficients.hoist(explicit_increment(displacement, increment, coordinates, sequence))
     return Kernel(
         "explicit",
@@ -76,7 +77,7 @@ def explicit_kernel(
 def linearise_kernel(
     system: System, realisation: BiRealisation, generating: GeneratingFunction, coefficients: Coefficients
 ) -> Kernel:
-    """What one Newton iteration needs at a point, see `phigen.scheme.step`."""
+    """Return the kernel of one Newton iteration at a point, see `phigen.scheme.step`."""
     n, coordinates = system.dimension, system.coordinates
     point = linearise(*ends(system, realisation), coordinates, generating)
     flat = [
@@ -110,23 +111,23 @@ class Solvers:
 
 
 def newton_solvers(linearised: Kernel, *, centred: bool) -> Solvers:
-    """Elimination by the pattern of the Jacobian, where it is worth writing out; ``centred`` as in `is_centred`."""
+    """Return elimination by the pattern of the Jacobian, where unrolling pays; ``centred`` as in `is_centred`."""
     jacobian, slope = _patterns(linearised)
     n = len(jacobian)
-    if n <= UNROLLED:
+    if n <= UNROLLED_DIMENSION:
         return Solvers(_elimination_kernel(jacobian), inverse(jacobian, centred=centred))
-    if operations(jacobian) > min(SPARSE * n**3, limits.OPERATIONS):
+    if operations(jacobian) > min(MAX_SPARSE_SHARE * n**3, limits.OPERATIONS):
         return Solvers()
     return Solvers(_elimination_kernel(jacobian), factors=_factorisation(factorise(jacobian), slope))
 
 
 def transposed_elimination_kernel(linearised: Kernel) -> Kernel:
-    """Elimination for the transpose of the Jacobian, by the pattern of the Jacobian itself."""
+    """Return elimination for the transpose of the Jacobian, by the pattern of the Jacobian itself."""
     return _elimination_kernel(_patterns(linearised)[0], transposed=True)
 
 
 def _patterns(linearised: Kernel) -> tuple[Pattern, Pattern]:
-    """Where the Jacobian and the slope of the increment may differ from zero."""
+    """Return the entries of the Jacobian, and of the slope of the increment, that may differ from zero."""
     _, _, jacobian, slope = linearised.outputs
     return _pattern(jacobian.values), _pattern(slope.values)
 
@@ -137,7 +138,7 @@ def _pattern(entries: Sequence[Expression]) -> Pattern:
 
 
 def full(n: int) -> Pattern:
-    """That of a matrix of which nothing is known."""
+    """Return the pattern of a matrix without known zeros."""
     return [[True] * n] * n
 
 
@@ -158,7 +159,7 @@ def _entries(name: str, n: int) -> tuple[str, ...]:
 
 
 def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
-    """Elimination in two parts, for many right-hand sides, and the product of each solution with the slope."""
+    """Return elimination in two parts, for many right-hand sides, and the product of each solution with the slope."""
     n, named = len(slope), factors.named("f")
     side = tuple(Symbol("r", i) for i in range(n))
     solution = named.solved([symbol(s) for s in side])
@@ -180,7 +181,7 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
 
 
 def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
-    """The inverse of a matrix J, and that times the slope, unrolled; ``centred``: the slope is 2(1 − J)."""
+    """Return the inverse of a matrix J, and the slope times it, unrolled; if ``centred``, the slope is 2(1 − J)."""
     n = len(pattern)
     entries, reciprocals = inversion(pattern)
     if centred:
@@ -198,7 +199,10 @@ def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
 
 
 def generate_kernel(system: System, generating: GeneratingFunction, coefficients: Coefficients) -> Kernel:
-    """∇S_h at the mean m of a path, and 1 − ½ Hess S_h(m) π(m): the Jacobian of p − ∇S_h(m(p)) up to O(h²)."""
+    """Return ∇S_h at the mean m of a path, and 1 − ½ Hess S_h(m) π(m).
+
+    The matrix is the Jacobian of p − ∇S_h(m(p)) up to O(h²).
+    """
     n, hessian, pi = system.dimension, generating.hessian, system.poisson
     half = number(Fraction(1, 2))
     jacobian = [
@@ -216,8 +220,8 @@ def generate_kernel(system: System, generating: GeneratingFunction, coefficients
 
 
 def path_elimination(n: int) -> Kernel | None:
-    """Elimination for the equation for p, whose matrix is full; None where a loop does better."""
-    return _elimination_kernel(full(n)) if n <= UNROLLED else None
+    """Return elimination for the equation for p, whose matrix is full; None where a loop is faster."""
+    return _elimination_kernel(full(n)) if n <= UNROLLED_DIMENSION else None
 
 
 def _outputs(values: Sequence[Expression], names: Sequence[str], sizes: Sequence[int]) -> tuple[Output, ...]:
@@ -229,19 +233,19 @@ def _outputs(values: Sequence[Expression], names: Sequence[str], sizes: Sequence
 
 
 def system_inputs(system: System) -> dict[str, tuple[str, ...]]:
-    """The arguments of a function on phase space: parameters, the time if there is one, coordinates."""
+    """Return the arguments of a function on phase space: parameters, the time if there is one, coordinates."""
     time = {"t": system.times} if system.time else {}
     return {"params": system.parameter_names, **time, "x": system.coordinates}
 
 
 def step_inputs(system: System) -> dict[str, tuple[str, ...]]:
-    """What a step is told beside its size: the time and the increments of the noise, where there are such."""
+    """Return the inputs of a step besides its size: the time and the increments of the noise, where they exist."""
     inputs = {"t": system.times, "dw": system.increments}
     return {name: symbols for name, symbols in inputs.items() if symbols}
 
 
 def noise_fields(system: System) -> Kernel:
-    """σπ∇g for each source of noise."""
+    """Return the kernel of σπ∇g for each source of noise."""
     fields = [hamiltonian_vector_field(system.poisson, s.impulse(system.coordinates)) for s in system.noise]
     values = tuple(e for field in fields for e in field)
     purpose = "sigma pi(x) grad g(x) of each source of noise"

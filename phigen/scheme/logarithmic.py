@@ -1,9 +1,10 @@
 """The explicit monitor of a splitting in two, H = A + B: K = log(A + e) − log(−B).
 
 A is constant along its own flow, so the flow of log(A + e) is that of A over the time τ/(A + e), and the flow of
-−log(−B) that of B over τ/(−B). The orbits are those of H where K = 0, that is A + e = −B; e = −H(x₀) is held fixed. The
-flow of A takes the physical time ∂K/∂e τ = τ/(A + e), that of B none. Needs A + e > 0 and −B > 0: S. Mikkola,
-K. Tanikawa, Celestial Mechanics and Dynamical Astronomy 74 (1999); M. Preto, S. Tremaine, Astron. J. 118 (1999).
+−log(−B) is that of B over τ/(−B). The orbits are those of H where K = 0, that is A + e = −B; e = −H(x₀) is held
+fixed. The flow of A takes the physical time ∂K/∂e τ = τ/(A + e), that of B none. Needs A + e > 0 and −B > 0: S.
+Mikkola, K. Tanikawa, Celestial Mechanics and Dynamical Astronomy 74 (1999); M. Preto, S. Tremaine, Astron. J. 118
+(1999).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from phigen.geometry.positivity import NOT_NEGATIVE, POSITIVE, sign_of
 from phigen.geometry.system import System
 from phigen.scheme.composition import find
 from phigen.scheme.kernel import Kernel
-from phigen.scheme.monitor import BY_HAND, rate_kernel
+from phigen.scheme.monitor import EXTENDED_SYSTEM_HINT, rate_kernel
 from phigen.scheme.program import Monitor
 from phigen.spec.model import Spec
 from phigen.splitting.flow import Flow
@@ -29,25 +30,28 @@ from phigen.symbolic.symbols import LEVEL
 
 @dataclass(frozen=True)
 class Logarithmic:
-    """The parts of H, by the expression of the Hamiltonian of their flows: ``negative`` is B."""
+    """The parts of H, identified by the expression of the Hamiltonian of their flows: ``negative`` is B."""
 
     negative: Expression
 
     def outputs(self, flow: Flow) -> tuple[Expression, ...]:
-        """The increments of a flow of K, the physical time that it takes, and what is no number out of the domain."""
-        other, time = self._argument(flow), self.time(flow)
+        """Return the outputs of the kernel of a flow of K.
+
+        These are the increments, the physical time of the flow, and a root that is no number outside the domain.
+        """
+        argument, time = self._argument(flow), self.time(flow)
         increments = substitute(flow.increment, {TIME: time})
-        return (*increments, ZERO if self._is_negative(flow) else time, power(other, Fraction(1, 2)))
+        return (*increments, ZERO if self._is_negative(flow) else time, power(argument, Fraction(1, 2)))
 
     def time(self, flow: Flow) -> Expression:
-        """The time of the flow of a part of H that its flow in τ is."""
+        """Return the time over which the flow of the part of H runs, for a flow of K in τ."""
         return symbol(TIME) * power(self._argument(flow), -1)
 
     def _argument(self, flow: Flow) -> Expression:
         return -flow.hamiltonian if self._is_negative(flow) else flow.hamiltonian + symbol(LEVEL)
 
     def monitor(self, system: System) -> Monitor:
-        """dt/dτ = 1/(−B)."""
+        """Return dt/dτ = 1/(−B)."""
         return Monitor(rate_kernel(system, power(-self.negative, -1)), None)
 
     def _is_negative(self, flow: Flow) -> bool:
@@ -55,12 +59,15 @@ class Logarithmic:
 
     @property
     def fact(self) -> str:
-        """What the header says."""
+        """The line of the header."""
         return f"monitor: log, steps are equal in tau; K = log(A + e) - log(-B) with B = {self.negative}"
 
 
 def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarithmic | None:
-    """The monitor of a splitting; None where the spec has none. Raises `SpecError` for what it does not apply to."""
+    """Return the monitor of a splitting, or None if the spec has none.
+
+    Raises `SpecError` where it does not apply.
+    """
     if spec.monitor is None:
         return None
     message = ""
@@ -75,28 +82,31 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
     elif not isinstance(spec.gauge, str):
         message = "monitor: log takes no gauge, since the parts of H would not be those of the motion"
     if message:
-        hint = BY_HAND if spec.time else "scheme: series takes an expression for g"
+        hint = EXTENDED_SYSTEM_HINT if spec.time else "scheme: series takes an expression for g"
         raise SpecError([spec.diagnostic(("monitor",), message, hint)])
-    found = next((f for f in flows if _below_zero(spec, system, f.hamiltonian)), None)
-    if found is None:
-        told = ", ".join(str(f.hamiltonian) for f in flows)
-        message = f"monitor: log needs a part that is negative, at least where runs start; the parts are {told}"
+    negative_flow = next((f for f in flows if _below_zero(spec, system, f.hamiltonian)), None)
+    if negative_flow is None:
+        parts = ", ".join(str(f.hamiltonian) for f in flows)
+        message = f"monitor: log needs a part that is negative, at least where runs start; the parts are {parts}"
         hint = "positive: true of a parameter shows a sign; a constant can be taken from a part, in hamiltonian"
         raise SpecError([spec.diagnostic(("monitor",), message, hint)])
-    return Logarithmic(found.hamiltonian)
+    return Logarithmic(negative_flow.hamiltonian)
 
 
-def composition_of(asked: str, order: int) -> str:
-    """The composition of a splitting with this monitor: one of Strang's, where none is asked for.
+def composition_of(requested: str, order: int) -> str:
+    """Return the composition of a splitting with this monitor: a composition of Strang's, unless the spec names one.
 
     Steps of Strang's splitting of K, of any size, stay on the orbit of a Kepler motion; those of others need not.
     """
-    found = find("auto", order + order % 2)
-    return found.name if asked == "auto" and found else asked
+    composition = find("auto", order + order % 2)
+    return composition.name if requested == "auto" and composition else requested
 
 
 def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
-    """Whether an expression is negative: by its form, or else where all runs start; without runs it may be 0 too."""
+    """Whether an expression is negative: by its form, or at the start of all runs.
+
+    Without runs it may be 0 too.
+    """
     sign = sign_of(-e, system.positive)
     if sign == POSITIVE or (sign == NOT_NEGATIVE and not spec.runs):
         return True
@@ -111,6 +121,6 @@ def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
 
 
 def trimmed(kernel: Kernel, count: int) -> Kernel:
-    """The kernel of a flow with the increments of the coordinates only."""
+    """Return the kernel of a flow with the increments of the coordinates only."""
     (output,) = kernel.outputs
     return replace(kernel, outputs=(replace(output, values=output.values[:count]),))

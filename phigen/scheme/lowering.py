@@ -1,7 +1,7 @@
-"""Lowering: from expression graphs to assignments that a target prints as they stand.
+"""Lowering: from expression graphs to assignments that a target prints unchanged.
 
-Passes, in order: `expand_powers` (powers become products, quotients and square roots), then `assign` (shared or
-long sub-expressions become temporaries). The result is a list of trees over symbols.
+Passes, in order: `expand_powers` (powers become products, quotients and square roots), then `assign` (shared or long
+sub-expressions become temporaries). The result is a list of trees over symbols.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from phigen.symbolic.expression import Expression, fold, raw, symbol, topologica
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import TEMPORARY, Symbol
 
-#: Cost of an operation in units of one addition, as measured on current x86-64 processors (throughput); a call is one
-#: of a function in the library.
+#: Cost of an operation in units of one addition, measured on current x86-64 processors (throughput); a call is a call
+#: of a function of the library.
 COST = {"add": 1, "sub": 1, "mul": 1, "neg": 0, "reciprocal": 4, "sqrt": 5, "call": 20}
 
-#: Longest tree that is printed as one statement, in operations.
-LONGEST = 14
+#: Largest number of operations in one printed statement, so that lines remain readable.
+MAX_STATEMENT_OPERATIONS = 14
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """``target`` = ``value``; the value is a tree over symbols, temporaries of earlier assignments included."""
+    """``target`` = ``value``, where the value is a tree over symbols and temporaries of earlier assignments."""
 
     target: str
     value: Expression
 
 
 def expand_powers(roots: Sequence[Expression]) -> list[Expression]:
-    """The roots with only these powers left: 2 (a square), −1, ½, ⅓ and powers that need the function."""
+    """Return the roots with these powers only: 2 (a square), −1, ½, ⅓ and powers that need the function."""
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if e.op == "pow":
@@ -62,7 +62,7 @@ def _power(base: Expression, exponent: Fraction) -> Expression:
 
 
 def _root(base: Expression, degree: int) -> Expression | None:
-    """The root by square roots and at most one cube root, which other powers share; None for other degrees."""
+    """Return the root by square roots and at most one cube root, shared by other powers; None for other degrees."""
     if degree in (2, 3):
         return raw("pow", (base,), Fraction(1, degree))
     half = _root(base, degree // 2) if degree % 2 == 0 else None
@@ -78,7 +78,7 @@ def _integer_power(base: Expression, n: int) -> Expression:
 
 
 def cost(roots: Sequence[Expression]) -> int:
-    """Cost of computing the roots together, each shared value once (see `COST`)."""
+    """Return the cost of computing the roots together, each shared value once (see `COST`)."""
     return sum(_cost(e) for e in topological(expand_powers(roots)))
 
 
@@ -93,17 +93,20 @@ def _cost(e: Expression) -> int:
 
 
 def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
-    """The roots with ½(ab) and ½(ac) as (½a)b and (½a)c, where that takes fewer operations."""
+    """Return the roots with ½(ab) and ½(ac) as (½a)b and (½a)c, where that takes fewer operations."""
     roots = list(roots)
     while True:
-        found = _numbers_moved(roots)
-        if cost(found) >= cost(roots):
+        regrouped = _numbers_regrouped(roots)
+        if cost(regrouped) >= cost(roots):
             return roots
-        roots = found
+        roots = regrouped
 
 
-def _numbers_moved(roots: Sequence[Expression]) -> list[Expression]:
-    """Every product of a number and a product with the number at that factor which most such products have."""
+def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
+    """Return the roots with numbers multiplied into a factor first.
+
+    In a product of a number and a product, the factor is the one that most products with the same number have.
+    """
     scaled = [e for e in topological(roots) if e.op == "mul" and e.args[0].is_number and e.args[1].op == "mul"]
     counts = Counter((e.args[0], factor) for e in scaled for factor in e.args[1].args)
     chosen = {e: int(counts[e.args[0], e.args[1].args[1]] > counts[e.args[0], e.args[1].args[0]]) for e in scaled}
@@ -118,7 +121,7 @@ def _numbers_moved(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def operation_counts(roots: Sequence[Expression]) -> dict[str, int]:
-    """Additions, multiplications, divisions and function calls of the roots together."""
+    """Return the numbers of additions, multiplications, divisions and function calls of the roots together."""
     counts = {"additions": 0, "multiplications": 0, "divisions": 0, "functions": 0}
     for e in topological(expand_powers(roots)):
         if e.op in ("add", "sub"):
@@ -135,11 +138,11 @@ def operation_counts(roots: Sequence[Expression]) -> dict[str, int]:
 def assign(
     roots: Sequence[Expression], named: Mapping[int, str] | None = None
 ) -> tuple[list[Assignment], list[Expression]]:
-    """Assignments of temporaries, and the roots as trees over them.
+    """Return assignments of temporaries, and the roots as trees over them.
 
-    A value used more than once, a value with a name in ``named`` (by ``id`` of the node in ``roots``' graph),
-    the operand of a square, and a value whose tree would exceed `LONGEST` operations get a temporary.
-    The roots must have passed `expand_powers`.
+    These values get a temporary: values used more than once, values with a name in ``named`` (by ``id`` of the node
+    in the graph of ``roots``), operands of squares, and values whose tree would exceed `MAX_STATEMENT_OPERATIONS`
+    operations. The roots must have passed `expand_powers`.
     """
     named = named or {}
     order = topological(roots)
@@ -161,7 +164,7 @@ def assign(
         tree = raw(e.op, tuple(args), e.value)
         size = 1 + sum(sizes[id(a)] for a in e.args)
         cheap = e.op == "neg" and not args[0].args
-        if id(e) in named or (uses[id(e)] > 1 and not cheap) or size > LONGEST:
+        if id(e) in named or (uses[id(e)] > 1 and not cheap) or size > MAX_STATEMENT_OPERATIONS:
             if id(e) in named:
                 target = named[id(e)]
             else:

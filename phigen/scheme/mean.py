@@ -1,8 +1,8 @@
-"""Derivatives along the mean of a path, where it is its middle that the path is expanded about.
+"""Derivatives along the mean of a path, from those along its middle, about which the path is expanded.
 
-Let the path take the time −1 … 1 under p/2, so that it starts at α and ends at β. With even and odd the sums of the
-terms of its Taylor series of even and odd order, α = even − odd and β − α = 2 odd, and likewise for derivatives: each
-is an n×2n matrix, along the middle m, then along p.
+Let the path take the time −1 … 1 under p/2, so that it starts at α and ends at β. Let even and odd be the sums of the
+terms of even and odd order of its Taylor series: α = even − odd and β − α = 2 odd, and likewise for derivatives. Each
+sum of derivatives is an n×2n matrix, along the middle m, then along p.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from phigen.symbolic.symbols import Symbol
 
 
 def along_mean(n: int) -> Kernel:
-    """Derivatives of the ends of a path in n coordinates along its mean y, from those along its middle m and along p.
+    """Return derivatives of the ends of a path in n coordinates along its mean y, from those along m and p.
 
-    For p held fixed m follows y by M⁻¹, M the derivative of the mean along m; with p = ∇S_h(y) by M⁻¹ (1 − N H), N that
-    along p and H the Hessian of S_h.
+    For fixed p, the derivative of m along y is M⁻¹, with M the derivative of the mean along m. With p = ∇S_h(y) it is
+    M⁻¹ (1 − N H), with N the derivative of the mean along p and H the Hessian of S_h.
     """
     inputs = {name: tuple(Symbol(name, i) for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
     inputs["hessian"] = tuple(Symbol("hessian", i) for i in range(n * n))
     hessian = _matrix([symbol(s) for s in inputs["hessian"]], n, n, 0)
     even, odd, mean = ([symbol(s) for s in inputs[name]] for name in ("even", "odd", "mean"))
-    start, change = [a - b for a, b in zip(even, odd, strict=True)], [2 * b for b in odd]
+    start, difference = [a - b for a, b in zip(even, odd, strict=True)], [2 * b for b in odd]
     inverse, reciprocals = _inverse(_matrix(mean, n, 2 * n, 0))
     follows = _times(inverse, _plus(_identity(n), _times(_matrix(mean, n, 2 * n, n), hessian), -1))
     fixed, along = [], []
-    for value in (start, change):
+    for value in (start, difference):
         by_m, by_p = _matrix(value, n, 2 * n, 0), _matrix(value, n, 2 * n, n)
         fixed.append(_times(by_m, inverse))
         along.append(_plus(_times(by_m, follows), _times(by_p, hessian)))

@@ -1,4 +1,4 @@
-"""The modified Hamiltonian of a program's step, as a kernel and for reading."""
+"""The modified Hamiltonian of the step of a program, as a kernel and as a formula."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from phigen.symbolic.symbols import STEP
 
 
 def powers(order: Order, count: int, *, symmetric: bool) -> list[int]:
-    """The powers of h of the first ``count`` corrections: order, order + 1, …, or every second if symmetric."""
+    """Return the powers of h of the first ``count`` corrections: order, order + 1, …, or every second if symmetric."""
     return [order.order + (2 if symmetric else 1) * k for k in range(count)]
 
 
@@ -31,9 +31,10 @@ def corrections(
     gauge: Gauge | None = None,
     values: Mapping[str, Fraction] | None = None,
 ) -> ModifiedSeries:
-    """H_0, H_1, … of H − Σ λC with ``count`` corrections, in a tower that contains the step size.
+    """Return H_0, H_1, … of H − Σ λC with ``count`` corrections, in a tower that contains the step size.
 
-    ``values`` of parameters are put in, which makes formulas shorter. Raises `LimitError` if a correction is too large.
+    ``values`` of parameters are substituted, which shortens formulas. Raises `LimitError` if a correction is too
+    large.
     """
     gauge = gauge or Gauge()
     gauged = gauge.applied(system)
@@ -61,17 +62,17 @@ def corrections(
 def modified_hamiltonian(
     system: System, realisation: BiRealisation, order: Order, count: int, gauge: Gauge | None = None
 ) -> Expression:
-    """H̃_h as one expression in coordinates, parameters, gauge and step size."""
-    found = corrections(system, realisation, order, count, gauge)
-    h = found.tower.variable(STEP)
-    summed = found.tower.expression(found.tower.combine([t * h**j for j, t in enumerate(found.terms)]))
+    """Return H̃_h as one expression in coordinates, parameters, gauge and step size."""
+    series = corrections(system, realisation, order, count, gauge)
+    h = series.tower.variable(STEP)
+    summed = series.tower.expression(series.tower.combine([t * h**j for j, t in enumerate(series.terms)]))
     gauge = gauge or Gauge()
-    taken = gauge.timed(system.hamiltonian) - gauge.applied(system).hamiltonian
-    return summed + taken
+    subtracted = gauge.timed(system.hamiltonian) - gauge.applied(system).hamiltonian
+    return summed + subtracted
 
 
 def expect_modified(system: System, realisation: BiRealisation, stages: int) -> None:
-    """Raise `SpecError` for compositions and approximate bi-realisations, for which it is not computed."""
+    """Raise `SpecError` for compositions, forces and approximate bi-realisations, for which H̃_h is not computed."""
     if stages > 1 or not realisation.exact or system.forces:
         why = "a composition" if stages > 1 else "a system with forces"
         why = why if realisation.exact else "an approximate bi-realisation"
@@ -82,7 +83,7 @@ def expect_modified(system: System, realisation: BiRealisation, stages: int) -> 
 def modified_of(
     system: System, realisation: BiRealisation, order: Order, gauge: Gauge, count: int, stages: int
 ) -> Modified:
-    """The modified Hamiltonian as a kernel. Raises `SpecError` where `expect_modified` does."""
+    """Return the modified Hamiltonian as a kernel. Raises `SpecError` where `expect_modified` does."""
     expect_modified(system, realisation, stages)
     value = modified_hamiltonian(system, realisation, order, count, gauge)
     time = {"t": system.times} if system.time else {}

@@ -1,12 +1,13 @@
 """Steps of equal size in τ, dt = g dτ, g > 0, that are Poisson maps: a monitored system.
 
-With a canonical pair (t, e) beside the coordinates, K = g(x)(H(x) + e) has the orbits of H where K = 0, that is for
-e = −H(x₀), and along them dt/dτ = ∂K/∂e = g. K does not depend on t; so e is constant, to the solver a parameter that
-each trajectory has a value of. In the midpoint realisation of the pair the step is that of the series S_τ(x; e) of K in
-x alone, and t₁ − t₀ = ∂S_τ/∂e at its point y: to the order of the method, since (t, x) is one step of one method.
+With a canonical pair (t, e) added to the coordinates, K = g(x)(H(x) + e) has the orbits of H where K = 0, that is for
+e = −H(x₀), and along them dt/dτ = ∂K/∂e = g. K does not depend on t, so e is constant: for the solver, a parameter
+with a value for each trajectory. In the midpoint realisation of the pair, the step in x is that of the series S_τ(x;
+e) of K, and t₁ − t₀ = ∂S_τ/∂e at its point y. The time has the order of the method, since (t, x) is one step of one
+method.
 
-With forces −H(x) is not constant. They leave no Poisson map anyway, and so there is no K: p = τg(∇H + ζ) and the
-impulse τgf at y, with t₁ − t₀ = τg(y), make a symmetric step of order 2, of (t, x) too.
+With forces −H(x) is not constant and no step is a Poisson map, so K is not used. Instead p = τg(∇H + ζ) and the
+impulse τgf at y, with t₁ − t₀ = τg(y), form a symmetric step of order 2 for (t, x).
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.spec.model import Spec
 from phigen.symbolic.expression import Expression
 
-#: What there is in its place where H depends on the time: e is no constant then, and with t a coordinate.
-BY_HAND = (
+#: Alternative where H depends on the time, so that e is not constant: t and e as coordinates.
+EXTENDED_SYSTEM_HINT = (
     "without time: make t and e coordinates too, a canonical pair; hamiltonian: g*(H + e), with e = -H at the start"
 )
 
 
 def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | None:
-    """∂S_τ/∂e at the point y of a step; None for a system that is not monitored."""
+    """Return ∂S_τ/∂e at the point y of a step; None for a system that is not monitored."""
     if generating.elapsed is None:
         return None
     (value,) = generating.coefficients.hoist([generating.elapsed])
@@ -40,7 +41,7 @@ def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | N
 
 
 def rate_kernel(system: System, monitor: Expression) -> Kernel:
-    """dt/dτ at a state."""
+    """Return dt/dτ at a state."""
     return Kernel(
         "monitor",
         "dt/dtau, which has to be positive",
@@ -50,7 +51,7 @@ def rate_kernel(system: System, monitor: Expression) -> Kernel:
 
 
 def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
-    """What the header says."""
+    """Yield the line of the header, if there is a monitor."""
     if monitor and forced:
         yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau; e has no part in them"
     elif monitor:
@@ -58,14 +59,14 @@ def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
 
 
 def monitor_of(spec: Spec) -> Expression | None:
-    """g of a spec whose step is that of a series. Raises `SpecError` for what does not go with it."""
+    """Return g of a spec whose step is that of a series. Raises `SpecError` where g does not apply."""
     if spec.monitor is None:
         return None
     others = {"time:": spec.time, "lattice:": spec.lattice}
-    for key, given in others.items():
-        if given:
+    for key, value in others.items():
+        if value:
             message = f"monitor: not together with {key} e = -H(x0) would not be constant, or nothing would adapt"
-            raise SpecError([spec.diagnostic(("monitor",), message, BY_HAND if spec.time else "")])
+            raise SpecError([spec.diagnostic(("monitor",), message, EXTENDED_SYSTEM_HINT if spec.time else "")])
     if spec.forces and not isinstance(spec.gauge, str):
         message = "monitor: with forces no Casimirs are taken from K, as there is none"
         raise SpecError([spec.diagnostic(("gauge",), message, "gauge: none")])

@@ -1,18 +1,20 @@
 """Splitting methods for near-integrable systems, H = A + εB with exact flows of A and of B.
 
-A step is e^{a_1 hA} e^{b_1 hεB} … e^{b_s hεB} e^{a_{s+1} hA}, symmetric. Its error is a sum of terms ε^k h^m; a method
-of generalised order (8, 6, 4) has none below εh^8, ε²h^6 and ε³h^4, per unit of time. With c_i = a_1 + … + a_i, and B
-moved along A to c_i, whose Taylor coefficients are free in a Lie algebra, the conditions are
+A step is e^{a_1 hA} e^{b_1 hεB} … e^{b_s hεB} e^{a_{s+1} hA}, symmetric. Its error is a sum of terms ε^k h^m; a
+method of generalised order (8, 6, 4) has none below εh^8, ε²h^6 and ε³h^4, per unit of time. With c_i = a_1 + … +
+a_i, and B transported along A to c_i, whose Taylor coefficients are free in a Lie algebra, the conditions are as
+follows.
 
-- of order ε: Σ b_i c_i^k = 1/(k + 1), those of a quadrature;
-- of order ε²: Σ_{i<j} b_i b_j (c_i^k c_j^l − c_i^l c_j^k) = (1/(k + 1) − 1/(l + 1))/(k + l + 2) for k < l, at
-  h^{k+l+2}.
+Of order ε: Σ b_i c_i^k = 1/(k + 1), those of a quadrature.
+
+Of order ε²: Σ_{i<j} b_i b_j (c_i^k c_j^l − c_i^l c_j^k) = (1/(k + 1) − 1/(l + 1))/(k + l + 2) for k < l, at
+h^{k+l+2}.
 
 J. Laskar, P. Robutel, High order symplectic integrators for perturbed Hamiltonian systems, Celestial Mechanics and
 Dynamical Astronomy 80 (2001): Gauss's quadrature, (2s, 2). R. I. McLachlan, Composition methods in the presence of
-small parameters, BIT 35 (1995): (8, 4). S. Blanes, F. Casas, A. Farrés, J. Laskar, J. Makazaga, A. Murua, New families
-of symplectic splitting methods for numerical integration in dynamical astronomy, Applied Numerical Mathematics 68
-(2013): (8, 6, 4) and (10, 6, 4).
+small parameters, BIT 35 (1995): (8, 4). S. Blanes, F. Casas, A. Farrés, J. Laskar, J. Makazaga, A. Murua, New
+families of symplectic splitting methods for numerical integration in dynamical astronomy, Applied Numerical
+Mathematics 68 (2013): (8, 6, 4) and (10, 6, 4).
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from itertools import pairwise
 from phigen.gauss.tableau import gauss_nodes
 from phigen.scheme.alternation import Alternation
 
-# The first half of a and of b, the middle included, to 60 digits: zeros of the conditions by Newton's method.
+# The first halves of a and b with their middles, to 60 digits: zeros of the conditions by Newton's method.
 _8_4 = (
     "0.0753469602698928884165278036834744643726526645540790631409721 "
     "0.517916854688256782300773978496315644323847447821980915025719 "
@@ -58,9 +60,10 @@ _10_6_4 = (
 
 @dataclass(frozen=True)
 class NearIntegrable(Alternation):
-    """A method for H = A + εB: ``generalised`` has the power of h at which errors in ε, ε², … begin.
+    """A method for H = A + εB.
 
-    ``a`` and ``b`` are the fractions of the flows of A and of B.
+    ``generalised`` has the powers of h at which errors in ε, ε², … begin; ``a`` and ``b`` are the fractions of the
+    flows of A and of B.
     """
 
     generalised: tuple[int, ...] = ()
@@ -75,7 +78,7 @@ class NearIntegrable(Alternation):
 
 
 def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[Fraction]) -> NearIntegrable:
-    """The method with these fractions, which sum to 1."""
+    """Return the method with these fractions, which sum to 1."""
     times = [t for pair in zip(a, b, strict=False) for t in pair]
     alpha = [times[0]]
     for t in times[1:]:
@@ -84,20 +87,20 @@ def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[
 
 
 def _listed(name: str, generalised: tuple[int, ...], stages: int, halves: tuple[str, str]) -> NearIntegrable:
-    """The method from the first halves of a and b, whose middles are what is left of 1."""
+    """Return the method from the first halves of a and b; their middles complete the sums to 1."""
     a, b = ([Fraction(v) for v in half.split()] for half in halves)
     return _method(name, generalised, _mirrored(a, stages + 1), _mirrored(b, stages))
 
 
 def _mirrored(half: list[Fraction], count: int) -> list[Fraction]:
-    """All fractions, of which there are ``count``; the sum of the first half is made exact in its last one."""
+    """Return all ``count`` fractions; the last one of the first half is adjusted so that the sum is exact."""
     others, odd = half[:-1], count % 2
     last = 1 - 2 * sum(others, Fraction(0)) if odd else Fraction(1, 2) - sum(others, Fraction(0))
     return [*others, last, *([] if odd else [last]), *reversed(others)]
 
 
 def _quadrature(stages: int) -> NearIntegrable:
-    """The method of Laskar and Robutel with so many flows of B: nodes and weights of Gauss."""
+    """Return the method of Laskar and Robutel with ``stages`` flows of B: nodes and weights of Gauss."""
     nodes = [Fraction(0), *gauss_nodes(stages), Fraction(1)]
     a = [after - before for before, after in pairwise(nodes)]
     b = [_weight(nodes[1:-1], i) for i in range(stages)]
@@ -106,7 +109,7 @@ def _quadrature(stages: int) -> NearIntegrable:
 
 
 def _weight(nodes: list[Fraction], i: int) -> Fraction:
-    """The integral over [0, 1] of the polynomial that is 1 at one node and 0 at the others."""
+    """Return the integral over [0, 1] of the polynomial that is 1 at one node and 0 at the others."""
     p = [Fraction(1)]
     for c in (c for j, c in enumerate(nodes) if j != i):
         p = [(x - c * y) / (nodes[i] - c) for x, y in zip([Fraction(0), *p], [*p, Fraction(0)], strict=True)]
@@ -127,10 +130,10 @@ NAMES = tuple(method.name for method in METHODS)
 
 
 def find(name: str, order: int) -> NearIntegrable | None:
-    """The method of that name (``auto``: the recommended one) and order, or None."""
+    """Return the method of this name (``auto``: the recommended one) and order, or None."""
     return next((m for m in METHODS if m.order == order and name in ("auto", m.name)), None)
 
 
 def orders(name: str) -> list[int]:
-    """The orders that a name offers."""
+    """Return the orders of the methods of this name."""
     return sorted({m.order for m in METHODS if m.name == name})

@@ -1,7 +1,8 @@
-"""What headers say of noise; and its flows in splittings: half a step before, and half a step after the flows of H.
+"""Flows of noise in splittings: half a step before, and half a step after the flows of H; header lines on noise.
 
 The increments of both halves are independent, so the mean of a step is exp(hN/2) exp(hA) exp(hN/2), with A the
-generator of the motion and N = ½ Σ X² that of the noise: of weak order 2, as the sources are split symmetrically too.
+generator of the motion and N = ½ Σ X² that of the noise. The weak order is 2, as the sources are split symmetrically
+too.
 """
 
 from __future__ import annotations
@@ -21,18 +22,18 @@ from phigen.symbolic.symbols import increment
 
 
 def expect_no_adjoint(system: System, adjoint: bool) -> None:
-    """Raise `SpecError` for what is not offered with noise."""
+    """Raise `SpecError` if the transpose of a step with noise is requested."""
     if system.noise and adjoint:
         raise SpecError([Diagnostic("adjoint is not offered with noise", system.locations.get(("noise",)))])
 
 
 def noise_facts(system: System, weak: int) -> Iterator[str]:
-    """What is said of noise."""
-    yield from noise_said([s.name for s in system.noise], weak)
+    """Yield the lines of the header on noise."""
+    yield from noise_lines([s.name for s in system.noise], weak)
 
 
-def noise_said(sources: Sequence[str], weak: int) -> Iterator[str]:
-    """The same of sources by their names."""
+def noise_lines(sources: Sequence[str], weak: int) -> Iterator[str]:
+    """Yield the lines of the header on sources of noise with these names."""
     if not sources:
         return
     names = ", ".join(sources)
@@ -41,51 +42,51 @@ def noise_said(sources: Sequence[str], weak: int) -> Iterator[str]:
 
 
 def noise_flows(system: System) -> tuple[Flow, ...]:
-    """The flow of g of each source. `SpecError` for one whose flow is not elementary."""
+    """Return the flow of g of each source. `SpecError` for one whose flow is not elementary."""
     return tuple(_flow(system, source) for source in system.noise)
 
 
 def _flow(system: System, source: Source) -> Flow:
-    alone = replace(system.frozen, hamiltonian=source.hamiltonian, noise=())
+    noise_system = replace(system.frozen, hamiltonian=source.hamiltonian, noise=())
     reason = f"scheme: splitting needs the flow of the noise {source.name} in closed form, which phigen does not find"
     place = system.locations.get(("noise", source.name))
     refused = SpecError([Diagnostic(reason, place, "scheme: series takes it")])
     try:
-        found = split(alone).flows
+        flows = split(noise_system).flows
     except SpecError:
         raise refused from None
-    if len(found) != 1:
+    if len(flows) != 1:
         raise refused
-    return found[0]
+    return flows[0]
 
 
 def driving_times(system: System) -> list[Expression]:
-    """The times σ ΔW of the flows of the sources, with the increment of any row of coefficients in place of ΔW."""
+    """Return the times σ ΔW of the flows of the sources, with one symbol for the increment ΔW of any row."""
     return [source.amplitude * symbol(increment(0)) for source in system.noise]
 
 
 def driven(system: System) -> list[Flow]:
-    """The flows of the sources for these times. `SpecError` for one whose flow is not elementary."""
-    found = zip(noise_flows(system), driving_times(system), strict=True)
-    return [replace(flow, increment=tuple(substitute(flow.increment, {TIME: time}))) for flow, time in found]
+    """Return the flows of the sources for these times. `SpecError` for one whose flow is not elementary."""
+    timed_flows = zip(noise_flows(system), driving_times(system), strict=True)
+    return [replace(flow, increment=tuple(substitute(flow.increment, {TIME: time}))) for flow, time in timed_flows]
 
 
 def with_noise(schedule: Schedule, sources: int) -> Schedule:
-    """The schedule with the sources as the first parts: forwards at the beginning of a step, backwards at its end.
+    """Return the schedule with the sources as the first parts: forwards at the start of a step, backwards at its end.
 
-    The first rows of ``times`` are those of the former, the last those of the latter.
+    The first rows of ``times`` belong to the sources at the start, the last rows to those at the end.
     """
     parts = range(sources)
     rows = sources + len(schedule.times)
     flows = [(part, part) for part in parts]
     flows += [(part + sources, row + sources) for part, row in schedule.flows]
     flows += [(part, rows + part) for part in reversed(parts)]
-    still = (0.0,) * sources
+    zeros = (0.0,) * sources
     moments = schedule.moments or (0.0,) * len(schedule.times)
     return Schedule(
-        (*still, *schedule.times, *still),
+        (*zeros, *schedule.times, *zeros),
         1,
         tuple((part, row - 1) for part, row in flows[1:]),
-        (*still, *schedule.multiples, *still) if schedule.multiples else (),
-        (*still, *moments, *((1.0,) * sources)),
+        (*zeros, *schedule.multiples, *zeros) if schedule.multiples else (),
+        (*zeros, *moments, *((1.0,) * sources)),
     )

@@ -1,8 +1,8 @@
 """Splitting methods for two parts with {V, {V, {V, T}}} = 0: Runge–Kutta–Nyström methods, and modified potentials.
 
-A step alternates flows of T and V, Φ_h = φ_{t_n h} ∘ … ∘ φ_{t_1 h}, with t_i = t_{n+1−i}. Under that condition fewer
-order conditions remain than for any two parts. Where V + κ{V, {V, T}} has an elementary flow too, each kick may have a
-multiple κ_i = m_i h² of its own, and there are more unknowns to meet them with (`phigen.splitting.kicks`).
+A step alternates flows of T and V, Φ_h = φ_{t_n h} ∘ … ∘ φ_{t_1 h}, with t_i = t_{n+1−i}. The condition leaves fewer
+order conditions than two arbitrary parts have. Where V + κ{V, {V, T}} also has an elementary flow, each kick may have
+a multiple κ_i = m_i h², which adds unknowns to solve them with (`phigen.splitting.kicks`).
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from phigen.scheme.alternation import Schedule
 
 @dataclass(frozen=True)
 class Nystrom:
-    """A named method: the times t_i of all flows, in order, and the multiples m_i of the kicks, if they are modified.
+    """A named method: the times t_i of all flows, in order, and the multiples m_i of modified kicks.
 
-    ``kicks_first`` tells that V is followed first. ``error`` is the Euclidean norm of the leading error, in the basis
-    of the Lie algebra of `tests/splitting/nystrom_algebra.py`: what methods are compared by.
+    ``kicks_first`` says that V is followed first. ``error`` is the Euclidean norm of the leading error, in the basis
+    of the Lie algebra of `tests/splitting/nystrom_algebra.py`; methods are compared by it.
     """
 
     name: str
@@ -30,16 +30,16 @@ class Nystrom:
 
     @property
     def stages(self) -> int:
-        """Flows of the part that is followed last."""
+        """The number of flows of the part that is followed last."""
         return len(self.times) // 2
 
     @property
     def kicks(self) -> int:
-        """Flows of V."""
+        """The number of flows of V."""
         return self.stages + self.kicks_first
 
     def schedule(self) -> Schedule:
-        """The flows of a step, where part 0 is that which is followed first."""
+        """Return the flows of a step, where part 0 is the one that is followed first."""
         multiples = []
         if self.multiples:
             kicks = iter(self.multiples)
@@ -50,10 +50,10 @@ class Nystrom:
 
 
 def _method(name: str, order: int, first: str, half: str, error: float, multiples: str = "") -> Nystrom:
-    """Times up to the middle one, and the multiples of the kicks among them."""
+    """Return the method with these times up to the middle one, and the multiples of the kicks among them."""
     times = [Fraction(v) for v in half.split()]
     kicks = [Fraction(v) for v in multiples.split()]
-    middle_kicks = (len(times) - 1) % 2 != (first == "V")  # the middle flow is a kick, which is not repeated
+    middle_kicks = (len(times) - 1) % 2 != (first == "V")  # the middle flow is a kick and occurs once
     mirrored = kicks[-2::-1] if middle_kicks else kicks[::-1]
     return Nystrom(name, order, first == "V", (*times, *times[-2::-1]), (*kicks, *mirrored), error)
 
@@ -160,5 +160,5 @@ NAMES = tuple(dict.fromkeys(m.name for m in METHODS))
 
 
 def orders(name: str) -> list[int]:
-    """The orders that a name offers."""
+    """Return the orders of the methods of this name."""
     return sorted({m.order for m in METHODS if m.name == name})

@@ -15,17 +15,17 @@ class Order:
 
 
 def plan_order(order: int | None, terms: int | None, *, symmetric: bool) -> Order:
-    """The terms that an order needs, or the order that terms give.
+    """Return the terms that an order needs, or the order that terms give.
 
-    In a symmetric bi-realisation the even S_i vanish and the method is symmetric, so its order is even:
-    S_1 … S_k with k odd gives order k + 1. Otherwise S_1 … S_k gives order k.
+    In a symmetric bi-realisation the even S_i vanish and the method is symmetric, so its order is even: S_1 … S_k
+    with k odd gives order k + 1. Otherwise S_1 … S_k gives order k.
     """
     if terms is not None:
         if not symmetric:
             return Order(terms, terms)
-        kept = terms if terms % 2 else terms - 1 or 1
-        note = "" if kept == terms else f"S_{terms} = 0 in a symmetric bi-realisation"
-        return Order(kept + 1, kept, note)
+        odd = terms if terms % 2 else terms - 1 or 1
+        note = "" if odd == terms else f"S_{terms} = 0 in a symmetric bi-realisation"
+        return Order(odd + 1, odd, note)
     if order is None:
         raise ValueError("a method needs an order or terms")
     if not symmetric:

@@ -1,8 +1,8 @@
-"""The path ṁ = π(m)p as Taylor recurrences: what a solver for Karasev's bi-realisation follows at run time.
+"""The path ṁ = π(m)p as Taylor recurrences, which a solver for Karasev's bi-realisation follows at run time.
 
-Each node of the graph of π(m)p is a series in the time along the path. The coefficient of order k of a node
-follows from those of its arguments up to order k (sums, products) or of the node itself below k (powers,
-functions), so the coefficients of m are computed one order at a time, as many as the size of p calls for.
+Each node of the graph of π(m)p is a series in the time along the path. The coefficient of order k of a node follows
+from those of its arguments up to order k (sums, products) or of the node itself below k (powers, functions). So the
+coefficients of m are computed one order at a time, as many as the size of p requires.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from phigen.symbolic.taylor import closure
 
 
 @dataclass(frozen=True)
-class Term:
+class ConvolutionTerm:
     """``factor · Σ`` of one kind over the orders j of two series:
 
     ``product``: Σ_{j=0}^{k} a_j b_{k−j} · ``chain``: Σ_{j=1}^{k} (j/k) a_j b_{k−j}, for b = ∂f/∂a ·
@@ -34,17 +34,17 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Series:
+class NodeSeries:
     """One node: ``first``, its value at order 0, as an expression, and the rule for orders k ≥ 1.
 
-    ``linear`` lists pairs (series, factor) that contribute factor · a_k, ``terms`` sums over orders, and
-    ``divisor`` is the series by whose value at order 0 the terms are divided (powers), or None.
-    Symbols ``s:i`` in expressions are the values at order 0 of series i.
+    ``linear`` lists pairs (series, factor) that contribute factor · a_k, ``terms`` sums over orders. ``divisor`` is
+    the series whose value at order 0 divides the terms (powers), or None. Symbols ``s:i`` in expressions are the
+    values at order 0 of series i.
     """
 
     first: Expression
     linear: tuple[tuple[int, Expression], ...] = ()
-    terms: tuple[Term, ...] = ()
+    terms: tuple[ConvolutionTerm, ...] = ()
     divisor: int | None = None
 
 
@@ -55,13 +55,13 @@ class Recurrences:
     ``fixed`` are values that stay constant along a path (functions of p and the coefficients), symbols ``f:i``.
     """
 
-    series: tuple[Series, ...]
+    series: tuple[NodeSeries, ...]
     slopes: tuple[int, ...]
     fixed: tuple[Expression, ...]
 
 
 @dataclass(frozen=True)
-class Entry:
+class SeriesEntry:
     """An entry of a matrix that is not 0, and its series."""
 
     row: int
@@ -71,37 +71,37 @@ class Entry:
 
 @dataclass(frozen=True)
 class PathSlopes:
-    """What the derivatives of a path along its start and along p follow from: V̇ = J V + (0, π), for V = (∂m, ∂_p m).
+    """Recurrences for the derivatives of a path along its start and along p: V̇ = J V + (0, π), for V = (∂m, ∂_p m).
 
-    ``series`` and ``fixed`` go on from those of the path. ``jacobian`` is J = ∂(π(m)p)/∂m, ``tensor`` is π(m), and
-    ``along`` is ∂(π(m)p)/∂c, a column for each coefficient c that derivatives are asked for: Ẇ = J W + ∂(π(m)p)/∂c.
+    ``series`` and ``fixed`` continue those of the path. ``jacobian`` is J = ∂(π(m)p)/∂m, ``tensor`` is π(m), and
+    ``along`` is ∂(π(m)p)/∂c, a column for each differentiated coefficient c: Ẇ = J W + ∂(π(m)p)/∂c.
     """
 
-    series: tuple[Series, ...]
+    series: tuple[NodeSeries, ...]
     fixed: tuple[Expression, ...]
-    jacobian: tuple[Entry, ...]
-    tensor: tuple[Entry, ...]
-    along: tuple[Entry, ...] = ()
+    jacobian: tuple[SeriesEntry, ...]
+    tensor: tuple[SeriesEntry, ...]
+    along: tuple[SeriesEntry, ...] = ()
 
 
 def build_path(system: System, coefficients: Coefficients) -> Recurrences:
-    """The recurrences of ṁ = π(m)p; values that depend on parameters only go to the table."""
+    """Return the recurrences of ṁ = π(m)p; values that depend on parameters only go to the table."""
     return path_of(system.coordinates, _flow(system, coefficients))
 
 
 def build_slopes(system: System, coefficients: Coefficients, along: Sequence[str] = ()) -> PathSlopes:
-    """The further recurrences for the derivatives of the path of `build_path`, also along some coefficients."""
+    """Return the further recurrences for derivatives of the path of `build_path`, also along some coefficients."""
     n, flow = system.dimension, _flow(system, coefficients)
     columns = [derivatives(flow, c) for c in system.coordinates]
     jacobian = [columns[j][i] for i in range(n) for j in range(n)]
     tensor = coefficients.hoist([e for row in system.poisson for e in row])
-    moved = [derivatives(flow, c) for c in along]
-    sources = [moved[u][i] for i in range(n) for u in range(len(along))]
+    by_coefficient = [derivatives(flow, c) for c in along]
+    sources = [by_coefficient[u][i] for i in range(n) for u in range(len(along))]
     return _Builder(system.coordinates).slopes(_chains([*flow, *jacobian, *tensor, *sources]))
 
 
 def used_by_path(system: System, coefficients: Coefficients) -> list[str]:
-    """The coefficients that π(m)p depends on."""
+    """Return the coefficients that π(m)p depends on."""
     present = set(symbols_of(*_flow(system, coefficients)))
     return [s for s in coefficients.slots if s in present]
 
@@ -112,12 +112,12 @@ def _flow(system: System, coefficients: Coefficients) -> list[Expression]:
 
 
 def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Recurrences:
-    """The recurrences of ṁ = flow(m, p), where p stays constant along the path."""
+    """Return the recurrences of ṁ = flow(m, p), where p stays constant along the path."""
     return _Builder(coordinates).path(_chains(flow))
 
 
 def _chains(roots: Sequence[Expression]) -> list[Expression]:
-    """Positive integer powers written as products; other powers have a recurrence of their own."""
+    """Return positive integer powers as products; other powers have a recurrence."""
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if not e.args:
@@ -132,7 +132,7 @@ def _chains(roots: Sequence[Expression]) -> list[Expression]:
 class _Builder:
     def __init__(self, coordinates: Sequence[str]) -> None:
         self.coordinates = tuple(coordinates)
-        self.series = [Series(symbol(c)) for c in coordinates]
+        self.series = [NodeSeries(symbol(c)) for c in coordinates]
         self.fixed: list[Expression] = []
         self._series_of: dict[int, int] = {}
         self._in_motion: set[int] = set()
@@ -152,13 +152,13 @@ class _Builder:
         entries = [self._entries(matrix) for matrix in matrices]
         return PathSlopes(tuple(self.series[len(path.series) :]), tuple(self.fixed[len(path.fixed) :]), *entries)
 
-    def _entries(self, matrix: Sequence[Expression]) -> tuple[Entry, ...]:
+    def _entries(self, matrix: Sequence[Expression]) -> tuple[SeriesEntry, ...]:
         width = max(1, len(matrix) // len(self.coordinates))
-        return tuple(Entry(*divmod(k, width), self._as_series(e)) for k, e in enumerate(matrix) if not e.is_zero)
+        return tuple(SeriesEntry(*divmod(k, width), self._as_series(e)) for k, e in enumerate(matrix) if not e.is_zero)
 
     def _include(self, roots: Sequence[Expression]) -> None:
         order = closure(roots)
-        self._keep += order  # values are found by id, so the nodes must live
+        self._keep += order  # nodes are identified by id, so they must live
         self._in_motion |= self._moving(order)
         fresh = [e for e in order if id(e) in self._in_motion and id(e) not in self._series_of]
         for e in fresh:
@@ -167,7 +167,7 @@ class _Builder:
             else:
                 self._series_of[id(e)] = len(self.series)
                 # Functions refer to series of their derivatives, which may come later: filled in below.
-                self.series.append(Series(symbol("pending")))
+                self.series.append(NodeSeries(symbol("pending")))
         for e in fresh:
             if e.args:
                 self.series[self._series_of[id(e)]] = self._rule(e)
@@ -180,15 +180,15 @@ class _Builder:
         return moving
 
     def _as_series(self, e: Expression) -> int:
-        """The series of a node; a fixed one becomes a series without further terms."""
+        """Return the series of a node; a fixed node becomes a series without further terms."""
         if id(e) not in self._series_of:
             value = self._value(e)
             self._series_of[id(e)] = len(self.series)
-            self.series.append(Series(value))
+            self.series.append(NodeSeries(value))
         return self._series_of[id(e)]
 
     def _value(self, e: Expression) -> Expression:
-        """The value of a node at order 0, as a symbol or a number."""
+        """Return the value of a node at order 0, as a symbol or a number."""
         if id(e) in self._series_of:
             return symbol(Symbol(SERIES, self._series_of[id(e)]))
         if not e.args:
@@ -198,29 +198,29 @@ class _Builder:
             self.fixed.append(e)
         return self._fixed_of[id(e)]
 
-    def _rule(self, e: Expression) -> Series:
+    def _rule(self, e: Expression) -> NodeSeries:
         values = [self._value(a) for a in e.args]
         first = raw(e.op, tuple(values), e.value)
         moving = [(k, self._series_of[id(a)]) for k, a in enumerate(e.args) if id(a) in self._in_motion]
         one, minus = raw("number", (), Fraction(1)), raw("number", (), Fraction(-1))
         match e.op:
             case "add":
-                return Series(first, tuple((s, one) for _, s in moving))
+                return NodeSeries(first, tuple((s, one) for _, s in moving))
             case "sub":
-                return Series(first, tuple((s, minus if k else one) for k, s in moving))
+                return NodeSeries(first, tuple((s, minus if k else one) for k, s in moving))
             case "neg":
-                return Series(first, ((moving[0][1], minus),))
+                return NodeSeries(first, ((moving[0][1], minus),))
             case "mul" if len(moving) == 1:
                 (k, s) = moving[0]
-                return Series(first, ((s, values[1 - k]),))
+                return NodeSeries(first, ((s, values[1 - k]),))
             case "mul":
-                return Series(first, (), (Term("product", moving[0][1], moving[1][1]),))
+                return NodeSeries(first, (), (ConvolutionTerm("product", moving[0][1], moving[1][1]),))
             case "pow" if e.value == 2:
-                return Series(first, (), (Term("product", moving[0][1], moving[0][1]),))
+                return NodeSeries(first, (), (ConvolutionTerm("product", moving[0][1], moving[0][1]),))
             case "pow":
-                own = self._series_of[id(e)]
-                term = Term("power", moving[0][1], own, e.value)
-                return Series(first, (), (term,), moving[0][1])
+                result = self._series_of[id(e)]
+                term = ConvolutionTerm("power", moving[0][1], result, e.value)
+                return NodeSeries(first, (), (term,), moving[0][1])
         slopes = partials(e)
-        chain = tuple(Term("chain", s, self._as_series(slopes[k])) for k, s in moving)
-        return Series(first, (), chain)
+        chain = tuple(ConvolutionTerm("chain", s, self._as_series(slopes[k])) for k, s in moving)
+        return NodeSeries(first, (), chain)

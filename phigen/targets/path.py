@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from phigen.scheme.lowering import expand_powers
-from phigen.scheme.path import Recurrences, Series, Term
+from phigen.scheme.path import ConvolutionTerm, NodeSeries, Recurrences
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Path, PathAdjoint
 from phigen.symbolic.expression import Expression
@@ -101,7 +101,7 @@ def _scope(program: Program, path: Recurrences, syntax: Syntax, series: str) -> 
     return scope
 
 
-def _rule(q: Series, text: Text, sums: str) -> str:
+def _rule(q: NodeSeries, text: Text, sums: str) -> str:
     pieces = [_linear(index, factor, text) for index, factor in q.linear]
     pieces += [("+", _term(t, sums)) for t in q.terms]
     if not pieces:
@@ -117,7 +117,7 @@ def _linear(index: int, factor: Expression, text: Text) -> tuple[str, str]:
     return "+", f"{text(factor)} * s[{index}][k]"
 
 
-def _term(t: Term, sums: str) -> str:
+def _term(t: ConvolutionTerm, sums: str) -> str:
     function = sums.format(kind=t.kind, Kind=t.kind.capitalize())
     if t.kind == "power":
         exponent = f"{t.exponent.numerator}.0 / {t.exponent.denominator}.0"

@@ -8,7 +8,7 @@ import mpmath
 import pytest
 from support import NAMES, compile_text, compiled, symbols, values
 
-from phigen.scheme.lowering import LONGEST, assign, cost, expand_powers, operation_counts
+from phigen.scheme.lowering import MAX_STATEMENT_OPERATIONS, assign, cost, expand_powers, operation_counts
 from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import number, power, sqrt, symbols_of, topological
 from phigen.symbolic.functions import FUNCTIONS
@@ -105,7 +105,7 @@ def test_assignments_compute_the_roots(name):
             for left, right in zip(found, expected, strict=True):
                 assert abs(left - right) <= mpmath.mpf(10) ** -25 * (1 + abs(right))
             operations = [sum(1 for e in topological([s.value]) if e.args) for s in assignments]
-            assert max(operations, default=0) <= 2 * LONGEST + 1
+            assert max(operations, default=0) <= 2 * MAX_STATEMENT_OPERATIONS + 1
 
 
 @pytest.mark.parametrize("name", NAMES)

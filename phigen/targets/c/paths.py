@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from phigen.scheme.lowering import expand_powers
-from phigen.scheme.path import Entry, PathSlopes, Recurrences, Series, Term
+from phigen.scheme.path import ConvolutionTerm, NodeSeries, PathSlopes, Recurrences, SeriesEntry
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Path
 from phigen.symbolic.expression import Expression
@@ -84,7 +84,7 @@ class _Show:
 
 
 def _rules(
-    program: Program, show: _Show, every: Sequence[Series], numbers: range
+    program: Program, show: _Show, every: Sequence[NodeSeries], numbers: range
 ) -> tuple[list[str], int, list[str], list[str]]:
     """Coefficient k ≥ 1 of the series of these numbers: the first lines of the function, the count of sums over orders,
     loops over lanes that add what orders j and k − j contribute to these, and loops for the rest, which may need
@@ -118,9 +118,12 @@ def _loops(program: Program, statements: Sequence[str]) -> list[str]:
     return lines
 
 
-def _orders(show: _Show, t: Term) -> tuple[str, str, str]:
-    """Of one sum over orders j (see `Term`): the weight of a_j b_{k-j}, what the sum is multiplied by, the terms that
-    it leaves out, with a coefficient of order 0."""
+def _orders(show: _Show, t: ConvolutionTerm) -> tuple[str, str, str]:
+    """Return the parts of one sum over orders j (see `ConvolutionTerm`).
+
+    They are the weight of a_j b_{k-j}, the factor of the sum, and the terms outside it, with a coefficient of order
+    0.
+    """
     a, b = show.series(t.a), show.series(t.b)
     last = f"{a}[k][lane] * {b}[0][lane]"
     match t.kind:
@@ -134,7 +137,7 @@ def _orders(show: _Show, t: Term) -> tuple[str, str, str]:
     return f"(({r} + 1.0) * (double)j - (double)k) * ", "share * ", f"{r} * {last}"
 
 
-def _linear(show: _Show, q: Series) -> str:
+def _linear(show: _Show, q: NodeSeries) -> str:
     text = ""
     for index, factor in q.linear:
         value = f"{show.series(index)}[k][lane]"
@@ -146,7 +149,7 @@ def _linear(show: _Show, q: Series) -> str:
     return text
 
 
-def _variation(show: _Show, jacobian: Sequence[Entry], width: int) -> list[str]:
+def _variation(show: _Show, jacobian: Sequence[SeriesEntry], width: int) -> list[str]:
     """The product of ∂(π p)/∂m and the derivatives so far, rows of this width, to be added."""
     n = show.dimension
     lines = [f"const double a{e.row}_{e.column} = share * {show.series(e.series)}[j][lane];" for e in jacobian]
