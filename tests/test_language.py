@@ -25,6 +25,7 @@ CLEAN = (
     "realisations",
     "report",
     "runtime",
+    "scheme",
     "series",
     "spec",
     "study",
