@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from mkdocs.structure.pages import Page
 from phigen import resources
 from phigen import spec as specs
 from phigen.compiler import compile_spec
-from phigen.report.panel import NoPanelError, panel_page
+from phigen.report.panel import panel_page
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -60,8 +59,8 @@ def panels() -> dict[str, str]:
     for name, path in resources.bundled().items():
         if CHOSEN is None or name in CHOSEN.split():
             spec = specs.load(path)
-            with suppress(NoPanelError):
-                found[name] = panel_page(compile_spec(spec), max(spec.runs.values(), key=lambda run: run.steps))
+            html = panel_page(compile_spec(spec), max(spec.runs.values(), key=lambda run: run.steps))
+            found |= {name: html} if html else {}
     return found
 
 

@@ -38,6 +38,9 @@ from phigen.writing import replacing
 #: As in the C, whose bits these are: see templates/c/runtime/lattice.c.
 STRETCH, FAR_STEPS = 32, 64
 
+#: Arguments of runs in one process, which make parts of steps or copies of the solver, as processes do not.
+_WHOLE_ONLY = ("until", "every", "at", "stop", "section", "retry")
+
 #: An array over the whole lattice, or a function that gives the planes from one to another, that not among them.
 Given = Any
 
@@ -109,6 +112,10 @@ class DistributedLattice:
         is. Raises on all processes: `StepError`, and `ValueError` where files are of an interrupted run, or of a
         complete one that was to go on.
         """
+        for name in _WHOLE_ONLY:
+            if name in more and name not in self.solver.interface.parameters:
+                hint = "integrate in one process, or to whole steps, and call it again from the last state"
+                raise TypeError(f"{name} is not available on several processes, whose rows are whole steps: {hint}")
         if checkpoints and not output:
             raise ValueError("checkpoints= needs output=, where the frames are of a run that was interrupted")
         paths = Path(output) if output else None, Path(checkpoints) if checkpoints else None

@@ -25,7 +25,6 @@ CLEAN = (
     "realisations",
     "report",
     "runtime",
-    "scheme",
     "series",
     "spec",
     "study",

@@ -6,23 +6,26 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
 from phigen.cli.console import Console
 from phigen.cli.experiment import Experiment
-from phigen.cli.past import begun
 from phigen.runtime.ending import End, after_steps, at_time, where_zero
 from phigen.runtime.interface import BackendError
+from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
-from phigen.study.sections import function_of
 
 #: How many times may be asked for.
 _MOST_TIMES = 10_000_000
 
+#: An experiment of either kind, and what integrates it.
+E = TypeVar("E", bound=Experiment)
+AnySolver = Solver | LatticeSolver
 
-def ended(experiment: Experiment, solver: Solver, console: Console) -> Experiment:
+
+def ended(experiment: E, solver: AnySolver, console: Console) -> E:
     """The experiment with its end, where that is at a time, or where ``stop`` passes through zero."""
     run, h = experiment.run, experiment.h
     end: End | None = None
@@ -31,7 +34,7 @@ def ended(experiment: Experiment, solver: Solver, console: Console) -> Experimen
         if span * h <= 0:
             message = f"the end, {float(run.until)!r}, is never reached from {experiment.begin!r} by steps of {h!r}"
             raise click.UsageError(f"{message}; --until T sets another end")
-        end = at_time(begun(solver, experiment), h, span)
+        end = at_time(experiment.begun(solver), h, span)
     if run.stop is not None:
         end = _stopped(experiment, solver, console, end) or end
     if end is None:
@@ -40,13 +43,13 @@ def ended(experiment: Experiment, solver: Solver, console: Console) -> Experimen
     return replace(experiment, run=replace(run, steps=end.steps, stride=stride), end=end)
 
 
-def _stopped(experiment: Experiment, solver: Solver, console: Console, end: End | None) -> End | None:
+def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: End | None) -> End | None:
     """Where ``stop`` is met, if that is before the end."""
     run, names, h = experiment.run, solver.interface, experiment.h
     assert run.stop is not None
-    g = function_of(run.stop, names.coordinates, experiment.parameters, names.time)
+    g = experiment.function(run.stop, solver)
     most = end.steps + 1 if end else run.steps
-    zero = where_zero(begun(solver, experiment), h, most, g, experiment.begin, timed=bool(names.time))
+    zero = where_zero(experiment.begun(solver), h, most, g, experiment.begin, timed=bool(names.time))
     if zero is None:
         console.note("stop: is not met")
         return None
@@ -59,16 +62,16 @@ def _stopped(experiment: Experiment, solver: Solver, console: Console, end: End 
     return zero if _count(experiment, solver, zero) < last else None
 
 
-def _count(experiment: Experiment, solver: Solver, end: End) -> float:
+def _count(experiment: Experiment, solver: AnySolver, end: End) -> float:
     """Count the steps up to an end, including the fraction of the last. Raises `BackendError`."""
     if not end.part:
         return float(end.steps)
-    session = begun(solver, experiment)
+    session = experiment.begun(solver)
     session.advance(experiment.h, end.steps)
     return end.finish(session)[1]
 
 
-def length(experiment: Experiment, solver: Solver) -> float:
+def length(experiment: Experiment, solver: AnySolver) -> float:
     """Length of a run up to its end, in the variable of equal steps, τ or t. Raises `StepError`."""
     if experiment.end is None:
         return abs(experiment.h) * experiment.run.steps
@@ -78,20 +81,20 @@ def length(experiment: Experiment, solver: Solver) -> float:
         raise solver.failure(error, experiment.h, None, experiment.parameters) from error
 
 
-def timed(experiment: Experiment, solver: Solver, every: float | None = None, at: str | None = None) -> Experiment:
+def timed(experiment: E, solver: AnySolver, every: float | None = None, at: str | None = None) -> E:
     """The experiment with the times of the states that are stored: every so often, or those listed, up to the end."""
     if every is None and at is None and experiment.run.every is not None:
         every = float(experiment.run.every)
     if every is None and at is None:
         return experiment
     if experiment.end is None and solver.interface.monitored:  # how much time its steps take, they tell
-        whole = after_steps(begun(solver, experiment), experiment.h, experiment.run.steps)
+        whole = after_steps(experiment.begun(solver), experiment.h, experiment.run.steps)
         experiment = replace(experiment, end=whole)
     times = _regular(experiment, solver, every) if every is not None else _chosen(experiment, solver, str(at))
     return replace(experiment, times=tuple(times))
 
 
-def _chosen(experiment: Experiment, solver: Solver, at: str) -> list[float]:
+def _chosen(experiment: Experiment, solver: AnySolver, at: str) -> list[float]:
     """The times that are listed, in the order in which they come, none of them the start or beyond a stop."""
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
     times = _listed(at)
@@ -105,7 +108,7 @@ def _chosen(experiment: Experiment, solver: Solver, at: str) -> list[float]:
     return times
 
 
-def _regular(experiment: Experiment, solver: Solver, every: float) -> list[float]:
+def _regular(experiment: Experiment, solver: AnySolver, every: float) -> list[float]:
     """Times so far apart, counted from the start."""
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
     if not every > 0 or not math.isfinite(every):
@@ -118,7 +121,7 @@ def _regular(experiment: Experiment, solver: Solver, every: float) -> list[float
     return [t for t in times if (t - begin) * sign > 0]
 
 
-def _expect_whole(experiment: Experiment, solver: Solver, times: Sequence[float], option: str) -> None:
+def _expect_whole(experiment: Experiment, solver: AnySolver, times: Sequence[float], option: str) -> None:
     """Check that all times are ends of steps: the path of the noise is known nowhere else."""
     for time in times if solver.interface.noise else ():
         steps = (time - experiment.begin) / experiment.h

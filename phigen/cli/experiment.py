@@ -16,12 +16,13 @@ from phigen.errors import Diagnostic, LimitError, SpecError
 from phigen.spec import limits
 
 if TYPE_CHECKING:
-    from phigen.cli.past import Past
     from phigen.compilation import Compilation
+    from phigen.runtime.crossings import Function
     from phigen.runtime.ending import End
     from phigen.runtime.interface import Floats
     from phigen.runtime.solver import Solver
     from phigen.spec.model import Run, Spec
+    from phigen.symbolic.expression import Expression
 
 
 @dataclass(frozen=True)
@@ -30,15 +31,15 @@ class Experiment:
 
     ``end`` is where it ends between two steps, ``times`` those of the states that are stored in place of a stride,
     beside the first and the last.
-    ``past`` is a finished run that it goes on with, ``first`` an attitude at its start.
+    ``past`` is a finished run (`phigen.cli.past.Past`) that it goes on with, ``first`` an attitude at its start.
     """
 
     run: Run
     initial: tuple[float, ...]
-    parameters: dict[str, float]
+    parameters: Mapping[str, Any]
     end: End | None = None
     times: tuple[float, ...] | None = None
-    past: Past | None = None
+    past: Any = None  # a `Past`
     first: Floats | None = None
 
     @property
@@ -61,6 +62,18 @@ class Experiment:
         """Number of steps of the noise that the past has used; a part of a step counts as one."""
         steps = (self.begin - self.t0) / self.h
         return math.ceil(steps - 1e-9 * max(1.0, steps))
+
+    def begun(self, solver: Any) -> Any:
+        """A session of the solver where the steps begin. Raises `StepError`."""
+        from phigen.cli.past import begun
+
+        return begun(solver, self)
+
+    def function(self, expression: Expression, solver: Any) -> Function:
+        """An expression of the run as a function of states, and of their times where there is a time."""
+        from phigen.study.sections import function_of
+
+        return function_of(expression, solver.interface.coordinates, self.parameters, solver.interface.time)
 
     @property
     def spans(self) -> tuple[float, ...]:
@@ -112,17 +125,7 @@ def prepared(
 ) -> Experiment:
     """The run of that name, the first by default, with changes of the command line; not of a lattice."""
     expect_system(spec)
-    run = run_of(spec, name)
-    if until is not None:
-        run = replace(run, duration=None)
-    run = with_steps(spec, run, step, steps)
-    if until is not None:
-        if not math.isfinite(until) or (until - run.start) / run.step <= 0:
-            raise click.BadParameter(
-                f"{until!r} is never reached by steps of {float(run.step)!r}", param_hint="--until"
-            )
-        _expect_few((until - run.start) / run.step, "--until")
-        run = replace(run, until=Fraction(until))
+    run = changed(spec, name, step, steps, until)
     initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
     parameters = spec.parameters_of(run)
     for setting in settings:
@@ -130,6 +133,26 @@ def prepared(
     expect_positive(spec, parameters)
     _expect_room_for_members(spec, run)
     return Experiment(run, tuple(initial.values()), parameters)
+
+
+def changed(
+    spec: Spec,
+    name: str | None,
+    step: float | None = None,
+    steps: int | None = None,
+    until: float | None = None,
+) -> Run:
+    """The run of that name, the first by default, with the step and the end that the command line says."""
+    run = run_of(spec, name)
+    if until is not None:
+        run = replace(run, duration=None)
+    run = with_steps(spec, run, step, steps)
+    if until is None:
+        return run
+    if not math.isfinite(until) or (until - run.start) / run.step <= 0:
+        raise click.BadParameter(f"{until!r} is never reached by steps of {float(run.step)!r}", param_hint="--until")
+    _expect_few((until - run.start) / run.step, "--until")
+    return replace(run, until=Fraction(until))
 
 
 def _expect_room_for_members(spec: Spec, run: Run) -> None:
@@ -153,7 +176,7 @@ def with_steps(spec: Spec, run: Run, step: float | None, steps: int | None) -> R
     if step == 0 or not math.isfinite(step):
         raise click.BadParameter("the step must be a finite number, and not 0", param_hint="--step")
     try:
-        return with_step(run, Fraction(step), parts=spec.monitor is None and spec.lattice is None)
+        return with_step(run, Fraction(step), parts=spec.monitor is None)
     except ValueError as error:
         raise click.BadParameter(f"{error}; --steps N sets the number of steps", param_hint="--step") from None
 

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import math
-import zipfile
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
-from fractions import Fraction
-from functools import partial
 from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,25 +13,17 @@ import numpy as np
 from phigen.cli.arguments import FILMS
 from phigen.cli.console import Console, counted, heading, out, out_json, table
 from phigen.cli.experiment import expect_positive, setting_of
-from phigen.cli.run_summary import described_averages, described_spectrum, finite, print_averages
+from phigen.cli.run_summary import counted_crossings, described_averages, described_spectrum, finite, print_averages
 from phigen.errors import StepError
-from phigen.reading import opened
 
 if TYPE_CHECKING:
+    from phigen.cli.lattice_experiment import LatticeExperiment
     from phigen.lattice.states import Start
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.runtime.lattice_series import LatticeSeries
     from phigen.spec.model import Run, Spec
     from phigen.study.conservation import Unit
     from phigen.study.lyapunov import Spectrum
-
-#: Options of ``phigen run`` that lattices do not have: the reasons, and what to do.
-_ABSENT = {
-    "every": "frames are ends of steps, as stride: says; trajectory.at([t, …]) in Python makes states between",
-    "at": "frames are ends of steps; trajectory.at([t, …]) in Python makes states at given times",
-    "extend": "files of frames are not written on; --from FILE.npz starts a further run at the end of this one",
-    "section": "sections are those of ordinary systems; observables: of the lattice are recorded at every frame",
-}
 
 
 def run_lattice(
@@ -50,27 +37,29 @@ def run_lattice(
     profile: str | None,
     settings: Iterable[str],
     output: Path | None,
+    section: Path | None,
     plot: Path | None,
     resume: bool,
     as_json: bool,
     lyapunov: bool,
     source: Path | None = None,
-    until: float | None = None,
+    extend: bool = False,
+    every: float | None = None,
+    at: str | None = None,
 ) -> None:
     """Integrate a run, and print what was conserved. Raises `StepError` after that if it did not come to its end.
 
     ``lyapunov`` asks for the largest Lyapunov exponent besides, in a second pass with a tangent vector.
     """
     from phigen.api import chosen_target, compilation_of, lattice_solver_of
+    from phigen.cli.endings import ended, timed
     from phigen.cli.energy_warning import energy_warning
+    from phigen.cli.lattice_experiment import LatticeExperiment, extended, started_from
     from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, errors_of, units_of
     from phigen.lattice.states import start_of
     from phigen.runtime.lattice_series import LatticeSeries, series_of
     from phigen.study.averages import averages_of
 
-    if output and output.suffix != ".npz" and not run.records_numbers:
-        message = "the frames of a lattice are stored in a .npz file; with record: [energy, …] columns go to .csv too"
-        raise click.BadParameter(message, param_hint="--output")
     if plot and plot.suffix.lower() in FILMS and run.records_numbers:
         raise click.BadParameter("a film needs frames: the run has record: without state", param_hint="--plot")
     if plot and plot.suffix.lower() in FILMS:
@@ -79,13 +68,23 @@ def run_lattice(
         expect_writer(plot)
     compiled = compilation_of(spec, order=order, scheme=scheme, profile=profile, tangent=lyapunov)
     compilation = compiled.by_sweeps()
-    run, start = begun_at(run, start_of(spec, run), source, timed=bool(spec.time))
-    run, parameters = until_time(run, until), parameters_of(spec, start, settings)
+    start = start_of(spec, run)
+    parameters = parameters_of(spec, start, settings)
     solver = lattice_solver_of(compilation, chosen_target(target, console.note))
-    whole, failure = _integrated(console, spec, run, solver, start, start.arguments | parameters, output, resume=resume)
+    if source:
+        run, start = started_from(run, start, source, solver)
+    _expect_columns(run, start, {"--output": output, "--section": section})
+    experiment = LatticeExperiment(run, (), start.arguments | parameters, start=start)
+    if extend:
+        if output is None or not output.exists():
+            raise click.UsageError("--extend continues a finished run: name its file by --output")
+        experiment = extended(experiment, output, solver)
+    experiment = timed(ended(experiment, solver, console), solver, every, at)
+    whole, failure = _integrated(console, experiment, solver, output, section, resume=resume)
     trajectory, series = (whole.ends, whole) if isinstance(whole, LatticeSeries) else (whole, series_of(whole))
-    if output and not failure:
-        console.note(f"wrote {output}")
+    for file in (output, section):
+        if file and not failure:
+            console.note(f"wrote {file}")
     spectrum = None
     if lyapunov and not failure:
         spectrum = exponents_of(console, spec, run, solver, start, start.arguments | parameters)
@@ -107,6 +106,7 @@ def run_lattice(
             "order": solver.order,
             "step": trajectory.h,
             "steps": trajectory.steps,
+            "time": float(trajectory.t[-1] - trajectory.t[0]),
         }
         description = {
             "name": spec.name,
@@ -117,6 +117,9 @@ def run_lattice(
             "errors": largest,
         }
         description |= {"observables": described_averages(observables, averages)} if observables else {}
+        if whole.crossings is not None:
+            crossed = {"expression": section_text(run), "crossings": len(whole.crossings)}
+            description["section"] = crossed
         out_json(finite(description | ({"lyapunov": described_spectrum(spectrum)} if spectrum else {})))
     else:
         target = f"target {solver.target}, {counted(threads, 'thread')}"
@@ -124,6 +127,8 @@ def run_lattice(
         _print(spec, run, start, named_method, trajectory, largest, units)
         if observables:
             print_averages(observables, averages)
+        if whole.crossings is not None:
+            out(f"\n  {counted_crossings(run, len(whole.crossings), section_text(run))}")
         if spectrum:
             changed_by = f"the second half changed it by {spectrum.uncertainty:.1g}"
             out(f"\n  largest Lyapunov exponent after t = {spectrum.t:.9g}: {spectrum.largest:.4g}; {changed_by}")
@@ -140,35 +145,48 @@ def run_lattice(
 
 def _integrated(
     console: Console,
-    spec: Spec,
-    run: Run,
+    experiment: LatticeExperiment,
     solver: LatticeSolver,
-    start: Start,
-    parameters: Mapping[str, Any],
     output: Path | None,
+    section: Path | None,
     *,
     resume: bool,
 ) -> tuple[LatticeTrajectory | LatticeSeries, StepError | None]:
     """The frames of a run, or what it records, and why it did not come to its end if it did not."""
     from phigen.runtime.checkpoint import MismatchError, objection
 
-    checkpoint = output.with_name(output.name + ".checkpoint") if output else None
+    run, first = experiment.run, output or section
+    checkpoint = first.with_name(first.name + ".checkpoint") if first else None
     if checkpoint is None and resume:
-        raise click.UsageError("--resume continues the files of an interrupted run: name them by --output")
-    if checkpoint and (refused := objection(checkpoint, output, resume=resume, how="--resume")):
+        raise click.UsageError("--resume continues the files of an interrupted run: name them by --output or --section")
+    finished = None if experiment.past else first
+    if checkpoint and (refused := objection(checkpoint, finished, resume=resume, how="--resume")):
         raise click.UsageError(refused)
-    with console.progress(f"{spec.name} {run.name}", run.steps) as progress:
+    plan, of = experiment.plan(solver), run.record if run.records_numbers else ()
+    with console.progress(f"{solver.interface.name} {run.name}", run.steps) as progress:
         try:
-            integrate: Any = partial(solver.series, of=run.record) if run.records_numbers else solver.integrate
-            return integrate(
-                start.state, float(run.step), run.steps, run.stride,
-                t0=float(run.start) if spec.time else None, seed=run.seed if spec.noise else None,
-                output=output, checkpoints=checkpoint, resume=resume, progress=progress, parameters=parameters,
-            ), None  # fmt: skip
+            result = solver.carried_out(
+                plan, of, output=output, checkpoints=checkpoint, resume=resume, progress=progress
+            )
         except MismatchError as error:
             raise click.UsageError(str(error)) from None
         except StepError as error:
             return error.trajectory, error
+    if section and result.crossings is not None:
+        result.crossings.save(section)
+    return result, None
+
+
+def _expect_columns(run: Run, start: Start, files: Mapping[str, Path | None]) -> None:
+    """Refuse tables of more states than they have columns for."""
+    from phigen.runtime.lattice_frames import TABLES, expect_columns
+
+    for option, path in files.items():
+        if path and path.suffix.lower() in TABLES and not run.records_numbers:
+            try:
+                expect_columns(start.state.shape)
+            except ValueError as error:
+                raise click.BadParameter(str(error), param_hint=option) from None
 
 
 def _draw(
@@ -212,47 +230,6 @@ def exponents_of(
         )
 
 
-def expect_no(**options: object) -> None:
-    """Refuse options that lattices do not have."""
-    for name, value in options.items():
-        if value:
-            raise click.BadParameter(f"not for lattices: {_ABSENT[name]}", param_hint=f"--{name}")
-
-
-def until_time(run: Run, until: float | None) -> Run:
-    """Return the run with the steps up to a time. Raises `click.BadParameter` where that is no whole number of them."""
-    from phigen.spec.runs import whole
-
-    if until is None:
-        return run
-    steps = whole((Fraction(until) - run.start) / run.step) if math.isfinite(until) else None
-    if steps is None or steps < 1:
-        message = f"runs of lattices make whole steps of {float(run.step):.9g}, which do not end at {until!r}"
-        raise click.BadParameter(message, param_hint="--until")
-    return replace(run, steps=steps, stride=min(run.stride, steps), duration=None)
-
-
-def begun_at(run: Run, start: Start, source: Path | None, *, timed: bool) -> tuple[Run, Start]:
-    """Return a run that starts at the last state in a file of another run, with its time where there is one.
-
-    Raises `click.BadParameter` for what is no such file, and states of other sizes.
-    """
-    if source is None:
-        return run, start
-    try:
-        with opened(source) as file, np.load(file, allow_pickle=False) as stored:
-            state = np.asarray(stored["last"] if "last" in stored else stored["x"][-1], dtype=np.float64)
-            t = float(stored["t"][-1])
-    except (OSError, ValueError, KeyError, EOFError, IndexError, zipfile.BadZipFile) as error:
-        message = f"{source} is no .npz of a run of a lattice: {error}"
-        raise click.BadParameter(message, param_hint="--from") from None
-    if state.shape != start.state.shape or not np.isfinite(state).all():
-        message = f"{source} ends with a state of shape {state.shape}, the run has {start.state.shape}"
-        wrong = message if state.shape != start.state.shape else f"the last state in {source} is not finite"
-        raise click.BadParameter(wrong, param_hint="--from")
-    return replace(run, start=Fraction(t)) if timed else run, replace(start, state=state)
-
-
 def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str, Any]:
     """The parameters of a run, with those of the command line put in."""
     parameters: dict[str, Any] = dict(start.parameters)
@@ -264,6 +241,20 @@ def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str
         parameters[name] = value
     expect_positive(spec, parameters)
     return parameters
+
+
+def told_steps(trajectory: LatticeTrajectory) -> str:
+    """``60 steps of 0.1 and a part of one``."""
+    whole = trajectory.steps * trajectory.h
+    part = abs(trajectory.t[-1] - trajectory.t[0] - whole) > 1e-9 * max(abs(whole), abs(trajectory.h))
+    return f"{trajectory.steps} steps of {trajectory.h:.9g}" + (" and a part of one" if part else "")
+
+
+def section_text(run: Run) -> str:
+    """The expression of a section, for people."""
+    from phigen.symbolic.readable import readable
+
+    return readable([run.section])[0] if run.section is not None else ""
 
 
 def _print(
@@ -280,10 +271,7 @@ def _print(
 
     out(heading(f"{spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
     sizes = " × ".join(map(str, start.sizes))
-    out(
-        f"  {sizes} sites; {trajectory.steps} steps of {trajectory.h:.9g}, "
-        f"t = {trajectory.t[0]:.9g} … {trajectory.t[-1]:.9g}; {method}\n"
-    )
+    out(f"  {sizes} sites; {told_steps(trajectory)}, t = {trajectory.t[0]:.9g} … {trajectory.t[-1]:.9g}; {method}\n")
     kinds = dict.fromkeys(spec.casimirs, "at the worst site") | {name: unit.kind for name, unit in units.items()}
     kinds |= dict.fromkeys((ENERGY, BALANCE, CHANGE), units["energy"].kind)
     rows = [["largest change" if CHANGE in errors else "largest error", "", ""]]

@@ -50,6 +50,8 @@ def _measured(
 
     from phigen import registry
     from phigen.api import chosen_target, lattice_solver_of
+    from phigen.cli.endings import ended, timed
+    from phigen.cli.lattice_experiment import LatticeExperiment
     from phigen.cli.lattice_run import exponents_of
     from phigen.cli.verify import fallen_short, verified_lattice
     from phigen.lattice.observing import errors_of
@@ -60,19 +62,12 @@ def _measured(
     spec = compilation.spec
     start = start_of(spec, run)
     solver = lattice_solver_of(compilation, chosen_target("auto", console.note))
-    console.note(f"{spec.name}: run {run.name}, {run.steps} steps")
+    experiment = LatticeExperiment(run, (), start.arguments, start=start)
+    experiment = timed(ended(experiment, solver, console), solver)
+    console.note(f"{spec.name}: run {run.name}, {experiment.run.steps} steps")
     failure: PhigenError | None = None
-    begin = float(run.start) if spec.time else None
     try:
-        trajectory = solver.integrate(
-            start.state,
-            float(run.step),
-            run.steps,
-            run.stride,
-            t0=begin,
-            seed=run.seed if spec.noise else None,
-            parameters=start.arguments,
-        )
+        trajectory = solver.framed(experiment.plan(solver))
     except StepError as error:
         failure, trajectory = error, error.trajectory
     energies = np.array(

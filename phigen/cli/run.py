@@ -22,9 +22,9 @@ from phigen.cli.arguments import (
     target_option,
 )
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.experiment import loaded, prepared, run_of, with_seed, with_steps
+from phigen.cli.experiment import changed, loaded, prepared, with_seed
 from phigen.cli.interruption import InterruptedRunError
-from phigen.cli.lattice_run import expect_no, run_lattice
+from phigen.cli.lattice_run import run_lattice
 from phigen.cli.resizing import resized, sizes_option
 from phigen.cli.run_summary import described_run, finite, print_summary
 from phigen.cli.sources import load_one
@@ -128,25 +128,23 @@ def command(
 
         require_matplotlib()
     spec = resized(load_one(spec_file), name, sizes)
-    if spec.lattice:
-        expect_no(section=section, every=every, at=at, extend=extend)
-        _expect_together({"--until": until, "--steps": steps})
-        chosen = with_seed(spec, with_steps(spec, run_of(spec, name), step, steps), seed)
-        method: Any = {"target": target, "order": order, "scheme": scheme, "profile": profile, "lyapunov": lyapunov}
-        written: Any = {"output": output, "plot": plot, "resume": resume, "as_json": as_json}
-        written |= {"source": source, "until": until}
-        run_lattice(console, spec, chosen, settings=settings, **method, **written)
-        return
-    if plot and plot.suffix.lower() in FILMS:
-        raise click.BadParameter(f"films are for lattices, and {spec.name} is not a lattice", param_hint="--plot")
     _expect_together(
         {"--until": until, "--every": every, "--at": at, "--extend": extend},
         {"--steps": steps, "--from": source, "--section": section, "--lyapunov": lyapunov},
     )
+    chosen = with_seed(spec, changed(spec, name, step, steps, until), seed)
+    if section and chosen.section is None:
+        raise click.BadParameter(f"the run {chosen.name} of the spec has no section", param_hint="--section")
+    if spec.lattice:
+        method: Any = {"target": target, "order": order, "scheme": scheme, "profile": profile, "lyapunov": lyapunov}
+        written: Any = {"output": output, "section": section, "plot": plot, "resume": resume, "as_json": as_json}
+        rows: Any = {"source": source, "extend": extend, "every": every, "at": at}
+        run_lattice(console, spec, chosen, settings=settings, **method, **written, **rows)
+        return
+    if plot and plot.suffix.lower() in FILMS:
+        raise click.BadParameter(f"films are for lattices, and {spec.name} is not a lattice", param_hint="--plot")
     experiment = prepared(spec, name, step, steps, settings, until)
-    experiment = replace(experiment, run=with_seed(spec, experiment.run, seed))
-    if section and experiment.run.section is None:
-        raise click.BadParameter(f"the run {experiment.run.name} of the spec has no section", param_hint="--section")
+    experiment = replace(experiment, run=chosen)
     compilation = compilation_of(spec, order=order, scheme=scheme, profile=profile, tangent=lyapunov)
     solver = loaded(compilation, target, console)
     if source:

@@ -11,6 +11,7 @@ from phigen.cli.console import counted, heading, out, table
 if TYPE_CHECKING:
     from phigen.cli.recording import Recorder
     from phigen.compilation import Compilation
+    from phigen.spec.model import Run
     from phigen.study.averages import Averages
     from phigen.study.lyapunov import Spectrum
     from phigen.study.summary import Drift, Summary
@@ -42,14 +43,18 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     if recorder.experiment.run.members > 1:
         _print_means(recorder)
     if recorder.finder:
-        kind = "crossing" if run.direction == "both" else f"{run.direction} crossing"
-        count = counted(recorder.points.seen, kind)
-        out(f"\n  {count} of the section {recorder.section_text} = 0")
+        out(f"\n  {counted_crossings(run, recorder.points.seen, recorder.section_text)}")
     if spectrum := recorder.spectrum:
         changed = f"the second half changed them by {spectrum.uncertainty:.1g}"
         clock = spectrum.clock
         out(f"\n  Lyapunov exponents after {clock} = {spectrum.t:.9g}, per unit of {clock}; {changed}")
         out(f"  {', '.join(f'{value:.4g}' for value in spectrum.exponents.tolist())};  sum {spectrum.total:.1g}")
+
+
+def counted_crossings(run: Run, count: int, section: str) -> str:
+    """``12 rising crossings of the section x1 = 0``."""
+    kind = "crossing" if run.direction == "both" else f"{run.direction} crossing"
+    return f"{counted(count, kind)} of the section {section} = 0"
 
 
 def told_steps(recorder: Recorder) -> str:

@@ -149,12 +149,20 @@ def _of_lattice(
     console: Console, compilation: Compilation, run: Run, settings: tuple[str, ...], horizon: float | None, measure: str
 ) -> Problem:
     """The problem of a run of a lattice, on fewer sites where it has many."""
+    from phigen.api import chosen_target, lattice_solver_of
+    from phigen.cli.endings import ended, length
+    from phigen.cli.lattice_experiment import LatticeExperiment
     from phigen.cli.lattice_run import parameters_of
     from phigen.lattice.states import start_of
     from phigen.tuning.lattices import MOST_COMPARED, lattice_problem
 
     changed = {s.partition("=")[0].strip() for s in settings}
-    values = parameters_of(compilation.spec, start_of(compilation.spec, run), settings)
+    start = start_of(compilation.spec, run)
+    values = parameters_of(compilation.spec, start, settings)
+    if horizon is None and (run.until is not None or run.stop is not None):
+        solver = lattice_solver_of(compilation, chosen_target("auto", console.note))
+        experiment = LatticeExperiment(run, (), start.arguments | values, start=start)
+        horizon = length(ended(experiment, solver, console), solver)
     chosen = {name: value for name, value in values.items() if name in changed}
     problem = lattice_problem(compilation, run, chosen, *_times(run, horizon))
     if problem.sizes != problem.whole:

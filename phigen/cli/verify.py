@@ -159,23 +159,26 @@ def verified_lattice(
 ) -> Verification:
     """The same for a lattice."""
     from phigen.api import chosen_target, lattice_solver_of
+    from phigen.cli.endings import ended
     from phigen.cli.experiment import run_of
+    from phigen.cli.lattice_experiment import LatticeExperiment
     from phigen.lattice.states import start_of
     from phigen.study.lattices import verify_lattice
 
     spec = compilation.spec
     run = run_of(spec, name)
+    start = start_of(spec, run)
     chosen = loadable(targets or spec.targets) or (chosen_target("auto"),)
     single = lattice_solver_of(compilation, "c") if compilation.program.single and "c" in chosen else None
     compilation = compilation.in_double
     solvers = {target: lattice_solver_of(compilation, target) for target in chosen}
     console.detail(f"{spec.name}: built {', '.join(solvers)}")
+    experiment = LatticeExperiment(run, (), start.arguments, start=start)
+    steps = max(1, ended(experiment, next(iter(solvers.values())), console).run.steps)
     begin = float(run.start) if spec.time else None
     seed = run.seed if spec.noise else None
     asked: dict[str, Any] = {"t0": begin, "seed": seed, "quick": quick, "single": single}
-    return verify_lattice(
-        compilation.by_sweeps(), solvers, run.name, start_of(spec, run), float(run.step), run.steps, **asked
-    )
+    return verify_lattice(compilation.by_sweeps(), solvers, run.name, start, float(run.step), steps, **asked)
 
 
 def fallen_short(verification: Verification) -> CheckError:

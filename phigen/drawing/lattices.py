@@ -114,7 +114,7 @@ def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
 def _draw_diagram(part: Any, name: str, run: LatticeTrajectory, values: Floats, dots: int = MOST_TIMES) -> None:
     """One coordinate of a chain: sites upwards, time to the right."""
     axes = part.add_subplot()
-    times = np.linspace(0, len(run) - 1, min(len(run), dots)).astype(int)
+    times = _shown_frames(run, dots)
     shown = axes.imshow(
         values[times].T, aspect="auto", origin="lower", interpolation="none",
         extent=(run.t[0], run.t[-1], -0.5, values.shape[1] - 0.5), **shades_of(values, LEVELS),
@@ -122,6 +122,16 @@ def _draw_diagram(part: Any, name: str, run: LatticeTrajectory, values: Floats, 
     axes.set_xlabel("t")
     axes.set_ylabel(run.axes[0])
     part.colorbar(shown, ax=axes, pad=0.02, label=name)
+
+
+def _shown_frames(run: LatticeTrajectory, dots: int) -> Any:
+    """Numbers of frames at about equal times, with the nearest frame to each where frames are not equal times apart."""
+    apart = np.diff(run.t[:-1])  # the last frame may come earlier
+    if len(apart) < 2 or np.ptp(apart) <= 1e-6 * abs(apart[0]):
+        return np.linspace(0, len(run) - 1, min(len(run), dots)).astype(int)
+    order = np.argsort(run.t)
+    times = run.t[order]
+    return order[np.searchsorted((times[1:] + times[:-1]) / 2, np.linspace(run.t[0], run.t[-1], dots))]
 
 
 def places_of(run: LatticeTrajectory) -> Floats | None:

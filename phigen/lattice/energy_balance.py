@@ -94,28 +94,42 @@ def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: 
     return mask
 
 
-def integral(values: Floats, h: float) -> tuple[Floats, float]:
+def integral(values: Floats, h: float, places: Floats | None = None) -> tuple[Floats, float]:
     """Return the integrals of P from the first time to each, and an estimate of their error.
 
-    ``values`` (steps + 1,) are taken at times ``h`` apart; so are the integrals.
+    ``values`` (steps + 1,) are taken at times ``h`` apart; so are the integrals, or they end at ``places``, numbers of
+    steps with a fraction (rows,). Beyond the last value, the polynomial through the values before it is integrated.
     """
-    fine, coarse = (
-        np.append(0.0, h * np.cumsum(_interval_integrals(values, count))) for count in (FINE_NODES, COARSE_NODES)
-    )
+    fine, coarse = (_integrals_to(values, count, h, places) for count in (FINE_NODES, COARSE_NODES))
     return fine, float(np.abs(fine - coarse).max())
 
 
-def _interval_integrals(values: Floats, count: int) -> Floats:
-    """Return the integral over each interval, by the polynomial through the ``count`` values around the interval."""
-    count = min(count, len(values))
+def _integrals_to(values: Floats, count: int, h: float, places: Floats | None) -> Floats:
+    """Return the integrals from the first time to each, by polynomials through ``count`` values."""
     intervals = len(values) - 1
-    starts = np.clip(np.arange(intervals) - (count // 2 - 1), 0, len(values) - count)
+    integrals = np.append(
+        0.0, h * np.cumsum(_interval_integrals(values, count, np.arange(intervals), np.ones(intervals)))
+    )
+    if places is None:
+        return integrals
+    whole = np.clip(np.floor(places + 1e-9).astype(int), 0, intervals)
+    part = np.where(np.abs(places - whole) > 1e-9, places - whole, 0.0)
+    return np.asarray(integrals[whole] + h * _interval_integrals(values, count, whole, part))
+
+
+def _interval_integrals(values: Floats, count: int, begins: NDArray[np.int64], lengths: Floats) -> Floats:
+    """Return the integral over each interval, by the polynomial through the ``count`` values around the interval.
+
+    Intervals begin at the values numbered ``begins``; their ``lengths`` are in units of the distance of two values.
+    """
+    count = min(count, len(values))
+    starts = np.clip(begins - (count // 2 - 1), 0, len(values) - count)
     powers = np.arange(count)
     vandermonde = np.arange(count)[None, :] ** powers[:, None]
-    integrals = np.zeros(intervals)
-    for place in np.unique(np.arange(intervals) - starts).tolist():
-        moments = ((place + 1.0) ** (powers + 1) - float(place) ** (powers + 1)) / (powers + 1)
+    integrals = np.zeros(len(begins))
+    for place, length in {*zip((begins - starts).tolist(), lengths.tolist(), strict=True)}:
+        moments = ((place + length) ** (powers + 1) - float(place) ** (powers + 1)) / (powers + 1)
         weights = np.linalg.solve(vandermonde.astype(np.float64), moments)
-        chosen = np.flatnonzero(np.arange(intervals) - starts == place)
+        chosen = np.flatnonzero((begins - starts == place) & (lengths == length))
         integrals[chosen] = sum(w * values[starts[chosen] + k] for k, w in enumerate(weights))
     return integrals

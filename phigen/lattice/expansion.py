@@ -242,12 +242,18 @@ def ring(sites: int) -> list[tuple[int, int]]:
 
 
 def run_of(expansion: Expansion, run: Run, state: Any, numbers: Mapping[str, float]) -> Run:
-    """Return a run of the ordinary spec, from the state and the parameters of a run of the lattice."""
+    """Return a run of the ordinary spec, from the state and the parameters of a run of the lattice.
+
+    It has no section and no stop: they are about observables, which the ordinary spec does not have.
+    """
     return replace(
         run,
         initial=tuple(_decimal(v) for v in state.reshape(-1)),
         parameters={n: _decimal(v) for n, v in numbers.items()},
         lattice=None,
+        section=None,
+        stop=None,
+        record=(),
     )
 
 

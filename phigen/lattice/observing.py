@@ -29,7 +29,7 @@ def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
 
     Energy and invariants are in the units of `units_of`. A Casimir of sites is reported at the site where it changed
     most. If H depends on the time, or forces act, the work done is subtracted from the energy, unless the run is too
-    long.
+    long, continues another, or has steps made in parts.
     """
     errors = _of_energy(cell, run) | run.casimir_changes()
     for name, density in cell.invariants.items():
@@ -50,7 +50,8 @@ def units_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Unit]:
 def _of_energy(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
     if not cell.driven:
         return {ENERGY: _relative(run.energy, run.energy_unit)}
-    if not cell.noise and run.steps * run.x[0, 0].size <= MAX_BALANCED_SITE_STEPS:
+    balanced = not (cell.noise or run.joined or run.retried)
+    if balanced and run.steps * run.x[0, 0].size <= MAX_BALANCED_SITE_STEPS:
         try:
             work, _ = works(cell, run)
             return {BALANCE: _relative(run.energy - work, run.energy_unit)}
@@ -74,8 +75,7 @@ def works(cell: Cell, run: LatticeTrajectory) -> tuple[Floats, float]:
                 session.advance(run.h, 1)
             except BackendError as error:
                 raise StepError(str(error), step=step, status=error.status) from error
-    integrals, error_estimate = integral(np.array(powers), run.h)
-    return integrals[np.rint((run.t - start_time) / run.h).astype(int)], error_estimate
+    return integral(np.array(powers), run.h, (run.t - start_time) / run.h)
 
 
 def _relative(values: Floats, unit: Unit) -> Floats:

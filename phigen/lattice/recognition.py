@@ -389,5 +389,5 @@ def _run(spec: Spec, run: Run, names: _SiteNames) -> Run:
     listed = {stem: Values(listed=tuple(v[s] for s in sorted(v))) for stem, v in arrays.items()}
     numbers = {n: v for n, v in run.parameters.items() if n not in names.sites}
     lattice = LatticeRun(names.sizes, state, (), listed)
-    none: dict[str, Any] = {"exact": {}, "section": None, "until": None, "every": None, "stop": None}  # of lattices
+    none: dict[str, Any] = {"exact": {}, "section": None, "stop": None}  # of lattices they are about observables
     return replace(run, initial=(), parameters=numbers, lattice=lattice, **none)

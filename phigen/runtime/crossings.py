@@ -25,7 +25,7 @@ C = TypeVar("C", bound=Course)
 #: A function from states (rows, DIM), and their times (rows,) if H depends on the time, to values (rows,).
 Function = Callable[..., Floats]
 
-#: Steps between two evaluations of g on arrays; a copy of the session is held for each.
+#: Steps between two evaluations of g on arrays, by default; a copy of the session is held for each.
 BLOCK = 64
 #: Numbers of equal steps that reach a point between two steps, tried in this order: a single step without a predictor
 #: may not converge.
@@ -74,6 +74,7 @@ class CrossingFinder(Generic[C]):
     ``past`` are copies of the session at the last steps except the latest. ``values`` are those of g at these steps and
     the latest, ``first`` is the number of the first of them. ``t0`` is the time of step 0; g receives times if it is
     ``timed``. ``places`` are sessions at the crossings of the latest block, with their numbers of steps from the start.
+    A ``block`` is the number of steps between two evaluations of g on arrays.
     """
 
     g: Function
@@ -85,6 +86,7 @@ class CrossingFinder(Generic[C]):
     first: int = 0
     direction: str = "rising"
     places: list[tuple[float, C]] = field(default_factory=list)
+    block: int = BLOCK
     _sign: float = 1.0  # crossings of sign·g that rise are searched; falling ones are the rising ones of −g
 
     def follow(
@@ -99,7 +101,7 @@ class CrossingFinder(Generic[C]):
             self.values = [self._value(session, 0, 0.0)]
         while steps > 0:
             states, clocks, failure, known = [], list[float](), None, len(self.values) - 1
-            for _ in range(min(steps, BLOCK)):
+            for _ in range(min(steps, self.block)):
                 before = session.branch()
                 try:
                     move()

@@ -6,16 +6,17 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from phigen.runtime.crossings import CrossingFinder, Function
 from phigen.runtime.interface import BackendError
-from phigen.runtime.session import Session
+from phigen.runtime.session import Followed
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
 #: Maps a session after the last whole step to a session at the end, and the number of steps from the start until there.
-Finish = Callable[[Session], tuple[Session, float]]
+Finish = Callable[[Any], tuple[Any, float]]
 
 
 #: Steps after the start within which a zero is ignored. A run that starts where another stopped at a zero is within
@@ -37,12 +38,12 @@ class End:
     stopped: bool = False
 
 
-def at_time(session: Session, h: float, span: float) -> End:
+def at_time(session: Followed, h: float, span: float) -> End:
     """Return the end after a span of time, for a session at its start."""
     steps, left = steps_until(session, h, span)
     part = abs(left) > EQUAL * abs(span)
 
-    def finish(here: Session) -> tuple[Session, float]:
+    def finish(here: Followed) -> tuple[Followed, float]:
         if not part:
             return here, float(steps)
         there, size = reached(here, h, left)
@@ -51,7 +52,7 @@ def at_time(session: Session, h: float, span: float) -> End:
     return End(steps, finish, span, part)
 
 
-def after_steps(session: Session, h: float, steps: int) -> End:
+def after_steps(session: Followed, h: float, steps: int) -> End:
     """Return the end after a number of whole steps, for a session at its start, which is advanced to measure the time.
 
     If a step fails, the span is the time before that step.
@@ -61,12 +62,12 @@ def after_steps(session: Session, h: float, steps: int) -> End:
     return End(steps, lambda here: (here, float(steps)), session.time(), part=False)
 
 
-def where_zero(session: Session, h: float, most: int, g: Function, t0: float, *, timed: bool) -> End | None:
+def where_zero(session: Followed, h: float, most: int, g: Function, t0: float, *, timed: bool) -> End | None:
     """Return the end at the first zero of g after the start, in either direction; None without one in ``most`` steps.
 
     The session is at its start, and is advanced. The zero is located to round-off, by steps of the solver.
     """
-    finder = CrossingFinder[Session](g, h, t0, timed=timed, direction="both")
+    finder = CrossingFinder[Followed](g, h, t0, timed=timed, direction="both")
     try:
         for _ in finder.follow(session, most, lambda: session.advance(h, 1)):
             for at, there in finder.places:
@@ -79,5 +80,5 @@ def where_zero(session: Session, h: float, most: int, g: Function, t0: float, *,
     return None
 
 
-def _finish_at(end: tuple[Session, float]) -> Finish:
+def _finish_at(end: tuple[Followed, float]) -> Finish:
     return lambda here: end

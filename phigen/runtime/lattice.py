@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import zipfile
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
@@ -15,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from phigen.display import display
 from phigen.errors import ParameterError, StepError
-from phigen.runtime import arguments, checkpoint, lattice_ensemble, lattice_gradients, runs
+from phigen.runtime import arguments, checkpoint, ending, lattice_ensemble, lattice_gradients, lattice_series, runs
 from phigen.runtime.arguments import Beginning
+from phigen.runtime.crossings import Function
 from phigen.runtime.gradients import Pullback
 from phigen.runtime.interface import (
     FIRST_DRAWS,
@@ -28,8 +28,19 @@ from phigen.runtime.interface import (
     Progress,
     row_steps,
 )
-from phigen.runtime.lattice_frames import Frames, LatticeRun, add_member, stream_path
-from phigen.runtime.lattice_series import LatticeSeries, SeriesRun, expect_table, recordable
+from phigen.runtime.lattice_course import ObservedCourse
+from phigen.runtime.lattice_frames import (
+    FrameRows,
+    Frames,
+    GrowingFrames,
+    add_member,
+    expect_columns,
+    stream_path,
+    write_table,
+)
+from phigen.runtime.lattice_rows import Crossed, Plan, strided, timed
+from phigen.runtime.lattice_run import LatticeRun
+from phigen.runtime.lattice_series import LatticeSeries, NumberRows, expect_table, recordable
 from phigen.runtime.live import LiveLattice
 from phigen.runtime.memory import expect_room
 from phigen.runtime.named import Named
@@ -40,9 +51,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from phigen.spec.model import Spec
+    from phigen.spec.model import Run, Spec
     from phigen.study.conservation import Unit
     from phigen.study.spectra import DynamicSpectrum
+    from phigen.symbolic.expression import Expression
 
 
 class LatticeSession(Protocol):
@@ -153,7 +165,9 @@ class LatticeTrajectory:
 
     ``t`` (frames,) are the times, ``x`` (frames, coordinates, *sizes) the states, mapped from their file if they were
     written to one, ``energy`` (frames,) the values of H. There is a frame for every stride-th of the ``steps`` steps of
-    size ``h``, and for the last. ``observed`` (frames, observables) are the observables that are one number each.
+    size ``h``, or at given times, and for the end, which may be a part of a step later. ``observed`` (frames,
+    observables) are the observables that are one number each. ``crossings`` are the frames where the section of a run
+    is crossed, ``retried`` the steps that were made in parts. ``joined`` tells whether the run continues another.
     """
 
     t: Floats
@@ -166,6 +180,9 @@ class LatticeTrajectory:
     axes: tuple[str, ...]
     solver: LatticeSolver = field(repr=False)
     observed: Floats = field(default_factory=lambda: np.empty((0, 0)), repr=False)
+    crossings: LatticeTrajectory | None = field(default=None, repr=False)
+    retried: tuple[int, ...] = ()
+    joined: bool = False
 
     def __len__(self) -> int:
         return len(self.t)
@@ -284,9 +301,13 @@ class LatticeTrajectory:
         return self.solver.states_at(self, arguments.times_within(times, self.t))
 
     def save(self, path: str | Path) -> None:
-        """Write ``.npz`` (t, x, energy, coordinates, axes, steps, h, observable_NAME and parameter_NAME), or the frames
-        as ``.npy``."""
+        """Write ``.npz`` (t, x, energy, coordinates, axes, steps, h, observable_NAME and parameter_NAME), the frames as
+        ``.npy``, or ``.csv`` with a column for each number of a state, of which there are at most 1,000.
+        """
         target = stream_path(path)
+        if target is None:
+            write_table(Path(path), self)
+            return
         if target.suffix == ".npy":
             with replacing(target) as file:
                 np.lib.format.write_array(file, np.asarray(self.x), allow_pickle=False)
@@ -327,9 +348,11 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         self,
         x0: ArrayLike,
         h: float,
-        steps: int,
+        steps: int | None = None,
         stride: int = 1,
         *,
+        until: float | None = None,
+        retry: int = 0,
         t0: float | None = None,
         seed: int | None = None,
         member: int | None = None,
@@ -343,10 +366,13 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     ) -> LatticeTrajectory:
         """Make ``steps`` steps of size ``h`` from ``x0`` (coordinates, *sizes).
 
-        Frames are the states after every ``stride``-th step and the last.
+        Frames are the states after every ``stride``-th step and the last. With ``until`` in place of ``steps``, the
+        last step is the part of one that ends at that time. A step that fails is made in 2, 4, …, 2**retry equal parts,
+        which is another map than a whole step, but also Poisson.
         ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With noise, the random
         numbers of a site are a function of ``seed``, ``member``, the number of the step, which begins with ``step0``,
-        and the site. With ``output``, a path that ends in .npy or .npz, frames are written to that file one by one.
+        and the site. With ``output``, a path that ends in .npy or .npz, frames are written to that file one by one; to
+        a .csv at the end, if states have up to 1,000 numbers.
         With ``checkpoints``, a path, the state is saved there at every frame; a call with the same arguments resumes
         from that state, and removes the file at the end. ``resume=False`` starts a new run, and refuses to overwrite
         the files of an interrupted one. ``progress`` is called after each frame with the number of steps done. Raises
@@ -355,25 +381,86 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """
         drawn = {"seed": seed, "member": member, "step0": step0}
         at = self._beginning(x0, "x0", h, parameters, more, t0, drawn)
-        steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
-        marks = row_steps(steps, stride)
-        frames = Frames(stream_path(output) if output else None, (len(marks), *at.x.shape))
-        run = LatticeRun(self, at, marks, frames, Path(checkpoints) if checkpoints else None)
-        run.expect_place(resume=resume)
+        plan = self._planned(at, steps, stride, until, retry)
+        where: Any = {"output": output, "checkpoints": checkpoints, "resume": resume, "progress": progress}
+        return self.framed(plan, **where)
+
+    def _planned(self, at: Beginning, steps: int | None, stride: int, until: float | None, retry: int) -> Plan:
+        """The plan of an integration for a number of steps, or until a time."""
+        if (steps is None) == (until is None):
+            many = "needs the number of steps, or the time until which to integrate"
+            raise TypeError(f"integrate {many if steps is None else 'takes either steps or until, not both'}")
+        stride, retry = arguments.count(stride, "stride", 1), arguments.count(retry, "retry", 0)
+        if retry:
+            arguments.expect_no_noise("retry", self.interface)
+        if until is None:
+            return Plan(at, strided(at.h, arguments.count(steps or 0, "steps", 0), stride), at.t0, retry)
+        end = ending.at_time(ObservedCourse.begun(self, at, retry), at.h, arguments.end(until, at.t0, at.h))
+        return Plan(at, strided(at.h, end.steps, stride, end), at.t0, retry)
+
+    def carried_out(self, plan: Plan, of: Sequence[str] = (), **where: Any) -> LatticeTrajectory | LatticeSeries:
+        """`numbered` where numbers ``of`` the lattice are to be recorded in place of states, else `framed`."""
+        return self.numbered(plan, of, **where) if of else self.framed(plan, **where)
+
+    def framed(
+        self,
+        plan: Plan,
+        *,
+        output: str | Path | None = None,
+        checkpoints: str | Path | None = None,
+        resume: bool = True,
+        progress: Progress | None = None,
+    ) -> LatticeTrajectory:
+        """Integrate as planned, with a frame for each row. Files and errors are those of `integrate`."""
+        shape, stream = plan.at.x.shape, stream_path(output) if output else None
+        table = Path(output) if output and stream is None else None
+        if table:
+            expect_columns(shape)
+        count = len(plan.times)
+        frames = Frames(stream, (count, *shape))
+        grown = GrowingFrames()
+        rows, met = FrameRows(frames, lattice_series.CHECKPOINT_SECONDS if table else 0.0), FrameRows(grown)
+        run = LatticeRun(self, plan, rows, met, Path(checkpoints) if checkpoints else None)
+        self._expect_place(run, output, frames, resume=resume)
+
+        def made(t: Floats, x: Floats, steps: int) -> LatticeTrajectory:
+            crossed = np.array(run.crossed)
+            crossings = self._trajectory(crossed, grown.whole(shape), met, steps, plan) if plan.section else None
+            retried = tuple(run.course.retried)
+            trajectory = self._trajectory(t, x, rows, steps, plan)
+            return replace(trajectory, crossings=crossings, retried=retried, joined=plan.past is not None)
+
         try:
-            count = run.complete(progress)
+            run.make(progress)
         except BackendError as error:
-            run.discard()
-            run.record()
-            states = np.array([*frames.first(run.count), error.states[-1]])
-            t = np.array([at.t0 + at.h * mark for mark in [*marks[: run.count], error.step]], dtype=np.float64)
-            trajectory = self._trajectory(t, states, run, error.step, at)
-            raise self.failure(error, at.h, trajectory, at.values) from error
-        t = np.asarray(at.t0 + at.h * marks[:count], dtype=np.float64)
-        trajectory = self._trajectory(t, frames.array, run, steps, at)
+            frames.discard()
+            run.forget()
+            last = run.course.sites
+            rows.record(last)
+            states = np.array([*frames.first(len(rows) - 1), last.state()])
+            done = run.course.steps
+            t = np.append(run.times, plan.begin + plan.at.h * done)
+            failed = made(t, states, done + (plan.past.steps if plan.past else 0))
+            raise self.failure(error, plan.at.h, failed, plan.at.values) from error
+        trajectory = made(run.times, frames.array, plan.steps)
+        if table:
+            write_table(table, trajectory)
         frames.finish(trajectory)
         run.forget()
         return trajectory
+
+    def _expect_place(self, run: LatticeRun, output: str | Path | None, frames: Frames | None, *, resume: bool) -> None:
+        """Refuse to overwrite what an interrupted run left, and to go on with a complete one. Raises `ValueError`.
+
+        A run that goes on with a finished one is to write its file again.
+        """
+        if run.checkpoints:
+            target = Path(output) if output and run.plan.past is None else None
+            refused = checkpoint.objection(run.checkpoints, target, resume=resume, how="resume=True")
+        else:
+            refused = frames.objection() if frames else ""
+        if refused:
+            raise ValueError(refused)
 
     def run(
         self,
@@ -383,7 +470,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         sizes: Sequence[int] | None = None,
         step: float | None = None,
         steps: int | None = None,
+        until: float | None = None,
         stride: int | None = None,
+        every: float | None = None,
+        retry: int = 0,
         seed: int | None = None,
         output: str | Path | None = None,
         checkpoints: str | Path | None = None,
@@ -395,34 +485,66 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
         A run whose ``record`` has no ``state`` returns the result of `series`. The initial state, the bonds, and
         parameters at sites and bonds are computed from the formulas, files and random numbers of the run, at its
-        ``sizes`` or at those passed. The other arguments replace the settings of the spec: ``x0`` (coordinates, *sizes)
-        is the initial state, ``seed`` that of the noise. Raises `ValueError` if there is no run of that name, and
-        `SpecError` for an initial state that does not fit the sizes.
+        ``sizes`` or at those passed. The other arguments replace the settings of the spec: the ``step``, the number of
+        ``steps`` or the time ``until`` where it ends, the ``stride`` or the time ``every`` between rows, ``seed`` that
+        of the noise; ``x0`` (coordinates, *sizes) is the initial state, ``retry`` as for `integrate`. A run with
+        ``stop`` ends where that expression first passes through 0; ``crossings`` of the result are those of the
+        ``section``. Raises `ValueError` if there is no run of that name, and `SpecError` for an initial state that does
+        not fit the sizes.
         """
         from phigen.lattice.states import start_of
 
         base = runs.run_named(self.spec, name)
         assert self.spec is not None
-        chosen = runs.changed(self.spec, base, runs.Settings(step=step, steps=steps, stride=stride, sizes=sizes))
+        settings = runs.Settings(step, steps, until, stride, every, sizes)
+        chosen = runs.changed(self.spec, base, settings)
         start = start_of(self.spec, chosen)
-        integrate: Any = partial(self.series, of=chosen.record) if chosen.records_numbers else self.integrate
-        recorded: LatticeTrajectory | LatticeSeries = integrate(
-            start.state if x0 is None else x0, float(chosen.step), chosen.steps, chosen.stride,
-            t0=float(chosen.start) if self.interface.time else None,
-            seed=chosen.seed if seed is None and self.interface.noise else seed,
-            output=output, checkpoints=checkpoints, progress=progress,
-            parameters=start.arguments | arguments.together(parameters, more),
-        )  # fmt: skip
-        return recorded
+        t0 = float(chosen.start) if self.interface.time else None
+        drawn = {"seed": chosen.seed if seed is None and self.interface.noise else seed}
+        values = start.arguments | arguments.together(parameters, more)
+        at = self._beginning(start.state if x0 is None else x0, "x0", float(chosen.step), values, {}, t0, drawn)
+        plan = self._plan_of(chosen, at, arguments.count(retry, "retry", 0))
+        of = chosen.record if chosen.records_numbers else ()
+        return self.carried_out(plan, of, output=output, checkpoints=checkpoints, progress=progress)
+
+    def _plan_of(self, run: Run, at: Beginning, retry: int) -> Plan:
+        """The plan of a run of the spec, from a start that has been checked."""
+        if retry or run.every is not None:
+            arguments.expect_no_noise("retry" if retry else "every", self.interface)
+        end = None
+        if run.stop is not None or run.until is not None:
+            stop = self.function(run.stop, at.values) if run.stop is not None else None
+            end = runs.end_of(ObservedCourse.begun(self, at, retry), run, stop, timed=bool(self.interface.time))
+        rows = strided(at.h, run.steps, run.stride, end)
+        if run.every is not None:
+            span = at.h * run.steps if end is None else end.span
+            rows = timed(at.h, run.steps, runs.spans_of(float(run.every), span), end)
+        return Plan(at, rows, at.t0, retry, self.section_of(run, at.values))
+
+    def function(self, expression: Expression, values: Mapping[str, Any]) -> Function:
+        """An expression in observables, parameters and the time as a function of observables (rows, observables)."""
+        from phigen.study.sections import function_of
+
+        return function_of(expression, self.interface.observables, values, self.interface.time)
+
+    def section_of(self, run: Run, values: Mapping[str, Any]) -> Crossed | None:
+        """The section of a run, if it has one."""
+        from phigen.symbolic.readable import readable
+
+        if run.section is None:
+            return None
+        return Crossed(self.function(run.section, values), run.direction, readable([run.section])[0])
 
     def series(
         self,
         x0: ArrayLike,
         h: float,
-        steps: int,
+        steps: int | None = None,
         stride: int = 1,
         *,
         of: Sequence[str] | None = None,
+        until: float | None = None,
+        retry: int = 0,
         t0: float | None = None,
         seed: int | None = None,
         member: int | None = None,
@@ -443,28 +565,52 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """
         drawn = {"seed": seed, "member": member, "step0": step0}
         at = self._beginning(x0, "x0", h, parameters, more, t0, drawn)
-        steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
-        names, known = tuple(("energy", *self.interface.observables) if of is None else of), recordable(self.interface)
-        if strange := [name for name in names if name not in known]:
+        plan = self._planned(at, steps, stride, until, retry)
+        names = ("energy", *self.interface.observables) if of is None else of
+        return self.numbered(plan, names, output=output, checkpoints=checkpoints, resume=resume, progress=progress)
+
+    def numbered(
+        self,
+        plan: Plan,
+        of: Sequence[str],
+        *,
+        output: str | Path | None = None,
+        checkpoints: str | Path | None = None,
+        resume: bool = True,
+        progress: Progress | None = None,
+    ) -> LatticeSeries:
+        """Integrate as planned, and record numbers. Names, files and errors are those of `series`."""
+        known = recordable(self.interface)
+        if strange := [name for name in of if name not in known]:
             raise ValueError(f"cannot record {strange[0]!r}; there are {', '.join(known)}")
-        target, resumable = expect_table(output) if output else None, Path(checkpoints) if checkpoints else None
-        if resumable and (refused := checkpoint.objection(resumable, target, resume=resume, how="resume=True")):
-            raise ValueError(refused)
-        run = SeriesRun(self, at, row_steps(steps, stride), names, resumable)
+        target = expect_table(output) if output else None
+        rows, met = NumberRows(self.interface, of), NumberRows(self.interface, of)
+        about = {"record": list(of)}
+        run = LatticeRun(self, plan, rows, met, Path(checkpoints) if checkpoints else None, about)
+        self._expect_place(run, target, None, resume=resume)
+
+        def made(steps: int, last: Floats) -> LatticeSeries:
+            at, first = plan.at, plan.at.x if plan.past is None else plan.past.first
+            series = LatticeSeries(run.times, rows.columns, first, last, steps, at.h, at.values, self)
+            crossings = replace(series, t=np.array(run.crossed), columns=met.columns) if plan.section else None
+            return replace(series, crossings=crossings)
+
         try:
-            recorded = run.complete(progress)
+            run.make(progress)
         except BackendError as error:
-            raise self.failure(error, at.h, run.series(error.step), at.values) from error
+            done = run.course.steps + (plan.past.steps if plan.past else 0)
+            failed = made(done, run.course.sites.state())
+            raise self.failure(error, plan.at.h, failed, plan.at.values) from error
+        series = made(plan.steps, run.last.state())
         if target:
-            recorded.save(target)
-        if resumable:
-            resumable.unlink(missing_ok=True)
-        return recorded
+            series.save(target)
+        run.forget()
+        return series
 
     def ends_of(self, series: LatticeSeries) -> LatticeTrajectory:
         """Return the trajectory of the first and the last state of a series; see `LatticeSeries.ends`."""
         x, about = np.array([series.first, series.last]), self.interface
-        t = np.array([series.t[0], series.t[0] + series.steps * series.h])
+        t = np.array([series.t[0], series.t[-1]])
         when = t.tolist() if about.time else [None, None]
         energy = [self.hamiltonian(state, at, parameters=series.parameters) for state, at in zip(x, when, strict=True)]
         settings = series.steps, series.h, series.parameters
@@ -631,7 +777,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """
         drawn = {"seed": seed, "member": member, "step0": step0}
         at = self._beginning(x0, "x0", None, parameters, more, t0, drawn)
-        return LiveLattice(self, self.started(at), at)
+        return LiveLattice(self, at)
 
     # --- functions of states
 
@@ -814,9 +960,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         there = ", ".join(f"{f} = {float(x[(k, *site)])!r}" for k, f in enumerate(self.coordinates))
         return f"since H is not finite at the start: at the site ({', '.join(map(str, site))}), where {there}"
 
-    def _trajectory(self, t: Floats, x: Floats, run: LatticeRun, steps: int, at: Beginning) -> LatticeTrajectory:
-        axes, observed = self.interface.axes, np.array(run.observed).reshape(len(t), -1)
-        energy = np.array(run.energy)
+    def _trajectory(self, t: Floats, x: Floats, rows: FrameRows, steps: int, plan: Plan) -> LatticeTrajectory:
+        at, axes = plan.at, self.interface.axes
+        observed = np.array(rows.observed).reshape(len(t), len(self.interface.observables))
+        energy = np.array(rows.energy)
         return LatticeTrajectory(t, x, energy, steps, at.h, at.values, self.coordinates, axes, self, observed)
 
 

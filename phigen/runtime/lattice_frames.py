@@ -1,12 +1,11 @@
-"""Frames of lattices, in memory or in a file, and the runs that compute them, which can resume from checkpoints."""
+"""Frames of lattices, in memory or streamed to disk, and the files that hold them."""
 
 from __future__ import annotations
 
 import hashlib
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,113 +13,112 @@ import numpy as np
 
 from phigen.reading import opened
 from phigen.runtime import checkpoint
-from phigen.runtime.checkpoint import Checkpoint, MismatchError
-from phigen.runtime.interface import FIRST_DRAWS, Floats, Progress
-from phigen.runtime.memory import filled
+from phigen.runtime.checkpoint import MismatchError
+from phigen.runtime.interface import FIRST_DRAWS, Floats, LatticeInterface
+from phigen.runtime.memory import expect_room, filled
+from phigen.runtime.tables import Column, write
+from phigen.runtime.trajectory import trajectory_columns
 
 if TYPE_CHECKING:
     from phigen.runtime.arguments import Beginning
-    from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
+    from phigen.runtime.lattice import LatticeSession, LatticeSolver, LatticeTrajectory
+    from phigen.runtime.lattice_rows import Past
 
-#: Suffixes of files that frames can be written to.
+#: Suffixes of files that frames can be written to one by one, and of tables, which are written at the end.
 STREAMS = (".npy", ".npz")
+TABLES = (".csv",)
+#: Columns of a table of states at most: programs that read tables show some hundred.
+MAX_COLUMNS = 1000
 
 
-@dataclass
-class LatticeRun:
-    """One call of `LatticeSolver.integrate`: frames at the steps ``marks``, of which ``count`` are complete."""
+class FrameRows:
+    """Rows of states, with their energies and observables (`phigen.runtime.lattice_run.Sink`)."""
 
-    solver: LatticeSolver
-    at: Beginning
-    marks: Any
-    frames: Frames
-    checkpoints: Path | None
-    energy: list[float] = field(default_factory=list)
-    observed: list[Floats] = field(default_factory=list)
-    count: int = 0
-    session: Any = None
-    saved: Mapping[str, Any] = field(default_factory=dict)  # arrays of the checkpoint, for `LatticeSession.resume`
+    def __init__(self, frames: Frames | GrowingFrames, seconds: float = 0.0) -> None:
+        self.frames, self.seconds = frames, seconds
+        self.energy: list[float] = []
+        self.observed: list[Floats] = []
 
-    def complete(self, progress: Progress | None) -> int:
-        """Compute the remaining frames, from a checkpoint if there is one, and return the number of all frames."""
-        first = self._resumed()
-        self.session = self.solver.started(replace(self.at, x=first))
-        if self.count:
-            self.session.resume(self.at.h, int(self.marks[self.count - 1]), self.saved)
-        else:
-            self._store(first)
-        for mark in self.marks[self.count :].tolist():
-            self.session.advance(self.at.h, mark - self.session.steps)
-            self._store(self.session.state())
-            self._save(mark)
-            if progress:
-                progress(mark)
-        return self.count
+    def __len__(self) -> int:
+        return len(self.energy)
 
-    def expect_place(self, *, resume: bool) -> None:
-        """Raise `ValueError` if the files of an interrupted run would be overwritten, or a complete run resumed."""
-        if self.checkpoints:
-            refused = checkpoint.objection(self.checkpoints, self.frames.path, resume=resume, how="resume=True")
-        else:
-            refused = self.frames.objection()
-        if refused:
-            raise ValueError(refused)
+    def see(self, sites: LatticeSession) -> None:
+        """See `Sink`."""
+        self.frames.put(len(self), sites.state())
+        self.record(sites)
 
-    def discard(self) -> None:
-        """Remove all files of the run, if it failed or cannot be resumed."""
-        self.frames.discard()
-        self.forget()
+    def record(self, sites: LatticeSession) -> None:
+        """Add the energy and the observables of a state to those of the frames."""
+        self.energy.append(sites.hamiltonian())
+        self.observed.append(sites.observables())
 
-    def forget(self) -> None:
-        """Remove the checkpoint."""
-        if self.checkpoints:
-            self.checkpoints.unlink(missing_ok=True)
+    def begin(self, past: Past) -> None:
+        """See `Sink`."""
+        assert past.x is not None
+        for k, state in enumerate(past.x):
+            self.frames.put(k, state)
+        columns = [values for name, values in past.columns.items() if name != "energy"]
+        self.energy = past.columns["energy"].tolist()
+        self.observed = list(np.column_stack([np.empty((len(past.t), 0)), *columns]))
 
-    def _store(self, state: Floats) -> None:
-        self.frames.put(self.count, state)
-        self.record()
-        self.count += 1
+    def saved(self) -> dict[str, Any]:
+        """See `Sink`."""
+        self.frames.flush()
+        arrays = {"energy": np.array(self.energy), "observed": np.array(self.observed)}
+        if self.frames.path is None:
+            return {**arrays, "frames": np.array(list(self.frames.first(len(self))))}
+        return {**arrays, "frame": self.frames.frame(len(self) - 1)}
 
-    def record(self) -> None:
-        """Append the energy and the observables of the present state to those of the frames."""
-        self.energy.append(self.session.hamiltonian())
-        self.observed.append(self.session.observables())
-
-    def _identity(self) -> dict[str, Any]:
-        return identity_of(self.solver, self.at, self.marks)
-
-    def _save(self, mark: int) -> None:
-        if self.checkpoints:
-            self.frames.flush()
-            arrays = {"state": self.session.state(), "count": np.array(self.count), "energy": np.array(self.energy)}
-            arrays |= {"observed": np.array(self.observed), **self.session.saved()}
-            if self.frames.path is None:
-                arrays["frames"] = self.frames.array[: self.count]
-            Checkpoint(self._identity(), arrays).save(self.checkpoints)
-
-    def _resumed(self) -> Floats:
-        """Return the initial state, or restore the frames of a checkpoint and return its state."""
-        if self.checkpoints is None or not self.checkpoints.exists():
-            return self.at.x
-        arrays = checkpoint.load(self.checkpoints, self._identity())
-        self.count, self.energy = int(arrays["count"]), arrays["energy"].tolist()
-        self.observed = list(arrays["observed"])
-        self.frames.restore(arrays.get("frames"), self.count)
-        if not np.array_equal(self.frames.array[self.count - 1], arrays["state"], equal_nan=True):
-            raise MismatchError(f"the frames beside {self.checkpoints} are not those of its run")
-        self.saved = arrays
-        return np.asarray(arrays["state"])
+    def restore(self, arrays: Mapping[str, Any]) -> None:
+        """See `Sink`."""
+        self.energy, self.observed = arrays["energy"].tolist(), list(arrays["observed"])
+        self.frames.restore(arrays.get("frames"), len(self))
+        if self.frames.path and not np.array_equal(self.frames.frame(len(self) - 1), arrays["frame"], equal_nan=True):
+            raise MismatchError(f"the frames of {self.frames.path} are not those of its checkpoint")
 
 
-def identity_of(solver: LatticeSolver, at: Beginning, marks: Any) -> dict[str, Any]:
-    """Return everything that determines the rows of an integration at the steps ``marks``, as plain data."""
+class GrowingFrames:
+    """Frames in memory whose number is not known before."""
+
+    path: Path | None = None
+
+    def __init__(self) -> None:
+        self._states: list[Floats] = []
+
+    def whole(self, shape: tuple[int, ...]) -> Floats:
+        """All frames (frames, *shape)."""
+        return np.array(self._states).reshape(-1, *shape)
+
+    def frame(self, k: int) -> Floats:
+        """Frame k."""
+        return self._states[k]
+
+    def put(self, k: int, state: Floats) -> None:
+        """Store frame k, the next. Raises `LimitError` if there is no memory for as many again."""
+        if k & (k - 1) == 0:
+            expect_room(f"{2 * max(k, 1)} states at crossings", 2 * max(k, 1) * state.nbytes)
+        self._states.append(state)
+
+    def first(self, count: int) -> Iterator[Floats]:
+        """The first frames."""
+        return iter(self._states[:count])
+
+    def flush(self) -> None:
+        """Do nothing: no frame is on the disk."""
+
+    def restore(self, frames: Floats | None, count: int) -> None:
+        """Go on after the first frames."""
+        self._states = [] if frames is None else list(frames[:count])
+
+
+def identity_of(solver: LatticeSolver, at: Beginning, rows: Sequence[int | float]) -> dict[str, Any]:
+    """Return all that decides an integration with such ``rows``, described in plain data, as plain data."""
     arrays = {name: np.asarray(value) for name, value in at.values.items() if np.ndim(value)}
     numbers = {name: float(value) for name, value in at.values.items() if not np.ndim(value)}
     hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": at.x}.items()}
-    rows = [len(marks), int(marks[-1]), int(marks[min(1, len(marks) - 1)])]
     hashes |= {"t0": at.t0.hex()} if at.t0 else {}
     hashes |= {"draws": repr(at.draws)} if at.draws != FIRST_DRAWS else {}
-    about = {"solver": solver.backend.identity, "h": at.h, "sizes": list(at.x.shape), "steps": rows}
+    about = {"solver": solver.backend.identity, "h": at.h, "sizes": list(at.x.shape), "steps": list(rows)}
     return {**about, "parameters": numbers, "arrays": hashes}
 
 
@@ -142,6 +140,10 @@ class Frames:
             else:
                 self._array = np.lib.format.open_memmap(self._part, "w+", np.float64, self._shape)
         return self._array
+
+    def frame(self, k: int) -> Floats:
+        """A copy of frame k."""
+        return np.array(self.array[k])
 
     def put(self, k: int, state: Floats) -> None:
         """Store frame k."""
@@ -194,12 +196,46 @@ class Frames:
             self._part.replace(self.path)
 
 
-def stream_path(path: str | Path) -> Path:
-    """Return a path to which frames can be written. Raises `ValueError` for other suffixes."""
+def stream_path(path: str | Path) -> Path | None:
+    """The path of a file that frames can go to one by one, None for a table. Raises `ValueError` for any other."""
     target = Path(path)
+    if target.suffix in TABLES:
+        return None
     if target.suffix not in STREAMS:
-        raise ValueError(f"frames are written to files that end in {' or '.join(STREAMS)}, not {str(path)!r}")
+        names = ", ".join([*STREAMS, *TABLES[:-1]]) + f" or {TABLES[-1]}"
+        raise ValueError(f"frames are written to files that end in {names}, not {str(path)!r}")
     return target
+
+
+def expect_columns(shape: tuple[int, ...]) -> None:
+    """`ValueError` where states (coordinates, *sizes) have more numbers than a table of them has columns."""
+    if (count := int(np.prod(shape))) > MAX_COLUMNS:
+        message = f"a .csv of states would have {count} columns, more than {MAX_COLUMNS}"
+        raise ValueError(f"{message}; frames go to .npz, and record: [energy, …] makes few columns")
+
+
+def site_names(coordinates: Sequence[str], sizes: Sequence[int]) -> tuple[str, ...]:
+    """Return the names of the numbers of a state, ``q_0_0``, …, field by field, the last axis fastest."""
+    sites = ["_".join(map(str, site)) for site in np.ndindex(*sizes)]
+    return tuple(f"{name}_{site}" for name in coordinates for site in sites)
+
+
+def state_columns(about: LatticeInterface, sizes: Sequence[int]) -> list[Column]:
+    """Return the columns of a table of states, with energy, Casimirs that are one number, and observables."""
+    summed = tuple(n for n, kind in zip(about.casimirs, about.casimir_kinds, strict=True) if kind != "sites")
+    return trajectory_columns(site_names(about.coordinates, sizes), summed, (), about.observables)
+
+
+def write_table(path: Path, trajectory: LatticeTrajectory) -> None:
+    """Write a trajectory as ``.csv``. Raises `ValueError` for more sites than it has columns."""
+    expect_columns(trajectory.x.shape[1:])
+    about, states = (
+        trajectory.solver.interface,
+        trajectory.x.reshape(len(trajectory), int(np.prod(trajectory.x.shape[1:]))),
+    )
+    columns = state_columns(about, trajectory.x.shape[2:])
+    summed = [trajectory.casimirs[c.key.removeprefix("casimir_")] for c in columns if c.key.startswith("casimir_")]
+    write(path, columns, np.column_stack([trajectory.t, states, trajectory.energy, *summed, trajectory.observed]), {})
 
 
 def add_member(archive: zipfile.ZipFile, name: str, value: Any) -> None:

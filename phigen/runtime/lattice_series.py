@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from phigen.runtime import checkpoint
-from phigen.runtime.checkpoint import Checkpoint
-from phigen.runtime.interface import Floats, Progress
-from phigen.runtime.lattice_frames import identity_of
+from phigen.runtime.interface import Floats
 from phigen.runtime.tables import SUFFIXES, Column, write
 
 if TYPE_CHECKING:
-    from phigen.runtime.arguments import Beginning
     from phigen.runtime.interface import LatticeInterface
-    from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
+    from phigen.runtime.lattice import LatticeSession, LatticeSolver, LatticeTrajectory
+    from phigen.runtime.lattice_rows import Past
 
 #: Seconds between two checkpoints. Each writes a whole state, which for large lattices takes longer than a step.
 CHECKPOINT_SECONDS = 2.0
@@ -30,7 +26,7 @@ class LatticeSeries:
     """Numbers along one integration: ``t`` (rows,) and ``columns`` by name, (rows,) each.
 
     ``first`` and ``last`` are the states (coordinates, *sizes) where it began and ended, after ``steps`` steps of size
-    ``h``.
+    ``h``, and perhaps a part of one. ``crossings`` are the same numbers where the section of a run was crossed.
     """
 
     t: Floats
@@ -41,6 +37,7 @@ class LatticeSeries:
     h: float
     parameters: Mapping[str, Any]
     solver: LatticeSolver = field(repr=False)
+    crossings: LatticeSeries | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -60,15 +57,16 @@ class LatticeSeries:
         return self.solver.ends_of(self)
 
     def save(self, path: str | Path) -> None:
-        """Write ``.csv`` (t and the columns) or ``.npz``, which holds the last state and the parameters too.
+        """Write ``.csv`` (t and the columns) or ``.npz``, which holds the states at its ends and the parameters too.
 
-        Keys of the latter are t, energy, casimir_NAME, observable_NAME, last, coordinates, axes, steps, h and
+        Keys of the latter are t, energy, casimir_NAME, observable_NAME, first, last, coordinates, axes, steps, h and
         parameter_NAME. Raises `ValueError` for other suffixes.
         """
         about = self.solver.interface
         columns = [Column("t", ("t",), flat=True)]
         columns += [Column(key_of(name, about), (name,), flat=True) for name in self.columns]
-        scalars = {"last": self.last, "coordinates": np.array(about.coordinates), "axes": np.array(about.axes)}
+        scalars = {"first": self.first, "last": self.last}
+        scalars |= {"coordinates": np.array(about.coordinates), "axes": np.array(about.axes)}
         scalars |= {"steps": np.array(self.steps), "h": np.array(self.h)}
         scalars |= {f"parameter_{name}": np.asarray(value) for name, value in self.parameters.items()}
         write(path, columns, np.column_stack([self.t, *self.columns.values()]), scalars)
@@ -96,79 +94,50 @@ def series_of(trajectory: LatticeTrajectory) -> LatticeSeries:
     return LatticeSeries(trajectory.t, columns, x[0], x[-1], *settings, solver)
 
 
-@dataclass
-class SeriesRun:
-    """One call of `LatticeSolver.series`: ``rows`` of the columns ``names`` at the steps ``marks``."""
+class NumberRows:
+    """Rows of the numbers ``names``, without states (`phigen.runtime.lattice_run.Sink`)."""
 
-    solver: LatticeSolver
-    at: Beginning
-    marks: Any
-    names: Sequence[str]
-    checkpoints: Path | None
-    rows: list[list[float]] = field(default_factory=list)
-    session: Any = None
+    def __init__(self, about: LatticeInterface, names: Sequence[str]) -> None:
+        self.about, self.names, self.seconds = about, names, CHECKPOINT_SECONDS
+        self.rows: list[list[float]] = []
 
-    def complete(self, progress: Progress | None) -> LatticeSeries:
-        """Compute the remaining rows, and return the series. Raises `BackendError`."""
-        first, saved = self._resumed()
-        self.session, seen = self.solver.started(replace(self.at, x=first)), time.monotonic()
-        read = _reader(self.session, self.solver.interface, self.names)
-        if saved:
-            self.session.resume(self.at.h, int(self.marks[len(self.rows) - 1]), saved)
-        else:
-            self.rows.append(read())
-        for mark in self.marks[len(self.rows) :].tolist():
-            self.session.advance(self.at.h, mark - self.session.steps)
-            self.rows.append(read())
-            if self.checkpoints and time.monotonic() - seen >= CHECKPOINT_SECONDS:
-                self._save()
-                seen = time.monotonic()
-            if progress:
-                progress(mark)
-        return self.series(int(self.marks[-1]))
+    def __len__(self) -> int:
+        return len(self.rows)
 
-    def series(self, steps: int) -> LatticeSeries:
-        """Return the series recorded so far; the state of the session is that after ``steps`` steps."""
-        t = np.asarray(self.at.t0 + self.at.h * self.marks[: len(self.rows)], dtype=np.float64)
+    @property
+    def columns(self) -> dict[str, Floats]:
+        """The numbers (rows,) by name."""
         values = np.array(self.rows).reshape(len(self.rows), len(self.names))
-        columns = {name: values[:, k] for k, name in enumerate(self.names)}
-        last = self.session.state()
-        return LatticeSeries(t, columns, self.at.x, last, steps, self.at.h, self.at.values, self.solver)
+        return {name: values[:, k] for k, name in enumerate(self.names)}
 
-    def _identity(self) -> dict[str, Any]:
-        return {**identity_of(self.solver, self.at, self.marks), "record": list(self.names)}
+    def see(self, sites: LatticeSession) -> None:
+        """See `Sink`."""
+        self.rows.append(_read(sites, self.about, self.names))
 
-    def _save(self) -> None:
-        assert self.checkpoints
-        arrays = {"state": self.session.state(), "rows": np.array(self.rows), **self.session.saved()}
-        Checkpoint(self._identity(), arrays).save(self.checkpoints)
+    def begin(self, past: Past) -> None:
+        """See `Sink`."""
+        self.rows = np.column_stack([past.columns[name] for name in self.names]).tolist()
 
-    def _resumed(self) -> tuple[Floats, Mapping[str, Any]]:
-        """Return the initial state and {}, or the state and the arrays of the checkpoint if there is one."""
-        if self.checkpoints is None or not self.checkpoints.exists():
-            return self.at.x, {}
-        arrays = checkpoint.load(self.checkpoints, self._identity())
+    def saved(self) -> dict[str, Any]:
+        """See `Sink`."""
+        return {"rows": np.array(self.rows).reshape(len(self.rows), len(self.names))}
+
+    def restore(self, arrays: Mapping[str, Any]) -> None:
+        """See `Sink`."""
         self.rows = arrays["rows"].tolist()
-        return np.asarray(arrays["state"]), arrays
 
 
-def _reader(session: Any, about: LatticeInterface, names: Sequence[str]) -> Callable[[], list[float]]:
-    """Return a function that reads the columns of a session, and computes no others."""
+def _read(session: LatticeSession, about: LatticeInterface, names: Sequence[str]) -> list[float]:
+    """Return the columns of a session; computes what is recorded only."""
     from phigen.runtime.lattice import reduced
 
-    observed = [name for name in names if name in about.observables]
-    summed = [name for name in names if name in about.casimirs]
-
-    def read() -> list[float]:
-        values = {"energy": session.hamiltonian()} if "energy" in names else {}
-        if observed:
-            values |= dict(zip(about.observables, session.observables().tolist(), strict=True))
-        if summed:
-            kinds = zip(about.casimirs, about.casimir_kinds, session.casimirs(), strict=True)
-            values |= {name: reduced(kind, densities) for name, kind, densities in kinds if name in summed}
-        return [values[name] for name in names]
-
-    return read
+    values = {"energy": session.hamiltonian()} if "energy" in names else {}
+    if any(name in about.observables for name in names):
+        values |= dict(zip(about.observables, session.observables().tolist(), strict=True))
+    if summed := [name for name in names if name in about.casimirs]:
+        kinds = zip(about.casimirs, about.casimir_kinds, session.casimirs(), strict=True)
+        values |= {name: reduced(kind, densities) for name, kind, densities in kinds if name in summed}
+    return [values[name] for name in names]
 
 
 def expect_table(path: str | Path) -> Path:

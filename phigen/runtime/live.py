@@ -13,6 +13,7 @@ from phigen.errors import StepError
 from phigen.runtime import arguments
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.interface import BackendError, Clock, Floats
+from phigen.runtime.lattice_course import LatticeCourse
 from phigen.runtime.session import Session
 from phigen.runtime.trajectory import turned_into
 
@@ -159,51 +160,38 @@ class LiveLattice(LiveSession):
     `LiveSession`. The cost of a step, a kick or a copy is proportional to the number of sites.
     """
 
-    def __init__(self, solver: LatticeSolver, session: LatticeSession, at: Beginning) -> None:
-        super().__init__(solver, cast("Session", session), at.values, at.t0)
-        self._draws, self._before = at.draws, 0
-
-    @property
-    def steps(self) -> int:
-        """The number of steps since the start."""
-        return self._before + self._session.steps
+    def __init__(self, solver: LatticeSolver, at: Beginning) -> None:
+        super().__init__(solver, cast("Session", LatticeCourse(solver, at)), at.values, at.t0)
 
     @property
     def energy(self) -> float:
         """H of the state."""
-        return self._lattice.hamiltonian()
+        return self._sites.hamiltonian()
 
     @property
     def observables(self) -> dict[str, Any]:
         """The observables of the spec at the state, by name: numbers, and arrays (*sizes) for those of sites."""
-        about, session = self.solver.interface, self._lattice
-        numbers = dict(zip(about.observables, session.observables().tolist(), strict=True))
-        return numbers | dict(zip(about.observed_fields, session.observed_fields(), strict=True))
+        about, sites = self.solver.interface, self._sites
+        numbers = dict(zip(about.observables, sites.observables().tolist(), strict=True))
+        return numbers | dict(zip(about.observed_fields, sites.observed_fields(), strict=True))
 
     def copy(self) -> LiveLattice:
         """Return an independent copy."""
         twin = object.__new__(LiveLattice)
-        twin.__setstate__(self.__getstate__())
+        branch = cast("LatticeCourse", self._session).branch()
+        twin.__dict__.update(self.__dict__, _session=branch, parameters=dict(self.parameters))
+        twin._clock = replace(self._clock)
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        session = {"_session": (self._session.state(), self._lattice.saved()), "_made": self.steps}
-        return {**self.__dict__, "parameters": dict(self.parameters), "_clock": replace(self._clock), **session}
+        return dict(self.__dict__)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        x, saved = state["_session"]
-        steps = state.pop("_made")
         self.__dict__.update(state)
-        # The restored session begins at the last change of the step size, for the same times and random numbers.
-        clock, self._before = self._clock, self._clock.counted
-        draws = replace(self._draws, step=self._draws.step + self._before)
-        self._session = self.solver.started(Beginning(x, clock.h, self.parameters, clock.t, draws))
-        if clock.h:
-            self._lattice.resume(clock.h, steps - self._before, saved)
 
     @property
-    def _lattice(self) -> LatticeSession:
-        return cast("LatticeSession", self._session)
+    def _sites(self) -> LatticeSession:
+        return cast("LatticeCourse", self._session).sites
 
     def _checked(self, value: ArrayLike, what: str) -> Floats:
         x: Floats = self.solver.state(value, what)

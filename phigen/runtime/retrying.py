@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.session import Followed
 
@@ -49,9 +51,9 @@ class Retrying:
             except BackendError as error:
                 self._make_parts(h, error)
 
-    def branch(self) -> Retrying:
+    def branch(self) -> Self:
         """Return an independent copy."""
-        twin = Retrying(self.session.branch(), self.most)
+        twin = type(self)(self.session.branch(), self.most)
         twin.retried, twin._extra = list(self.retried), self._extra
         return twin
 

@@ -14,7 +14,7 @@ from fractions import Fraction
 from phigen.runtime import arguments
 from phigen.runtime.crossings import Function
 from phigen.runtime.ending import End, after_steps, at_time, where_zero
-from phigen.runtime.session import Session
+from phigen.runtime.session import Followed, Session
 from phigen.runtime.timed import EQUAL, reached, steps_until
 from phigen.spec import limits
 from phigen.spec.model import Run, Spec
@@ -63,7 +63,7 @@ def changed(spec: Spec, run: Run, settings: Settings) -> Run:
         run = replace(run, until=_number(settings.until, "until"), duration=None)
     if settings.step is not None:
         step = Fraction(arguments.step_size(settings.step))
-        run = with_step(run, step, parts=spec.monitor is None and spec.lattice is None)
+        run = with_step(run, step, parts=spec.monitor is None)
     if run.until is not None and (run.until - run.start) / run.step <= 0:
         raise ValueError(f"until = {float(run.until)!r} is never reached by steps of {float(run.step)!r}")
     if settings.stride is not None:
@@ -94,7 +94,7 @@ def _number(value: float, name: str) -> Fraction:
     return Fraction(value)
 
 
-def end_of(session: Session, run: Run, stop: Function | None, *, timed: bool) -> End:
+def end_of(session: Followed, run: Run, stop: Function | None, *, timed: bool) -> End:
     """Return where a run ends, for a session at its start, which is left as it is.
 
     ``stop`` is a function of states whose first zero ends the run; ``timed`` tells whether it takes the time too.
@@ -107,8 +107,15 @@ def end_of(session: Session, run: Run, stop: Function | None, *, timed: bool) ->
         return zero
     if last is not None:
         return last
-    whole = after_steps(session.branch(), h, run.steps)
-    return whole if math.isfinite(whole.span) else replace(whole, span=h * run.steps)
+    if math.isfinite(session.time()):
+        return after_steps(session.branch(), h, run.steps)
+    return End(run.steps, lambda here: (here, float(run.steps)), h * run.steps, part=False)
+
+
+def spans_of(every: float, span: float) -> list[float]:
+    """Return the multiples of ``every`` from the start to before the end of a ``span`` of time."""
+    count = math.ceil(abs(span / every) * (1 - EQUAL))
+    return [k * math.copysign(every, span) for k in range(1, count)]
 
 
 def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
@@ -133,13 +140,12 @@ def _strided_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Sessio
 def _timed_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
     """Yield the states at multiples of ``every`` before the end, each by a part of a step from the step before it."""
     assert run.every is not None
-    h, every = float(run.step), float(run.every) * math.copysign(1.0, float(run.step))
-    rows = math.ceil(abs(end.span / every) * (1 - EQUAL))
-    for k in range(1, rows):
+    h = float(run.step)
+    for span in spans_of(float(run.every), end.span):
         passed = session.time() if math.isfinite(session.time()) else session.steps * h
-        steps, left = steps_until(session, h, k * every - passed)
+        steps, left = steps_until(session, h, span - passed)
         session.advance(h, steps)
-        if abs(left) <= EQUAL * abs(k * every):
+        if abs(left) <= EQUAL * abs(span):
             yield session, float(session.steps)
         else:
             there, size = reached(session, h, left)

@@ -83,7 +83,7 @@ def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
     If a step fails within the span, the number includes that step, so that the caller meets the same failure.
     """
     if not np.isfinite(session.time()):
-        whole = _whole_steps(h, span)
+        whole = whole_steps(h, span)
         return whole, span - whole * h
     target, done, chunk, growing, here = session.time() + span, 0, 1, True, session
     while chunk:
@@ -112,7 +112,7 @@ def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C
     see(session, 0.0)
     done = 0
     if not np.isfinite(session.time()):
-        whole = _whole_steps(h, span)
+        whole = whole_steps(h, span)
         while done < whole:
             count = min(stride - done % stride, whole - done)
             session.advance(h, count)
@@ -161,7 +161,7 @@ def states_at(place: Callable[[int], Session], t: Floats, x: Floats, h: float, t
 def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -> None:
     """Make steps for the time ``span``: whole steps of size h, then a part of one. For steps equal in time."""
     step = float(np.copysign(h, span))
-    whole = _whole_steps(step, span)
+    whole = whole_steps(step, span)
     advance(step, whole)
     left = span - whole * step
     if abs(left) > EQUAL * abs(span):
@@ -187,7 +187,7 @@ def _from(session: Session, h: float, span: float) -> Session:
     return reached(session, step, left)[0] if left else session
 
 
-def _whole_steps(h: float, span: float) -> int:
+def whole_steps(h: float, span: float) -> int:
     """Return the number of whole steps in a span of time; a step that the span misses only by rounding counts."""
     ratio = span / h
     return round(ratio) if abs(ratio - round(ratio)) <= 1e-12 * max(1.0, abs(ratio)) else max(0, int(np.floor(ratio)))

@@ -1,9 +1,9 @@
-"""The kinds of steps, with their kernels: ``Step = Newton Explicit Path Gauss Splitting Sweeps``.
+"""The kinds of steps, with their kernels: ``Step = Newton | Explicit | Path | Gauss | Splitting | Sweeps``.
 
-Kernels of a step are of three stages. ``prepare`` computes, from parameters and step size, the values that depend
-neither on the state nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … Where H depends on the
-time, or there is noise, ``refresh`` computes further coefficients once in each stage, from these and from the time in
-the middle of the stage or the increments of the noise. All other kernels read the coefficients and the state only.
+Kernels of a step are of three stages. ``prepare`` computes, from parameters and step size, every value that does not
+depend on the state, nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … Where H depends on the time,
+``refresh`` computes from these, and from the time in the middle of a stage, those that come after them, once in each
+stage; so it does with the increments of noise. All others read the coefficients and the state only.
 """
 
 from __future__ import annotations
@@ -16,18 +16,15 @@ from phigen.scheme.alternation import Schedule
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.path import PathSlopes, Recurrences
 
-#: The end of the name of a transposed kernel of a lattice.
+#: The end of the name of a kernel of lattices that is the transpose of another.
 BACK = "_back"
 
 
 @dataclass(frozen=True)
 class PathAdjoint:
-    """The path traced back with cotangents (`phigen.scheme.adjoint`).
-
-    ``recurrences`` are those of the cotangents, with those of the ``used`` coefficients last. ``curvature`` is ∇S_h and
-    its Hessian at the mean, ``slope`` the transpose of ∇S_h along coefficients. ``slopes`` are the recurrences for the
-    derivatives of a path, for many paths at once.
-    """
+    """The path traced back with cotangents (`phigen.scheme.adjoint`): their ``recurrences``, those of the ``used``
+    coefficients last; ∇S_h and its Hessian at the mean, and the transpose of ∇S_h along coefficients; ``slopes``, from
+    which the derivatives of many paths at once follow."""
 
     recurrences: Recurrences
     used: tuple[int, ...]
@@ -38,11 +35,8 @@ class PathAdjoint:
 
 @dataclass(frozen=True)
 class Adjoint:
-    """The transpose of a step.
-
-    It has the transposes of the kernels of ``steps`` (one, or one for each flow), of ``prepare``, of ``refresh``, and
-    of the ``path`` if the step follows one.
-    """
+    """The transpose of a step: of the kernels of the ``steps`` (one, or one for each flow), of ``prepare`` and of
+    ``refresh``; if the step follows a path, that of the ``path``."""
 
     steps: tuple[Kernel, ...]
     prepare: Kernel
@@ -58,7 +52,7 @@ class Adjoint:
 
 @dataclass(frozen=True)
 class _Staged:
-    """Any step; ``adjoint`` is its transpose, if requested."""
+    """Any step; ``adjoint`` is there if it was asked for."""
 
     prepare: Kernel
     refresh: Kernel | None = field(default=None, kw_only=True)
@@ -71,30 +65,30 @@ class _Staged:
 
     @property
     def prepared(self) -> int:
-        """The number of values that ``prepare`` computes in one call."""
+        """Values that ``prepare`` computes in one call."""
         return len(self.prepare.outputs[0].values)
 
     @property
     def renewed(self) -> int:
-        """The number of values that ``refresh`` computes in one call."""
+        """Values that ``refresh`` computes in one call."""
         return len(self.refresh.outputs[0].values) if self.refresh else 0
 
     @property
     def row(self) -> int:
-        """The number of values that one call of each computes."""
+        """Values that are computed by one call of each."""
         return self.prepared + self.renewed
 
     @property
     def coefficients(self) -> int:
-        """The number of coefficients of one stage."""
+        """Coefficients of one stage."""
         return self.row
 
 
 @dataclass(frozen=True)
 class InnerSolve:
-    """Settings of the solve of an implicit step.
+    """How the equation of an implicit step is solved.
 
-    ``relative`` says that the coordinates are positive or keep their sign (log-canonical π), so that errors count
+    ``relative`` tells that the coordinates are positive or keep their sign (log-canonical π), so that errors count
     relative to each coordinate.
     """
 
@@ -115,9 +109,9 @@ class Factorisation:
 class Newton(_Staged):
     """α(y, ∇S_h(y)) = x, solved for y by Newton's method; then x + (β − α)(y, ∇S_h(y)).
 
-    ``eliminate`` solves with one matrix, ``eliminate_transposed`` with its transpose, if the adjoint was requested.
-    For many right-hand sides there is ``invert``, ``factors``, or neither. Where a kernel is None, the runtime uses a
-    loop. ``centred`` says that y is the mean of x and x'.
+    ``eliminate`` solves with one matrix, ``eliminate_transposed`` with the transpose of one, if the adjoint was asked
+    for; of ``invert`` and ``factors``, for many right-hand sides, there is at most one. What is None is left to a loop.
+    ``centred`` says that y is the mean of x and x'.
     """
 
     linearise: Kernel
@@ -128,9 +122,9 @@ class Newton(_Staged):
     centred: bool = False
     eliminate_transposed: Kernel | None = None
 
-    #: The unit that the operation counts of `main` refer to.
+    #: What the operation counts of `main` refer to.
     unit = "Newton iteration"
-    #: Description of the step in the header.
+    #: What the header says of the step.
     manner = "implicit, Newton iteration with the analytic matrix"
 
     @property
@@ -142,13 +136,13 @@ class Newton(_Staged):
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         factors = (self.factors.factorise, self.factors.substitute) if self.factors else ()
-        kernels = (self.prepare, self.refresh, self.linearise, self.eliminate, self.eliminate_transposed, self.invert)
-        return _present((*kernels, *factors, *self.transposed))
+        own = (self.prepare, self.refresh, self.linearise, self.eliminate, self.eliminate_transposed, self.invert)
+        return _present((*own, *factors, *self.transposed))
 
 
 @dataclass(frozen=True)
 class Explicit(_Staged):
-    """The increment of a step as a formula; ``tangent`` is its Jacobian, if the tangent map was requested."""
+    """The increment of a step as a formula; ``tangent`` is its Jacobian, if the tangent map was asked for."""
 
     increment: Kernel
     tangent: Kernel | None = None
@@ -169,7 +163,7 @@ class Explicit(_Staged):
 
 @dataclass(frozen=True)
 class PathLanes:
-    """Kernels for several paths in lanes: the recurrences of the derivatives of a path, and their use."""
+    """What following several paths at once needs: the recurrences of the derivatives of a path, and their use."""
 
     slopes: PathSlopes
     curvature: Kernel
@@ -209,17 +203,17 @@ class Path(_Staged):
         """All kernels, each once."""
         lanes = (self.lanes.curvature, self.lanes.along_mean, self.lanes.invert) if self.lanes else ()
         varied = (self.curvature,) if not self.lanes else ()
-        kernels = (self.prepare, self.refresh, self.generate, self.eliminate)
-        return _present((*kernels, *lanes, *varied, *self.transposed))
+        own = (self.prepare, self.refresh, self.generate, self.eliminate)
+        return _present((*own, *lanes, *varied, *self.transposed))
 
     @property
     def back(self) -> PathAdjoint | None:
-        """The transpose of the path, if requested."""
+        """What going back along the path needs, if that was asked for."""
         return self.adjoint.path if self.adjoint else None
 
     @property
     def curvature(self) -> Kernel | None:
-        """∇S_h and its Hessian, if derivatives of a step were requested."""
+        """∇S_h and its Hessian, where derivatives of a step were asked for."""
         if self.tangent:
             return self.tangent.curvature
         return self.back.curvature if self.back else None
@@ -238,9 +232,9 @@ class Gauss(_Staged):
     """Gauss collocation: Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j), by fixed-point sweeps; then x + D(x, Σ_j L_j).
 
     The unknowns Z are offsets, 0 at the start of the step. ``slope`` is f; the input x is the point, with the time as
-    the last entry if f depends on it. ``change`` is D. ``frame`` transforms the L_j of a step to the frame of the
-    next step, where that differs. The first ``plain`` unknowns have the scale of the state; the others, of group
-    elements, have the scale 1.
+    the last entry if f depends on it. ``change`` is D. ``frame`` turns the L_j of a step into those that the next one
+    would see, where that starts in another frame. The first ``plain`` unknowns are of the size of the state, those of
+    group elements of that of the unit.
     """
 
     slope: Kernel
@@ -278,11 +272,11 @@ class Gauss(_Staged):
 
 @dataclass(frozen=True)
 class _Scheduled(_Staged):
-    """A step whose coefficients form rows, one for each of the times of its schedule."""
+    """A step whose coefficients are rows, one for each of the times of its schedule."""
 
     @property
     def coefficients(self) -> int:
-        """The number of coefficients of one step, in all rows."""
+        """Coefficients of one step, in all rows."""
         schedule: Schedule = self.schedule  # type: ignore[attr-defined]
         return self.row * len(schedule.times)
 
@@ -291,8 +285,8 @@ class _Scheduled(_Staged):
 class Splitting(_Scheduled):
     """The exact flows of the parts of H, one after another as the ``schedule`` lists them.
 
-    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the
-    method; ``tangents`` are the Jacobians of the increments of the flows, if the tangent map was requested.
+    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the method;
+    ``tangents`` are the Jacobians of the increments of the flows, if the tangent map was asked for.
     """
 
     flows: tuple[Kernel, ...]
@@ -311,11 +305,10 @@ class Splitting(_Scheduled):
 
 @dataclass(frozen=True)
 class Seam:
-    """The boundary seam along an axis, for sizes that are no multiples of the ``period`` of the colours.
+    """Where the last site along an axis meets the first, of sizes that are no multiples of the ``period`` of colours.
 
-    The seam consists of the last sites: the remainder of the size, and as many periods as make it at least ``wide``.
-    The terms that begin on it also move sites up to ``near`` it. All other terms have colours that fit their
-    neighbours.
+    It is as many of the last sites as are left over, and so many periods more that it is at least so ``wide``. Sites on
+    it and so ``near`` it are moved by its terms too. Others have colours that fit those around them.
     """
 
     period: int = 1
@@ -324,7 +317,7 @@ class Seam:
 
     @property
     def least(self) -> int:
-        """The smallest size for any remainder: the seam and as many sites beside it."""
+        """The smallest size, whatever is left over: the seam and as many sites beside it."""
         return 2 * self.wide + self.period - 1
 
 
@@ -332,9 +325,9 @@ class Seam:
 class Sites:
     """The sites of a lattice, whose number is an argument of the solver.
 
-    ``places`` maps each symbol of kernels to the field, or parameter at sites, and the offset, with the fastest axis
-    last. A site has the colour Σ ``weights``·position modulo ``colours``; sizes are multiples of ``periods``, at
-    least ``least``.
+    ``places`` tells of each symbol of kernels the field, or parameter at sites, and the offset, the fastest axis last.
+    A site has the colour Σ ``weights``·position modulo ``colours``; sizes are multiples of ``periods``, at least
+    ``least``.
     """
 
     axes: tuple[str, ...]
@@ -345,21 +338,19 @@ class Sites:
     weights: tuple[int, ...] = ()
     periods: tuple[int, ...] = ()
     least: tuple[int, ...] = ()
-    ends: Mapping[str, tuple[str, str]] = field(
-        default_factory=dict
-    )  # symbols of kernels of bonds or pairs: field and end
+    ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # of bonds, pairs: what is read at a, or at b
     at_bonds: tuple[str, ...] = ()  # parameters at bonds
-    increments: tuple[str, ...] = ()  # of the noise of a site in a part of a step
-    seams: tuple[Seam, ...] = ()  # along each axis, where the colours fit every size
+    increments: tuple[str, ...] = ()  # of the noise that each site has in a part of a step
+    seams: tuple[Seam, ...] = ()  # along each axis, where colours take every size
 
 
 @dataclass(frozen=True)
 class Ends:
     """A ``kernel`` of bonds or pairs between a site, a, and another, b.
 
-    Its inputs are ``coef`` or ``params``, ``site`` and ``bonds``, the parameters at bonds. ``end`` is the end of the
-    bond, as the user lists it, at which the site is: a, b, or "" for either. ``chosen`` says which of the two must
-    have the colour of the sweep: ``here``, ``there``, or "" for neither.
+    Its inputs are ``coef`` or ``params``, ``site`` and ``bonds``, the parameters at bonds. ``end`` tells of bonds at
+    which end, as they are given, the site is: a, b, or either; ``chosen`` which of the two must have the colour of the
+    sweep: ``here``, ``there``, or none.
     """
 
     kernel: Kernel
@@ -368,13 +359,13 @@ class Ends:
 
     @property
     def of_all(self) -> bool:
-        """Whether both sites of every bond or pair add its contribution."""
+        """Whether both sites of every bond or pair add up what it gives them."""
         return not (self.end or self.chosen)
 
 
 @dataclass(frozen=True)
 class Gather:
-    """Sums over the bonds of a site, or over its pairs with other sites: a value for each of the ``names``."""
+    """What all bonds, or pairs with other sites, add up at a site, a value for each of some ``names``."""
 
     ends: tuple[Ends, ...]
     names: tuple[str, ...]
@@ -387,10 +378,10 @@ class Gather:
 
 @dataclass(frozen=True)
 class Partners:
-    """Sums over bonds or pairs at a site: half the energies, and the forces or rates, as functions of the parameters.
+    """The sites of a graph or all pairs: half the energies of a site with others, and what moves it, by parameters.
 
-    ``varied`` has the forces with their derivatives along variations of the fields, where a step solves an
-    `Equation`. ``observed`` are the densities of observables of bonds and pairs.
+    ``varied`` is the latter with its derivative along variations of the fields, where a step solves an `Equation`.
+    ``observed`` are the densities of observables of bonds and pairs.
     """
 
     energy: Gather
@@ -401,21 +392,21 @@ class Partners:
 
     @property
     def gathers(self) -> tuple[Gather, ...]:
-        """All sums, including empty ones."""
+        """All sums, also those of nothing."""
         return (self.energy, self.field, self.varied, self.observed)
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Increments of the fields with the indices ``moved`` at all sites of one ``colour``, from values that stand still.
+    """Changes of the ``moved`` fields (indices) at all sites of one ``colour``, read from what stands still.
 
-    Without a colour the sweep updates every site. If it is ``inside``, it omits sites near seams. With a ``window``
-    it updates only sites near seams, by the terms that begin on the seams of these axes (bits), or on none.
+    Without a colour it is made at every site. If it is ``inside``, it leaves out sites near seams. With a ``window`` it
+    is made at these alone, for terms that begin on these seams, as bits of their axes, or on none.
 
-    The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. The symbols of ``present`` are
-    1 where a term of H reaches beyond no open end, or where a site has the colour of the sweep, else 0; ``gathered``
-    are the sums of ``gather``. ``tangent`` is there if derivatives of a step were requested: the increments of the
-    variations of the fields, from the inputs of this sweep and the variations ``varied``.
+    The inputs of the ``kernel`` are ``coef``, ``site``, ``present``, symbols that are 1 where a term of H reaches
+    beyond no open end, or where a site has the colour of the sweep, else 0, and ``gathered``, what ``gather`` adds up.
+    ``tangent`` is there if derivatives of a step were asked for: how the variations of the moved fields change, from
+    what this sweep reads and from variations, ``varied``, of it.
     """
 
     kernel: Kernel
@@ -428,7 +419,7 @@ class Sweep:
 
     @property
     def is_tangent(self) -> bool:
-        """Whether the sweep updates variations."""
+        """Whether it changes variations."""
         return self.kernel.role is Role.SWEEP_TANGENT
 
 
@@ -436,10 +427,10 @@ class Sweep:
 class Equation:
     """y = x − (α − x)(y, h∇H(y)) at all sites of a lattice, solved for y; then x moves by (β − α)(y, h∇H(y)).
 
-    The inputs of the kernels are those of sweeps, with values of y as ``site``. ``relax``, the right-hand side at a
-    site, also reads ``start``, the x of the site. ``advance`` is the increment of x. ``slope`` is the derivative of
-    ``relax`` along a variation of y, for Newton's method. ``tangents`` are there if derivatives of a step were
-    requested: those of ``relax`` along a variation of x, and of ``advance`` along one of y.
+    The inputs of the kernels are those of sweeps, where ``site`` are values of y, and of ``relax``, the right-hand
+    side at a site, also ``start``: x there. ``advance`` is what x moves by. ``slope`` is the derivative of ``relax``
+    along a variation of y, for Newton's method. ``tangents`` are there if derivatives of a step were asked for: that
+    of ``relax`` along a variation of x, and that of ``advance`` along one of y.
     """
 
     relax: Kernel
@@ -458,15 +449,11 @@ class Equation:
 class Sweeps(_Scheduled):
     """A step of a lattice, by sweeps over its sites.
 
-    In a splitting each of the ``parts`` is a list of sweeps, which may run in any order, and the ``schedule`` lists
-    the parts.
-
-    If some parts belong to one colour of a graph (``by_colour``), the flows of a step are those of all parts,
-    repeated for each colour. The ``schedule`` then has these numbers in place of parts: 0 the first flow, 1 the flows
-    in the middle, 2 the last, 3 the flows in the middle backwards. If H depends on the time, which advances in place
-    of the last flow, the last flow is in the middle too.
-
-    In the series there is an ``equation`` in place of parts, and the schedule lists its stages.
+    Of a splitting each of the ``parts`` is a list of sweeps, which may be made in any order, and the ``schedule`` is
+    that of the parts. Where some are ``by_colour``, the flows are those of all parts, of each colour where they are so,
+    and the ``schedule`` has in place of parts: 0 the first flow, 1 those in the middle, 2 the last, 3 the middle
+    backwards; where H depends on the time, which advances in place of the last, that one is in the middle too. Of the
+    series there is an ``equation`` in place of parts, and the schedule has its stages.
     """
 
     sites: Sites
@@ -475,7 +462,7 @@ class Sweeps(_Scheduled):
     composition: str
     casimir_kinds: tuple[str, ...] = ()
     partners: Partners | None = None
-    by_colour: tuple[bool, ...] = ()  # graphs: whether a part belongs to one colour
+    by_colour: tuple[bool, ...] = ()  # of graphs: the parts that belong to one colour, and are done for each
     equation: Equation | None = None
 
     unit = "step of one site"
@@ -483,25 +470,23 @@ class Sweeps(_Scheduled):
 
     @property
     def is_by_hand(self) -> bool:
-        """Whether a caller can drive the sweeps of a step one by one over planes: those of a grid that is split.
+        """Whether the sweeps of a step can be driven one by one over planes: those of a grid that is split.
 
-        Noise is drawn with the sweep that reads it, so no sweep may read that of neighbours. A seam lies at the ends
-        of the lattice, which a caller with a piece of the lattice does not have.
+        Noise is drawn with the sweep that reads it, so that must not be that of neighbours. Seams are where the lattice
+        has its ends, of which those who have but a piece of it know nothing.
         """
         beside = any(base in self.sites.increments and any(offset) for base, offset in self.sites.places.values())
         return self.partners is None and self.equation is None and not beside and not self.sites.seams
 
     def stage(self, part: int, fields: Sequence[str]) -> tuple[int, int, int, int]:
-        """Return the access of a part on a grid: its extent behind and ahead along the first axis, and two sets.
-
-        The sets, as bits of numbers, are the fields that it reads at these distances, and the fields that it updates.
-        """
+        """Of a part on a grid: how far behind and ahead it reads along the first axis, and as bits of a number the
+        fields that it reads there, and those that it changes."""
         places = [self.sites.places[s] for sweep in self.parts[part] for s in sweep.kernel.inputs["site"]]
-        distant = [(f, offset[0]) for f, offset in places if offset[0]]
-        read_fields = {f for f, _ in distant if f in fields}
-        updated = {fields[i] for sweep in self.parts[part] for i in sweep.moved}
-        behind, ahead = max([0, *(-o for _, o in distant)]), max([0, *(o for _, o in distant)])
-        bits = [sum(1 << k for k, f in enumerate(fields) if f in names) for names in (read_fields, updated)]
+        far = [(f, offset[0]) for f, offset in places if offset[0]]
+        read = {f for f, _ in far if f in fields}
+        changed = {fields[i] for sweep in self.parts[part] for i in sweep.moved}
+        behind, ahead = max([0, *(-o for _, o in far)]), max([0, *(o for _, o in far)])
+        bits = [sum(1 << k for k, f in enumerate(fields) if f in names) for names in (read, changed)]
         return behind, ahead, bits[0], bits[1]
 
     @property
@@ -511,19 +496,19 @@ class Sweeps(_Scheduled):
 
     @property
     def tangents(self) -> tuple[tuple[Sweep, ...], ...]:
-        """The derivatives of the sweeps of each part; empty if they were not requested."""
+        """The derivatives of the sweeps of each part; nothing where they were not asked for."""
         if any(sweep.tangent is None for part in self.parts for sweep in part):
             return ()
         return tuple(tuple(sweep.tangent for sweep in part if sweep.tangent) for part in self.parts)
 
     @property
     def others(self) -> Partners:
-        """The sums over bonds or pairs; empty on grids."""
+        """Bonds or pairs; nothing where there are none."""
         return self.partners or Partners(Gather((), ()), Gather((), ()))
 
     @property
     def sums(self) -> int:
-        """The largest number of sums over other sites that a site stores."""
+        """The most sums over other sites that are held for each."""
         swept = [sweep.gather for sweep in self.sweeps if sweep.gather]
         return max(len(g.names) for g in (*swept, *self.others.gathers))
 
@@ -536,13 +521,13 @@ class Sweeps(_Scheduled):
         swept_kernels += self.equation.kernels if self.equation else ()
         gathers = [sweep.gather for sweep in swept if sweep.gather]
         gathers += self.others.gathers
-        kernels = (*swept_kernels, *(k for g in gathers for k in g.kernels))
-        return _present((self.prepare, self.refresh, *kernels, *self.transposed))
+        own = (*swept_kernels, *(k for g in gathers for k in g.kernels))
+        return _present((self.prepare, self.refresh, *own, *self.transposed))
 
 
 Step = Newton | Explicit | Path | Gauss | Splitting | Sweeps
 
-#: Steps that solve an equation for one point.
+#: Those that solve an equation for one point.
 Implicit = Newton | Path
 
 

@@ -5,17 +5,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from phigen.spec import limits
 from phigen.spec.declarations import Declarations, Raw
+from phigen.spec.grammar import Scope
+from phigen.spec.indices import Indices
 from phigen.spec.model import Lattice, LatticeRun, Values
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.values import values
 from phigen.spec.yaml_source import Scalar
-from phigen.symbolic.expression import ZERO, Expression, symbols_of
+from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
 
 KINDS = ("sites", "sum", "product")
 #: Densities of H by what they belong to, and the relation that they need.
@@ -63,18 +65,29 @@ def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapp
     return replace(lattice, kinds={**local, **kinds}, **parts)
 
 
-_SECTIONS = "sections are those of ordinary systems; observables: of the lattice are recorded at every frame"
-
 #: Keys of runs that lattices do not have: the reasons, and what to do.
 _ABSENT_IN_RUNS = {
     "exact": "closed forms are those of ordinary systems; phigen show --expand prints a lattice as one",
-    "section": _SECTIONS,
-    "direction": _SECTIONS,
-    "until": "runs of lattices end after whole steps: give steps, or duration, a multiple of the step",
-    "every": "frames are ends of steps: give stride; trajectory.at([t, …]) in Python makes states between",
-    "stop": "runs of lattices end after whole steps: give steps; observables: are recorded at every frame",
+    "compare": "phigen verify and phigen tune set classical methods beside the solver of a lattice",
     "members": "sweeps: integrates many members, each with its own path",
 }
+
+
+def scope_of_numbers(declared: Declarations, observables: Iterable[str], fields: Iterable[str]) -> Scope:
+    """The names of numbers of a whole lattice: for sections and stops of runs.
+
+    They are ``observables`` that are reduced to one number, parameters with one value, and the time. ``fields`` are
+    observables with a value at each site.
+    """
+    scope = declared.dated_constants("a number of the lattice")
+    at_sites = [name for name, parameter in declared.parameters.items() if parameter.at != "all"]
+    hint = "observables: {{M: {{mean: {}}}}} makes it a number, which may be named here"
+    local = [n for n, e in declared.definitions.items() if set(at_sites).intersection(symbols_of(e))]
+    several = dict.fromkeys([*declared.coordinates, *fields, *sorted(declared.varying), *at_sites, *local])
+    refused = {n: (f"{n!r} has a value at each site, and this is one number for all", hint.format(n)) for n in several}
+    names = {n: e for n, e in scope.names.items() if n not in refused} | {n: symbol(n) for n in observables}
+    indices = Indices(declared.neighbours, {}, refused)
+    return replace(scope, names=names, refused={**scope.refused, **refused}, indices=indices)
 
 
 def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRun | None:

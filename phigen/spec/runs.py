@@ -24,10 +24,13 @@ _ADAPTING = ("auto", "adaptive", "variable")
 NEAR_INTEGER = Fraction(1, 10**9)
 
 
-def run(name: str, raw: Mapping[str, Any], declared: Declarations, recordable: Mapping[str, str]) -> Run:
+def run(
+    name: str, raw: Mapping[str, Any], declared: Declarations, recordable: Mapping[str, str], watched: Scope
+) -> Run:
     """The run of that name. After errors, which are reported, some of its values are stand-ins.
 
-    ``recordable`` maps what ``record`` may name to "", other names of the spec to why it may not.
+    ``recordable`` maps what ``record`` may name to "", other names of the spec to why it may not. ``watched`` has the
+    names of what changes along a run, for sections and stops.
     """
     numbers = declared.numbers()
     step_node = raw.get("step")
@@ -50,7 +53,9 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations, recordable: M
     elif every is not None and "stride" in raw:
         _fail(name, "every", "every and stride exclude each other", declared, "give one of them")
     if "direction" in raw and "section" not in raw:
-        _fail(name, "direction", "direction needs a section", declared, "section: x1 records where x1 passes through 0")
+        example = "x1" if declared.lattice is None else "M"
+        hint = f"section: {example} records where {example} passes through 0"
+        _fail(name, "direction", "direction needs a section", declared, hint)
     stride = raw.get("stride", 1)
     if steps is not None and stride > max(steps, 1):
         _fail(name, "stride", f"the stride {stride} is longer than the run of {steps} steps", declared)
@@ -68,12 +73,12 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations, recordable: M
         start=start,
         exact=_exact(raw.get("exact", {}), declared),
         compare=without_repetition(raw.get("compare", ()), ("runs", name, "compare"), declared),
-        section=_crossed(name, "section", raw, declared, declared.dated_scope()),
+        section=_crossed(name, "section", raw, declared, watched),
         direction=raw.get("direction") or "rising",
         duration=duration,
         until=until,
         every=every,
-        stop=_crossed(name, "stop", raw, declared, replace(declared.dated_scope(), piecewise=True)),
+        stop=_crossed(name, "stop", raw, declared, replace(watched, piecewise=True)),
         average=_average(raw.get("average"), declared),
         record=_recorded(name, raw.get("record"), declared, recordable),
         description=raw.get("description", ""),
@@ -112,9 +117,10 @@ def _average(raw: Mapping[str, Any] | None, declared: Declarations) -> AverageCh
 def _crossed(name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: Scope) -> Expression | None:
     """An expression whose zeros are looked for along the run, so that it has to change."""
     section = declared.formula(raw.get(key), scope)
-    changing = {*declared.coordinates, *filter(None, [declared.time])}
-    if section is not None and not declared.incomplete and changing.isdisjoint(symbols_of(section)):
-        _fail(name, key, f"{key}: {shown(raw[key].text)} depends neither on a coordinate nor on the time", declared)
+    constant = {n for n, p in declared.parameters.items() if p.at == "all"}
+    if section is not None and not declared.incomplete and constant.issuperset(symbols_of(section)):
+        what = "a coordinate" if declared.lattice is None else "an observable"
+        _fail(name, key, f"{key}: {shown(raw[key].text)} depends neither on {what} nor on the time", declared)
     return section
 
 

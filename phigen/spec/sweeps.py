@@ -173,7 +173,10 @@ def _expect_sense(
     if run is not None and sweep.frames > run.steps:
         message = f"frames: every {sweep.frames} steps, but the run {run.name} has only {run.steps}"
         _fail((*place, "frames"), message, declared)
-    if "crossings" in sweep.keep and run is not None and run.section is None:
+    if "crossings" in sweep.keep and declared.lattice:
+        hint = "keep observables: M, mean(M), std(M)"
+        _fail((*place, "keep"), "crossings: sweeps keep those of ordinary systems", declared, hint)
+    elif "crossings" in sweep.keep and run is not None and run.section is None:
         hint = "give the run a section: an expression whose zeros are the crossings"
         _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared, hint)
     if "energy_error" in sweep.keep and declared.time:

@@ -14,7 +14,7 @@ from phigen.spec.fields import SPEC
 from phigen.spec.grammar import Scope
 from phigen.spec.kinds import Reader
 from phigen.spec.lattice import casimirs as read_casimirs
-from phigen.spec.lattice import densities, with_kinds
+from phigen.spec.lattice import densities, scope_of_numbers, with_kinds
 from phigen.spec.model import (
     DEFAULT_ORDER,
     NOISY_ORDER,
@@ -82,7 +82,9 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         columns |= dict.fromkeys(declared.coordinates, "is recorded with the state")
     summed = [name for name in casimirs if lattice is None or lattice.kinds[name] != "sites"]
     columns |= dict.fromkeys(["state", "energy", *summed, *numbers], "")
-    runs = {n: run(n, r, declared, columns) for n, (_, r) in raw.get("runs", {}).items() if r is not None}
+    fields = [name for name in observed if name not in numbers]
+    watched = declared.dated_scope() if lattice is None else scope_of_numbers(declared, numbers, fields)
+    runs = {n: run(n, r, declared, columns, watched) for n, (_, r) in raw.get("runs", {}).items() if r is not None}
     return {
         "name": _name(raw.get("name"), declared),
         "coordinates": declared.coordinates,

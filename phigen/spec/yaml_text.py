@@ -188,7 +188,9 @@ def _run(run: Run) -> Iterator[str]:
         yield from _indented(_wrapped("parameters: {", changed, "}"))
     yield f"  step: {_number(run.step)}"
     yield f"  steps: {run.steps}" if run.until is None else f"  until: {_number(run.until)}"
-    if run.stride != 1:
+    if run.every is not None:
+        yield f"  every: {_number(run.every)}"
+    elif run.stride != 1:
         yield f"  stride: {run.stride}"
     if run.start:
         yield f"  start: {_number(run.start)}"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from phigen.scheme.policies import POLICIES, MeasurePolicy, Policy, PolicyConstant
+from phigen.scheme.policies import POLICIES, Constant, MeasurePolicy, Policy
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Implicit
 
@@ -26,7 +26,7 @@ class Spelling:
     """How a language writes a power of two of a negative exponent, and the constants of a policy."""
 
     power: str
-    written: Callable[[list[tuple[PolicyConstant, str]]], str]
+    written: Callable[[list[tuple[Constant, str]]], str]
 
     def value(self, value: float) -> str:
         """A number."""
@@ -41,7 +41,7 @@ class Spelling:
         return self.written([(c, self.value(c.value)) for c in constants])
 
 
-def _c(constants: list[tuple[PolicyConstant, str]]) -> str:
+def _c(constants: list[tuple[Constant, str]]) -> str:
     """Real numbers as macros, so that `single` sees thresholds; whole numbers as enumerators, without a type."""
     whole = [(f"PHI_{c.name} = {value},", c.about) for c, value in constants if isinstance(c.value, int)]
     real = [(f"#define PHI_{c.name} {value}", c.about) for c, value in constants if isinstance(c.value, float)]
@@ -54,11 +54,11 @@ def _aligned(lines: list[tuple[str, str]]) -> list[str]:
     return [f"{text:{width}} /* {about} */" for text, about in lines]
 
 
-def _js(constants: list[tuple[PolicyConstant, str]]) -> str:
+def _js(constants: list[tuple[Constant, str]]) -> str:
     return "\n".join(f"/** {c.about[:1].upper()}{c.about[1:]} */\nconst {c.name} = {value};" for c, value in constants)
 
 
-def _python(constants: list[tuple[PolicyConstant, str]]) -> str:
+def _python(constants: list[tuple[Constant, str]]) -> str:
     return "\n".join(f"{c.name} = {value}  # {c.about}" for c, value in constants)
 
 

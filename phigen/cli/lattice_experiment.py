@@ -1,0 +1,170 @@
+"""The run of a lattice with the values of the command line put in, and the runs that it goes on with."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from phigen.cli.experiment import Experiment
+from phigen.reading import opened, opened_text
+from phigen.runtime.arguments import Beginning
+from phigen.runtime.interface import Draws, Floats, LatticeInterface
+from phigen.runtime.lattice_course import ObservedCourse
+from phigen.runtime.lattice_frames import state_columns
+from phigen.runtime.lattice_rows import Past, Plan, strided, timed
+from phigen.runtime.lattice_series import key_of
+
+if TYPE_CHECKING:
+    from phigen.lattice.states import Start
+    from phigen.runtime.crossings import Function
+    from phigen.runtime.lattice import LatticeSolver
+    from phigen.spec.model import Run
+    from phigen.symbolic.expression import Expression
+
+#: What a file of another run says, or one that is none.
+_UNREADABLE = (OSError, ValueError, KeyError, EOFError, IndexError, zipfile.BadZipFile)
+
+
+@dataclass(frozen=True)
+class LatticeExperiment(Experiment):
+    """An `Experiment` of a lattice: its ``start`` has the state, ``past`` is a `phigen.runtime.lattice_rows.Past`."""
+
+    start: Start | None = None
+
+    @property
+    def begin(self) -> float:
+        """The time where its steps begin."""
+        return float(self.past.t[-1]) if self.past else self.t0
+
+    def beginning(self, solver: LatticeSolver) -> Beginning:
+        """The state where its steps begin, and what they depend on."""
+        assert self.start is not None
+        state = solver.state(self.start.state if self.past is None else self.past.last, "x0")
+        values = solver.values(self.parameters, {}, state.shape[1:])
+        draws = Draws(self.run.seed, step=self.made) if solver.interface.noise else Draws()
+        return Beginning(state, self.h, values, self.begin if solver.interface.time else 0.0, draws)
+
+    def begun(self, solver: LatticeSolver) -> ObservedCourse:
+        """A course where the steps begin. Raises `StepError`."""
+        return ObservedCourse.begun(solver, self.beginning(solver))
+
+    def function(self, expression: Expression, solver: LatticeSolver) -> Function:
+        """An expression of the run as a function of observables."""
+        return solver.function(expression, self.parameters)
+
+    def plan(self, solver: LatticeSolver) -> Plan:
+        """The integration that it asks for."""
+        at, run = self.beginning(solver), self.run
+        if self.times is None:
+            rows = strided(at.h, run.steps, run.stride, self.end)
+        else:
+            rows = timed(at.h, run.steps, self.spans, self.end)
+        return Plan(at, rows, self.begin, section=solver.section_of(run, at.values), past=self.past)
+
+
+def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) -> tuple[Run, Start]:
+    """Return a run that starts at the last state in a file of another run, with its time where there is one.
+
+    Raises `click.BadParameter` for what is no such file, and states of other sizes.
+    """
+    try:
+        state, t = _last_of(source, solver.interface, start.state.shape)
+    except _UNREADABLE as error:
+        kinds = ".csv of states" if source.suffix.lower() == ".csv" else ".npz of a run of a lattice"
+        raise click.BadParameter(f"{source} is no {kinds}: {_reason(error)}", param_hint="--from") from None
+    if state.shape != start.state.shape or not np.isfinite(state).all():
+        message = f"{source} ends with a state of shape {state.shape}, the run has {start.state.shape}"
+        wrong = message if state.shape != start.state.shape else f"the last state in {source} is not finite"
+        raise click.BadParameter(wrong, param_hint="--from")
+    return replace(run, start=Fraction(t)) if solver.interface.time else run, replace(start, state=state)
+
+
+def _last_of(source: Path, about: LatticeInterface, shape: tuple[int, ...]) -> tuple[Floats, float]:
+    """The last state in a file, and its time."""
+    if source.suffix.lower() == ".csv":
+        table = _table(source, about, shape)
+        return table.last, float(table.t[-1])
+    with opened(source) as file, np.load(file, allow_pickle=False) as stored:
+        last = stored["last"] if "last" in stored else stored["x"][-1]
+        return np.asarray(last, dtype=np.float64), float(stored["t"][-1])
+
+
+def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -> LatticeExperiment:
+    """The experiment after the rows of a finished run of it."""
+    run, start = experiment.run, experiment.start
+    assert start is not None
+    if run.records_numbers and path.suffix.lower() == ".csv":
+        message = f"the run {run.name} has record: without state, and {path} no state to go on from"
+        raise click.UsageError(f"--extend: {message}; a .npz has it")
+    try:
+        past = _past_of(path, run, solver.interface, start.state.shape)
+    except _UNREADABLE as error:
+        message = f"{path} does not hold a run of {solver.interface.name}: {_reason(error)}"
+        raise click.BadParameter(message, param_hint="--extend") from None
+    if past.t[0] != experiment.t0 or not np.array_equal(past.first, start.state):
+        what = f"its first row, at t = {float(past.t[0])!r}, is not the start of the run {run.name}"
+        raise click.BadParameter(f"{path} is of another run: {what}", param_hint="--extend")
+    steps = past.steps or round((float(past.t[-1]) - experiment.t0) / experiment.h)
+    return replace(experiment, past=replace(past, steps=steps))
+
+
+def _past_of(path: Path, run: Run, about: LatticeInterface, shape: tuple[int, ...]) -> Past:
+    """Read the rows of a finished run."""
+    if path.suffix.lower() == ".csv":
+        return _table(path, about, shape)
+    numbers = run.record if run.records_numbers else ("energy", *about.observables)
+    with opened(path) as file, np.load(file, allow_pickle=False) as stored:
+        t = _rows(stored["t"], "t")
+        columns = {name: _rows(stored[key_of(name, about)], name, len(t)) for name in numbers}
+        steps = int(stored["steps"])
+        if run.records_numbers:
+            first, last = (np.asarray(stored[name], dtype=np.float64) for name in ("first", "last"))
+            return _checked(Past(t, first, last, columns, steps), shape)
+        x = np.asarray(stored["x"], dtype=np.float64)
+        if x.shape != (len(t), *shape):
+            raise ValueError(f"x has the shape {x.shape}, not {(len(t), *shape)}")
+        return _checked(Past(t, x[0], x[-1], columns, steps, x), shape)
+
+
+def _table(path: Path, about: LatticeInterface, shape: tuple[int, ...]) -> Past:
+    """Read a ``.csv`` of states; the number of steps is not in it."""
+    columns = state_columns(about, shape[1:])
+    expected = [name for column in columns for name in column.names]
+    with opened_text(path) as file:
+        header = file.readline().strip().split(",")
+        if header != expected:
+            strange = next((name for name in expected if name not in header), "as many columns")
+            raise ValueError(f"it has {len(header)} columns, and not {strange}")
+        rows = np.loadtxt(file, delimiter=",", ndmin=2)
+    if not rows.size or rows.shape[1] != len(expected):
+        raise ValueError("it has no rows")
+    keys = {name: rows[:, expected.index(column.names[0])] for column in columns for name in [column.key]}
+    numbers = {"energy": keys["energy"]} | {name: keys[f"observable_{name}"] for name in about.observables}
+    x = rows[:, 1 : 1 + int(np.prod(shape))].reshape(-1, *shape)
+    return _checked(Past(rows[:, 0], x[0], x[-1], numbers, 0, x), shape)
+
+
+def _rows(values: Any, name: str, count: int | None = None) -> Floats:
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 1 or not len(array) or len(array) != (count or len(array)):
+        raise ValueError(f"{name} has the shape {array.shape}")
+    return array
+
+
+def _checked(past: Past, shape: tuple[int, ...]) -> Past:
+    """The same, where it ends with a finite state of that shape and a finite time."""
+    if past.first.shape != shape or past.last.shape != shape:
+        raise ValueError(f"its states have the shape {past.last.shape}, those of the run {shape}")
+    if not (np.isfinite(past.last).all() and np.isfinite(past.t[-1])):
+        raise ValueError("its last state is not finite")
+    return past
+
+
+def _reason(error: Exception) -> str:
+    return f"it has no {error}" if isinstance(error, KeyError) else str(error)

@@ -1,0 +1,128 @@
+"""Lattices on their way as courses that branch: what ends, rows between steps, sections and retries are made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from phigen.runtime.arguments import Beginning
+from phigen.runtime.interface import Clock, Floats
+from phigen.runtime.retrying import Retrying
+from phigen.runtime.session import Followed
+
+if TYPE_CHECKING:
+    from phigen.runtime.lattice import LatticeSession, LatticeSolver
+
+
+class LatticeCourse:
+    """A lattice on its way (`phigen.runtime.session.Followed`), whose state has the shape (coordinates, *sizes).
+
+    Steps of a branch, and of a course that goes on from `saved`, have the bits of those of one integration.
+    """
+
+    def __init__(self, solver: LatticeSolver, at: Beginning) -> None:
+        self.solver, self.at = solver, at
+        self.sites: LatticeSession = solver.started(at)
+        self._clock, self._before = Clock(at.t0), 0
+
+    @property
+    def steps(self) -> int:
+        """Good steps since the start."""
+        return self._before + self.sites.steps
+
+    @property
+    def rounding(self) -> float:
+        """See `Followed`."""
+        return float(np.finfo(np.float32 if self.solver.interface.single else np.float64).eps)
+
+    def state(self) -> Floats:
+        """A copy of the state (coordinates, *sizes)."""
+        return self.sites.state()
+
+    def time(self) -> float:
+        """NaN: steps are equal in time."""
+        return math.nan
+
+    def element(self) -> Floats:
+        """No numbers: lattices have no attitude."""
+        return np.empty(0)
+
+    def advance(self, h: float, steps: int) -> None:
+        """Make so many steps."""
+        self._clock.set_step(h, self.steps)
+        self.sites.advance(h, steps)
+
+    def branch(self) -> LatticeCourse:
+        """An independent copy."""
+        return LatticeCourse.restored(self.solver, self.at, self.saved())
+
+    def place(self, x: Floats) -> None:
+        """Stand at ``x`` (coordinates, *sizes), with all else as it is; raises `BackendError` if it is not finite."""
+        self.sites.place(x)
+
+    def kick(self, change: Floats) -> None:
+        """Move the state by ``change`` (coordinates, *sizes), else as `place`."""
+        self.sites.kick(change)
+
+    def saved(self) -> dict[str, Any]:
+        """Arrays for `restored`."""
+        clock = self._clock
+        counts = np.array([clock.counted, self.steps])
+        return {"state": self.state(), "clock": np.array([clock.t, clock.h]), "counts": counts, **self.sites.saved()}
+
+    @classmethod
+    def restored(cls, solver: LatticeSolver, at: Beginning, arrays: Mapping[str, Any]) -> LatticeCourse:
+        """The course that began at ``at`` and was saved."""
+        course = object.__new__(cls)
+        course.__setstate__({"solver": solver, "at": at, "saved": arrays})
+        return course
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"solver": self.solver, "at": self.at, "saved": self.saved()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.solver, self.at, arrays = state["solver"], state["at"], state["saved"]
+        (t, h), (counted, steps) = arrays["clock"].tolist(), arrays["counts"].tolist()
+        # counted from where the size of the step was set: with the same times and random numbers
+        self._clock, self._before = Clock(t, h, counted), counted
+        draws = replace(self.at.draws, step=self.at.draws.step + counted)
+        self.sites = self.solver.started(Beginning(np.asarray(arrays["state"]), h, self.at.values, t, draws))
+        if h:
+            self.sites.resume(h, steps - counted, arrays)
+
+
+class ObservedCourse(Retrying):
+    """A lattice as sections, stops and rows see it: its `state` are the observables of the spec, one number each.
+
+    Failing steps are made in parts, as `Retrying` does.
+    """
+
+    def state(self) -> Floats:
+        """Observables (observables,)."""
+        return self.sites.observables()
+
+    @property
+    def sites(self) -> LatticeSession:
+        """The session, with the state at the sites."""
+        return cast("LatticeCourse", self.session).sites
+
+    def saved(self) -> dict[str, Any]:
+        """Arrays for `restored`."""
+        parts = np.array([self._extra, *self.retried])
+        return {**cast("LatticeCourse", self.session).saved(), "parts": parts}
+
+    @classmethod
+    def begun(cls, solver: LatticeSolver, at: Beginning, retry: int = 0) -> ObservedCourse:
+        """The course at its start."""
+        return cls(cast("Followed", LatticeCourse(solver, at)), retry)
+
+    @classmethod
+    def restored(cls, solver: LatticeSolver, at: Beginning, retry: int, arrays: Mapping[str, Any]) -> ObservedCourse:
+        """The course that began at ``at`` and was saved."""
+        course = cls(cast("Followed", LatticeCourse.restored(solver, at, arrays)), retry)
+        course._extra, *course.retried = arrays["parts"].tolist()
+        return course

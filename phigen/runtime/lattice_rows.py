@@ -1,0 +1,118 @@
+"""Where the rows of an integration of a lattice are, and all else that a run asks for beside its start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phigen.runtime.arguments import Beginning
+from phigen.runtime.crossings import Function
+from phigen.runtime.ending import End
+from phigen.runtime.interface import Floats, row_steps
+from phigen.runtime.timed import EQUAL, whole_steps
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows after ``whole`` steps each (rows,), and a further step of the size ``part`` (rows,), 0 for none.
+
+    The first is the start. With an ``end``, that makes the last row.
+    """
+
+    whole: NDArray[np.int64]
+    part: Floats
+    end: End | None = None
+
+    def __len__(self) -> int:
+        return len(self.whole)
+
+    @property
+    def steps(self) -> int:
+        """Whole steps up to the last row."""
+        return int(self.whole[-1])
+
+    def times(self, begin: float, h: float) -> Floats:
+        """The times (rows,), from that of the start."""
+        return np.asarray(begin + (h * self.whole + self.part), dtype=np.float64)
+
+    def described(self) -> list[int | float]:
+        """Plain data that tells these rows from others."""
+        rows = [len(self), self.steps, int(self.whole[min(1, len(self) - 1)])]
+        return [*rows, *([] if not self.part.any() else [float(self.part.sum()), float(self.part[-1])])]
+
+
+def strided(h: float, steps: int, stride: int, end: End | None = None) -> Rows:
+    """Return rows at every ``stride``-th of ``steps`` steps and the last, or up to an end with a part of a step."""
+    if end is None or not end.part:
+        whole = row_steps(steps if end is None else end.steps, stride)
+        return Rows(whole, np.zeros(len(whole)), end)
+    whole = np.append(np.arange(0, end.steps + 1, stride, dtype=np.int64), end.steps)
+    part = np.zeros(len(whole))
+    part[-1] = end.span - end.steps * h
+    return Rows(whole, part, end)
+
+
+def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) -> Rows:
+    """Return rows at times ``spans`` after the start, and at the end: after ``steps`` steps, or where ``end`` is."""
+    last = h * steps if end is None else end.span
+    inner = [span for span in spans if abs(last - span) > EQUAL * abs(last)]
+    whole = [whole_steps(h, span) for span in inner]
+    left = np.array([span - h * count for span, count in zip(inner, whole, strict=True)])
+    part = np.where(np.abs(left) > EQUAL * np.abs(inner), left, 0.0)
+    tail = strided(h, steps, max(1, steps if end is None else end.steps), end)
+    whole = [0, *whole, int(tail.whole[-1])]
+    return Rows(np.array(whole, dtype=np.int64), np.array([0.0, *part, tail.part[-1]]), end)
+
+
+@dataclass(frozen=True)
+class Crossed:
+    """A section: where ``g`` of the observables passes through zero, in a ``direction``; ``text`` is g for people."""
+
+    g: Function
+    direction: str
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """A finished run that another goes on with: its rows ``t`` (rows,), ``energy`` and observables, and its states.
+
+    ``x`` (rows, coordinates, *sizes) are those of all rows, None where numbers alone were recorded; ``first`` and
+    ``last`` are the states at its ends. ``columns`` are numbers by name, (rows,). It made ``steps`` steps.
+    """
+
+    t: Floats
+    first: Floats
+    last: Floats
+    columns: Mapping[str, Floats]
+    steps: int
+    x: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """An integration: where it begins, its rows, and in how many halvings a failing step may be made.
+
+    ``begin`` is the time of its start, which `Beginning` has only where H depends on the time.
+    """
+
+    at: Beginning
+    rows: Rows
+    begin: float = 0.0
+    retry: int = 0
+    section: Crossed | None = None
+    past: Past | None = field(default=None, compare=False)
+
+    @property
+    def times(self) -> Floats:
+        """The times of all rows, those of the past first."""
+        times = self.rows.times(self.begin, self.at.h)
+        return times if self.past is None else np.append(self.past.t, times[1:])
+
+    @property
+    def steps(self) -> int:
+        """Whole steps up to the end, with those of the past."""
+        return self.rows.steps + (self.past.steps if self.past else 0)
