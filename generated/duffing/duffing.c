@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 6b0b6ae1e902b2f26b00d8642673043a9466bd6dd394daaa5fff68835e9f0340
+ * body-sha256: b1a59e52f1200524e59c0b4a0b37edb0f36662c5683f09929c26638aac92a813
  */
 #include "duffing.h"
 #include <float.h>
@@ -19,9 +19,9 @@
 /* ---- The model ---- */
 const duffing_params duffing_default_params = { 0.1, 1.2 };
 
-enum { duffing_PREPARED = 22 };       /* coefficients that depend on params and h only, before the others */
-enum { duffing_MAX_ITERATIONS = 20 }; /* of an inner solve */
-#define duffing_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
+enum { duffing_PREPARED = 22 };       /* number of the first coefficients, functions of params and h only */
+enum { duffing_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+#define duffing_TOLERANCE 1e-20       /* largest estimated error after an accepted correction */
 
 /* The middle of a step, where the time is taken. */
 #define duffing_middles 0.5

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 56192ba3d00f7007b101947118c4db7bab84e75a52b7896d4bf429bfe41b76c4
+ * body-sha256: d3812d6618ff6437e80021e608ebd289203ecfec5e96f6beba5ad34e2a60e2ef
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -20,13 +20,13 @@
 /* ---- The model ---- */
 const guiding_centre_params guiding_centre_default_params = { 0.5, 0.3, 0.2 };
 
-enum { guiding_centre_MAX_ITERATIONS = 20 }; /* of an inner solve */
-/* most of the expansion of a path; one that needs more is cut into pieces */
+enum { guiding_centre_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+/* largest number of Taylor terms of a path; a path that needs more is divided */
 enum { guiding_centre_TERMS = 30 };
-enum { guiding_centre_SERIES = 55 }; /* of a path, those of the coordinates first */
+enum { guiding_centre_SERIES = 55 }; /* Taylor series of a path, those of the coordinates first */
 enum { guiding_centre_FIXED = 1 };   /* values that are constant along a path */
 
-/* A step of size h is the composition of these fractions of it. */
+/* A step of size h is the composition of steps of these fractions of h. */
 static const double guiding_centre_fractions[guiding_centre_STAGES] = { 0.4144907717943757,
     0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 444f6be9352628b5646835acbb527327c829fa78899dd9715361f8b29d11ab94
+ * body-sha256: 7ed88666e1c4b533bdd64fa8d9abbcd9e80b21e3ffb1cea7e112f683928f2d3a
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -15,8 +15,8 @@ extern "C" {
 #define guiding_centre_PHIGEN_VERSION "0.1.0"
 #define guiding_centre_SPEC_SHA256 "2fe2b1310137da070ce71887dcad93562dc0dd719fad890ce1b776e6af4b1570"
 enum { guiding_centre_STAGES = 5 };       /* of a step */
-enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that depend on params and h only */
-enum { guiding_centre_DIFFERENCES = 9 };  /* that a step is extrapolated from: more amplify rounding */
+enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that are functions of params and h */
+enum { guiding_centre_DIFFERENCES = 9 };  /* for the predictor; more would amplify rounding */
 
 typedef struct {
     double kappa; /* twist of the field lines per unit of length */
@@ -32,48 +32,49 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
 
 typedef enum { guiding_centre_OK = 0, guiding_centre_NO_CONVERGENCE, guiding_centre_SINGULAR,
     guiding_centre_NOT_FINITE, guiding_centre_BAD_ARGUMENT } guiding_centre_status;
-const char *guiding_centre_status_string(guiding_centre_status status);
+const char *guiding_centre_status_string(guiding_centre_status status); /* what a status means */
 
-/* The last value of the unknown and its backward differences, for a guess at the next. */
+/* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
 typedef struct {
-    int count, order; /* differences that are known; how many of them the extrapolation adds up */
-    double difference[guiding_centre_DIFFERENCES][guiding_centre_DIM];
+    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
+    double difference[guiding_centre_DIFFERENCES][guiding_centre_DIM]; /* the solution, then differences */
 } guiding_centre_history;
 
-/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
+/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {
-    double x[guiding_centre_DIM];     /* the state; read it freely, change it only through functions */
-    double carry[guiding_centre_DIM]; /* what rounding took from x: the state proper is x + carry */
-    size_t steps;                     /* good steps since guiding_centre_init */
-    size_t evaluations;               /* of the generating function, for statistics */
+    double x[guiding_centre_DIM];     /* the state; change it only by the functions below */
+    double carry[guiding_centre_DIM]; /* rounding error of x: x + carry is more accurate */
+    size_t steps;                     /* number of successful steps since guiding_centre_init */
+    size_t evaluations;               /* number of evaluations of the generating function, for statistics */
     double t;                         /* time since guiding_centre_init */
-    double h;                         /* the last step size; NaN before the first step */
-    guiding_centre_params params;
-    /* all that depends on params and h only */
+    double h;                         /* size of the last step; NaN before the first step */
+    guiding_centre_params params;     /* the parameters, set by guiding_centre_init; do not change them */
+    /* functions of params and h, computed when h changes */
     double coef[guiding_centre_STAGES][guiding_centre_COEFFICIENTS];
-    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
-    guiding_centre_history history[guiding_centre_STAGES]; /* for starting guesses */
+    /* predictor of the starting value of the iteration */
+    guiding_centre_history history[guiding_centre_STAGES];
 } guiding_centre_solver;
-size_t guiding_centre_solver_size(void); /* for bindings to other languages, as what follows */
+size_t guiding_centre_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. guiding_centre_BAD_ARGUMENT, and *s as before, if x0, a
-   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
+/* Initialise *s with the state x0. params may be NULL for the defaults. guiding_centre_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
     const double x0[guiding_centre_DIM]);
 
-/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
+/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
 guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h);
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps);
 
-/* Between steps: stand at x, or move by change, all else being as it was, also on
-   guiding_centre_BAD_ARGUMENT. Either may leave the leaf. */
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+   guiding_centre_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const double x[guiding_centre_DIM]);
 guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM]);
 
-/* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
-   state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
+   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

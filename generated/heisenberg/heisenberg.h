@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 21b99811df45cccf9ff35382c7df283131ec74c865a886c496e18dc246c20a11
+ * body-sha256: cc8e183e41f1d5b1c9764d39035f13913fa068c2116e6b912eff2f9ef28298e6
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -24,94 +24,100 @@ typedef struct {
 extern const heisenberg_params heisenberg_default_params;
 
 enum { heisenberg_ARRAYS = 4 };        /* arrays over the sites: fields, then parameters */
-enum { heisenberg_COEFFICIENTS = 18 }; /* numbers that depend on params and h only */
+enum { heisenberg_COEFFICIENTS = 18 }; /* numbers that are functions of params and h */
 
 typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,
     heisenberg_BAD_ARGUMENT } heisenberg_status;
 
-/* The state is kept in memory of the caller.
-   A field is many rows: a row is all sites along the last axis, with copies of the other end beside them.
-   Set it up with heisenberg_init; a copy of the struct is the same solver, not another one. */
+/* A solver and the trajectory that it computes. Initialise it by heisenberg_init. Its arrays lie in memory of
+   the caller, so a copy of the struct is not an independent solver. A field is stored in rows. A row is all
+   sites along the last axis, with a halo: copies of the sites of the other end beside each end. Read all
+   fields of the struct at any time, write to none of them. */
 typedef struct {
-    size_t sizes[heisenberg_AXES];
-    size_t sites, rows;
-    ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
-    /* in rows, each field, then each parameter at sites: the first site of the first row */
+    size_t sizes[heisenberg_AXES]; /* number of sites along each axis */
+    size_t sites, rows;            /* number of all sites, and of rows */
+    ptrdiff_t length, width;       /* sites of a row; doubles from the start of a row to that of the next */
+    /* the state: first site of each field, then of each parameter at sites, in rows */
     double *x[heisenberg_ARRAYS];
-    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
-    double *before[heisenberg_DIM]; /* the fields before the steps that are being made */
-    int open; /* whether these lack the last flow of a step, which between calls x has made */
-    size_t far; /* steps to be made by functions for large arguments, where there are others */
-    size_t steps; /* good steps since heisenberg_init */
+    ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
+    /* the fields at the start of the present steps, restored if a step fails */
+    double *before[heisenberg_DIM];
+    /* 1 if before lacks the last flow of the last step, which x includes between calls */
+    int open;
+    /* steps that use functions for arguments of any size in place of faster ones for small */
+    size_t far;
+    size_t steps; /* number of successful steps since heisenberg_init */
     double t; /* time since heisenberg_init */
-    double h; /* the last step size */
-    heisenberg_params params;
-    double coef[heisenberg_COEFFICIENTS]; /* all that depends on params and h only */
-    int prepared; /* whether coef has been computed */
-    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double h; /* size of the last step */
+    heisenberg_params params; /* the parameters, set by heisenberg_init */
+    double coef[heisenberg_COEFFICIENTS]; /* functions of params and h */
+    int prepared; /* 1 if coef has been computed */
+    size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
 } heisenberg_solver;
 
-/* The bytes that the solver of a lattice needs as its memory; 0 for sizes that are not allowed. */
+/* Return the number of bytes that heisenberg_init needs as memory for these sizes, 0 for sizes that are not
+   admissible. */
 size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES]);
 
-/* Start at x0[field][site], the last axis fastest, with heisenberg_work_size(sizes) bytes of memory, as from
-   malloc, which must stay. params may be NULL for the defaults; its arrays are copied.
-   heisenberg_BAD_ARGUMENT if sizes are not allowed, x0 or a parameter is not finite, or one that has to be
-   positive is not. */
+/* Initialise *s with the state x0[field][site], where the site index of the last axis varies fastest. work is
+   memory of heisenberg_work_size(sizes) bytes, aligned as by malloc; the caller frees it after the last use
+   of *s. params may be NULL for the defaults; its arrays are copied. Returns heisenberg_BAD_ARGUMENT if sizes
+   are not admissible, if x0 or a parameter is not finite, or if a parameter that must be positive is not. */
 heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params *params,
     const size_t sizes[heisenberg_AXES], const double *x0, void *work);
 
-/* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
-   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
+   step, and s->steps counts the successful ones. The last flow of a step is merged with the first of the
+   next, also of the next call. With OpenMP, rows are updated in parallel, with the same bits for any number
+   of threads. */
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps);
 
-/* The state x[field][site]. */
+/* Copy the state to x[field][site]. */
 void heisenberg_state(const heisenberg_solver *s, double *x);
 
-/* Between steps: stand at x, or move by change, both [field][site], all else being as it was, also on
-   heisenberg_BAD_ARGUMENT. */
+/* Between steps: replace the state by x[field][site], or add change[field][site] to it. Returns
+   heisenberg_BAD_ARGUMENT and leaves the state unchanged if the new state is not finite. */
 heisenberg_status heisenberg_set_state(heisenberg_solver *s, const double *x);
 heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 
-/* To go on elsewhere with the same bits: if heisenberg_saved is 1, x is what the next step begins with, for
-   heisenberg_resume after heisenberg_init at the state. If it is 0, heisenberg_resume has NULL for x. */
+/* Save and restore a run with the same bits. heisenberg_saved writes x[field][site] and far. To restore, call
+   heisenberg_init with the state, then heisenberg_resume with far, and with x if heisenberg_saved returned 1,
+   else NULL. */
 int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far);
 
-/* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
-   out[field][site]. */
+/* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the
+   Casimirs; the right-hand side out[field][site] of the equations of motion. */
 double heisenberg_hamiltonian(const heisenberg_solver *s);
 void heisenberg_density(const heisenberg_solver *s, double *out);
 void heisenberg_casimirs(const heisenberg_solver *s, double *out);
 void heisenberg_vector_field(const heisenberg_solver *s, double *out);
 
-/* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, ...
-   before heisenberg_stages(), each a sweep over all planes: the sites of one place along the first axis.
-   Number heisenberg_stages(), which with noise there is not, is the last stage of a step and the first of the
-   next together, as heisenberg_integrate does them. A stage may be made in any number of pieces, in any
-   order, with the bits of heisenberg_step; before that, the planes beside a piece that it reads must have
-   made the stages before. */
+/* Caller-driven stepping, for lattices distributed over several memories. A plane is all sites with the same
+   index of the first axis. A step consists of the stages 0 ... heisenberg_stages() - 1; each is a sweep over
+   all planes. Without noise, stage number heisenberg_stages() is the last stage of a step merged with the
+   first of the next, as in heisenberg_integrate. A stage may be made in parts, in any order, with the same
+   bits as heisenberg_step. Before a part is swept, all planes that it reads must have completed the stages
+   before. */
 typedef struct {
-    /* planes before the first one swept, and after the last one, that are read */
-    size_t behind, ahead;
-    /* fields that are read there, and those that are changed; bit k is field k */
+    size_t behind, ahead; /* number of planes read before the first swept one, and after the last */
+    /* fields that are read there, and fields that are changed; bit k is field k */
     unsigned long read, changed;
 } heisenberg_stage;
 
 size_t heisenberg_stages(void);
 heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about);
 
-/* What depends on the step size, before the first stage; and a stage for the planes from..to, to not among
-   them. far: whether by functions for arguments of any size; without it, values that are not finite say that
-   these were needed. */
+/* heisenberg_begin computes the coefficients for a step size; call it before the first stage.
+   heisenberg_sweep makes a stage for the planes from ... to - 1. With far = 1 it uses functions for arguments
+   of any size; with far = 0 faster ones, which give NaN if an argument is too large. */
 heisenberg_status heisenberg_begin(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far, size_t from, size_t to);
 
-/* Values x[plane of those from..to][sites of it] of a field, which is 0 for the first; putting them takes the
-   place of what was there. heisenberg_holds tells whether those of all fields there are finite. */
+/* Read or write the values x[plane][site] of a field, counted from 0, on the planes from ... to - 1.
+   heisenberg_holds returns 1 if all fields are finite on these planes. */
 heisenberg_status heisenberg_planes(const heisenberg_solver *s, size_t field, size_t from, size_t to,
     double *x);
 heisenberg_status heisenberg_put_planes(heisenberg_solver *s, size_t field, size_t from, size_t to,
@@ -120,7 +126,8 @@ int heisenberg_holds(const heisenberg_solver *s, size_t from, size_t to);
 
 const char *heisenberg_status_string(heisenberg_status status);
 
-/* For bindings: the size of heisenberg_solver, and its count of good steps. */
+/* For other languages, which cannot read the struct: its size in bytes, and its number of successful
+   steps. */
 size_t heisenberg_solver_size(void);
 size_t heisenberg_solver_steps_done(const heisenberg_solver *s);
 

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; What a monitored trajectory holds fixed: e = -H(x0), so that
  *   K = monitor (H + e) is 0 along it; The solver
- * body-sha256: ca3e85755d055710f3f843d67d50a35c1bf3dc4a291baa0a20eca909cafb664c
+ * body-sha256: 2178235f7f579efc6cb7035aa5c5b3ab91ba44c3edfdbfe16b084d5a8d86b61c
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -22,7 +22,7 @@ const kepler_eccentric_params kepler_eccentric_default_params = { 1e-06 };
 enum { kepler_eccentric_ROWS_OF_FLOWS = 35 }; /* times of flows in a step, each with its coefficients */
 enum { kepler_eccentric_ROW = 4 };            /* coefficients for one of them */
 
-/* The times of the flows of one step, as fractions of it: one row of coefficients for each. */
+/* The times of the flows of one step, as fractions of h; each has a row of coefficients. */
 static const double kepler_eccentric_times[kepler_eccentric_ROWS_OF_FLOWS] = { 0.06510124154444503,
     0.13020248308889007, 0.3456827324319992, 0.5611629817751084, 0.08584400956513055, -0.38947496264484727,
     -0.11531652804484584, 0.1588419065551556, -0.11853099378904099, -0.39590389413323757,

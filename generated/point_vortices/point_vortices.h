@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0ca8c02c960a7431aa27780c563b631264c55327d9b970f49a91d1c6f49c3409
+ * body-sha256: ad19eae6f08339341401e62c5fbce2638dc54fbaeda6e9077b44d4261109f5c4
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -23,76 +23,80 @@ typedef struct {
 extern const point_vortices_params point_vortices_default_params;
 
 enum { point_vortices_ARRAYS = 3 };       /* arrays over the sites: fields, then parameters */
-enum { point_vortices_COEFFICIENTS = 5 }; /* numbers that depend on params and h only */
-enum { point_vortices_STAGES = 5 };       /* of a step */
-enum { point_vortices_DIRECTIONS = 24 };  /* of a Krylov space */
-enum { point_vortices_DIFFERENCES = 2 };  /* that a guess is extrapolated from */
-enum { point_vortices_GATHERED = 4 };     /* sums over other sites that are held for each site */
+enum { point_vortices_COEFFICIENTS = 5 }; /* numbers that are functions of params and h */
+enum { point_vortices_STAGES = 5 };       /* stages of a step */
+enum { point_vortices_DIRECTIONS = 24 };  /* dimension of a Krylov space */
+enum { point_vortices_DIFFERENCES = 2 };  /* differences of the predictor */
+enum { point_vortices_GATHERED = 4 };     /* sums over other sites that are stored for each site */
 
 typedef enum { point_vortices_OK = 0, point_vortices_NO_CONVERGENCE, point_vortices_SINGULAR,
     point_vortices_NOT_FINITE, point_vortices_BAD_ARGUMENT } point_vortices_status;
 
-/* What guesses for the y of a stage are extrapolated from: differences of the last values of y - x. */
+/* Predictor of the solution y of an implicit stage: backward differences of the last values of y - x, from
+   which the starting value of the iteration is extrapolated. */
 typedef struct {
-    int count, order; /* differences that there are, and that the next guess takes */
+    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
     double *difference[point_vortices_DIFFERENCES][point_vortices_DIM];
 } point_vortices_guess;
 
-/* The state is kept in memory of the caller.
-   A field is a row: all its sites.
-   Set it up with point_vortices_init; a copy of the struct is the same solver, not another one. */
+/* A solver and the trajectory that it computes. Initialise it by point_vortices_init. Its arrays lie in
+   memory of the caller, so a copy of the struct is not an independent solver. A field is stored as one row of
+   all sites. Read all fields of the struct at any time, write to none of them. */
 typedef struct {
-    size_t sizes[point_vortices_AXES];
-    size_t sites, rows;
-    ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
-    /* in rows, each field, then each parameter at sites: the first site of the first row */
+    size_t sizes[point_vortices_AXES]; /* number of sites along each axis */
+    size_t sites, rows; /* number of all sites, and of rows */
+    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
+    /* the state: first site of each field, then of each parameter at sites, in rows */
     double *x[point_vortices_ARRAYS];
-    double *gathered[point_vortices_GATHERED]; /* sums over other sites, for each site */
-    double *before[point_vortices_DIM];        /* the fields before the steps that are being made */
-    /* the middle of a stage, before and after a sweep, with the parameters at sites */
+    double *gathered[point_vortices_GATHERED]; /* for each site, sums over other sites */
+    /* the fields at the start of the present steps, restored if a step fails */
+    double *before[point_vortices_DIM];
+    /* solution of a stage before and after a sweep, with the parameters at sites */
     double *y[2][point_vortices_ARRAYS];
-    point_vortices_guess guess[point_vortices_STAGES];
-    size_t sweeps;                    /* that stages took since point_vortices_init */
-    int stiff;                        /* whether sweeps have failed */
-    double usual[point_vortices_DIM]; /* the sizes of the fields of y */
-    /* variations of y, sums over pieces: see point_vortices_krylov */
+    point_vortices_guess guess[point_vortices_STAGES]; /* predictor of each stage */
+    size_t sweeps; /* number of sweeps of all stages since point_vortices_init */
+    int stiff; /* 1 if fixed-point sweeps have failed, so that Newton's method is used */
+    double usual[point_vortices_DIM]; /* magnitudes of the fields of y */
+    /* basis of the Krylov space, sums over row segments: see point_vortices_krylov */
     double *space[point_vortices_DIRECTIONS + 1][point_vortices_DIM], *sums;
-    size_t steps; /* good steps since point_vortices_init */
-    double t;     /* time since point_vortices_init */
-    double h;     /* the last step size */
-    point_vortices_params params;
-    double coef[point_vortices_COEFFICIENTS]; /* all that depends on params and h only */
-    int prepared; /* whether coef has been computed */
-    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    size_t steps; /* number of successful steps since point_vortices_init */
+    double t; /* time since point_vortices_init */
+    double h; /* size of the last step */
+    point_vortices_params params; /* the parameters, set by point_vortices_init */
+    double coef[point_vortices_COEFFICIENTS]; /* functions of params and h */
+    int prepared; /* 1 if coef has been computed */
+    size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
 } point_vortices_solver;
 
-/* The bytes that the solver of a lattice needs as its memory; 0 for sizes that are not allowed. */
+/* Return the number of bytes that point_vortices_init needs as memory for these sizes, 0 for sizes that are
+   not admissible. */
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES]);
 
-/* Start at x0[field][site], the last axis fastest, with point_vortices_work_size(sizes) bytes of memory, as
-   from malloc, which must stay. params may be NULL for the defaults; its arrays are copied.
-   point_vortices_BAD_ARGUMENT if sizes are not allowed, x0 or a parameter is not finite, or one that has to
-   be positive is not. */
+/* Initialise *s with the state x0[field][site], where the site index of the last axis varies fastest. work is
+   memory of point_vortices_work_size(sizes) bytes, aligned as by malloc; the caller frees it after the last
+   use of *s. params may be NULL for the defaults; its arrays are copied. Returns point_vortices_BAD_ARGUMENT
+   if sizes are not admissible, if x0 or a parameter is not finite, or if a parameter that must be positive is
+   not. */
 point_vortices_status point_vortices_init(point_vortices_solver *s, const point_vortices_params *params,
     const size_t sizes[point_vortices_AXES], const double *x0, void *work);
 
-/* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Guesses are extrapolated from the former steps of one call. With OpenMP rows are worked at in
-   parallel, with the same bits for any number of threads. */
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
+   step, and s->steps counts the successful ones. Predictors are extrapolated from earlier steps of the same
+   call. With OpenMP, rows are updated in parallel, with the same bits for any number of threads. */
 point_vortices_status point_vortices_step(point_vortices_solver *s, double h);
 point_vortices_status point_vortices_integrate(point_vortices_solver *s, double h, size_t steps);
 
-/* The state x[field][site]. */
+/* Copy the state to x[field][site]. */
 void point_vortices_state(const point_vortices_solver *s, double *x);
 
-/* Between steps: stand at x, or move by change, both [field][site], all else being as it was, also on
-   point_vortices_BAD_ARGUMENT. */
+/* Between steps: replace the state by x[field][site], or add change[field][site] to it. Returns
+   point_vortices_BAD_ARGUMENT and leaves the state unchanged if the new state is not finite. */
 point_vortices_status point_vortices_set_state(point_vortices_solver *s, const double *x);
 point_vortices_status point_vortices_kick(point_vortices_solver *s, const double *change);
 
-/* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
-   out[field][site]. */
+/* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the
+   Casimirs; the right-hand side out[field][site] of the equations of motion. */
 double point_vortices_hamiltonian(const point_vortices_solver *s);
 void point_vortices_density(const point_vortices_solver *s, double *out);
 void point_vortices_casimirs(const point_vortices_solver *s, double *out);
@@ -100,7 +104,8 @@ void point_vortices_vector_field(const point_vortices_solver *s, double *out);
 
 const char *point_vortices_status_string(point_vortices_status status);
 
-/* For bindings: the size of point_vortices_solver, and its count of good steps. */
+/* For other languages, which cannot read the struct: its size in bytes, and its number of successful
+   steps. */
 size_t point_vortices_solver_size(void);
 size_t point_vortices_solver_steps_done(const point_vortices_solver *s);
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: b8f4226fa41bbc3744b4adfd2c4ae5b232cda3509aab1b4842d18f7fa5348534
+ * body-sha256: d7bee1394f59ca48d3c3681d7d77c0413662576e21452d279bfaef363cb3aa80
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -19,8 +19,8 @@
 /* ---- The model ---- */
 const predator_prey_params predator_prey_default_params = { 1.0, 0.1, 0.05, 0.5 };
 
-enum { predator_prey_MAX_ITERATIONS = 20 }; /* of an inner solve */
-#define predator_prey_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
+enum { predator_prey_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+#define predator_prey_TOLERANCE 1e-20       /* largest estimated error after an accepted correction */
 
 static int predator_prey_allowed(const predator_prey_params *params)
 {

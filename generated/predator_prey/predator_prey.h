@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b5f422a3866079d3a5304977fbbdef179931144f4f2214bf2c5a7ba4eac4ccd3
+ * body-sha256: 1e173ae77d8fdf6f53f8155afc459a33118bc6411c29a4bc82631d9e21199f22
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -14,8 +14,8 @@ extern "C" {
 #define predator_prey_CASIMIRS 0
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "e9ed620ed8f3d5aad12a62fc9348c8e9ca6a49af75e51b9b9dab791a7ff33715"
-enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that depend on params and h only */
-enum { predator_prey_DIFFERENCES = 9 };   /* that a step is extrapolated from: more amplify rounding */
+enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that are functions of params and h */
+enum { predator_prey_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
 
 typedef struct {
     double growth; /* growth rate of the prey without predators */
@@ -32,47 +32,47 @@ void predator_prey_vector_field(const predator_prey_params *params, const double
 
 typedef enum { predator_prey_OK = 0, predator_prey_NO_CONVERGENCE, predator_prey_SINGULAR,
     predator_prey_NOT_FINITE, predator_prey_BAD_ARGUMENT } predator_prey_status;
-const char *predator_prey_status_string(predator_prey_status status);
+const char *predator_prey_status_string(predator_prey_status status); /* what a status means */
 
-/* The last value of the unknown and its backward differences, for a guess at the next. */
+/* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
 typedef struct {
-    int count, order; /* differences that are known; how many of them the extrapolation adds up */
-    double difference[predator_prey_DIFFERENCES][predator_prey_DIM];
+    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
+    double difference[predator_prey_DIFFERENCES][predator_prey_DIM]; /* the solution, then differences */
 } predator_prey_history;
 
-/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
+/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {
-    double x[predator_prey_DIM];     /* the state; read it freely, change it only through functions */
-    double carry[predator_prey_DIM]; /* what rounding took from x: the state proper is x + carry */
-    size_t steps;                    /* good steps since predator_prey_init */
-    size_t evaluations;              /* of the generating function, for statistics */
-    double t;                        /* time since predator_prey_init */
-    double h;                        /* the last step size; NaN before the first step */
-    predator_prey_params params;
-    double coef[predator_prey_COEFFICIENTS]; /* all that depends on params and h only */
-    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double x[predator_prey_DIM]; /* the state; change it only by the functions below */
+    double carry[predator_prey_DIM]; /* rounding error of x: x + carry is more accurate */
+    size_t steps; /* number of successful steps since predator_prey_init */
+    size_t evaluations; /* number of evaluations of the generating function, for statistics */
+    double t; /* time since predator_prey_init */
+    double h; /* size of the last step; NaN before the first step */
+    predator_prey_params params; /* the parameters, set by predator_prey_init; do not change them */
+    double coef[predator_prey_COEFFICIENTS]; /* functions of params and h, computed when h changes */
+    size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
-    predator_prey_history history; /* for starting guesses */
+    predator_prey_history history; /* predictor of the starting value of the iteration */
 } predator_prey_solver;
-size_t predator_prey_solver_size(void); /* for bindings to other languages, as what follows */
+size_t predator_prey_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t predator_prey_solver_steps_done(const predator_prey_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. predator_prey_BAD_ARGUMENT, and *s as before, if x0, a
-   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
+/* Initialise *s with the state x0. params may be NULL for the defaults. predator_prey_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
     const double x0[predator_prey_DIM]);
 
-/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
+/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
 predator_prey_status predator_prey_step(predator_prey_solver *s, double h);
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps);
 
-/* Between steps: stand at x, or move by change, all else being as it was, also on predator_prey_BAD_ARGUMENT.
-   Either may leave the leaf. */
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+   predator_prey_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 predator_prey_status predator_prey_set_state(predator_prey_solver *s, const double x[predator_prey_DIM]);
 predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM]);
 
-/* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
-   state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
+   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

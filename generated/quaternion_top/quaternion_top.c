@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: ac8506cccc433351e53d0f267883c957774d104f1708a390fcdf6e54c090d687
+ * body-sha256: b8532dad6f26cd74dc50c87cf595dd91e207034866f434390de701415da50d2c
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -20,10 +20,10 @@
 /* ---- The model ---- */
 const quaternion_top_params quaternion_top_default_params = { 1.0, 1.5, 2.0, 1.0, 0.5 };
 
-enum { quaternion_top_MAX_ITERATIONS = 20 }; /* of an inner solve */
-/* most of the expansion of a path; one that needs more is cut into pieces */
+enum { quaternion_top_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+/* largest number of Taylor terms of a path; a path that needs more is divided */
 enum { quaternion_top_TERMS = 30 };
-enum { quaternion_top_SERIES = 84 }; /* of a path, those of the coordinates first */
+enum { quaternion_top_SERIES = 84 }; /* Taylor series of a path, those of the coordinates first */
 enum { quaternion_top_FIXED = 1 };   /* values that are constant along a path */
 
 static int quaternion_top_allowed(const quaternion_top_params *params)

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1d47979182b05ab2fe133576fa521998fcb1345917ae1e9bb8b7250e1c580ee6
+ * body-sha256: b8b1335f60ac1d15a1ba0113d1f06d85497d28988366f7d3439c9617c3605f29
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -14,9 +14,9 @@ extern "C" {
 #define quaternion_top_CASIMIRS 1 /* length */
 #define quaternion_top_PHIGEN_VERSION "0.1.0"
 #define quaternion_top_SPEC_SHA256 "818ae683b38dea8c70860ad173c7962b5eb71229e0d7aeaea854acb32ebba04c"
-enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that depend on params and h only */
-enum { quaternion_top_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: length */
-enum { quaternion_top_DIFFERENCES = 9 };   /* that a step is extrapolated from: more amplify rounding */
+enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that are functions of params and h */
+enum { quaternion_top_GAUGES = 1 };        /* Casimirs of which multiples are subtracted from H: length */
+enum { quaternion_top_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
 
 typedef struct {
     double I1;     /* least moment of inertia */
@@ -34,52 +34,53 @@ void quaternion_top_vector_field(const quaternion_top_params *params, const doub
 
 typedef enum { quaternion_top_OK = 0, quaternion_top_NO_CONVERGENCE, quaternion_top_SINGULAR,
     quaternion_top_NOT_FINITE, quaternion_top_BAD_ARGUMENT } quaternion_top_status;
-const char *quaternion_top_status_string(quaternion_top_status status);
+const char *quaternion_top_status_string(quaternion_top_status status); /* what a status means */
 
-/* The last value of the unknown and its backward differences, for a guess at the next. */
+/* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
 typedef struct {
-    int count, order; /* differences that are known; how many of them the extrapolation adds up */
-    double difference[quaternion_top_DIFFERENCES][quaternion_top_DIM];
+    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
+    double difference[quaternion_top_DIFFERENCES][quaternion_top_DIM]; /* the solution, then differences */
 } quaternion_top_history;
 
-/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
+/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {
-    double x[quaternion_top_DIM];     /* the state; read it freely, change it only through functions */
-    double carry[quaternion_top_DIM]; /* what rounding took from x: the state proper is x + carry */
-    size_t steps;                     /* good steps since quaternion_top_init */
-    size_t evaluations;               /* of the generating function, for statistics */
+    double x[quaternion_top_DIM];     /* the state; change it only by the functions below */
+    double carry[quaternion_top_DIM]; /* rounding error of x: x + carry is more accurate */
+    size_t steps;                     /* number of successful steps since quaternion_top_init */
+    size_t evaluations;               /* number of evaluations of the generating function, for statistics */
     double t;                         /* time since quaternion_top_init */
-    double h;                         /* the last step size; NaN before the first step */
-    quaternion_top_params params;
-    double gauge[quaternion_top_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */
-    double coef[quaternion_top_COEFFICIENTS]; /* all that depends on params and h only */
-    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double h;                         /* size of the last step; NaN before the first step */
+    quaternion_top_params params;     /* the parameters, set by quaternion_top_init; do not change them */
+    /* factors of the Casimirs that are subtracted from H, in their order */
+    double gauge[quaternion_top_GAUGES];
+    double coef[quaternion_top_COEFFICIENTS]; /* functions of params and h, computed when h changes */
+    size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
-    quaternion_top_history history; /* for starting guesses */
+    quaternion_top_history history; /* predictor of the starting value of the iteration */
 } quaternion_top_solver;
-size_t quaternion_top_solver_size(void); /* for bindings to other languages, as what follows */
+size_t quaternion_top_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t quaternion_top_solver_steps_done(const quaternion_top_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. quaternion_top_BAD_ARGUMENT, and *s as before, if x0, a
-   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
+/* Initialise *s with the state x0. params may be NULL for the defaults. quaternion_top_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
 quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM]);
 
-/* Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge. */
+/* As quaternion_top_init, with given factors of Casimirs. The step is a Poisson map for each fixed gauge. */
 quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM], const double gauge[quaternion_top_GAUGES]);
 
-/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
+/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
 quaternion_top_status quaternion_top_step(quaternion_top_solver *s, double h);
 quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double h, size_t steps);
 
-/* Between steps: stand at x, or move by change, all else being as it was, also on
-   quaternion_top_BAD_ARGUMENT. Either may leave the leaf. */
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+   quaternion_top_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const double x[quaternion_top_DIM]);
 quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double change[quaternion_top_DIM]);
 
-/* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
-   state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
+   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 quaternion_top_status quaternion_top_ensemble(const quaternion_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

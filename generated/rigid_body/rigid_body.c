@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: c97e8bef48d3a358600465b11e4116caa7d98d28e78bbeed2314d4f5497827ec
+ * body-sha256: 92472a7d47b530f4f7298979d06ac926e8d2b9c2525d98bfd671bb692d9eeed1
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -28,10 +28,10 @@
 /* ---- The model ---- */
 const rigid_body_params rigid_body_default_params = { 2.0, 1.0, 0.6666666666666666 };
 
-enum { rigid_body_MAX_ITERATIONS = 20 }; /* of an inner solve */
-enum { rigid_body_CHECKS = 8 };          /* values that a recurrence is not fitted to, but has to foresee */
-enum { rigid_body_PASSES = 2 };          /* over a block, that cost per step what an evaluation costs */
-#define rigid_body_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
+enum { rigid_body_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+enum { rigid_body_CHECKS = 8 }; /* past solutions that the recurrence is tested on, not fitted to */
+enum { rigid_body_PASSES = 2 }; /* iterations of a block that cost as much per step as one evaluation */
+#define rigid_body_TOLERANCE 1e-20 /* largest estimated error after an accepted correction */
 
 static int rigid_body_allowed(const rigid_body_params *params)
 {

@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 11f8f4e75e3f6dcf5dc5edd6afb2a1f7de938bb96e4050666ef4a53b39ce8e3a
+ * body-sha256: 416d2aaabde60e8c42afcdcac934e4c8d6c990d8a1065bd1dc06549a69be2b8c
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -14,11 +14,11 @@ extern "C" {
 #define rigid_body_CASIMIRS 1 /* C */
 #define rigid_body_PHIGEN_VERSION "0.1.0"
 #define rigid_body_SPEC_SHA256 "8810186c1e0019884e5b3b03e44e3be202fcaec17d97ceab9967252a6cdb2d99"
-enum { rigid_body_COEFFICIENTS = 35 }; /* numbers that depend on params and h only */
-enum { rigid_body_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: C */
-enum { rigid_body_REMEMBERED = 111 };  /* values that a recurrence is fitted to */
-enum { rigid_body_WINDOW = 40 };       /* of them that it may use */
-enum { rigid_body_AHEAD = 8 };         /* values that it foresees */
+enum { rigid_body_COEFFICIENTS = 35 }; /* numbers that are functions of params and h */
+enum { rigid_body_GAUGES = 1 };        /* Casimirs of which multiples are subtracted from H: C */
+enum { rigid_body_REMEMBERED = 111 };  /* past solutions that the recurrence is fitted to */
+enum { rigid_body_WINDOW = 40 };       /* largest number of past solutions in the recurrence */
+enum { rigid_body_AHEAD = 8 };         /* number of solutions that the recurrence predicts */
 
 typedef struct {
     double I1; /* first principal moment of inertia */
@@ -34,85 +34,87 @@ void rigid_body_vector_field(const rigid_body_params *params, const double x[3],
 
 typedef enum { rigid_body_OK = 0, rigid_body_NO_CONVERGENCE, rigid_body_SINGULAR, rigid_body_NOT_FINITE,
     rigid_body_BAD_ARGUMENT } rigid_body_status;
-const char *rigid_body_status_string(rigid_body_status status);
+const char *rigid_body_status_string(rigid_body_status status); /* what a status means */
 
 enum { rigid_body_KEPT = 2 * rigid_body_REMEMBERED };
 
-/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear
-   recurrence fitted to the last rigid_body_REMEMBERED values. For speed only. */
+/* Predictor: recent solutions of the implicit equation, from which the starting value of the next iteration
+   follows by extrapolation, or by a linear recurrence fitted to the last rigid_body_REMEMBERED solutions. It
+   affects the speed only. */
 typedef struct {
-    int count; /* values in past */
-    int extrapolation_order; /* how many of them the extrapolation uses */
-    int recurrence_terms; /* how many of them the recurrence uses; 0 if there is none */
-    int use_recurrence; /* whether the recurrence is the better guess */
-    int fits; /* how often it has been fitted */
-    int slow_steps; /* how many of the last steps took more than one iteration */
-    int slow_steps_allowed; /* how many of those before it is fitted again */
-    double past[rigid_body_KEPT][rigid_body_DIM]; /* values, the latest last */
-    /* of past values, the latest first, for the next */
+    int count; /* number of solutions in past */
+    int extrapolation_order; /* number of solutions that the extrapolation uses */
+    int recurrence_terms; /* number of solutions that the recurrence uses; 0 if none is fitted */
+    int use_recurrence; /* 1 if the recurrence predicts better than the extrapolation */
+    int fits; /* number of fits so far */
+    int slow_steps; /* recent steps that took more than one iteration */
+    int slow_steps_allowed; /* value of slow_steps at which the recurrence is fitted again */
+    double past[rigid_body_KEPT][rigid_body_DIM]; /* solutions, the latest last */
+    /* factors of past solutions, the latest first, for the next ones */
     double weight[rigid_body_WINDOW][rigid_body_DIM][rigid_body_AHEAD];
 } rigid_body_history;
 
-/* What was learnt about blocks of steps. For speed only. */
+/* Measurements that decide when several steps are solved together, as a block in SIMD registers, and when one
+   by one. They affect the speed only. */
 typedef struct {
-    double evaluations_per_stage; /* that single steps take */
-    int single_steps;             /* to make before a block is tried */
-    /* the same after the last failure, halved with every block that succeeds */
+    double evaluations_per_stage; /* number of evaluations in single steps */
+    int single_steps;             /* single steps to make before the next block */
+    /* single_steps after the last failure, halved by each successful block */
     int last_single_steps;
-    int use_recurrences;              /* whether blocks are guessed by recurrences */
-    int passes_without_recurrences;   /* that the last block took which was guessed by Runge-Kutta steps */
-    size_t steps_without_recurrences; /* to wait before recurrences are tried again */
-    size_t recurrences_from_step;     /* when that is */
+    int use_recurrences;              /* 1 if recurrences predict blocks, 0 if Runge-Kutta steps do */
+    int passes_without_recurrences;   /* iterations of the last block predicted by Runge-Kutta steps */
+    size_t steps_without_recurrences; /* steps to wait before recurrences are tried again */
+    size_t recurrences_from_step;     /* number of the step from which they are tried again */
 } rigid_body_learnt;
 
-/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
+/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {
-    double x[rigid_body_DIM];     /* the state; read it freely, change it only through functions */
-    double carry[rigid_body_DIM]; /* what rounding took from x: the state proper is x + carry */
-    size_t steps;                 /* good steps since rigid_body_init */
-    size_t evaluations;           /* of the generating function, for statistics */
-    double t;                     /* time since rigid_body_init */
-    double h;                     /* the last step size; NaN before the first step */
-    rigid_body_params params;
-    double gauge[rigid_body_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */
-    double coef[rigid_body_COEFFICIENTS]; /* all that depends on params and h only */
-    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double x[rigid_body_DIM]; /* the state; change it only by the functions below */
+    double carry[rigid_body_DIM]; /* rounding error of x: x + carry is more accurate */
+    size_t steps; /* number of successful steps since rigid_body_init */
+    size_t evaluations; /* number of evaluations of the generating function, for statistics */
+    double t; /* time since rigid_body_init */
+    double h; /* size of the last step; NaN before the first step */
+    rigid_body_params params; /* the parameters, set by rigid_body_init; do not change them */
+    double gauge[rigid_body_GAUGES]; /* factors of the Casimirs that are subtracted from H, in their order */
+    double coef[rigid_body_COEFFICIENTS]; /* functions of params and h, computed when h changes */
+    size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
-    rigid_body_history history; /* for starting guesses */
-    rigid_body_learnt blocks;
+    rigid_body_history history; /* predictor of the starting value of the iteration */
+    rigid_body_learnt blocks;   /* measurements that decide when steps are made in blocks */
 } rigid_body_solver;
-size_t rigid_body_solver_size(void); /* for bindings to other languages, as what follows */
+size_t rigid_body_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t rigid_body_solver_steps_done(const rigid_body_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. rigid_body_BAD_ARGUMENT, and *s as before, if x0, a
-   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
+/* Initialise *s with the state x0. params may be NULL for the defaults. rigid_body_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
 rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM]);
 
-/* Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge. */
+/* As rigid_body_init, with given factors of Casimirs. The step is a Poisson map for each fixed gauge. */
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES]);
 
-/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
+/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
 rigid_body_status rigid_body_step(rigid_body_solver *s, double h);
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps);
 
-/* Between steps: stand at x, or move by change, all else being as it was, also on rigid_body_BAD_ARGUMENT.
-   Either may leave the leaf. */
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+   rigid_body_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 rigid_body_status rigid_body_set_state(rigid_body_solver *s, const double x[rigid_body_DIM]);
 rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigid_body_DIM]);
 
-/* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
-   state. status (or NULL) receives the status of each; the first that is not OK is returned. */
-/* Members are integrated side by side in groups; with OpenMP, groups in parallel. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
+   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Members are integrated in SIMD batches; with OpenMP, batches in parallel. */
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
 
-/* The same where each member has its own parameters params[m], gauge &gauge[m * rigid_body_GAUGES] and step
-   h[m]; params and gauge may be NULL. */
-/* frames (or NULL) receives the states after every stride-th step: frames[(k * rigid_body_DIM + i) * members
-   + m] is coordinate i of member m after (k + 1) * stride steps, NaN if it failed before. Arrays must not
-   overlap. */
+/* The same for members with parameters params[m], step size h[m], and factors gauge[m * rigid_body_GAUGES +
+   k] of the Casimirs. params may be NULL for the defaults, gauge for factors chosen at the initial states. */
+/* frames, if not NULL, receives the states after every stride-th step: frames[(k * rigid_body_DIM + i) *
+   members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before.
+   Arrays must not overlap. */
 rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, double *x, size_t members,
     const double *gauge, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
 

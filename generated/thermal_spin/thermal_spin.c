@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 64986dd2bb0fb84109cf147ad29e790125a64f1e83fe0f6e02263a4481c538b6
+ * body-sha256: a1d8819dbe7dc2d5593d8e1a11adef3e8308542c5da09be7b725e730d8bd5a05
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -27,11 +27,11 @@
 /* ---- The model ---- */
 const thermal_spin_params thermal_spin_default_params = { 1.0, 0.5, 0.1 };
 
-enum { thermal_spin_PREPARED = 7 }; /* coefficients that depend on params and h only, before the others */
-enum { thermal_spin_MAX_ITERATIONS = 20 }; /* of an inner solve */
-#define thermal_spin_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
+enum { thermal_spin_PREPARED = 7 }; /* number of the first coefficients, functions of params and h only */
+enum { thermal_spin_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+#define thermal_spin_TOLERANCE 1e-20 /* largest estimated error after an accepted correction */
 
-#define thermal_spin_BOUND 6.0 /* of normal variates, so that no rare one makes a step impossible */
+#define thermal_spin_BOUND 6.0 /* bound of normal variates, so that steps do not fail by rare large ones */
 
 static int thermal_spin_allowed(const thermal_spin_params *params)
 {

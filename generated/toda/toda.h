@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6c68c9a9a9647c9abd3c476e0bca627b35e20cee9c2c8f9f0ec2034ca127f4e5
+ * body-sha256: c3f839245801bee15eec76ee9abdd8539e48a02ef183bad90850fe7c2fdb8484
  */
 #ifndef TODA_H
 #define TODA_H
@@ -23,58 +23,64 @@ typedef struct {
 extern const toda_params toda_default_params;
 
 enum { toda_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
-enum { toda_COEFFICIENTS = 28 }; /* numbers that depend on params and h only */
+enum { toda_COEFFICIENTS = 28 }; /* numbers that are functions of params and h */
 
 typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
     toda_BAD_ARGUMENT } toda_status;
 
-/* The state is kept in memory of the caller.
-   A field is a row: all its sites, with copies of the other end beside them.
-   Set it up with toda_init; a copy of the struct is the same solver, not another one. */
+/* A solver and the trajectory that it computes. Initialise it by toda_init. Its arrays lie in memory of the
+   caller, so a copy of the struct is not an independent solver. A field is stored as one row of all sites,
+   with a halo: copies of the sites of the other end beside each end. Read all fields of the struct at any
+   time, write to none of them. */
 typedef struct {
-    size_t sizes[toda_AXES];
-    size_t sites, rows;
-    ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
-    /* in rows, each field, then each parameter at sites: the first site of the first row */
+    size_t sizes[toda_AXES]; /* number of sites along each axis */
+    size_t sites, rows;      /* number of all sites, and of rows */
+    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
+    /* the state: first site of each field, then of each parameter at sites, in rows */
     double *x[toda_ARRAYS];
-    double *before[toda_DIM]; /* the fields before the steps that are being made */
-    int open;                 /* whether these lack the last flow of a step, which between calls x has made */
-    size_t far;               /* steps to be made by functions for large arguments, where there are others */
-    size_t steps;             /* good steps since toda_init */
-    double t;                 /* time since toda_init */
-    double h;                 /* the last step size */
-    toda_params params;
-    double coef[toda_COEFFICIENTS]; /* all that depends on params and h only */
-    int prepared; /* whether coef has been computed */
-    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double *before[toda_DIM]; /* the fields at the start of the present steps, restored if a step fails */
+    /* 1 if before lacks the last flow of the last step, which x includes between calls */
+    int open;
+    /* steps that use functions for arguments of any size in place of faster ones for small */
+    size_t far;
+    size_t steps; /* number of successful steps since toda_init */
+    double t; /* time since toda_init */
+    double h; /* size of the last step */
+    toda_params params; /* the parameters, set by toda_init */
+    double coef[toda_COEFFICIENTS]; /* functions of params and h */
+    int prepared; /* 1 if coef has been computed */
+    size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
 } toda_solver;
 
-/* The bytes that the solver of a lattice needs as its memory; 0 for sizes that are not allowed. */
+/* Return the number of bytes that toda_init needs as memory for these sizes, 0 for sizes that are not
+   admissible. */
 size_t toda_work_size(const size_t sizes[toda_AXES]);
 
-/* Start at x0[field][site], the last axis fastest, with toda_work_size(sizes) bytes of memory, as from
-   malloc, which must stay. params may be NULL for the defaults; its arrays are copied. toda_BAD_ARGUMENT if
-   sizes are not allowed, x0 or a parameter is not finite, or one that has to be positive is not. */
+/* Initialise *s with the state x0[field][site], where the site index of the last axis varies fastest. work is
+   memory of toda_work_size(sizes) bytes, aligned as by malloc; the caller frees it after the last use of *s.
+   params may be NULL for the defaults; its arrays are copied. Returns toda_BAD_ARGUMENT if sizes are not
+   admissible, if x0 or a parameter is not finite, or if a parameter that must be positive is not. */
 toda_status toda_init(toda_solver *s, const toda_params *params, const size_t sizes[toda_AXES],
     const double *x0, void *work);
 
-/* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
-   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
+   step, and s->steps counts the successful ones. The last flow of a step is merged with the first of the
+   next, also of the next call. With OpenMP, rows are updated in parallel, with the same bits for any number
+   of threads. */
 toda_status toda_step(toda_solver *s, double h);
 toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 
-/* The state x[field][site]. */
+/* Copy the state to x[field][site]. */
 void toda_state(const toda_solver *s, double *x);
 
-/* To go on elsewhere with the same bits: if toda_saved is 1, x is what the next step begins with, for
-   toda_resume after toda_init at the state. If it is 0, toda_resume has NULL for x. */
+/* Save and restore a run with the same bits. toda_saved writes x[field][site] and far. To restore, call
+   toda_init with the state, then toda_resume with far, and with x if toda_saved returned 1, else NULL. */
 int toda_saved(const toda_solver *s, double *x, size_t *far);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far);
 
-/* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
-   out[field][site]. */
+/* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the
+   Casimirs; the right-hand side out[field][site] of the equations of motion. */
 double toda_hamiltonian(const toda_solver *s);
 void toda_density(const toda_solver *s, double *out);
 void toda_casimirs(const toda_solver *s, double *out);
@@ -82,7 +88,8 @@ void toda_vector_field(const toda_solver *s, double *out);
 
 const char *toda_status_string(toda_status status);
 
-/* For bindings: the size of toda_solver, and its count of good steps. */
+/* For other languages, which cannot read the struct: its size in bytes, and its number of successful
+   steps. */
 size_t toda_solver_size(void);
 size_t toda_solver_steps_done(const toda_solver *s);
 

@@ -50,19 +50,25 @@ STATE = (
     StateBlock(
         "x",
         members=(
-            "double x[PHI_DIM];     /* the state; read it freely, change it only through functions */",
-            "double carry[PHI_DIM]; /* what rounding took from x: the state proper is x + carry */",
-            "size_t steps;          /* good steps since phi_init */",
+            "double x[PHI_DIM];     /* the state; change it only by the functions below */",
+            "double carry[PHI_DIM]; /* rounding error of x: x + carry is more accurate */",
+            "size_t steps;          /* number of successful steps since phi_init */",
         ),
         saved=(("x", "PHI_DIM"), ("carry", "PHI_DIM")),
         copied=("twin.carry.set(this.carry);",),
     ),
-    StateBlock("evaluations", "GAUSS", ("size_t evaluations;    /* sweeps over the stages, for statistics */",)),
-    StateBlock("evaluations", "!GAUSS", ("size_t evaluations;    /* of the generating function, for statistics */",)),
+    StateBlock(
+        "evaluations", "GAUSS", ("size_t evaluations;    /* number of sweeps over the stages, for statistics */",)
+    ),
+    StateBlock(
+        "evaluations",
+        "!GAUSS",
+        ("size_t evaluations;    /* number of evaluations of the generating function, for statistics */",),
+    ),
     StateBlock(
         "t",
         "MONITOR",
-        ("double t, t_carry;     /* physical time since phi_init, t + t_carry: steps are equal in tau, not in it */",),
+        ("double t, t_carry;     /* physical time since phi_init, t + t_carry; steps are equal in tau, not t */",),
         saved=(("t", ""), ("t_carry", "")),
         copied=("twin.tCarry = this.tCarry;",),
     ),
@@ -72,59 +78,68 @@ STATE = (
         "noise",
         "NOISE",
         (
-            "uint64_t seed, first_step; /* which random numbers are taken, see phi_set_noise */",
+            "uint64_t seed, first_step; /* with member, these select the random numbers: see phi_set_noise */",
             "uint32_t member;",
-            "double dw[PHI_DRAWS];  /* the increments of the noise in the last step */",
+            "double dw[PHI_DRAWS];  /* increments of the noise in the last step */",
         ),
         copied=("twin.dw.set(this.dw);",),
     ),
     StateBlock(
         "h",
-        members=("double h;              /* the last step size; NaN before the first step */", "phi_params params;"),
+        members=(
+            "double h;              /* size of the last step; NaN before the first step */",
+            "phi_params params;     /* the parameters, set by phi_init; do not change them */",
+        ),
         reset=("s->h = h;",),
     ),
     StateBlock(
         "gauge",
         "GAUGE && MONITOR",
-        ("double gauge[PHI_GAUGES]; /* e = -H(x0): K = monitor (H + e) is 0 along the trajectory */",),
+        ("double gauge[PHI_GAUGES]; /* energy level e = -H(x0); K = monitor (H + e) is 0 along the trajectory */",),
     ),
     StateBlock(
         "gauge",
         "GAUGE && !MONITOR",
-        ("double gauge[PHI_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */",),
+        ("double gauge[PHI_GAUGES]; /* factors of the Casimirs that are subtracted from H, in their order */",),
     ),
     StateBlock(
         "coef",
         "NOISE",
-        (f"{_COEFFICIENTS} /* what depends on params and h only, then on dw and the time as well */",),
+        (f"{_COEFFICIENTS} /* functions of params and h; behind them, functions of dw and time too */",),
     ),
     StateBlock(
         "coef",
         "RENEWED && !NOISE",
-        (f"{_COEFFICIENTS} /* what depends on params and h only, then on the time of the step as well */",),
+        (f"{_COEFFICIENTS} /* functions of params and h; behind them, functions of the time too */",),
     ),
-    StateBlock("coef", "!RENEWED && !NOISE", (f"{_COEFFICIENTS} /* all that depends on params and h only */",)),
+    StateBlock(
+        "coef", "!RENEWED && !NOISE", (f"{_COEFFICIENTS} /* functions of params and h, computed when h changes */",)
+    ),
     StateBlock(
         "attitude",
         "ATTITUDE && MATRICES",
-        ("double attitude[PHI_ATTITUDE_SIZE]; /* a matrix, row by row; change it only through phi_set_attitude */",),
+        ("double attitude[PHI_ATTITUDE_SIZE]; /* a matrix, row by row; change it only by phi_set_attitude */",),
     ),
     StateBlock(
         "attitude",
         "ATTITUDE && !MATRICES",
         (
             "double attitude[PHI_ATTITUDE_SIZE];"
-            " /* the quaternion (w, x, y, z) that turns body into space; see phi_set_attitude */",
+            " /* quaternion (w, x, y, z) that rotates body into space coordinates; see phi_set_attitude */",
         ),
     ),
-    StateBlock("position", "ATTITUDE && POSITION", ("double position[3]; /* of the body, in space */",)),
-    StateBlock("first", "ATTITUDE && MATRICES", ("double first[PHI_ELEMENT]; /* where the attitude began */",)),
+    StateBlock(
+        "position",
+        "ATTITUDE && POSITION",
+        ("double position[3]; /* position of the body in space; change it only by phi_set_attitude */",),
+    ),
+    StateBlock("first", "ATTITUDE && MATRICES", ("double first[PHI_ELEMENT]; /* attitude of phi_set_attitude */",)),
     StateBlock(
         "turned",
         "ATTITUDE",
         (
             "double turned[PHI_ELEMENT], turned_carry[PHI_ELEMENT];"
-            " /* the product of what steps turned by; what rounding took */",
+            " /* product of the rotations of all steps; its rounding error */",
         ),
         saved=(("turned", "PHI_ELEMENT"), ("turned_carry", "PHI_ELEMENT")),
         copied=(
@@ -138,8 +153,8 @@ STATE = (
         "RATE_OF_GAUGE",
         (
             "double rate[PHI_RATE];"
-            " /* the gradient of the Casimirs that are taken from H: the body turns by them too */",
-            "double aside[PHI_ELEMENT]; /* what it turns by so in a step, less 1 */",
+            " /* gradient of the Casimirs subtracted from H: the body rotates at this rate too */",
+            "double aside[PHI_ELEMENT]; /* the rotation at this rate in one step, minus the identity */",
         ),
         reset=("phi_set_aside(s);",),
         copied=(
@@ -150,13 +165,13 @@ STATE = (
     StateBlock(
         "aside_of_block",
         "RATE_OF_GAUGE && BLOCKS",
-        ("double aside_of_block[PHI_ELEMENT]; /* the same in a block of steps */",),
+        ("double aside_of_block[PHI_ELEMENT]; /* the same for a block of steps */",),
     ),
     StateBlock(
         "before_h",
         "!MONITOR",
         (
-            "size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */",
+            "size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */",
             "double t_before_h;",
         ),
         reset=("s->t_before_h = s->t;", "s->steps_before_h = s->steps;"),
@@ -164,7 +179,7 @@ STATE = (
     StateBlock(
         "history",
         "GUESSED",
-        ("phi_history PHI_OF(history, PHI_STAGES); /* for starting guesses */",),
+        ("phi_history PHI_OF(history, PHI_STAGES); /* predictor of the starting value of the iteration */",),
         reset=("memset(&s->history, 0, sizeof s->history);",),
     ),
     StateBlock(
@@ -175,7 +190,7 @@ STATE = (
     StateBlock(
         "blocks",
         "BLOCKS",
-        ("phi_learnt blocks;",),
+        ("phi_learnt blocks;     /* measurements that decide when steps are made in blocks */",),
         reset=(
             "memset(&s->blocks, 0, sizeof s->blocks);",
             "s->blocks.single_steps = 2 * PHI_AHEAD;",

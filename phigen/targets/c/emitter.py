@@ -148,28 +148,30 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
 def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
     member, step = members(program), program.step
     sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
-    only = f", and on {_renewing(program)}" if program.step.refresh else " only"
-    sizes.append(("COEFFICIENTS", max(1, program.step.coefficients), f"numbers that depend on params and h{only}"))
+    also = f", and of {_renewing(program)}" if program.step.refresh else ""
+    sizes.append(
+        ("COEFFICIENTS", max(1, program.step.coefficients), f"numbers that are functions of params and h{also}")
+    )
     sizes += _of_noise(program.noise) if program.noise else []
     if program.held:
-        whose = f"Casimirs whose multiples are taken from H: {', '.join(program.held)}"
-        sizes.append(("GAUGES", len(program.held), "that a trajectory holds fixed: e" if program.monitor else whose))
+        held = f"Casimirs of which multiples are subtracted from H: {', '.join(program.held)}"
+        sizes.append(("GAUGES", len(program.held), "the energy level e" if program.monitor else held))
     sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["ADJOINT"]:
         trail = _trail(program, lanes)
-        sizes.append(("TRAIL", trail, "numbers of a step that its transpose needs"))
+        sizes.append(("TRAIL", trail, "numbers on the tape for each step, for the reverse pass"))
         if has["EACH"]:
-            kept = 1 if isinstance(program.step, Splitting) else LANES * _packs_back(lanes, has)
-            sizes.append(("TRAIL_EACH", trail * max(1, kept), "the same for members that go back together"))
+            batch = 1 if isinstance(program.step, Splitting) else LANES * _packs_back(lanes, has)
+            sizes.append(("TRAIL_EACH", trail * max(1, batch), "the same for a batch of members"))
     if has["GUESSED"] and not has["RECURRENCES"] and not has["GAUSS"]:
         predictor = PredictorPolicy()
-        sizes.append(("DIFFERENCES", predictor.differences, "that a step is extrapolated from: more amplify rounding"))
+        sizes.append(("DIFFERENCES", predictor.differences, "for the predictor; more would amplify rounding"))
     sizes += gauss.declared(step, lanes) if isinstance(step, Gauss) else []
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
-        sizes.append(("REMEMBERED", memory["REMEMBERED"], "values that a recurrence is fitted to"))
-        sizes.append(("WINDOW", memory["WINDOW"], "of them that it may use"))
-        sizes.append(("AHEAD", memory["AHEAD"], "values that it foresees"))
+        sizes.append(("REMEMBERED", memory["REMEMBERED"], "past solutions that the recurrence is fitted to"))
+        sizes.append(("WINDOW", memory["WINDOW"], "largest number of past solutions in the recurrence"))
+        sizes.append(("AHEAD", memory["AHEAD"], "number of solutions that the recurrence predicts"))
     return {
         "NAME": program.name,
         "noise": program.noise is not None,
@@ -206,7 +208,7 @@ Exported = list[tuple[Kernel, str, bool]]
 
 
 def _observables(program: Program) -> Iterator[tuple[str, Exported]]:
-    """What users may ask of a system at a state, and what the header says of it."""
+    """Yield the exported functions of a state, in groups with the comment of the header."""
     seen, noise, monitor, modified = program.observables, program.noise, program.monitor, program.modified
     at = " at the time t" if program.time else ""
     yield (
@@ -219,28 +221,31 @@ def _observables(program: Program) -> Iterator[tuple[str, Exported]]:
             [(seen.named, "observables", False)],
         )
     if noise and noise.fields:
-        said = "sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL."
-        yield said, [(noise.fields, "", False)]
+        comment = "The vector field sigma pi(x) grad g(x) of each source of noise, in order. params may be NULL."
+        yield comment, [(noise.fields, "", False)]
     if monitor:
-        yield "dt/dtau at x; params may be NULL.", [(monitor.rate, "", True)]
+        yield (
+            "The monitor dt/dtau at x, the physical time per unit of tau. params may be NULL.",
+            [(monitor.rate, "", True)],
+        )
     if modified:
-        order = f"up to O(h^{program.name}_MODIFIED_POWER)"
-        said = f"The Hamiltonian whose flow a step of size h is, {order}: constant along a trajectory to that order."
-        yield said, [(modified.kernel, "modified_hamiltonian", True)]
+        error = f"O(h^{program.name}_MODIFIED_POWER)"
+        comment = f"The modified Hamiltonian: a step of size h is its flow, and conserves it, up to {error}."
+        yield comment, [(modified.kernel, "modified_hamiltonian", True)]
 
 
 def _renewing(program: Program) -> str:
-    """What `refresh` computes from."""
-    given = {"the time": program.time, "the noise": program.noise}
-    return " and ".join(name for name, there in given.items() if there)
+    """Return the arguments of `refresh` in words: the time, the noise, or both."""
+    arguments = {"the time": program.time, "the noise": program.noise}
+    return " and ".join(name for name, present in arguments.items() if present)
 
 
 def _of_noise(noise: Noise) -> Sizes:
     names = ", ".join(noise.sources)
     return [
-        ("SOURCES", len(noise.sources), f"of noise: {names}"),
-        ("DRAWS", noise.draws, "increments of the noise in a step"),
-        ("PARTS", noise.parts, "increments of one source in a step, each of a part of it"),
+        ("SOURCES", len(noise.sources), f"sources of noise: {names}"),
+        ("DRAWS", noise.draws, "increments of all sources in a step"),
+        ("PARTS", noise.parts, "increments of one source in a step, one for each part of the step"),
     ]
 
 
@@ -248,54 +253,56 @@ def _of_attitude(attitude: Attitude) -> Sizes:
     from phigen.scheme.attitude import SIZE_OF_COVECTOR
 
     group, rate, rows = attitude.group, attitude.rate, attitude.group.rows
-    shown = f"numbers of an attitude, a matrix of {rows} rows" if rows else "numbers of an attitude, a quaternion"
+    shown = f"numbers of an attitude, a matrix with {rows} rows" if rows else "numbers of an attitude, a quaternion"
     sizes = [("ATTITUDE_SIZE", rows**2 or 4, shown)]
     position = ", with the position" * bool(group.translation)
-    sizes.append(("ELEMENT", group.size, f"numbers of an element of the group{position}"))
-    sizes += [("ROWS_OF_ATTITUDE", rows, "of a matrix")] if rows else []
+    sizes.append(("ELEMENT", group.size, f"numbers of a group element: an attitude{position}"))
+    sizes += [("ROWS_OF_ATTITUDE", rows, "rows of an attitude matrix")] if rows else []
     covector = f"numbers of a covector, and {SIZE_OF_COVECTOR}"
     sizes += [("COVECTOR", len(group.matrices) + 1, covector)] if attitude.exponential else []
-    return sizes + ([("RATE", len(rate.roots), "numbers of what the Casimirs turn")] if rate else [])
+    return sizes + ([("RATE", len(rate.roots), "numbers of the rotation rate of the gauge")] if rate else [])
 
 
 def _about(parameter: Parameter, member: str) -> str:
-    """The comment on a member of the struct; with the name of the spec where the member has another."""
-    said = plain(parameter.description) or f"default {float(parameter.value)!r}"
-    said += f" [{plain(parameter.unit)}]" * bool(parameter.unit)
-    return said if member == parameter.name else f"{parameter.name}: {said}"
+    """Return the comment on a member of the struct, with the name in the spec if the member has another one."""
+    comment = plain(parameter.description) or f"default {float(parameter.value)!r}"
+    comment += f" [{plain(parameter.unit)}]" * bool(parameter.unit)
+    return comment if member == parameter.name else f"{parameter.name}: {comment}"
 
 
 def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> Sizes:
     sizes: Sizes = []
     step = program.step
     if step.refresh:
-        sizes.append(("PREPARED", step.prepared, "coefficients that depend on params and h only, before the others"))
+        sizes.append(("PREPARED", step.prepared, "number of the first coefficients, functions of params and h only"))
     if isinstance(step, Implicit):
-        sizes.append(("MAX_ITERATIONS", step.inner.max_iterations, "of an inner solve"))
+        sizes.append(("MAX_ITERATIONS", step.inner.max_iterations, "limit of the iterations of an implicit step"))
     sizes += gauss.constants(program, step) if isinstance(step, Gauss) else []
     if isinstance(step, Path):
-        sizes.append(("TERMS", TERMS, "most of the expansion of a path; one that needs more is cut into pieces"))
-        sizes.append(("SERIES", len(step.recurrences.series), "of a path, those of the coordinates first"))
+        sizes.append(("TERMS", TERMS, "largest number of Taylor terms of a path; a path that needs more is divided"))
+        sizes.append(
+            ("SERIES", len(step.recurrences.series), "Taylor series of a path, those of the coordinates first")
+        )
         sizes.append(("FIXED", max(1, len(step.recurrences.fixed)), "values that are constant along a path"))
         if step.tangent:
             varied = step.tangent.recurrences
-            sizes.append(("TANGENT_SERIES", len(varied.series), "of a path with its variation"))
-            sizes.append(("TANGENT_FIXED", max(1, len(varied.fixed)), "values that are constant along it"))
+            sizes.append(("TANGENT_SERIES", len(varied.series), "Taylor series of a path and its derivative"))
+            sizes.append(("TANGENT_FIXED", max(1, len(varied.fixed)), "values that are constant along the path"))
         if step.back:
             back, n = step.back, program.dimension
-            sizes.append(("BACK", 3 * n + len(back.used), "numbers of a path traced back, with cotangents"))
-            sizes.append(("BACK_SERIES", len(back.recurrences.series), "of such a path"))
-            sizes.append(("BACK_FIXED", max(1, len(back.recurrences.fixed)), "values that are constant along it"))
+            sizes.append(("BACK", 3 * n + len(back.used), "numbers of a path in the reverse pass, with cotangents"))
+            sizes.append(("BACK_SERIES", len(back.recurrences.series), "Taylor series of such a path"))
+            sizes.append(("BACK_FIXED", max(1, len(back.recurrences.fixed)), "values that are constant along the path"))
     if has["ADJOINT"]:
         sizes += [("RENEWED_OF_ROW", step.renewed, "coefficients of a row that depend on the time")] * bool(
             step.refresh
         )
     if has["RECURRENCES"]:
         checks = remembered(program, lanes)["CHECKS"]
-        sizes.append(("CHECKS", checks, "values that a recurrence is not fitted to, but has to foresee"))
+        sizes.append(("CHECKS", checks, "past solutions that the recurrence is tested on, not fitted to"))
     if has["BLOCKS"] and isinstance(lanes, Blocks):
         passes = PASSES if lanes.vectorised and not has["PATH"] else PASSES_OF_CALLS
-        sizes.append(("PASSES", passes, "over a block, that cost per step what an evaluation costs"))
+        sizes.append(("PASSES", passes, "iterations of a block that cost as much per step as one evaluation"))
         if lanes.factors:
             entries = len(lanes.factors.factorise.roots)
             sizes.append(("FACTORS", entries, "entries of the factors of a Newton matrix"))

@@ -23,21 +23,23 @@ from phigen.targets.rendering import render
 
 
 def declarations(program: Program, step: Sweeps) -> str:
-    """What users see: sizes and parameters."""
+    """Return the public declarations: sizes and parameters."""
     member, layout = members(program), layout_of(program, step)
     listed = [_declared(p, member[p.name]) for p in program.parameters]
     arrays = len(layout.arrays)
     sizes = [
         ("ARRAYS", arrays, f"arrays over the sites: fields, then parameters{', then noise' * bool(program.noise)}"),
-        ("COEFFICIENTS", max(1, step.row * rows_of(step)), "numbers that depend on params and h only"),
+        ("COEFFICIENTS", max(1, step.row * rows_of(step)), "numbers that are functions of params and h"),
     ]
     if step.equation:
         stages, has = len(program.fractions), switches(program, step, layout)
-        sizes += [("STAGES", stages, "of a step")] if stages > 1 else []
-        sizes += [("DIRECTIONS", LatticeNewtonPolicy().directions, "of a Krylov space")] if has["KRYLOV"] else []
-        sizes += [("DIFFERENCES", _differences(program), "that a guess is extrapolated from")] if has["GUESSES"] else []
+        sizes += [("STAGES", stages, "stages of a step")] if stages > 1 else []
+        sizes += (
+            [("DIRECTIONS", LatticeNewtonPolicy().directions, "dimension of a Krylov space")] if has["KRYLOV"] else []
+        )
+        sizes += [("DIFFERENCES", _differences(program), "differences of the predictor")] if has["GUESSES"] else []
     if step.partners:
-        sizes.append(("GATHERED", _gathered(layout), "sums over other sites that are held for each site"))
+        sizes.append(("GATHERED", _gathered(layout), "sums over other sites that are stored for each site"))
     if step.sites.at_bonds:
         sizes.append(("BOND_ARRAYS", len(step.sites.at_bonds), "parameters at bonds"))
     values = {
