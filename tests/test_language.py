@@ -27,6 +27,7 @@ CLEAN = (
     "runtime",
     "series",
     "spec",
+    "splitting",
     "study",
     "sweeping",
     "symbolic",

@@ -1,8 +1,8 @@
-"""The linear equations that coordinates satisfy along the flow of a part, found by closing them under differentiation.
+"""Linear equations of coordinates along the flow of a part, by closing sets of monomials under differentiation.
 
-Starting from a coordinate, derivatives along π∇G are written as polynomials in the moving variables; each new monomial
-joins the list. Where the list ends, its entries w obey ẇ = Aw, and A holds frozen and static quantities alone. So
-kicks and drifts, rotations, shears and scalings are all one case, and triangular polynomial equations are another.
+The derivative of a coordinate along π∇G is written as a polynomial in the moving variables, and each new monomial
+joins the list. If the list ends, its entries w obey ẇ = Aw, where A contains frozen and static quantities alone. So
+kicks and drifts, rotations, shears and scalings are all one case; triangular polynomial equations are another.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from phigen.splitting.ring import Monomial, Ring
 from phigen.symbolic.tower import Poly
 
-#: Longest list of monomials for one coordinate, and the largest degree of one; of coordinates alone, without products.
+#: Bounds of a list: monomials, their degree, and coordinates in a list without products. Longer ones count as infinite.
 MOST_MONOMIALS, MOST_DEGREE, MOST_COORDINATES = 16, 8, 64
 
 Row = dict[Monomial, Poly]
@@ -23,7 +23,7 @@ Row = dict[Monomial, Poly]
 class LinearMotion:
     """ẇ = Aw for the monomials w in ``basis``, of which the first are the ``coordinates`` (indices); A is constant.
 
-    The monomial 1, if it is needed, is the last one.
+    The monomial 1, if the equations need it, is the last one.
     """
 
     coordinates: tuple[int, ...]
@@ -33,7 +33,10 @@ class LinearMotion:
 
 @dataclass(frozen=True)
 class Motion:
-    """How the coordinates move: the ``moving`` variables, linear motions, and the rates of the other coordinates."""
+    """The motion of the coordinates: linear motions, and the rates of other coordinates.
+
+    ``moving`` are the variables that are not constant.
+    """
 
     moving: frozenset[int]
     linear: tuple[LinearMotion, ...]
@@ -41,38 +44,38 @@ class Motion:
 
 
 def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
-    """The motion along a vector field, coordinate by coordinate."""
+    """Return the motion along a vector field, coordinate by coordinate."""
     rates = {v: ring.rate(ring.tower.gens[v], field) for v in ring.state}
     rates = {v: r for v, r in rates.items() if r != 0}
     rows: dict[Monomial, Row] = {}
     starts: dict[Monomial, int] = {}
-    other: dict[int, Poly] = {}
+    nonlinear: dict[int, Poly] = {}
     for i, c in enumerate(ring.coordinates):
         v = ring.tower.names.index(c)
         if v not in rates:
             continue
         start = tuple(int(k == v) for k in range(len(ring.tower.names)))
-        found = _closed(ring, rates, start, rows)
-        if found is None:
-            other[i] = rates[v]
+        closed_rows = _closed(ring, rates, start, rows)
+        if closed_rows is None:
+            nonlinear[i] = rates[v]
         else:
-            rows |= found
+            rows |= closed_rows
             starts[start] = i
-    return Motion(frozenset(rates), tuple(_motions(ring, rows, starts)), other)
+    return Motion(frozenset(rates), tuple(_motions(ring, rows, starts)), nonlinear)
 
 
 def _closed(
     ring: Ring, rates: Mapping[int, Poly], start: Monomial, known: Mapping[Monomial, Row]
 ) -> dict[Monomial, Row] | None:
-    """The rows of all monomials that the derivatives of one lead to; None if there seem to be infinitely many."""
+    """Return the rows of all monomials in the repeated derivatives of one; None if there seem to be infinitely many."""
     rows: dict[Monomial, Row] = {}
     pending = [start]
     while pending:
         m = pending.pop()
         if m in rows or m in known:
             continue
-        most = MOST_COORDINATES if all(sum(k) <= 1 for k in (*rows, m)) else MOST_MONOMIALS
-        if len(rows) >= most or sum(m) > MOST_DEGREE:
+        limit = MOST_COORDINATES if all(sum(k) <= 1 for k in (*rows, m)) else MOST_MONOMIALS
+        if len(rows) >= limit or sum(m) > MOST_DEGREE:
             return None
         rows[m] = _row(ring, rates, m)
         pending += sorted(rows[m])
@@ -80,28 +83,28 @@ def _closed(
 
 
 def _row(ring: Ring, rates: Mapping[int, Poly], m: Monomial) -> Row:
-    """The derivative of a monomial."""
+    """Return the derivative of a monomial."""
     parts = []
     for v, rate in rates.items():
         if m[v]:
             rest = ring.monomial((*m[:v], m[v] - 1, *m[v + 1 :]))
             parts.append(m[v] * rest * rate)
-    found = ring.terms(ring.tower.combine(parts), rates)
-    return {k: c for k, c in found.items() if not ring.tower.is_zero(c)}
+    terms = ring.terms(ring.tower.combine(parts), rates)
+    return {k: c for k, c in terms.items() if not ring.tower.is_zero(c)}
 
 
 def _motions(ring: Ring, rows: Mapping[Monomial, Row], starts: Mapping[Monomial, int]) -> Iterator[LinearMotion]:
-    """The equations, cut into systems that do not share monomials other than 1."""
+    """Yield the equations, split into systems that share no monomials other than 1."""
     label = {m: k for k, m in enumerate(rows) if any(m)}
     for m, row in rows.items():
-        together = {label[k] for k in (m, *row) if any(k)}
-        label = {k: min(together) if old in together else old for k, old in label.items()}
-    for wanted in sorted(set(label.values())):
-        inside = [m for m in rows if label.get(m) == wanted]
-        basis = sorted((m for m in inside if m in starts), key=lambda m: starts[m])
+        merged = {label[k] for k in (m, *row) if any(k)}
+        label = {k: min(merged) if old in merged else old for k, old in label.items()}
+    for label_of_system in sorted(set(label.values())):
+        monomials = [m for m in rows if label.get(m) == label_of_system]
+        basis = sorted((m for m in monomials if m in starts), key=lambda m: starts[m])
         coordinates = tuple(starts[m] for m in basis)
-        basis += [m for m in inside if m not in starts]
-        basis += sorted({k for m in inside for k in rows[m] if not any(k)})
+        basis += [m for m in monomials if m not in starts]
+        basis += sorted({k for m in monomials for k in rows[m] if not any(k)})
         zero = ring.tower.zero
         matrix = tuple(tuple(rows[m].get(k, zero) if any(m) else zero for k in basis) for m in basis)
         yield LinearMotion(coordinates, tuple(basis), matrix)

@@ -1,4 +1,4 @@
-"""The numbers of a matrix exponential beside rigorous enclosures of the exact values, by ball arithmetic."""
+"""Check of the floating-point values of matrix exponentials against rigorous enclosures by ball arithmetic."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from phigen.splitting.matrices import MatrixExponential, exponential_less_one
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement
 
-#: Times at which the numbers are compared, as multiples of 1/‖A‖.
+#: Times of the comparison, as multiples of 1/‖A‖.
 TIMES = (1e-3, 1.0, 30.0)
 
-#: Allowed errors, in units of rounding, relative to the norm of the matrix: for each row, and for each unit of ‖tA‖.
+#: Largest error in units of rounding, relative to the norm of the matrix, for each row and for each unit of ‖tA‖.
 UNITS = 8.0
 
 #: Bits of the enclosures.
@@ -23,7 +23,7 @@ BITS = 200
 
 
 def enclosed(name: str, exponential: MatrixExponential, values: Mapping[str, float]) -> Statement:
-    """Whether exp(tA) − 1 is exact but for rounding, with these values of parameters."""
+    """Decide whether exp(tA) − 1 is exact up to rounding, with these values of parameters."""
     try:
         rates = np.array(evaluate(list(exponential.rates), values)).reshape(exponential.size, -1)
     except (DomainError, KeyError):
@@ -35,8 +35,8 @@ def enclosed(name: str, exponential: MatrixExponential, values: Mapping[str, flo
 
 
 def _error(a: NDArray[np.float64]) -> float:
-    """The error of exp(a) − 1 relative to its norm."""
-    computed, before = exponential_less_one(a), ctx.prec
+    """Return the error of exp(a) − 1 relative to its norm."""
+    computed, precision = exponential_less_one(a), ctx.prec
     try:
         ctx.prec = BITS
         exact = arb_mat([[arb(float(e)) for e in row] for row in a]).exp()
@@ -44,6 +44,6 @@ def _error(a: NDArray[np.float64]) -> float:
         differences = [abs(exact[i, j] - int(i == j) - arb(float(computed[i, j]))) for i in range(n) for j in range(n)]
         largest = max(float(d.mid() + d.rad()) for d in differences)
     finally:
-        ctx.prec = before
+        ctx.prec = precision
     scale = float(np.abs(computed).sum(axis=1).max())
     return largest / scale if scale else largest

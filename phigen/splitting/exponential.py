@@ -6,8 +6,8 @@ The closed forms rest on the relation that the powers of A satisfy; A commutes w
 - A^{a+1} = dA^a: Σ_{k<a} (tA)^k/k! and (e^{td} − …) A^a/d^a, the part of the exponential series from (td)^a on
 - A^{a+2} = −cA^a: the same with sin and cos of t√c, or with sinh and cosh, for a = 1 and a = 2
 
-Where A^a/d^a is not in the ring, as when d depends on the state and A/d would be 0/0 where d vanishes, the functions of
-`phigen.symbolic.entire` take the place of the quotients; they do not care about the sign of c either.
+If d depends on the state, A/d may be 0/0 where d vanishes, so A^a/d^a is not in the ring. Then the entire functions of
+`phigen.symbolic.entire` replace the quotients; they serve for both signs of c.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from phigen.symbolic.tower import Poly, rational
 
 Matrix = Sequence[Sequence[Poly]]
 
-#: Most powers of a matrix that are tried: with 64 rows all of them take minutes.
+#: Largest number of powers of a matrix that are tried: with 64 rows all powers take minutes.
 MOST_POWERS = 16
 
 #: The manner of a motion at a constant rate.
@@ -35,36 +35,39 @@ _HALF = number(Fraction(1, 2))
 
 
 class NoClosedFormError(Exception):
-    """No closed form is known; the text says of what."""
+    """No closed form is known; the text names the matrix."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """The increments of the coordinates of a linear motion, and what they do, in a word."""
+    """The increments of the coordinates of a linear motion, and a word for the motion."""
 
     increments: tuple[Expression, ...]
     manner: str
 
 
 def solve(ring: Ring, motion: LinearMotion) -> Solution:
-    """exp(tA)w − w for the coordinates of the motion. Raises `NoClosedFormError`."""
+    """Return exp(tA)w − w for the coordinates of the motion. Raises `NoClosedFormError`."""
     w = [ring.monomial(m) for m in motion.basis]
     if len(w) == 1:
         growth = ring.expression(motion.matrix[0][0] * ring.tower.variable(TIME))
         return Solution((ring.expression(w[0]) * call("expm1", growth),), "scaled")
     powers = _powers(ring, motion.matrix)
     images = [_image(ring, power, w) for power in powers]
-    found = _nilpotent(ring, powers, images)
+    solution = _nilpotent(ring, powers, images)
     for a in (1, 2):
-        found = found or _scaling(ring, powers, images, a) or _turning(ring, powers, images, a)
-    if found is None:
+        solution = solution or _scaling(ring, powers, images, a) or _turning(ring, powers, images, a)
+    if solution is None:
         size = f"{len(w)}×{len(w)}"
         raise NoClosedFormError(f"exp(tA) with a {size} matrix A whose powers satisfy no relation that phigen can use")
-    return Solution(found.increments[: len(motion.coordinates)], found.manner)
+    return Solution(solution.increments[: len(motion.coordinates)], solution.manner)
 
 
 def _powers(ring: Ring, a: Matrix) -> list[Matrix]:
-    """A, A², …, up to the first power that vanishes, or the size of A if it is small, or A⁴ if that is more."""
+    """Return A, A², …, up to the first power that vanishes.
+
+    If none vanishes, there are as many as A has rows, but at least 4 and at most `MOST_POWERS`.
+    """
     powers = [a]
     while len(powers) < max(4, min(len(a), MOST_POWERS)) and not _vanishes(powers[-1]):
         powers.append(_product(ring, powers[-1], a))
@@ -72,7 +75,7 @@ def _powers(ring: Ring, a: Matrix) -> list[Matrix]:
 
 
 def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]]) -> Solution | None:
-    """Σ t^k A^k w/k!, if some power of A vanishes."""
+    """Return Σ t^k A^k w/k!, if some power of A vanishes."""
     if not _vanishes(powers[-1]):
         return None
     tower, t, factorial = ring.tower, ring.tower.variable(TIME), 1
@@ -86,7 +89,7 @@ def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[P
 
 
 def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
-    """If A^{a+1} = dA^a."""
+    """Return the solution if A^{a+1} = dA^a, else None."""
     d = _ratio(ring, powers[a], powers[a - 1], powers[0])
     if d is None:
         return None
@@ -107,7 +110,7 @@ def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 
 
 def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
-    """If A^{a+2} = −cA^a."""
+    """Return the solution if A^{a+2} = −cA^a, else None."""
     c = None if len(powers) < a + 2 else _ratio(ring, powers[a + 1], powers[a - 1], powers[1])
     if c is None:
         return None
@@ -126,7 +129,7 @@ def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 def _without_quotients(
     ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], c: Poly, a: int
 ) -> Solution | None:
-    """The same by functions of s = ct²: sin and 1 − cos of the angle √s by those of its half."""
+    """Return the solution by functions of s = ct²: sin and 1 − cos of the angle √s from those of its half."""
     t, s = symbol(TIME), ring.expression(c * ring.tower.variable(TIME) ** 2)
     if a == 1:
         return _turned(ring, matrix, images, s)
@@ -138,22 +141,23 @@ def _without_quotients(
 
 
 def _turned(ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], s: Expression) -> Solution:
-    """That for a = 1, with A = fM: the static factor f of all entries joins the time.
+    """Return the solution for a = 1, with A = fM: the static factor f of all entries multiplies the time.
 
-    M²w is what M makes of Mw where that takes fewer operations than its entries do, as cross products."""
+    M²w is computed as M times Mw where that takes fewer operations than its entries, as for cross products.
+    """
     factor = _static_factor(ring, matrix)
     once = [ring.expression(v / factor) for v in images[0]]
     twice = [ring.expression(v / factor**2) for v in images[1]]
     rows = [[ring.expression(e / factor) for e in row] for row in matrix]
     again = [total(e * v for e, v in zip(row, once, strict=True)) for row in rows]
-    twice = min(twice, again, key=lambda found: len(list(topological(found))))
+    twice = min(twice, again, key=lambda entries: len(list(topological(entries))))
     speed = symbol(TIME) * ring.expression(factor) * call("sinroot", s / 4)
     sine, versine = speed * call("cosroot", s / 4), _HALF * speed**2
     return Solution(tuple(sine * u + versine * v for u, v in zip(once, twice, strict=True)), "turned")
 
 
 def _static_factor(ring: Ring, a: Matrix) -> Poly:
-    """The common factor of all entries of a matrix, if it does not depend on the state; else 1."""
+    """Return the common factor of all entries of a matrix, if it does not depend on the state; else 1."""
     factor = reduce(lambda x, y: x.gcd(y), [e for row in a for e in row if e != 0])
     return ring.tower.constant(1) if ring.support(factor) else factor
 
@@ -161,7 +165,10 @@ def _static_factor(ring: Ring, a: Matrix) -> Poly:
 def _circular(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """sin(θ)A/e + (1 − cos θ)A²/e² for a = 1; tA + (1 − cos θ)A²/e² + (θ − sin θ)A³/e³ for a = 2."""
+    """Return the solution with sin and cos.
+
+    It is sin(θ)A/e + (1 − cos θ)A²/e² for a = 1, and tA + (1 − cos θ)A²/e² + (θ − sin θ)A³/e³ for a = 2.
+    """
     sine, versine = call("sin", angle), call("versin", angle)
     if a == 1:
         return Solution(tuple(sine * u + versine * v for u, v in zip(*units, strict=True)), "turned")
@@ -173,7 +180,7 @@ def _circular(
 def _hyperbolic(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """The same with sinh and cosh; 1 − cos θ becomes cosh θ − 1 = 2 sinh²(θ/2)."""
+    """Return the solution with sinh and cosh, where cosh θ − 1 = 2 sinh²(θ/2) replaces 1 − cos θ."""
     s, c = call("sinh", angle / 2), call("cosh", angle / 2)
     if a == 1:
         increments = tuple(2 * s * (c * u + s * v) for u, v in zip(*units, strict=True))
@@ -199,9 +206,9 @@ def _image(ring: Ring, a: Matrix, w: Sequence[Poly]) -> list[Poly]:
 
 
 def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
-    """d with a = d·b, if there is one in the ring.
+    """Return d with a = d·b, or None if there is none in the ring.
 
-    Reciprocals that were cancelled may hide it from the division; then it stands on the diagonal of ``guess``.
+    Where cancelled reciprocals hide d from the division, d stands on the diagonal of ``guess``.
     """
     pairs = [(x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True)]
     if any(x != 0 and y == 0 for x, y in pairs):
@@ -213,9 +220,9 @@ def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
 
 
 def _quotients(ring: Ring, elements: Sequence[Poly], divisor: Poly) -> list[Expression] | None:
-    """The elements over the divisor, if all quotients are in the ring."""
-    found = [divmod(e, divisor) for e in elements]
-    return None if any(rest != 0 for _, rest in found) else [ring.expression(quotient) for quotient, _ in found]
+    """Return the elements over the divisor, if all quotients are in the ring."""
+    divided = [divmod(e, divisor) for e in elements]
+    return None if any(rest != 0 for _, rest in divided) else [ring.expression(quotient) for quotient, _ in divided]
 
 
 @dataclass(frozen=True)
@@ -228,7 +235,7 @@ class _Root:
 
 
 def _root(ring: Ring, c: Poly) -> _Root | None:
-    """The square root of c or of −c, if it is in the ring but for the root of a number."""
+    """Return the square root of c or of −c, if it is in the ring up to the root of a number."""
     content, factors = c.factor()
     if any(multiplicity % 2 for _, multiplicity in factors):
         return None

@@ -1,7 +1,7 @@
 """The exact flow of one part of H, as increments of the coordinates.
 
-A part is a sum of terms that commute with one another. If the joint equations of motion have a closed form, that is the
-flow; otherwise it is the composition of the flows of the terms, in any order, since they commute.
+A part is a sum of terms that commute with one another. If the joint equations of motion have a closed form, this is
+the flow. Otherwise the flow is the composition of the flows of the terms, in any order, since they commute.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ BY_MATRIX = "moved by exp(tA), computed before the steps"
 
 @dataclass(frozen=True)
 class Term:
-    """A term of H, as the user wrote it and in the ring; ``motion`` is what it is, if it is a Kepler motion."""
+    """A term of H, as the user wrote it and in the ring; ``motion`` is set for Kepler motions."""
 
     expression: Expression
     element: Poly
@@ -38,11 +38,11 @@ class Term:
 
 @dataclass(frozen=True)
 class Flow:
-    """The flow of ``hamiltonian`` for the time `TIME`: x + ``increment``; ``manner`` says how the coordinates move.
+    """The flow of ``hamiltonian`` for the time `TIME`: x + ``increment``; ``manner`` describes the motion in words.
 
-    Or that of a ``force``, a vector field; then the Hamiltonian is 0. ``pieces`` are the commuting flows that it is
-    composed of, if there are several; one that is alone a ``motion`` has no pieces. ``exponentials`` are the matrices
-    whose entries are in the increments, as symbols.
+    For a ``force``, a vector field, the Hamiltonian is 0. ``pieces`` are the commuting flows that compose it, if
+    there are several; a single Kepler ``motion`` has no pieces. ``exponentials`` are the matrices whose entries are
+    in the increments, as symbols.
     """
 
     hamiltonian: Expression
@@ -55,16 +55,16 @@ class Flow:
 
     @property
     def letter(self) -> str:
-        """What it is called in formulas: H, or F."""
+        """The letter of the part in formulas: H, or F for a force."""
         return "F" if self.force else "H"
 
     @property
     def has_motion(self) -> bool:
-        """Whether it is a Kepler motion, or some of its pieces are."""
+        """Whether the flow is a Kepler motion, or some of its pieces are."""
         return any(flow.motion for flow in (self, *self.pieces))
 
     def vector_field(self, system: System) -> tuple[Expression, ...]:
-        """The vector field that it is the flow of."""
+        """Return the vector field of the flow."""
         return self.force or hamiltonian_vector_field(system.poisson, gradient(self.hamiltonian, system.coordinates))
 
     @property
@@ -74,7 +74,7 @@ class Flow:
 
 
 class NoFlowError(Exception):
-    """A term has no elementary flow that phigen finds; the text says why."""
+    """phigen finds no elementary flow of a term; the text is the reason."""
 
     def __init__(self, term: Term, reason: str) -> None:
         super().__init__(reason)
@@ -82,7 +82,7 @@ class NoFlowError(Exception):
 
 
 def flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool = True) -> Flow:
-    """The flow of a sum of commuting terms: in closed form, or if there is none and ``numeric`` by matrix exponentials.
+    """Return the flow of a sum of commuting terms: in closed form or, if ``numeric``, by matrix exponentials.
 
     Raises `NoFlowError` for the first term that has neither.
     """
@@ -121,14 +121,17 @@ def _flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool) -> Flow:
 
 
 def _flow_of_motion(ring: Ring, term: Term, motion: KeplerMotion) -> Flow:
-    """The flow of a Kepler motion."""
+    """Return the flow of a Kepler motion."""
     names = ", ".join(ring.coordinates[i] for i in (*motion.positions, *motion.momenta))
     manner = f"{names} {motion.manner}"
     return Flow(term.expression, tuple(motion.increments(ring.coordinates)), manner, motion=motion)
 
 
 def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:
-    """The composition; flows that move least come first, so that the others see coordinates as they were."""
+    """Return the composition of flows that commute; flows that move fewer coordinates come first.
+
+    The later flows then read few updated coordinates.
+    """
     ordered = sorted(flows, key=lambda f: f.moving)
     so_far: list[Expression] = [ZERO] * len(coordinates)
     for flow in ordered:
@@ -142,25 +145,28 @@ def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:
 
 
 def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, numeric: bool = False) -> Flow | str:
-    """The joint flow of terms, or why there is none; ``linear`` admits only flows of linear equations.
+    """Return the joint flow of terms, or the reason why there is none; ``linear`` admits only linear equations.
 
-    These keep small coordinates to their own precision, which differences with a constant sum do not. ``numeric``
-    admits exponentials of matrices that are computed before the steps.
+    Flows of linear equations resolve small coordinates to their own precision, unlike differences with a constant
+    sum. ``numeric`` admits exponentials of matrices that are computed before the steps.
     """
     g = total(t.expression for t in terms)
     field = ring.field(ring.tower.combine(t.element for t in terms))
-    found = solved(ring, field, linear=linear, numeric=numeric)
-    if isinstance(found, str):
-        return found
-    moved = {c for c, e in zip(ring.coordinates, found.increments, strict=True) if not e.is_zero}
-    if any(e.op == "sign" and not moved.isdisjoint(symbols_of(e)) for e in topological(found.increments)):
+    solution = solved(ring, field, linear=linear, numeric=numeric)
+    if isinstance(solution, str):
+        return solution
+    moving = {c for c, e in zip(ring.coordinates, solution.increments, strict=True) if not e.is_zero}
+    if any(e.op == "sign" and not moving.isdisjoint(symbols_of(e)) for e in topological(solution.increments)):
         return "it moves across a kink, as that of abs(q) at q = 0"
-    return Flow(g, tuple(_as_written(ring, g, found)), found.manner, exponentials=found.exponentials)
+    return Flow(g, tuple(_as_written(ring, g, solution)), solution.manner, exponentials=solution.exponentials)
 
 
 @dataclass(frozen=True)
 class Solved:
-    """Increments, how the coordinates move, those that move at a constant rate (indices), and matrix exponentials."""
+    """Increments along a vector field, a description, and matrix exponentials.
+
+    ``shifted`` are the indices of the coordinates that move at a constant rate.
+    """
 
     increments: list[Expression]
     manner: str
@@ -169,47 +175,48 @@ class Solved:
 
 
 def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False, numeric: bool = False) -> Solved | str:
-    """The increments along a vector field, with linear first integrals put in where they help; or why there are none.
+    """Return the increments along a vector field, or the reason why there are none.
 
-    The field need not be that of a Hamiltonian. ``linear`` and ``numeric`` are those of `joint_flow`.
+    Linear first integrals are substituted where that helps. The field need not be that of a Hamiltonian. ``linear``
+    and ``numeric`` are those of `joint_flow`.
     """
-    found = _solved(ring, field, linear)
-    if not isinstance(found, str):
-        return found
-    other = None if linear else _nonlinear(ring, field)
-    if other is None and numeric:
-        by_numbers = _solved(ring, field, linear, numeric=True)
-        other = None if isinstance(by_numbers, str) else by_numbers
-    return other or found
+    direct = _solved(ring, field, linear)
+    if not isinstance(direct, str):
+        return direct
+    alternative = None if linear else _nonlinear(ring, field)
+    if alternative is None and numeric:
+        numerical = _solved(ring, field, linear, numeric=True)
+        alternative = None if isinstance(numerical, str) else numerical
+    return alternative or direct
 
 
 def _nonlinear(ring: Ring, field: Sequence[Poly]) -> Solved | None:
-    """The increments by methods for equations that are not linear in the coordinates."""
+    """Return the increments by methods for equations that are not linear in the coordinates."""
     return _with_integrals(ring, field) or _with_common_factor(ring, field) or _on_sphere(ring, field)
 
 
 def _on_sphere(ring: Ring, field: Sequence[Poly]) -> Solved | None:
-    """The same by a closed form on spheres."""
-    found = spheres.solve(ring, field)
-    if found is None:
+    """Return the increments by a closed form on spheres, or None."""
+    solution = spheres.solve(ring, field)
+    if solution is None:
         return None
-    moved, manner = found
-    names = ", ".join(ring.coordinates[i] for i in moved)
-    return Solved([moved.get(i, ZERO) for i in range(len(field))], f"{names} {manner}", ())
+    increments, manner = solution
+    names = ", ".join(ring.coordinates[i] for i in increments)
+    return Solved([increments.get(i, ZERO) for i in range(len(field))], f"{names} {manner}", ())
 
 
 def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False, *, numeric: bool = False) -> Solved | str:
-    """The increments along a vector field, or why there are none."""
+    """Return the increments along a vector field, or the reason why there are none."""
     motion = motion_of(ring, field)
     increments: list[Expression] = [ZERO] * len(ring.coordinates)
     manners: dict[str, list[int]] = {}
     exponentials: list[MatrixExponential] = []
     for i, rate in motion.other.items():
-        alone = None if linear else scalar.solve(ring, i, rate, motion.moving)
-        if alone is None:
+        solution_of_one = None if linear else scalar.solve(ring, i, rate, motion.moving)
+        if solution_of_one is None:
             return f"phigen cannot solve the equation of {ring.coordinates[i]} along its flow, which is not linear"
-        increments[i] = alone.increments[0]
-        manners.setdefault(alone.manner, []).append(i)
+        increments[i] = solution_of_one.increments[0]
+        manners.setdefault(solution_of_one.manner, []).append(i)
     for equations in motion.linear:
         try:
             solution = exponential.solve(ring, equations)
@@ -224,35 +231,36 @@ def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False, *, numeric:
             return f"phigen has no closed form for the motion of {names} along its flow: {error}"
         increments = _placed(increments, equations.coordinates, solution.increments)
         manners.setdefault(solution.manner, []).extend(equations.coordinates)
-    said = [f"{', '.join(ring.coordinates[i] for i in moved)} {manner}" for manner, moved in manners.items()]
+    descriptions = [f"{', '.join(ring.coordinates[i] for i in moved)} {manner}" for manner, moved in manners.items()]
     shifted = tuple(manners.get(exponential.SHIFTED, ()))
-    return Solved(increments, "; ".join(said) or "nothing moves", shifted, tuple(exponentials))
+    return Solved(increments, "; ".join(descriptions) or "nothing moves", shifted, tuple(exponentials))
 
 
 def _placed(increments: Sequence[Expression], places: Sequence[int], values: Sequence[Expression]) -> list[Expression]:
-    """The increments with those of some coordinates put in."""
+    """Return the increments with those of some coordinates replaced."""
     known = dict(zip(places, values, strict=True))
     return [known.get(i, e) for i, e in enumerate(increments)]
 
 
 def _with_integrals(ring: Ring, field: Sequence[Poly]) -> Solved | None:
-    """The same with linear first integrals put in as constants."""
+    """Return the increments with linear first integrals substituted as constants, or None."""
     smaller = reduced(ring, field)
-    found = None if smaller is None else _solved(smaller.ring, smaller.field)
-    if smaller is None or found is None or isinstance(found, str):
+    solution = None if smaller is None else _solved(smaller.ring, smaller.field)
+    if smaller is None or solution is None or isinstance(solution, str):
         return None
-    changes = substitute(found.increments, smaller.integrals)
+    changes = substitute(solution.increments, smaller.integrals)
     along = dict(zip(ring.coordinates, changes, strict=True))
     for i, form in smaller.forms.items():
         changes[i] = -substitute([form], along)[0]
     names = ", ".join(ring.coordinates[i] for i in smaller.forms)
-    return Solved(changes, f"{found.manner}; {names} by linear integrals", ())
+    return Solved(changes, f"{solution.manner}; {names} by linear integrals", ())
 
 
 def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
-    """The same with a common factor of all rates put in as a constant, if it is one along the flow.
+    """Return the increments with a common factor of all rates as a constant, if it is constant along the flow.
 
-    Functions of a first integral move as it does, faster: (q² + p²)² turns q and p by an angle that grows with q² + p².
+    The flow of a function of a first integral is that of the integral with another speed: (q² + p²)² rotates q and p
+    by an angle that grows with q² + p².
     """
     moving = [f for f in field if f != 0]
     factor = reduce(lambda a, b: a.gcd(b), moving) if moving else ring.tower.constant(1)
@@ -261,22 +269,25 @@ def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
     name = Symbol("integral", "factor")
     rates = [symbol(name) * ring.tower.expression(f / factor) for f in field]
     tower = Tower([*(s for s in ring.tower.symbols if s != TIME), name, TIME], rates, ring.tower.variables)
-    found = _solved(replace(ring, tower=tower, poisson=()), tower.convert_all(rates))
-    if isinstance(found, str):
+    solution = _solved(replace(ring, tower=tower, poisson=()), tower.convert_all(rates))
+    if isinstance(solution, str):
         return None
-    return replace(found, increments=substitute(found.increments, {name: ring.expression(factor)}), shifted=())
+    return replace(solution, increments=substitute(solution.increments, {name: ring.expression(factor)}), shifted=())
 
 
-def _as_written(ring: Ring, g: Expression, found: Solved) -> list[Expression]:
-    """t π∇g of g as it was written, for coordinates that are shifted, where it has fewer operations: (x − y)⁴ has."""
+def _as_written(ring: Ring, g: Expression, solution: Solved) -> list[Expression]:
+    """Return the increments, with t π∇g as written for shifted coordinates where this takes fewer operations.
+
+    (x − y)⁴ is an example.
+    """
     slope = gradient(symbol(TIME) * g, ring.coordinates)
     written = hamiltonian_vector_field(ring.brackets, slope)
-    mixed = [written[i] if i in found.shifted else e for i, e in enumerate(found.increments)]
-    return min(found.increments, mixed, key=lambda increments: _operations(ring, increments))
+    mixed = [written[i] if i in solution.shifted else e for i, e in enumerate(solution.increments)]
+    return min(solution.increments, mixed, key=lambda increments: _operations(ring, increments))
 
 
 def _operations(ring: Ring, increments: Sequence[Expression]) -> int:
-    """Operations on the state."""
+    """Return the number of operations on the state."""
     moving: set[int] = set()
     for e in topological(increments):
         if (e.op == "symbol" and e.value in ring.coordinates) or any(id(a) in moving for a in e.args):

@@ -1,9 +1,12 @@
-"""The flows of forces, as parts of a splitting beside those of H: of ẋ = πζ + f, or of pieces of it.
+"""The flows of forces, as parts of a splitting besides those of H: of ẋ = πζ + f, or of its summands.
 
-The pieces are, the first that have one: all of it; πζ and f; πζ in the single covectors ζ_i dx_i, f in its components.
-πζ_i dx_i is the field of the coordinate x_i with a factor, tangent to the leaves, so each piece of πζ keeps Casimirs.
-Of damping, ζ = λπb with b = ∇H, the pieces are those of b: in a block of π what of b does not depend on its
-coordinates, and each component of the rest. Those that do not move what others read are one part.
+The first of these sums with flows is taken: the whole field; πζ and f; πζ for the single covectors ζ_i dx_i, and f by
+components. πζ_i dx_i is the field of the coordinate x_i times a factor, tangent to the leaves, so each summand of πζ
+preserves the Casimirs.
+
+Damping, ζ = λπb with b = ∇H, is divided by the terms of b, for each block of π: the terms that do not depend on the
+coordinates of the block, and each component of the rest. Flows that do not update coordinates that others read form
+one part.
 """
 
 from __future__ import annotations
@@ -28,25 +31,28 @@ _DAMPING_HINT = (
 
 
 def force_flows(system: System) -> tuple[Flow, ...]:
-    """The flows of the forces; none without any. `SpecError` that names the piece that has none."""
+    """Return the flows of the forces; none without forces.
+
+    Raises `SpecError`, naming the summand that has no flow.
+    """
     if system.forces is None:
         return ()
     forces = system.forces
     tangent = hamiltonian_vector_field(system.poisson, forces.covector)
-    pushed = tuple(a + b for a, b in zip(tangent, forces.vector, strict=True))
+    field = tuple(a + b for a, b in zip(tangent, forces.vector, strict=True))
     try:
         closed = _closed_flows(system, forces)
     except SpecError:
-        whole = _flow(system, pushed, numeric=True)
+        whole = _flow(system, field, numeric=True)
         if isinstance(whole, Flow):
             return (whole,)
         raise
-    whole = closed[0] if len(closed) == 1 else _flow(system, pushed, numeric=True)
+    whole = closed[0] if len(closed) == 1 else _flow(system, field, numeric=True)
     return (whole,) if isinstance(whole, Flow) else closed
 
 
 def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
-    """The flows of the forces in closed form, in as few pieces as there are."""
+    """Return the flows of the forces in closed form, with as few summands as possible."""
     tangent = hamiltonian_vector_field(system.poisson, forces.covector)
     whole = _flow(system, tuple(a + b for a, b in zip(tangent, forces.vector, strict=True)))
     if isinstance(whole, Flow):
@@ -58,7 +64,7 @@ def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
 
 
 def _tangent_flows(system: System, forces: Forces, tangent: Field) -> tuple[Flow, ...]:
-    """The flows of πζ: the whole of it, or of its covectors, or of damping and of the other covectors."""
+    """Return the flows of πζ: one flow, one for each covector, or those of damping and of the other covectors."""
     try:
         covectors = list(_covectors(system, forces.covector))
         return tuple(_pieces(system, tangent, covectors, ("forces", "covector"), ("damping",)))
@@ -71,22 +77,22 @@ def _tangent_flows(system: System, forces: Forces, tangent: Field) -> tuple[Flow
 
 
 def _damping_flows(system: System, damping: Expression) -> list[Flow]:
-    """The flows of λππb, b = ∇H: those of the blocks of π in as few parts as possible."""
-    found = [
+    """Return the flows of λππb, b = ∇H: those of the blocks of π in as few parts as possible."""
+    flows = [
         flow for block in blocks(system.coordinates, system.poisson) for flow in _damped_block(system, damping, block)
     ]
-    moved = [{k for k, e in enumerate(flow.increment) if not e.is_zero} for flow in found]
-    read = [{k for k, c in enumerate(system.coordinates) if c in symbols_of(*flow.increment)} for flow in found]
+    updated = [{k for k, e in enumerate(flow.increment) if not e.is_zero} for flow in flows]
+    read = [{k for k, c in enumerate(system.coordinates) if c in symbols_of(*flow.increment)} for flow in flows]
     neighbours = [
-        {j for j in range(len(found)) if j != i and (moved[i] & read[j] or moved[j] & read[i])}
-        for i in range(len(found))
+        {j for j in range(len(flows)) if j != i and (updated[i] & read[j] or updated[j] & read[i])}
+        for i in range(len(flows))
     ]
-    colours = coloured(neighbours, moved)
-    return [_joined([f for f, k in zip(found, colours, strict=True) if k == colour]) for colour in sorted(set(colours))]
+    colours = coloured(neighbours, updated)
+    return [_joined([f for f, k in zip(flows, colours, strict=True) if k == colour]) for colour in sorted(set(colours))]
 
 
 def _joined(flows: Sequence[Flow]) -> Flow:
-    """Flows that neither move nor read what others move, as one."""
+    """Return flows that neither update nor read what the others update, as one flow."""
     increment, force = (
         tuple(total(entries) for entries in zip(*listed, strict=True))
         for listed in ([f.increment for f in flows], [f.force for f in flows])
@@ -95,18 +101,20 @@ def _joined(flows: Sequence[Flow]) -> Flow:
 
 
 def _damped_block(system: System, damping: Expression, block: Sequence[int]) -> Iterator[Flow]:
-    """The flows of λππb for the components of b in a block of π."""
+    """Yield the flows of λππb for the components of b in a block of π."""
     slopes = gradient(system.hamiltonian, system.coordinates)
     ring = ring_of(system, slopes)
-    own = [v for v in ring.state if ring.tower.depends_on(ring.tower.gens[v], [system.coordinates[i] for i in block])]
-    still, rest = [ZERO] * system.dimension, [ZERO] * system.dimension
+    variables = [
+        v for v in ring.state if ring.tower.depends_on(ring.tower.gens[v], [system.coordinates[i] for i in block])
+    ]
+    constant, rest = [ZERO] * system.dimension, [ZERO] * system.dimension
     for i in block:
-        parts = ring.terms(ring.tower.convert(slopes[i]), own)
-        still[i] = ring.expression(parts.pop((0,) * len(ring.tower.gens), ring.tower.zero))
+        parts = ring.terms(ring.tower.convert(slopes[i]), variables)
+        constant[i] = ring.expression(parts.pop((0,) * len(ring.tower.gens), ring.tower.zero))
         rest[i] = total(ring.expression(c * ring.monomial(m)) for m, c in parts.items())
     single = [[e if k == i else ZERO for k in range(system.dimension)] for i, e in enumerate(rest)]
-    for pieces in ([[a + b for a, b in zip(still, rest, strict=True)]], [still, rest], [still, *single]):
-        flows = [_damped(system, damping, b) for b in pieces if any(not e.is_zero for e in b)]
+    for summands in ([[a + b for a, b in zip(constant, rest, strict=True)]], [constant, rest], [constant, *single]):
+        flows = [_damped(system, damping, b) for b in summands if any(not e.is_zero for e in b)]
         if all(isinstance(flow, Flow) for flow in flows):
             yield from (flow for flow in flows if isinstance(flow, Flow) and flow.moving)
             return
@@ -122,7 +130,7 @@ def _damped(system: System, damping: Expression, b: Sequence[Expression]) -> Flo
 
 
 def _covectors(system: System, covector: Sequence[Expression]) -> Iterator[tuple[str, Field]]:
-    """The fields of ζ_i dx_i."""
+    """Yield the fields of ζ_i dx_i."""
     for i, (c, zeta) in enumerate(zip(system.coordinates, covector, strict=True)):
         if not zeta.is_zero:
             alone = [zeta if k == i else ZERO for k in range(system.dimension)]
@@ -136,26 +144,29 @@ def _components(vector: Sequence[Expression]) -> Iterator[tuple[str, Field]]:
 
 
 def _pieces(
-    system: System, field: Field, pieces: Sequence[tuple[str, Field]], *keys: tuple[str, ...]
+    system: System, field: Field, summands: Sequence[tuple[str, Field]], *keys: tuple[str, ...]
 ) -> Iterator[Flow]:
-    """The flow of a field, or those of its pieces; ``keys`` are what the spec may have given it by."""
-    whole = _flow(system, field) if pieces else ""
+    """Yield the flow of a field or, where it is not elementary, the flows of its summands.
+
+    ``keys`` are the keys of the spec that may have defined the field.
+    """
+    whole = _flow(system, field) if summands else ""
     if isinstance(whole, Flow):
         yield whole
         return
-    for name, piece in pieces:
-        found = _flow(system, piece)
-        if not isinstance(found, Flow):
-            message = f"scheme splitting: the force {name} has no elementary flow: {found}"
+    for name, summand in summands:
+        flow = _flow(system, summand)
+        if not isinstance(flow, Flow):
+            message = f"scheme splitting: the force {name} has no elementary flow: {flow}"
             place = next((system.locations[key] for key in keys if key in system.locations), None)
             raise SpecError([Diagnostic(message, place, "scheme: series takes every force")])
-        yield found
+        yield flow
 
 
 def _flow(system: System, field: Field, *, numeric: bool = False) -> Flow | str:
-    """The flow of a vector field, or why there is none; ``numeric`` admits matrix exponentials."""
+    """Return the flow of a vector field, or the reason why there is none; ``numeric`` admits matrix exponentials."""
     ring = ring_of(system, field)
-    found = solved(ring, ring.tower.convert_all(field), numeric=numeric)
-    if isinstance(found, str):
-        return found
-    return Flow(ZERO, tuple(found.increments), found.manner, force=field, exponentials=found.exponentials)
+    solution = solved(ring, ring.tower.convert_all(field), numeric=numeric)
+    if isinstance(solution, str):
+        return solution
+    return Flow(ZERO, tuple(solution.increments), solution.manner, force=field, exponentials=solution.exponentials)

@@ -1,10 +1,10 @@
-"""Sums of terms of H that have a simpler flow together than each has by itself, such as rotations about a vector.
+"""Sums of terms of H whose joint flow is simpler than those of the terms, such as rotations about a vector.
 
-*Cancelling terms.* Of m·N on se(3)*, each m_i N_i moves m and N by products of both, and their sum moves neither: what
-is left turns other vectors about N. Terms are taken together if monomials of their vector fields cancel.
+*Cancelling terms.* In m·N on se(3)*, each m_i N_i changes m and N by products of both, while the sum changes neither
+and rotates other vectors about N. Terms are summed if monomials of their vector fields cancel.
 
-*Linear terms.* Σ v_i m_i, where all v commute with each other and with all m, is a rotation about v, or a shear, or any
-other motion of a Lie algebra: v stands still, and m obeys linear equations.
+*Linear terms.* Σ v_i m_i, where all v commute with each other and with all m, is a rotation about v, or a shear, or
+any other motion of a Lie algebra: v is constant, and m obeys linear equations.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _Place = tuple[int, Monomial]
 
 
 def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
-    """The terms with such sums taken together: cancelling ones, linear ones, and both; none where π is constant."""
+    """Yield the terms with such sums: cancelling terms, linear terms, and both; nothing where π is constant."""
     if not _algebra(ring):
         return
     cancelling = _with_cancelling(ring, terms)
@@ -33,7 +33,7 @@ def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
 
 
 def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """The terms with those summed up whose fields have monomials that cancel, if the sum has a flow."""
+    """Return the terms, with a sum of those whose fields have cancelling monomials if the sum has a flow."""
     fields = [_field_monomials(ring, t) for t in terms]
     users: dict[_Place, list[int]] = {}
     for k, field in enumerate(fields):
@@ -51,15 +51,15 @@ def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
 
 
 def _sum_with_flow(ring: Ring, group: Sequence[Term]) -> list[Term] | None:
-    """The sum of several terms as one, if it has a flow."""
+    """Return the sum of several terms as one, if it has a flow."""
     if len(group) == 1:
         return None
-    together = Term(total(t.expression for t in group), ring.tower.combine(t.element for t in group))
-    return [together] if isinstance(joint_flow(ring, [together], numeric=True), Flow) else None
+    sum_of_terms = Term(total(t.expression for t in group), ring.tower.combine(t.element for t in group))
+    return [sum_of_terms] if isinstance(joint_flow(ring, [sum_of_terms], numeric=True), Flow) else None
 
 
 def _field_monomials(ring: Ring, term: Term) -> dict[_Place, Any]:
-    """The coefficients of π∇G by coordinate and monomial of all variables of the ring."""
+    """Return the coefficients of π∇G by coordinate and monomial of all variables of the ring."""
     return {
         (i, tuple(map(int, m))): c
         for i, rate in enumerate(ring.field(term.element))
@@ -69,31 +69,31 @@ def _field_monomials(ring: Ring, term: Term) -> dict[_Place, Any]:
 
 
 def _with_linear(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """The terms with those summed up that are linear in the coordinates of an algebra, if not all of these commute."""
+    """Return the terms, with a sum of those that are linear in an algebra, unless all of these commute."""
     algebra = _algebra(ring)
     linear: list[Term] = []
     others: list[Term] = []
     for term in terms:
         pieces = monomial_terms(ring, term.element)
-        inside = [p for p in pieces if _is_linear(ring, p.element, algebra)]
-        linear += inside
-        if len(inside) < len(pieces):
-            rest = ring.tower.combine([term.element, *(-p.element for p in inside)])
-            others.append(Term(ring.expression(rest), rest) if inside else term)
+        linear_pieces = [p for p in pieces if _is_linear(ring, p.element, algebra)]
+        linear += linear_pieces
+        if len(linear_pieces) < len(pieces):
+            rest = ring.tower.combine([term.element, *(-p.element for p in linear_pieces)])
+            others.append(Term(ring.expression(rest), rest) if linear_pieces else term)
     if all(ring.commute(a.element, b.element) for n, a in enumerate(linear) for b in linear[:n]):
         return None
-    together = _sum_with_flow(ring, linear)
-    return [*others, *together] if together else None
+    sum_of_linear = _sum_with_flow(ring, linear)
+    return [*others, *sum_of_linear] if sum_of_linear else None
 
 
 def _algebra(ring: Ring) -> frozenset[int]:
-    """The coordinates that have a bracket which is not constant."""
+    """Return the coordinates that have a bracket which is not constant."""
     n = range(len(ring.coordinates))
     return frozenset(i for i in n if any(ring.support(ring.poisson[i][j]) for j in ring.brackets_of[i]))
 
 
 def _is_linear(ring: Ring, element: Poly, algebra: Collection[int]) -> bool:
-    """Whether a monomial is one coordinate of the algebra times what commutes with all of it."""
+    """Whether a monomial is one coordinate of the algebra times factors that commute with the algebra."""
     names = [ring.coordinates[i] for i in algebra]
     ((monomial, _),) = ring.terms(element, ring.state).items()
     reading = [

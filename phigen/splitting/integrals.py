@@ -1,7 +1,6 @@
-"""Linear first integrals of a part, and its equations with them put in as constants.
+"""Linear first integrals of a part, and its equations with the integrals substituted as constants.
 
-The sum S = s_1 + s_2 of two spins is constant along s_1·s_2, and with it the equation ṡ_1 = s_1 × s_2 is the linear
-ṡ_1 = s_1 × S.
+The sum S = s_1 + s_2 of two spins is constant along s_1·s_2, which makes ṡ_1 = s_1 × s_2 the linear ṡ_1 = s_1 × S.
 """
 
 from __future__ import annotations
@@ -21,8 +20,8 @@ from phigen.symbolic.tower import Poly, Tower, rational
 class Reduced:
     """A ring in which some coordinates do not occur: x_i = I − L_i, with an integral I, a symbol of the ring.
 
-    ``forms`` gives for each of them the linear form L_i in the others. ``field`` is the vector field in that ring, 0
-    for these coordinates; ``integrals`` maps the symbols of integrals to what they stand for.
+    ``forms`` has for each of these coordinates the linear form L_i in the others. ``field`` is the vector field in
+    this ring, 0 for these coordinates; ``integrals`` maps the symbols of integrals to their expressions.
     """
 
     ring: Ring
@@ -32,14 +31,14 @@ class Reduced:
 
 
 def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
-    """The equations without the coordinates that linear integrals with rational coefficients determine."""
+    """Return the equations without the coordinates that linear integrals with rational coefficients determine."""
     moving = [i for i, f in enumerate(field) if f != 0]
     relations = kernel(Field(), _equations(field, moving), len(moving))
     if not relations:
         return None
     forms: dict[int, Expression] = {}
     integrals: dict[str, Expression] = {}
-    for relation in relations:  # each is 1 at its last place, where the others are 0
+    for relation in relations:  # a relation is 1 at its last place, where the other relations are 0
         pivot = moving[max(relation)]
         others = total(
             number(rational(c)) * symbol(ring.coordinates[moving[k]]) for k, c in relation.items() if moving[k] != pivot
@@ -57,7 +56,7 @@ def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
 
 
 def _equations(field: Sequence[Poly], moving: Sequence[int]) -> list[dict[int, object]]:
-    """One row for each monomial: Σ_k c_k field_k = 0 in each."""
+    """Return one row for each monomial, for the equation Σ_k c_k field_k = 0."""
     rows: dict[tuple[int, ...], dict[int, object]] = {}
     for k, i in enumerate(moving):
         for monomial, c in field[i].to_dict().items():

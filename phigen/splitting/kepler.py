@@ -1,13 +1,13 @@
 """The flow of a Kepler motion, H = w|p|²/2 − k/|q| with w = 1/m, by universal variables.
 
-With μ = wk, v = wp, r0 = |q|, η = q·v, β = 2μ/r0 − |v|² and the universal anomaly s of `phigen.symbolic.universal`,
+Let μ = wk, v = wp, r0 = |q|, η = q·v, β = 2μ/r0 − |v|², and s the universal anomaly of `phigen.symbolic.universal`:
 
     q' − q = g v − (μG2/r0) q,    p' − p = −(kG1/(r r0)) q − (μG2/r) p,
     g = r0 G1 + ηG2,    r = r0 + ηG1 + (μ − βr0)G2 = |q'|,
 
-where G1 = 2SC and G2 = 2S² by C = cosroot(βs²/4) and S = s sinroot(βs²/4)/2. These are the coefficients f, g, ḟ, ġ of
-Lagrange, with g free of the time: so an s that is not quite the solution gives the motion of another time, and no
-other energy. Ellipses, parabolas, hyperbolas and both signs of k are one formula, which divides by neither β nor w.
+where G1 = 2SC, G2 = 2S², C = cosroot(βs²/4) and S = s sinroot(βs²/4)/2. These are the coefficients f, g, ḟ, ġ of
+Lagrange, with g free of the time: an error of s gives the motion of another time, and does not change the energy.
+One formula, which divides by neither β nor w, holds for ellipses, parabolas, hyperbolas and both signs of k.
 """
 
 from __future__ import annotations
@@ -39,41 +39,41 @@ class KeplerMotion:
     manner = "moved along a conic section"
 
     def hamiltonian(self, coordinates: Sequence[str]) -> Expression:
-        """w|p|²/2 − k/|q|."""
+        """Return w|p|²/2 − k/|q|."""
         q, p = self.vectors(coordinates)
         return self.inverse_mass / 2 * _square(p) - self.strength * power(sqrt(_square(q)), -1)
 
     def field(self, coordinates: Sequence[str]) -> list[Expression]:
-        """The rates of all coordinates, wp and −kq/|q|³."""
+        """Return the rates of all coordinates, wp and −kq/|q|³."""
         q, p = self.vectors(coordinates)
         pull = self.strength * power(sqrt(_square(q)), -3)
-        found: list[Expression] = [ZERO] * len(coordinates)
+        rates: list[Expression] = [ZERO] * len(coordinates)
         for i, j, a, b in zip(self.positions, self.momenta, q, p, strict=True):
-            found[i], found[j] = self.inverse_mass * b, -(pull * a)
-        return found
+            rates[i], rates[j] = self.inverse_mass * b, -(pull * a)
+        return rates
 
     def vectors(self, coordinates: Sequence[str]) -> tuple[list[Expression], list[Expression]]:
-        """q and p."""
+        """Return q and p."""
         q, p = ([symbol(coordinates[i]) for i in places] for places in (self.positions, self.momenta))
         return q, p
 
     def increments(self, coordinates: Sequence[str]) -> list[Expression]:
-        """The increments of all coordinates in the time of the flow."""
+        """Return the increments of all coordinates in the time of the flow."""
         q, p = self.vectors(coordinates)
         orbit = _Orbit.through(q, p, self.inverse_mass, self.strength)
         s = call(ANOMALY, symbol(TIME), orbit.distance, orbit.moment, orbit.beta, orbit.mu, orbit.spin)
         z = orbit.beta * s**2 / 4
         changes = orbit.changes(call("cosroot", z), s * call("sinroot", z) / 2)
-        found: list[Expression] = [ZERO] * len(coordinates)
+        increments: list[Expression] = [ZERO] * len(coordinates)
         for places, change in zip((self.positions, self.momenta), changes, strict=True):
             for i, e in zip(places, change, strict=True):
-                found[i] = e
-        return found
+                increments[i] = e
+        return increments
 
 
 @dataclass(frozen=True)
 class _Orbit:
-    """An orbit by its state at the start: r0, η, β, μ, and what changes are multiples of."""
+    """An orbit by its state at the start, with r0, η, β and μ."""
 
     position: Vector
     momentum: Vector
@@ -86,7 +86,7 @@ class _Orbit:
 
     @classmethod
     def through(cls, q: Vector, p: Vector, w: Expression, k: Expression) -> _Orbit:
-        """The orbit with this state."""
+        """Return the orbit with this state."""
         distance, mu = sqrt(_square(q)), w * k
         moment = w * total(a * b for a, b in zip(q, p, strict=True))
         beta = 2 * mu * power(distance, -1) - w**2 * _square(p)
@@ -99,50 +99,51 @@ class _Orbit:
         return self.inverse_mass**2 * total((a * d - b * c) ** 2 for (a, b), (c, d) in pairs)
 
     def end(self, c: Expression, s: Expression) -> tuple[Expression, Expression, Expression]:
-        """G1, G2 and the distance r at the end, from C and S."""
+        """Return G1, G2 and the distance r at the end, from C and S."""
         g1, g2 = 2 * s * c, 2 * s**2
         return g1, g2, self.distance + (self.moment * g1 + (self.mu - self.beta * self.distance) * g2)
 
     def changes(self, c: Expression, s: Expression) -> tuple[list[Expression], list[Expression]]:
-        """q' − q and p' − p, from C and S."""
+        """Return q' − q and p' − p, from C and S."""
         g1, g2, r = self.end(c, s)
         inverse, inverse_end = power(self.distance, -1), power(r, -1)
         along = self.inverse_mass * (self.distance * g1 + self.moment * g2)
         towards, pull = self.mu * g2, inverse * inverse_end * (self.strength * g1)
-        moved = [along * b - towards * inverse * a for a, b in zip(self.position, self.momentum, strict=True)]
-        turned = [-(pull * a + towards * inverse_end * b) for a, b in zip(self.position, self.momentum, strict=True)]
-        return moved, turned
+        q_change = [along * b - towards * inverse * a for a, b in zip(self.position, self.momentum, strict=True)]
+        p_change = [-(pull * a + towards * inverse_end * b) for a, b in zip(self.position, self.momentum, strict=True)]
+        return q_change, p_change
 
 
 def identities() -> Iterator[tuple[str, Expression]]:
-    """What must vanish for the increments to be the flow, in C, S, r0, η, β, w, k and one component of q and of p.
+    """Yield the residuals that vanish if the increments are the flow.
 
-    Along the motion ds = dt/r, so dS/dt = C/(2r) and dC/dt = −βS/(2r); the state at the start is constant. Required are
-    the equations of motion with r for |q'|, and r² = |q'|² with |v|² = 2wk/r0 − β. C² + βS² = 1 is put in as
-    β = (1 − C²)/S², which leaves rational functions of independent symbols.
+    They are in C, S, r0, η, β, w, k and one component of q and of p. Along the motion ds = dt/r, so dS/dt = C/(2r)
+    and dC/dt = −βS/(2r); the state at the start is constant. Required are the equations of motion with r for |q'|,
+    and r² = |q'|² with |v|² = 2wk/r0 − β. C² + βS² = 1 is substituted as β = (1 − C²)/S², which leaves rational
+    functions of independent symbols.
     """
     names = [Symbol("orbit", name) for name in ("C", "S", "r0", "η", "β", "w", "k", "q", "p")]
     c, s, distance, moment, beta, w, k, q, p = map(symbol, names)
     orbit = _Orbit([q], [p], distance, moment, beta, w * k, w, k)
     _, _, r = orbit.end(c, s)
-    ((moved,), (turned,)) = orbit.changes(c, s)
-    along_c, along_s = (derivatives([moved, turned], name) for name in names[:2])
+    ((position_change,), (momentum_change,)) = orbit.changes(c, s)
+    along_c, along_s = (derivatives([position_change, momentum_change], name) for name in names[:2])
     rates = [(c * b - beta * s * a) / 2 * power(r, -1) for a, b in zip(along_c, along_s, strict=True)]
-    (of_q,), (of_p,) = (derivatives([moved], name) for name in names[-2:])
+    (of_q,), (of_p,) = (derivatives([position_change], name) for name in names[-2:])
     f, g = ONE + of_q, of_p * power(w, -1)
     squared = (f * distance) ** 2 + 2 * f * g * moment + g**2 * (2 * w * k * power(distance, -1) - beta)
-    stated = {
-        "dq'/dt = wp'": rates[0] - w * (p + turned),
-        "dp'/dt = -kq'/r³": rates[1] + k * (q + moved) * power(r, -3),
+    residuals = {
+        "dq'/dt = wp'": rates[0] - w * (p + momentum_change),
+        "dp'/dt = -kq'/r³": rates[1] + k * (q + position_change) * power(r, -3),
         "|q'| = r": squared - r**2,
     }
     start: dict[str, Expression] = {names[0]: ONE, names[1]: ZERO}
     for name, value in zip(
-        ("q' - q", "p' - p", "r - r0"), substitute([moved, turned, r - distance], start), strict=True
+        ("q' - q", "p' - p", "r - r0"), substitute([position_change, momentum_change, r - distance], start), strict=True
     ):
         yield f"{name} at s = 0", value
     circle: dict[str, Expression] = {names[4]: (ONE - c**2) * power(s, -2)}
-    yield from zip(stated, substitute(list(stated.values()), circle), strict=True)
+    yield from zip(residuals, substitute(list(residuals.values()), circle), strict=True)
 
 
 def _square(vector: Vector) -> Expression:

@@ -1,11 +1,12 @@
-"""Linear parts whose matrix is known before the steps: exp(tA) − 1 as numbers, for any A up to `MOST_ROWS` rows.
+"""Linear parts with a matrix known before the steps: exp(tA) − 1 as numbers, for any A up to `MOST_ROWS` rows.
 
-The entries of A are functions of parameters. Where the coefficients of a linear motion hold values that stand still
-along the flow but change from step to step, as a coupling to a coordinate of another part, products of such values with
-what moves are unknowns of their own: q̇ = p, ṗ = −q + f is linear in q, p and f, with f as the third unknown.
+The entries of A are functions of parameters. The coefficients of a linear motion may also contain values that are
+constant along the flow but change from step to step, as a coupling to a coordinate of another part. Products of such
+values with moving variables are then further unknowns: q̇ = p, ṗ = −q + f is linear in q, p and f, with f as the
+third unknown.
 
-Scaling and squaring: with ‖A/2^s‖ ≤ 1/2 the Padé approximant of order 6 is F = 2(V − U)⁻¹U, with the even part V and
-the odd part U of its numerator, and F ↦ 2F + F² takes exp(A) − 1 to exp(2A) − 1, which keeps all digits of a small A.
+Scaling and squaring: if ‖A/2^s‖ ≤ 1/2, the Padé approximant of order 6 is F = 2(V − U)⁻¹U, with the even part V and
+the odd part U of its numerator. F ↦ 2F + F² takes exp(A) − 1 to exp(2A) − 1, which preserves all digits of a small A.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from phigen.symbolic.expression import Expression, symbol, total
 from phigen.symbolic.symbols import EXPONENTIAL, Symbol
 from phigen.symbolic.tower import Poly
 
-#: Most rows of a matrix, and most factors of an unknown.
+#: Bounds of a matrix: its rows, and the factors of an unknown. A step multiplies by the whole matrix.
 MOST_ROWS, MOST_DEGREE = 64, 8
 
-#: The numerator of the Padé approximant of order 6, error 2·10⁻¹⁷ up to this norm.
+#: The numerator of the Padé approximant of order 6, and the largest norm for it: the error is 2·10⁻¹⁷.
 PADE = tuple(Fraction(1, n) * m for m, n in ((1, 1), (1, 2), (5, 44), (1, 66), (1, 792), (1, 15840), (1, 665280)))
-REACH = 0.5
+MAX_PADE_NORM = 0.5
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class MatrixExponential:
 
     @property
     def symbols(self) -> list[Symbol]:
-        """The symbols of the entries of exp(tA) − 1, row by row; equal matrices have equal ones."""
+        """The symbols of the entries of exp(tA) − 1, row by row; equal matrices have equal symbols."""
         key = blake2b(b"|".join(e.digest for e in self.rates), digest_size=8).hexdigest()
         return [Symbol(EXPONENTIAL, key, k) for k in range(len(self.rates))]
 
@@ -58,15 +59,15 @@ class MatrixExponential:
     def reached(self) -> list[set[int]]:
         """For each row the columns where exp(tA) − 1 may not vanish, by the zeros of A."""
         n = range(self.size)
-        found = [{j for j in n if not self.rates[i * self.size + j].is_zero} for i in n]
+        columns = [{j for j in n if not self.rates[i * self.size + j].is_zero} for i in n]
         while True:
-            wider = [set.union(near, *(found[k] for k in near)) for near in found]
-            if wider == found:
-                return found
-            found = wider
+            wider = [set.union(row, *(columns[k] for k in row)) for row in columns]
+            if wider == columns:
+                return columns
+            columns = wider
 
     def slopes(self) -> dict[str, Expression]:
-        """The derivatives of the entries along the time: A exp(tA)."""
+        """Return the derivatives of the entries along the time: A exp(tA)."""
         n, entries = self.size, self.symbols
         rates: dict[str, Expression] = {}
         for k, name in enumerate(entries):
@@ -85,7 +86,7 @@ class StaticSolution:
 
 
 def solve(ring: Ring, motion: LinearMotion) -> StaticSolution | None:
-    """exp(tA)w − w with a matrix of static entries; None if there is none."""
+    """Return exp(tA)w − w with a matrix of static entries, or None."""
     rows = _static_rows(ring, motion)
     if rows is None:
         return None
@@ -103,7 +104,7 @@ def solve(ring: Ring, motion: LinearMotion) -> StaticSolution | None:
 
 
 def _static_rows(ring: Ring, motion: LinearMotion) -> dict[Monomial, dict[Monomial, Poly]] | None:
-    """The equations of products of the unknowns with values that stand still, until they close."""
+    """Return the equations of products of the unknowns with constant values, or None if they do not close."""
     matrix = {
         m: {k: c for k, c in zip(motion.basis, row, strict=True) if c != 0}
         for m, row in zip(motion.basis, motion.matrix, strict=True)
@@ -120,9 +121,9 @@ def _static_rows(ring: Ring, motion: LinearMotion) -> dict[Monomial, dict[Monomi
             return None
         row: dict[Monomial, list[Poly]] = {}
         for k, coefficient in matrix[m].items():
-            for still, c in ring.terms(coefficient, ring.changing).items():
-                row.setdefault(_times(_times(factor, still), k), []).append(c)
-                pending.append((_times(factor, still), k))
+            for constant, c in ring.terms(coefficient, ring.changing).items():
+                row.setdefault(_times(_times(factor, constant), k), []).append(c)
+                pending.append((_times(factor, constant), k))
         rows[unknown] = {k: ring.tower.combine(c) for k, c in row.items()}
     return rows
 
@@ -132,12 +133,12 @@ def _times(a: Monomial, b: Monomial) -> Monomial:
 
 
 def exponential_less_one(a: NDArray[np.float64]) -> NDArray[np.float64]:
-    """exp(a) − 1 as the generated code computes it."""
+    """Return exp(a) − 1 as the generated code computes it."""
     n, norm = len(a), float(np.abs(a).sum(axis=1).max())
     if not np.isfinite(norm):
         return np.full_like(a, np.nan)
     squarings = 0
-    while norm > REACH:
+    while norm > MAX_PADE_NORM:
         norm, squarings = norm / 2, squarings + 1
     c, a, one = [float(v) for v in PADE], a * 0.5**squarings, np.eye(n)
     b = a @ a

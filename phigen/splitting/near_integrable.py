@@ -1,7 +1,7 @@
-"""Kepler motions among the terms of H: p²/2m and −k/|q| of one body, which do not commute, taken together.
+"""Kepler motions among the terms of H: sums of p²/2m and −k/|q| of one body, which do not commute.
 
-A body is two or three coordinates q with 1/|q| in H, and their conjugate momenta. What is left of the terms are
-perturbations; where these are small beside the motions, H = A + εB is near-integrable.
+A body is two or three coordinates q with 1/|q| in H, and their conjugate momenta. The remaining terms are
+perturbations; where these are small compared with the motions, H = A + εB is near-integrable.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from phigen.symbolic.tower import Generator, Poly
 #: Dimensions of the space in which a body moves.
 _DIMENSIONS = (2, 3)
 
-#: Largest ratio of the coefficients of a perturbation to those of the motions for which methods of a near-integrable
-#: system are taken: below, errors of ε² h^6 and ε³ h^4 are less than those of general methods of order 4.
+#: Largest ratio of the coefficients of a perturbation to those of the motions for methods of a near-integrable system.
+#: Below, errors of ε² h^6 and ε³ h^4 are less than those of general methods of order 4.
 SMALL = 0.02
 
 
 def with_motions(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """The terms with Kepler motions taken together, these first; None if there are no such motions.
+    """Return the terms with Kepler motions as single terms, these first; None if there are no such motions.
 
-    Only terms of one body by itself belong to its motion: (p_1 + p_2)² stays whole, and commutes with what depends on
-    q_1 − q_2.
+    Only terms of a single body belong to its motion: (p_1 + p_2)² is not divided, and commutes with functions of q_1
+    − q_2.
     """
     motions = list(_motions(ring, terms))
     if not motions:
         return None
-    taken = [Term(motion.hamiltonian(ring.coordinates), element, motion) for motion, element in motions]
-    return [*taken, *_remaining(ring, terms, taken)]
+    motion_terms = [Term(motion.hamiltonian(ring.coordinates), element, motion) for motion, element in motions]
+    return [*motion_terms, *_remaining(ring, terms, motion_terms)]
 
 
 def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> int | None:
-    """The index of the part εB of a near-integrable H = A + εB, None if H is no such sum of two parts.
+    """Return the index of the part εB of a near-integrable H = A + εB, None if H is no such sum of two parts.
 
-    Small is what has a factor that is declared to be small. Without such a declaration, and where A is divided by the
-    small parameter as p²/2m is by a small mass, it is what stands beside Kepler motions, if its coefficients are small.
+    A part with a factor that is declared small is small. Without such a declaration, or if A is divided by the small
+    parameter as p²/2m by a small mass, the part without Kepler motions is small if its coefficients are.
     """
     if len(parts) != 2:
         return None
@@ -51,11 +51,11 @@ def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> i
     if declared and not any(_divided_by(ring, term, names) for part in parts for term in part):
         small = [all(_vanishes_with(ring, term, declared) for term in part) for part in parts]
         return small.index(True) if sum(small) == 1 else None
-    beside = [k for k, part in enumerate(parts) if not any(term.motion for term in part)]
-    if len(beside) != 1:
+    perturbations = [k for k, part in enumerate(parts) if not any(term.motion for term in part)]
+    if len(perturbations) != 1:
         return None
-    other, motions = [parts[k] for k in (beside[0], 1 - beside[0])]
-    return beside[0] if size_of(system, ring, other) < SMALL * size_of(system, ring, motions) else None
+    perturbation, motions = [parts[k] for k in (perturbations[0], 1 - perturbations[0])]
+    return perturbations[0] if size_of(system, ring, perturbation) < SMALL * size_of(system, ring, motions) else None
 
 
 def _vanishes_with(ring: Ring, term: Term, variables: Sequence[int]) -> bool:
@@ -71,7 +71,7 @@ def _divided_by(ring: Ring, term: Term, names: Sequence[str]) -> bool:
 
 
 def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:
-    """The sum of the magnitudes of the coefficients of terms that move something, parameters at their defaults."""
+    """Return the sum of the magnitudes of the coefficients of terms that move coordinates, at default parameters."""
     values = {p.name: float(p.value) for p in system.parameters}
     sizes = []
     for term in terms:
@@ -85,17 +85,17 @@ def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:
 
 
 def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> list[Term]:
-    """The terms without the monomials of the motions; those that have none of them as they were written."""
-    untouched, rest = [], []
+    """Return the terms without the monomials of the motions; terms without such monomials stay as written."""
+    untouched, remaining = [], []
     for term in terms:
-        inside = {m for motion in motions for m in ring.terms(motion.element, ring.state) if _is_of(ring, term, motion)}
+        shared = {m for motion in motions for m in ring.terms(motion.element, ring.state) if _is_of(ring, term, motion)}
         monomials = ring.terms(term.element, ring.state)
-        if inside.isdisjoint(monomials):
+        if shared.isdisjoint(monomials):
             untouched.append(term)
         else:
-            rest += [c * ring.monomial(m) for m, c in monomials.items() if m not in inside]
-    split = [t for e in rest for t in monomial_terms(ring, e)]
-    return [*untouched, *joined(ring, split)]
+            remaining += [c * ring.monomial(m) for m, c in monomials.items() if m not in shared]
+    monomials_left = [t for e in remaining for t in monomial_terms(ring, e)]
+    return [*untouched, *joined(ring, monomials_left)]
 
 
 def _is_of(ring: Ring, term: Term, motion: Term) -> bool:
@@ -104,7 +104,7 @@ def _is_of(ring: Ring, term: Term, motion: Term) -> bool:
 
 
 def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, Poly]]:
-    """The Kepler motions in H with what they are in the ring."""
+    """Yield the Kepler motions in H with their elements of the ring."""
     size = len(ring.tower.gens)
     supports = [{*ring.support(t.element)} for t in terms]
     for generator in ring.tower.generators:
@@ -112,8 +112,8 @@ def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, 
         momenta = [j for i in positions if (j := _conjugate(ring, i)) is not None]
         if not positions or len(momenta) < len(positions):
             continue
-        alone = [t.element for t, inside in zip(terms, supports, strict=True) if inside <= {*positions, *momenta}]
-        coefficients = ring.terms(ring.tower.combine(alone), ring.state)
+        elements = [t.element for t, inside in zip(terms, supports, strict=True) if inside <= {*positions, *momenta}]
+        coefficients = ring.terms(ring.tower.combine(elements), ring.state)
         pull = coefficients.get(_exponents(size, ring.tower.names.index(generator.name), 1))
         places = [ring.tower.names.index(ring.coordinates[j]) for j in momenta]
         squares: list[Poly] = [coefficients.get(_exponents(size, place, 2), ring.tower.zero) for place in places]
@@ -129,14 +129,14 @@ def _is_inverse_distance(generator: Generator) -> bool:
 
 
 def _distance_from(ring: Ring, arguments: Sequence[Poly]) -> tuple[int, ...]:
-    """The coordinates whose squares sum to the argument of a root; none if it is another."""
+    """Return the coordinates whose squares sum to the argument of a root; none if it is of another form."""
     inside = ring.support(arguments[0])
     squares = ring.tower.combine(ring.tower.variable(ring.coordinates[i]) ** 2 for i in inside)
     return inside if len(inside) in _DIMENSIONS and arguments[0] == squares else ()
 
 
 def _conjugate(ring: Ring, i: int) -> int | None:
-    """The coordinate p with {q, p} = 1, if neither has a bracket with another."""
+    """Return the coordinate p with {q, p} = 1, if neither has a bracket with another coordinate."""
     partners = ring.brackets_of[i]
     alone = len(partners) == 1 and ring.brackets_of[partners[0]] == [i]
     return partners[0] if alone and ring.poisson[i][partners[0]] == 1 else None

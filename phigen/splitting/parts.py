@@ -1,4 +1,4 @@
-"""Which terms of H go together: as few parts as possible, each of terms that commute and have elementary flows."""
+"""Grouping of the terms of H into parts: as few as possible, each of commuting terms with elementary flows."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from phigen.splitting.terms import hamiltonian_terms, terms_of
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Poly
 
-#: How often a companion is taken out of the terms.
-ROUNDS = 3
+#: Largest number of companions that are subtracted from the terms, one after the other.
+MAX_COMPANIONS = 3
 
 
 @dataclass(frozen=True)
 class Splitting:
     """The flows of the parts of H, in the order of a step.
 
-    ``kick`` is the index of the part V if the method rests on {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`); then a
+    ``kick`` is the index of the part V if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`); then a
     multiple of {V, {V, T}} may be in the Hamiltonian of its flow. ``small`` is the index of the part εB of a
     near-integrable H = A + εB.
     """
@@ -38,11 +38,10 @@ class Splitting:
 
 
 def split(system: System, *, motions: bool = True) -> Splitting:
-    """H as a sum of parts with elementary flows: as few as possible; of as many those that keep more invariants.
+    """Return H as a sum of parts with elementary flows: as few as possible, among these with the most invariants.
 
-    Kepler motions are taken together if ``motions``. A near-integrable H is split in its two parts.
-
-    Raises `SpecError`, located at the Hamiltonian, that names the term that stands in the way.
+    Kepler motions are single terms if ``motions``. A near-integrable H is split in its two parts. Raises `SpecError`,
+    located at the Hamiltonian, with the term that has no flow.
     """
     listed = hamiltonian_terms(system)
     ring = ring_of(system, listed)
@@ -73,24 +72,27 @@ def split(system: System, *, motions: bool = True) -> Splitting:
 
 
 def _invariants(system: System, ring: Ring) -> list[Poly]:
-    """The invariants of the spec, but for those with functions or symbols that H and π do not have."""
-    found = []
+    """Return the invariants of the spec, except those with functions or symbols that H and π do not have."""
+    elements = []
     for e in system.invariants.values():
         try:
-            found.append(ring.tower.convert(e))
+            elements.append(ring.tower.convert(e))
         except ValueError:
             continue
-    return found
+    return elements
 
 
 def _lost(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly]) -> int:
-    """How many invariants some part does not keep: s_1 + s_2 is constant along s_1·s_2, but not along x_1 x_2."""
+    """Return the number of invariants that some part does not preserve.
+
+    s_1 + s_2 is constant along s_1·s_2, but not along x_1 x_2.
+    """
     sums = [ring.tower.combine(t.element for t in part) for part in parts]
     return sum(not all(ring.commute(invariant, g) for g in sums) for invariant in invariants)
 
 
 def _candidates(system: System, conflicts: Conflicts, terms: list[Term], *, motions: bool) -> Iterator[list[Term]]:
-    """The terms as they are, with Kepler motions, by blocks of π, with companions taken out, and in simpler groups."""
+    """Yield the terms as written, with Kepler motions, by blocks of π, without companions, and in simpler groups."""
     yield terms
     ring = conflicts.ring
     keplerian = with_motions(ring, terms) if motions else None
@@ -106,44 +108,44 @@ def _candidates(system: System, conflicts: Conflicts, terms: list[Term], *, moti
 
 
 def _without_companions(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:
-    """The terms with companions taken out that make the parts fewer."""
+    """Yield the terms without companions where this reduces the number of parts."""
     ring = conflicts.ring
-    for _ in range(ROUNDS):
+    for _ in range(MAX_COMPANIONS):
         fewest = len(conflicts.grouped(terms))
         if fewest == 1:
             return
         with progress.stage("companions of the terms") as running:
-            found = []
+            improved = []
             for running.done, c in enumerate(with_companions(system, conflicts, terms), 1):
                 if len(conflicts.grouped(c)) < fewest:
-                    found.append(c)
-        if not found:
+                    improved.append(c)
+        if not improved:
             return
-        found.sort(key=lambda c: (len(conflicts.grouped(c)), size_of(system, ring, c)))
-        yield from found
-        terms = found[0]
+        improved.sort(key=lambda c: (len(conflicts.grouped(c)), size_of(system, ring, c)))
+        yield from improved
+        terms = improved[0]
 
 
 def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
-    """Parts whose sum has linear equations with a closed form, taken together though they do not commute."""
+    """Return the flows, with one flow for parts whose sum has linear equations with a closed form."""
     for i, first in enumerate(flows):
         for second in flows[i + 1 :]:
             if first.has_motion or second.has_motion:
                 continue
             terms = [Term(f.hamiltonian, ring.tower.convert(f.hamiltonian)) for f in (first, second)]
-            found = joint_flow(ring, terms, linear=True)
-            if isinstance(found, Flow):
-                return _merged(ring, [found, *(f for f in flows if f not in (first, second))])
+            joint = joint_flow(ring, terms, linear=True)
+            if isinstance(joint, Flow):
+                return _merged(ring, [joint, *(f for f in flows if f not in (first, second))])
     return flows
 
 
 def _whole(ring: Ring, flows: list[Flow]) -> list[Flow]:
-    """All parts as one if the equations of their sum are linear: the exact flow, by a matrix exponential."""
+    """Return one flow if the equations of the sum of all parts are linear: the exact flow, by a matrix exponential."""
     if len(flows) == 1:
         return flows
     terms = [Term(f.hamiltonian, ring.tower.convert(f.hamiltonian)) for f in flows]
-    found = joint_flow(ring, terms, linear=True, numeric=True)
-    return [found] if isinstance(found, Flow) else flows
+    joint = joint_flow(ring, terms, linear=True, numeric=True)
+    return [joint] if isinstance(joint, Flow) else flows
 
 
 def _refusal(system: System, error: NoFlowError | None) -> SpecError:

@@ -1,10 +1,10 @@
-"""Other ways to write H as a sum of terms, which may need fewer parts.
+"""Other forms of H as a sum of terms, which may need fewer parts.
 
-*Quadratic companions.* A Casimir C does not move anything, and |P|² on se(3)* commutes with every function of P. So
-H = λC + (H − λC) may lose a term on the right that conflicts with others, at no cost: the free rigid body has two parts
-rather than three. C is a Casimir of π, or of the bracket among some coordinates that is closed.
+*Quadratic companions.* A Casimir C has no flow, and |P|² on se(3)* commutes with every function of P. So in H = λC +
+(H − λC) the bracket may lose a term that conflicts with others, at no cost: the free rigid body has two parts instead
+of three. C is a Casimir of π, or of a closed bracket of some coordinates.
 
-*Blocks.* Terms that couple the same blocks of π, such as products of the components of two spins, are taken together.
+*Blocks.* Terms that couple the same blocks of π, such as products of the components of two spins, are summed.
 """
 
 from __future__ import annotations
@@ -22,53 +22,53 @@ from phigen.splitting.terms import joined, monomial_terms
 from phigen.symbolic.expression import Expression, total
 from phigen.symbolic.tower import Poly
 
-#: Most coordinates of a closed bracket whose Casimirs are looked for.
+#: Largest number of coordinates of a closed bracket for the search for its Casimirs.
 MOST_COORDINATES = 8
 
 
-def with_companions(system: System, found: Conflicts, terms: Sequence[Term]) -> Iterator[list[Term]]:
-    """The terms with λC taken out of them, for each companion C and each λ that makes a monomial disappear."""
-    ring = found.ring
-    for companion in _companions(system, found, terms):
-        inside = ring.terms(companion.element, ring.state)
-        affected = [t for t in terms if not found.monomials(t).isdisjoint(inside)]
+def with_companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> Iterator[list[Term]]:
+    """Yield the terms with λC subtracted, for each companion C and each λ that cancels a monomial."""
+    ring = conflicts.ring
+    for companion in _companions(system, conflicts, terms):
+        of_companion = ring.terms(companion.element, ring.state)
+        affected = [t for t in terms if not conflicts.monomials(t).isdisjoint(of_companion)]
         if not affected:
             continue
         others = [t for t in terms if t not in affected]
         sum_of_affected = ring.tower.combine(t.element for t in affected)
         present = ring.terms(sum_of_affected, ring.state)
         multiples: list[Poly] = []
-        for monomial, coefficient in inside.items():
+        for monomial, coefficient in of_companion.items():
             inverse = ring.tower.inverse(coefficient) if monomial in present else None
             if inverse is not None:
                 multiple = ring.tower.combine([present[monomial] * inverse])
                 if multiple not in multiples:
                     multiples.append(multiple)
         for multiple in multiples:
-            rest = ring.tower.combine([sum_of_affected, -multiple * companion.element])
-            taken = Term(ring.expression(multiple) * companion.expression, multiple * companion.element)
-            yield [*others, *joined(ring, monomial_terms(ring, rest)), taken]
+            remainder = ring.tower.combine([sum_of_affected, -multiple * companion.element])
+            subtracted = Term(ring.expression(multiple) * companion.expression, multiple * companion.element)
+            yield [*others, *joined(ring, monomial_terms(ring, remainder)), subtracted]
 
 
 def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> Iterator[Term]:
-    """Casimirs, and quadratic Casimirs of the closed brackets that pairs of conflicting terms generate."""
-    ring, found = conflicts.ring, list(system.casimirs.values())
-    seen: set[tuple[int, ...]] = set()
+    """Yield Casimirs, and quadratic Casimirs of the closed brackets that pairs of conflicting terms generate."""
+    ring, candidates = conflicts.ring, list(system.casimirs.values())
+    closures: set[tuple[int, ...]] = set()
     for i, neighbours in enumerate(conflicts.graph(terms)):
         for j in sorted(n for n in neighbours if n < i):
-            inside = _closure(ring, {*conflicts.support(terms[i]), *conflicts.support(terms[j])})
-            if len(inside) < min(len(ring.coordinates), MOST_COORDINATES + 1) and inside not in seen:
-                seen.add(inside)
-                found += _casimirs_within(system, inside)
-    for e in found:
+            closure = _closure(ring, {*conflicts.support(terms[i]), *conflicts.support(terms[j])})
+            if len(closure) < min(len(ring.coordinates), MOST_COORDINATES + 1) and closure not in closures:
+                closures.add(closure)
+                candidates += _casimirs_within(system, closure)
+    for e in candidates:
         try:
             yield Term(e, ring.tower.convert(e))
-        except ValueError:  # it needs functions that H and π do not have
+        except ValueError:  # with functions that H and π do not have
             continue
 
 
 def _closure(ring: Ring, coordinates: set[int]) -> tuple[int, ...]:
-    """The coordinates that brackets of the given ones lead to."""
+    """Return the closure of coordinates under brackets."""
     while True:
         more = {k for i in coordinates for j in coordinates for k in ring.support(ring.poisson[i][j])}
         if more <= coordinates:
@@ -83,7 +83,7 @@ def _casimirs_within(system: System, inside: Sequence[int]) -> list[Expression]:
 
 
 def by_blocks(system: System, ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Terms that touch the same two or more blocks of π taken together; None if that changes nothing."""
+    """Return sums of the terms that depend on the same two or more blocks of π; None if that changes nothing."""
     block_of = {i: k for k, block in enumerate(blocks(system.coordinates, system.poisson)) for i in block}
     groups: dict[tuple[int, ...], list[Term]] = {}
     for n, term in enumerate(terms):

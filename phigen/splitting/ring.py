@@ -1,7 +1,7 @@
-"""The ring in which a Hamiltonian is taken apart: H, π and all derivatives as polynomials in one tower.
+"""The ring for the splitting of a Hamiltonian: H, π and all derivatives as polynomials in one tower.
 
 A *variable* is a generator of the ring: a coordinate, a parameter, the time t, or a function value such as cos(q) or
-1/r. Those that do not depend on coordinates are *static*. Along the flow of a part G a variable that depends on
+1/r. Variables that do not depend on coordinates are *static*. Along the flow of a part G a variable that depends on
 coordinates is *frozen* if its derivative X_G(v) = Σ_j (π∇G)_j ∂_j v vanishes, else *moving*.
 """
 
@@ -32,13 +32,13 @@ Monomial = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Ring:
-    """A tower that holds a system, with its bracket; ``brackets`` is π as the system gives it."""
+    """A tower that contains a system, with its bracket; ``brackets`` is π in the form of the system."""
 
     tower: Tower
     coordinates: tuple[str, ...]
     poisson: tuple[tuple[Poly, ...], ...]
     brackets: Matrix
-    #: Symbols that stand still along all flows, but change from step to step: the time; of lattices, neighbours.
+    #: Symbols that are constant along all flows, but change from step to step: the time, and neighbours in lattices.
     still: tuple[str, ...] = ()
 
     @cached_property
@@ -49,13 +49,13 @@ class Ring:
 
     @cached_property
     def changing(self) -> tuple[int, ...]:
-        """The variables that are not known before the steps, as indices."""
+        """The variables that are unknown before the steps, as indices."""
         tower, names = self.tower, [*self.coordinates, *self.still]
         return tuple(i for i, g in enumerate(tower.gens[: len(tower.names)]) if tower.depends_on(g, names))
 
     @cached_property
     def values(self) -> list[Expression]:
-        """What each variable stands for."""
+        """The expression of each variable."""
         return [symbol(n) for n in self.tower.symbols] + [g.expression for g in self.tower.generators]
 
     @cached_property
@@ -66,17 +66,17 @@ class Ring:
 
     @cached_property
     def brackets_of(self) -> list[list[int]]:
-        """For each coordinate those with which its bracket is not 0."""
+        """For each coordinate the coordinates with which its bracket is not 0."""
         n = range(len(self.coordinates))
         return [[j for j in n if (i, j) not in self.zero_pairs] for i in n]
 
     def support(self, element: Poly) -> tuple[int, ...]:
-        """The coordinates that an element depends on, directly or inside a function, as indices."""
+        """Return the coordinates that an element depends on, directly or inside a function, as indices."""
         names = self.tower.names_in(element)
         return tuple(i for i, c in enumerate(self.coordinates) if c in names)
 
     def field(self, g: Poly) -> list[Poly]:
-        """π∇g."""
+        """Return π∇g."""
         sums: dict[int, list[Poly]] = {}
         for i in self.support(g):
             slope = self.tower.derivative(g, self.coordinates[i])
@@ -86,44 +86,44 @@ class Ring:
         return [self.lowest(self.tower.combine(sums[j])) if j in sums else zero for j in range(len(self.poisson))]
 
     def lowest(self, element: Poly) -> Poly:
-        """The element with q·(1/q) cancelled where q is a polynomial that divides what stands beside 1/q."""
+        """Return the element with q·(1/q) cancelled where the polynomial q divides the cofactor of 1/q."""
         for g in self.tower.generators:
             if g.kind != "reciprocal" or element == 0:
                 continue
-            own, q = self.tower.names.index(g.name), g.arguments[0]
-            pending, settled = [element], []
+            reciprocal, q = self.tower.names.index(g.name), g.arguments[0]
+            pending, final = [element], []
             while pending:
-                powers = self.terms(pending.pop(), [own])
+                powers = self.terms(pending.pop(), [reciprocal])
                 for monomial, coefficient in powers.items():
-                    quotient, rest = divmod(coefficient, q) if monomial[own] else (coefficient, 1)
-                    lower = (*monomial[:own], max(monomial[own] - 1, 0), *monomial[own + 1 :])
+                    quotient, rest = divmod(coefficient, q) if monomial[reciprocal] else (coefficient, 1)
+                    lower = (*monomial[:reciprocal], max(monomial[reciprocal] - 1, 0), *monomial[reciprocal + 1 :])
                     if rest == 0:
                         pending.append(quotient * self.monomial(lower))
                     else:
-                        settled.append(coefficient * self.monomial(monomial))
-            element = self.tower.combine(settled)
+                        final.append(coefficient * self.monomial(monomial))
+            element = self.tower.combine(final)
         return element
 
     def rate(self, element: Poly, field: Sequence[Poly]) -> Poly:
-        """The derivative of an element along a vector field; 0 as a polynomial if it vanishes."""
-        found = self.tower.combine(
+        """Return the derivative of an element along a vector field; 0 as a polynomial if it vanishes."""
+        derivative = self.tower.combine(
             field[j] * self.tower.derivative(element, self.coordinates[j])
             for j in self.support(element)
             if field[j] != 0
         )
-        return self.tower.zero if self.tower.is_zero(found) else self.lowest(found)
+        return self.tower.zero if self.tower.is_zero(derivative) else self.lowest(derivative)
 
     def commute(self, f: Poly, g: Poly) -> bool:
-        """Whether {f, g} = 0, proved."""
+        """Whether {f, g} = 0 is proved."""
         if all((i, j) in self.zero_pairs for i in self.support(f) for j in self.support(g)):
             return True
         return bool(self.rate(f, self.field(g)) == 0)
 
     def terms(self, element: Poly, variables: Collection[int]) -> dict[Monomial, Poly]:
-        """The element as a polynomial in some of the ring's variables, its coefficients in the others."""
+        """Return the element as a polynomial in some of the variables, with coefficients in the others."""
         groups: dict[Monomial, dict[Monomial, Any]] = {}
-        wanted = frozenset(variables)
-        inside = [int(i in wanted) for i in range(len(self.tower.gens))]
+        chosen = frozenset(variables)
+        inside = [int(i in chosen) for i in range(len(self.tower.gens))]
         for m, c in element.to_dict().items():
             exponents = tuple(map(int, m))
             key = tuple(map(mul, exponents, inside))
@@ -132,11 +132,11 @@ class Ring:
         return {m: self.tower.context.from_dict(part) for m, part in groups.items()}
 
     def monomial(self, exponents: Monomial) -> Poly:
-        """The product of powers of the ring's variables."""
+        """Return the product of powers of the variables of the ring."""
         return self.tower.context.from_dict({exponents: 1})
 
     def expression(self, element: Poly) -> Expression:
-        """The element as an expression in which static factors are collected, to be computed before the steps."""
+        """Return the element as an expression with collected static factors, to be computed before the steps."""
         names = len(self.tower.names)
         state = set(self.state)
         static = [i for i in range(names) if i not in state]
@@ -150,7 +150,7 @@ class Ring:
 
 
 def ring_of(system: System, more: Iterable[Expression] = (), symbols: Sequence[str] = ()) -> Ring:
-    """The ring of a system, with the time, further static ``symbols``, and what occurs in the expressions ``more``."""
+    """Return the ring of a system, with the time, further static ``symbols``, and the functions in ``more``."""
     listed = list(more)
     roots = [system.hamiltonian, *listed, *(e for row in system.poisson for e in row)]
     tower = Tower([*system.coordinates, *system.parameter_names, *symbols, TIME], roots, system.coordinates)

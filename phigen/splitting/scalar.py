@@ -1,10 +1,14 @@
-"""Flows of one coordinate by itself: ż = r(z) with frozen coefficients, where r is not linear.
+"""Flows of a single coordinate: ż = r(z) with frozen coefficients, where r is not linear.
 
-- r = az² + bz + c: z + r T/(1 − (az + b/2)T), T = tanh(wt)/w with w² = b²/4 − ac, written with cosroot and sinroot
-- r' = kr: z − log(1 − krt)/k
-- zr' = nr: z(1 + (1 − n) t r/z)^{1/(1 − n)}
+The cases are:
 
-Each ends where the solution becomes infinite; beyond, the increment is not a number, and the step fails.
+r = az² + bz + c: z + r T/(1 − (az + b/2)T), T = tanh(wt)/w with w² = b²/4 − ac, written with cosroot and sinroot;
+
+r' = kr: z − log(1 − krt)/k;
+
+zr' = nr: z(1 + (1 − n) t r/z)^{1/(1 − n)}.
+
+Each flow ends where the solution becomes infinite; beyond, the increment is not a number, and the step fails.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from phigen.symbolic.tower import Poly, rational
 
 
 def solve(ring: Ring, i: int, rate: Poly, moving: Collection[int]) -> Solution | None:
-    """The increment of coordinate i, whose rate involves no other moving variables than functions of itself."""
+    """Return the increment of coordinate i, if its rate depends on no other moving variables than functions of it."""
     name = ring.coordinates[i]
     others = [ring.coordinates[j] for j in range(len(ring.coordinates)) if j != i]
     if any(ring.tower.depends_on(ring.tower.gens[v], others) for v in _variables(ring, rate) if v in moving):
@@ -32,8 +36,8 @@ def _variables(ring: Ring, element: Poly) -> list[int]:
 
 
 def _quadratic(ring: Ring, name: str, rate: Poly, moving: Collection[int]) -> Solution | None:
-    tower, own = ring.tower, ring.tower.names.index(name)
-    terms: dict[int, Poly] = {m[own]: c for m, c in ring.terms(rate, [own]).items()}
+    tower, variable = ring.tower, ring.tower.names.index(name)
+    terms: dict[int, Poly] = {m[variable]: c for m, c in ring.terms(rate, [variable]).items()}
     if max(terms) > 2 or any(v in moving for c in terms.values() for v in _variables(ring, c)):
         return None
     padded: dict[int, Poly] = dict.fromkeys((2, 1, 0), tower.zero) | terms

@@ -1,11 +1,13 @@
-"""Motions on spheres: ẋ = (β·x)x − |x|²β for some of the coordinates, as damping by the double bracket moves spins.
+"""Motions on spheres: ẋ = (β·x)x − |x|²β for some of the coordinates, as double-bracket damping of spins.
 
-The end is x mirrored at the line of y = x − e, which keeps |x| whatever the rounding of e, and loses nothing where that
-is small: x + 2(y(y·e)/|y|² − e).
+The end point is the reflection of x at the line of y = x − e. This preserves |x| for any rounding of e, and is
+accurate for small e: x + 2(y(y·e)/|y|² − e).
 
-- β constant: a boost. Then e = |x|β tanh(θ/2)/|β| with θ = t|x||β|.
-- β = (v·x)w with w along v: the cotangent of the angle between x and v decays exponentially, which takes x to the
-  direction of u = x + T(x − 2x_v), x_v the part along v, T = tanh(t|x|²(v·w)/2); e = −|x|T(x − 2x_v)/(|x| + |u|).
+If β is constant, the flow is a boost: e = |x|β tanh(θ/2)/|β| with θ = t|x||β|.
+
+If β = (v·x)w with w along v, the cotangent of the angle between x and v decays exponentially. Then x moves to the
+direction of u = x + T(x − 2x_v), with x_v the component along v and T = tanh(t|x|²(v·w)/2), and e = −|x|T(x −
+2x_v)/(|x| + |u|).
 """
 
 from __future__ import annotations
@@ -17,36 +19,36 @@ from phigen.splitting.ring import TIME, Monomial, Ring
 from phigen.symbolic.expression import Expression, call, sqrt, symbol, total
 from phigen.symbolic.tower import Poly
 
-#: How coordinates move.
+#: Descriptions of the motion.
 BOOSTED, DRAWN = "moved on a sphere, as by a boost", "moved on a sphere along meridians"
 
 
 def solve(ring: Ring, field: Sequence[Poly]) -> tuple[dict[int, Expression], str] | None:
-    """The increments by the number of the coordinate, and the manner; None for other motions."""
+    """Return the increments by the index of the coordinate, with a description; None for other motions."""
     moving = [i for i, f in enumerate(field) if f != 0]
     if len(moving) < 2:
         return None
     sphere = _Sphere(ring, [ring.tower.names.index(ring.coordinates[i]) for i in moving])
-    rates = [ring.terms(field[i], sphere.own) for i in moving]
+    rates = [ring.terms(field[i], sphere.variables) for i in moving]
     names = {ring.coordinates[i] for i in moving}
     if any(names & set(ring.tower.names_in(c)) for rate in rates for c in rate.values()):
         return None
-    found, manner = sphere.boosted(rates), BOOSTED
-    if found is None:
-        found, manner = sphere.drawn(rates), DRAWN
-    return None if found is None else (dict(zip(moving, found, strict=True)), manner)
+    increments, manner = sphere.boosted(rates), BOOSTED
+    if increments is None:
+        increments, manner = sphere.drawn(rates), DRAWN
+    return None if increments is None else (dict(zip(moving, increments, strict=True)), manner)
 
 
 class _Sphere:
-    """Coordinates, ``own`` as variables of the ring, on a sphere; rates are given as polynomials in them."""
+    """Coordinates on a sphere; ``variables`` are their variables in the ring, and rates are polynomials in these."""
 
-    def __init__(self, ring: Ring, own: Sequence[int]) -> None:
-        self.ring, self.own, self.size = ring, own, len(own)
-        self.x = [ring.values[v] for v in own]
+    def __init__(self, ring: Ring, variables: Sequence[int]) -> None:
+        self.ring, self.variables, self.size = ring, variables, len(variables)
+        self.x = [ring.values[v] for v in variables]
         self.t, self.square = symbol(TIME), dot(self.x, self.x)
 
     def boosted(self, rates: Sequence[dict[Monomial, Poly]]) -> list[Expression] | None:
-        """β constant."""
+        """Return the increments if β is constant, else None."""
         beta = [rates[k - 1].get(self._monomial(k, k - 1), self.ring.tower.zero) for k in range(self.size)]
         if not self._moves(rates, [[b] for b in beta], [()]):
             return None
@@ -56,10 +58,13 @@ class _Sphere:
         return self._mirrored([scale * e for e in b])
 
     def drawn(self, rates: Sequence[dict[Monomial, Poly]]) -> list[Expression] | None:
-        """β = (v·x)w: β = Ax with A = M + g, where M = v wᵀ has rank 1, and g does not move anything."""
+        """Return the increments if β = (v·x)w, else None.
+
+        Then β = Ax with A = M + g, where M = v wᵀ has rank 1, and the number g causes no motion.
+        """
         zero, n = self.ring.tower.zero, range(self.size)
         a = [[zero if i == j else zero - rates[i].get(self._monomial(j, j, j), zero) for j in n] for i in n]
-        for i in n[1:]:  # from the first on, whose entry is taken to be 0
+        for i in n[1:]:  # relative to the first, whose entry is set to 0
             a[i][i] = rates[0].get(self._monomial(0, i, i), zero)
         if any(a[i][j] != a[j][i] for i in n for j in n) or not self._moves(rates, a, [(j,) for j in n]):
             return None
@@ -68,7 +73,7 @@ class _Sphere:
             minors = (m[i][j] * m[k][h] - m[i][h] * m[k][j] for i in n for k in n[:i] for j in n for h in n[:j])
             pivot = next((k for k in n if m[k][k] != 0), None)
             if pivot is not None and all(e == 0 for e in minors):
-                common = reduce(lambda p, q: p.gcd(q), m[pivot])  # such as a strength, which may be 0
+                common = reduce(lambda p, q: p.gcd(q), m[pivot])  # a factor such as a strength may be 0
                 v = [self.ring.expression(e / common) for e in m[pivot]]
                 return self._drawn(v, total(self.ring.expression(m[i][i]) for i in n))
         return None
@@ -84,13 +89,16 @@ class _Sphere:
         return self._mirrored([scale * e for e in across])
 
     def _mirrored(self, e: Sequence[Expression]) -> list[Expression]:
-        """2(y(y·e)/|y|² − e), which is −2x where y = 0: against β, so far that rounding leaves no direction."""
+        """Return 2(y(y·e)/|y|² − e), which is −2x where y = 0.
+
+        There x is opposite to β, and rounding leaves no direction.
+        """
         y = [c - d for c, d in zip(self.x, e, strict=True)]
         along = dot(y, e) * call("inv0", dot(y, y))
         return [2 * (c * along - d) for c, d in zip(y, e, strict=True)]
 
     def _shifts(self, a: Sequence[Sequence[Poly]]) -> Iterator[Poly]:
-        """What may stand beside a matrix of rank 1 on the diagonal."""
+        """Yield the candidates for the number g that A has on the diagonal in addition to a matrix of rank 1."""
         yield from (a[i][i] for i in range(self.size))
         for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)) if self.size == 3 else ():
             quotient, rest = divmod(a[i][j] * a[i][k], a[j][k]) if a[j][k] != 0 else (0, 1)
@@ -98,11 +106,11 @@ class _Sphere:
                 yield a[i][i] - quotient
 
     def _monomial(self, *factors: int) -> Monomial:
-        """The product of coordinates, by their places in ``own``; negative ones count from the end."""
-        found = [0] * len(self.ring.tower.gens)
+        """Return the product of coordinates, by their places in ``variables``; negative places count from the end."""
+        exponents = [0] * len(self.ring.tower.gens)
         for k in factors:
-            found[self.own[k]] += 1
-        return tuple(found)
+            exponents[self.variables[k]] += 1
+        return tuple(exponents)
 
     def _moves(
         self, rates: Sequence[dict[Monomial, Poly]], beta: Sequence[Sequence[Poly]], factors: Sequence[tuple[int, ...]]
@@ -115,11 +123,11 @@ class _Sphere:
         ]
         x = [ring.monomial(self._monomial(k)) for k in n]
         inner, square = (ring.tower.combine(a * b for a, b in zip(x, other, strict=True)) for other in (product, x))
-        wanted = [inner * x[k] - square * product[k] for k in n]
-        given = [ring.tower.combine(c * ring.monomial(m) for m, c in rate.items()) for rate in rates]
-        return all(ring.tower.is_zero(a - b) for a, b in zip(given, wanted, strict=True))
+        expected = [inner * x[k] - square * product[k] for k in n]
+        actual = [ring.tower.combine(c * ring.monomial(m) for m, c in rate.items()) for rate in rates]
+        return all(ring.tower.is_zero(a - b) for a, b in zip(actual, expected, strict=True))
 
 
 def dot(a: Sequence[Expression], b: Sequence[Expression]) -> Expression:
-    """a·b."""
+    """Return a·b."""
     return total(x * y for x, y in zip(a, b, strict=True))

@@ -1,7 +1,7 @@
-"""What makes a splitting right, proved for each build: the parts sum to H, and each flow solves its equation.
+"""Proofs that a splitting is correct, for each build: the parts sum to H, and each flow solves its equation.
 
-With exact flows, composed as in `phigen.scheme.alternation`, a step is a Poisson map, keeps all Casimirs and has the
-order of the composition, whatever the parts are.
+With exact flows, composed as in `phigen.scheme.alternation`, a step is a Poisson map, preserves all Casimirs, and has
+the order of the composition, for any parts.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from phigen.symbolic.verdict import Statement, decide_zero
 
 
 def check(system: System, splitting: Splitting, noise: Sequence[tuple[str, Flow]] = ()) -> Iterator[Statement]:
-    """The statements, those on flows in the order of the parts; H is that of the system, any gauge applied.
+    """Yield the statements, those on flows in the order of the parts; H includes the gauge.
 
     ``noise`` are flows of sources by their names.
     """
@@ -59,7 +59,7 @@ def check(system: System, splitting: Splitting, noise: Sequence[tuple[str, Flow]
 
 
 def _exponential_statements(system: System, splitting: Splitting) -> Iterator[Statement]:
-    """The numbers of matrix exponentials, beside enclosures of exact ones."""
+    """Yield the comparison of matrix exponentials with enclosures of the exact values."""
     values = {p.name: float(p.value) for p in system.parameters}
     for k, flow in enumerate(splitting.flows, 1):
         for exponential in flow.exponentials:
@@ -68,19 +68,19 @@ def _exponential_statements(system: System, splitting: Splitting) -> Iterator[St
 
 
 def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> Statement:
-    """The force parts are πζ + f together."""
+    """Decide that the force parts sum to πζ + f."""
     slope = gradient(system.hamiltonian, system.coordinates)
-    pushed = [
+    force_field = [
         a - b for a, b in zip(system.vector_field(), hamiltonian_vector_field(system.poisson, slope), strict=True)
     ]
     parts = [(name, flow.force) for name, flow in numbered if flow.force]
     sums = [total(entries) for entries in zip(*(force for _, force in parts), strict=True)]
-    residuals = [(c, a - b) for c, a, b in zip(system.coordinates, pushed, sums, strict=True)]
+    residuals = [(c, a - b) for c, a, b in zip(system.coordinates, force_field, sums, strict=True)]
     return decide_zero("πζ + f = " + " + ".join(name for name, _ in parts), residuals, system.positive)
 
 
 def _kick_statements(system: System, splitting: Splitting, plain: Sequence[Expression]) -> Iterator[Statement]:
-    """{V, {V, {V, T}}} = 0, and that {V, {V, T}} is what κ multiplies."""
+    """Yield {V, {V, {V, T}}} = 0, and that {V, {V, T}} is the factor of κ."""
     assert splitting.kick is not None
     v, t = plain[splitting.kick], plain[1 - splitting.kick]
     name_v, name_t = f"H_{1 + splitting.kick}", f"H_{2 - splitting.kick}"
@@ -94,14 +94,17 @@ def _kick_statements(system: System, splitting: Splitting, plain: Sequence[Expre
 
 
 def bracket(system: System, f: Expression, g: Expression) -> Expression:
-    """{f, g} = ∇f·π∇g."""
+    """Return {f, g} = ∇f·π∇g."""
     names = system.coordinates
     field = hamiltonian_vector_field(system.poisson, gradient(g, names))
     return total(a * b for a, b in zip(gradient(f, names), field, strict=True))
 
 
 def angles_added(e: Expression) -> Expression:
-    """sin, cos, 1 − cos and exp of sums and differences by the addition theorems, which the ring does not know."""
+    """Return the expression with the addition theorems applied to sin, cos, 1 − cos and exp of sums.
+
+    The ring does not contain these relations.
+    """
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         if args and args[0].op in ("add", "sub"):
@@ -131,14 +134,14 @@ def _sine_and_cosine_of_sum(e: Expression) -> tuple[Expression, Expression]:
 
 
 def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
-    """Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t; or with a force for π∇H_k."""
+    """Decide Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t; for a force its field replaces π∇H_k."""
     part, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
     name = f"the flow Φ of {part}: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t" + ", for exp(tA)" * bool(flow.exponentials)
     return decide_zero(name, list(_residuals(system, flow)), system.positive, flow.manner)
 
 
 def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
-    """What must vanish for a flow to be that of its vector field, by labels."""
+    """Yield the residuals that vanish if a flow is that of its vector field, with labels."""
     if any(piece.motion for piece in flow.pieces):
         yield from _composition_residuals(system, flow)
     elif flow.motion:
@@ -148,7 +151,7 @@ def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
 
 
 def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
-    """The pieces are flows, sum to the whole, commute, and are composed."""
+    """Yield the residuals of a composition: pieces are flows, sum to the whole, commute, and are composed."""
     pieces = flow.pieces
     for piece in pieces:
         yield from _residuals(system, piece)
@@ -162,7 +165,10 @@ def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Ex
 
 
 def _motion_residuals(system: System, flow: Flow, motion: KeplerMotion) -> Iterator[tuple[str, Expression]]:
-    """π∇H is the field of a Kepler motion, and the increments are those of `phigen.splitting.kepler`, proved there."""
+    """Yield the residuals of a Kepler motion.
+
+    π∇H is its field, and the increments are those proved by `phigen.splitting.kepler.identities`.
+    """
     names = system.coordinates
     field = flow.vector_field(system)
     for c, a, b in zip(names, field, motion.field(names), strict=True):
@@ -173,7 +179,7 @@ def _motion_residuals(system: System, flow: Flow, motion: KeplerMotion) -> Itera
 
 
 def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
-    """Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t."""
+    """Yield the residuals of Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t."""
     names = system.coordinates
     slopes = {name: slope for e in flow.exponentials for name, slope in e.slopes().items()}
     start = substitute(flow.increment, {TIME: ZERO, **dict.fromkeys(slopes, ZERO)})
@@ -187,12 +193,11 @@ def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expre
 
 
 def _rates(increments: Sequence[Expression], slopes: Mapping[str, Expression]) -> list[Expression]:
-    """The derivatives along the time, with those of the entries of matrix exponentials."""
+    """Return the derivatives along the time, including those of the entries of matrix exponentials."""
     rates = derivatives(increments, TIME)
     if not slopes:
         return rates
     listed = sparse_derivatives(increments, slopes)
     return [
-        total([rate, *(d * slopes[name] for name, d in found.items())])
-        for rate, found in zip(rates, listed, strict=True)
+        total([rate, *(d * slopes[name] for name, d in row.items())]) for rate, row in zip(rates, listed, strict=True)
     ]

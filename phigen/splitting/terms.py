@@ -1,4 +1,4 @@
-"""The terms of H: sums taken apart as they were written, and products expanded where they mix what does not commute."""
+"""The terms of H: summands as written, and expanded products where coordinates do not commute."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from phigen.symbolic.tower import Poly
 
 
 def summands(e: Expression, coordinates: Collection[str], factor: Expression = ONE) -> Iterator[Expression]:
-    """The terms of a sum, nested sums and constant factors of sums resolved."""
+    """Yield the terms of a sum, with nested sums and constant factors of sums resolved."""
     if e.op in ("add", "sub"):
         yield from summands(e.args[0], coordinates, factor)
         yield from summands(e.args[1], coordinates, factor if e.op == "add" else neg(factor))
@@ -30,34 +30,34 @@ def _static(e: Expression, coordinates: Collection[str]) -> bool:
 
 
 def hamiltonian_terms(system: System) -> list[Expression]:
-    """The summands of H."""
+    """Return the summands of H."""
     return list(summands(system.hamiltonian, system.coordinates))
 
 
 def terms_of(ring: Ring, listed: Iterable[Expression]) -> list[Term]:
-    """The terms of H, those of the same coordinates together.
+    """Return the terms of H, one for each set of coordinates.
 
     A summand of coordinates that do not commute is expanded in the ring, and its monomials are separate terms.
     """
-    found: list[Term] = []
+    terms: list[Term] = []
     for e in listed:
         element = ring.tower.convert(e)
         support = ring.support(element)
         if all((i, j) in ring.zero_pairs for i in support for j in support):
-            found.append(Term(e, element))
+            terms.append(Term(e, element))
         else:
-            found += monomial_terms(ring, element)
-    return joined(ring, found)
+            terms += monomial_terms(ring, element)
+    return joined(ring, terms)
 
 
 def monomial_terms(ring: Ring, element: Poly) -> list[Term]:
-    """The monomials of an element, each a term."""
+    """Return the monomials of an element, each as a term."""
     parts = [c * ring.monomial(m) for m, c in ring.terms(element, ring.state).items()]
     return [Term(ring.expression(part), part) for part in parts if not ring.tower.is_zero(part)]
 
 
 def joined(ring: Ring, terms: Iterable[Term]) -> list[Term]:
-    """Terms of the same coordinates together; constants go with the first of the others."""
+    """Return one term for each set of coordinates; constants are added to the first of them."""
     groups: dict[tuple[int, ...], list[Term]] = {}
     for term in terms:
         groups.setdefault(ring.support(term.element), []).append(term)

@@ -9,7 +9,7 @@ from fractions import Fraction
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.program import Program
-from phigen.splitting.matrices import PADE, REACH
+from phigen.splitting.matrices import MAX_PADE_NORM, PADE
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression, call, symbol, symbols_of, topological
 from phigen.symbolic.special import MIDDLE, NEAR, POLE, SPECIAL, near_coefficients, order_of, rest_coefficients
@@ -127,4 +127,4 @@ def transposes_exponentials(program: Program) -> bool:
 
 def exponential_constants() -> dict[str, object]:
     """The constants of the exponential of matrices."""
-    return {"pade": ", ".join(repr(float(c)) for c in PADE), "reach": repr(REACH)}
+    return {"pade": ", ".join(repr(float(c)) for c in PADE), "reach": repr(MAX_PADE_NORM)}
