@@ -22,7 +22,6 @@ from phigen.compiler import compile_proved, emit
 from phigen.errors import Diagnostic, PhigenWarning, SpecError
 from phigen.geometry.system import System, system_from_spec, system_of_lattice
 from phigen.proofs.examination import located
-from phigen.scheme.steps import Sweeps
 from phigen.spec import limits
 from phigen.spec.model import Overrides, Spec
 from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SCHEMES, SPEC_NAME, TIMED_ARGUMENTS
@@ -205,27 +204,28 @@ def interface_of(program: Program) -> Interface:
         single=program.single,
         observables=program.observed,
     )
-    if not isinstance(program.step, Sweeps):
+    step = program.step.swept
+    if step is None:
         return about
-    sites = program.step.sites
-    every_other = bool(program.step.partners and not program.step.partners.graph)
+    sites = step.sites
+    every_other = bool(step.partners and not step.partners.graph)
     return LatticeInterface(
         **vars(about),
         axes=sites.axes,
         at_sites=sites.parameters,
         observed_fields=program.observables.fields,
-        casimir_kinds=program.step.casimir_kinds,
+        casimir_kinds=step.casimir_kinds,
         periods=sites.periods,
         least=sites.least,
         required=frozenset(p.name for p in program.parameters if p.values is not None),
         first_open=sites.open[0],
         open_axes=sites.open,
         colour_period=sites.colours // math.gcd(sites.colours, sites.weights[0]),
-        graph=bool(program.step.partners and program.step.partners.graph),
+        graph=bool(step.partners and step.partners.graph),
         pairs=every_other,
         compensated=program.compensated,
         at_bonds=sites.at_bonds,
-        dear=every_other or program.step.equation is not None,
+        dear=every_other or step.equation is not None,
     )
 
 

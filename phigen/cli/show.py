@@ -255,7 +255,7 @@ def _power(exponent: int) -> str:
 def _code(compilation: Compilation) -> list[str]:
     program = compilation.program
     lines = [fact for fact in program.about.facts if not fact.startswith("bi-realisation")]
-    lines.append(f"operations of one {program.step.unit}: {program.about.counts}")
+    lines.append(f"operations of one {program.step.kind.unit}: {program.about.counts}")
     return lines + [f"{name}: {len(text.splitlines())} lines" for name, text in _files(compilation).items()]
 
 

@@ -7,8 +7,9 @@ This stage decides whether lanes are possible and fit on the stack, and which ke
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from phigen.lanes import path_kernels
 from phigen.lanes.inverse_flows import recomputing_transposes
@@ -25,7 +26,7 @@ from phigen.lanes.lane_functions import (
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import PathSlopes
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Explicit, Factorisation, Gauss, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
+from phigen.scheme.steps import Explicit, Factorisation, Gauss, Newton, Path, PathLanes, Splitting, Sweeps
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import SPECIAL
 
@@ -149,40 +150,55 @@ def in_lanes(program: Program) -> Lanes | None:
 
     None where the spec excludes lanes, the program has no such parts, or they would need too much of the stack.
     """
-    if isinstance(program.step, Sweeps):
-        return _rows(program, program.step)
-    if not program.lanes:
+    return LOWERINGS[program.step.kind.name](program, program.step)
+
+
+def _is_lowered(program: Program) -> bool:
+    """Whether steps may be computed in lanes.
+
+    With noise every step has different coefficients, so predictors from earlier steps fail. Where H depends on the
+    time, members in packs would share coefficients that differ from step to step.
+    """
+    dated = program.time and (program.monitor or not program.step.kind.implicit)
+    return program.lanes and program.offers("lanes") and not program.noise and not dated
+
+
+def _of_newton(program: Program, step: Newton) -> Blocks | None:
+    # the predictor of blocks needs recurrences
+    return _newton(program, step) if _is_lowered(program) and program.offers("recurrences") else None
+
+
+def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
+    """Return blocks of steps; where there are none, paths in the reverse pass, in double precision."""
+    blocks = None
+    if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):
+        blocks = _paths(program, step, step.lanes)
+    if blocks or program.single or not program.lanes:
+        return blocks  # lanes hold numbers of 64 bits
+    return _traces(program, step)
+
+
+def _of_explicit(program: Program, step: Explicit) -> Packs | None:
+    if not _is_lowered(program):
         return None
-    lanes = _of_steps(program) if program.offers("lanes") else None
-    if lanes or program.single or not isinstance(program.step, Path):
-        return lanes  # lanes hold numbers of 64 bits
-    return _traces(program, program.step)
+    transposes = step.adjoint.steps if step.adjoint else ()
+    return _with_transposes(program, _packs(program, (step.increment,), ()), transposes, 0)
 
 
-def _of_steps(program: Program) -> Blocks | Packs | Stages | None:
-    if isinstance(program.step, Gauss):
-        return _stages(program.step)
-    if program.noise:
-        return None  # every step has different coefficients, so predictors from earlier steps fail
-    if program.time and (program.monitor or not isinstance(program.step, Implicit)):
-        return None  # members in packs would share coefficients that differ from step to step
-    match program.step:
-        case Newton() as step if program.offers("recurrences"):  # the predictor of blocks needs them
-            return _newton(program, step)
-        case Path() as step if step.lanes and (program.offers("recurrences") or not step.adjoint):
-            return _paths(program, step, step.lanes)
-        case Explicit() as step:
-            transposes = step.adjoint.steps if step.adjoint else ()
-            return _with_transposes(program, _packs(program, (step.increment,), ()), transposes, 0)
-        case Splitting() as step:
-            used = operations(step.flows)
-            packs = _packs(program, step.flows, tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f in used))
-            segment_bytes = 2 * _DOUBLE * LANES**2 * program.dimension  # of the stored states of one pack
-            inverse_transposes = recomputing_transposes(program, step) if packs else ()
-            if packs and inverse_transposes:
-                return _with_transposes(program, replace(packs, recomputed=True), inverse_transposes, 0)
-            return _with_transposes(program, packs, step.adjoint.steps if step.adjoint else (), segment_bytes)
-    return None
+def _of_splitting(program: Program, step: Splitting) -> Packs | None:
+    if not _is_lowered(program):
+        return None
+    used = operations(step.flows)
+    packs = _packs(program, step.flows, tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f in used))
+    segment_bytes = 2 * _DOUBLE * LANES**2 * program.dimension  # of the stored states of one pack
+    inverse_transposes = recomputing_transposes(program, step) if packs else ()
+    if packs and inverse_transposes:
+        return _with_transposes(program, replace(packs, recomputed=True), inverse_transposes, 0)
+    return _with_transposes(program, packs, step.adjoint.steps if step.adjoint else (), segment_bytes)
+
+
+def _of_gauss(program: Program, step: Gauss) -> Stages | None:
+    return _stages(step) if program.lanes and program.offers("lanes") else None
 
 
 def _rows(program: Program, step: Sweeps) -> Rows:
@@ -357,3 +373,14 @@ def _without_matrices(kernel: Kernel) -> Kernel:
     needed = set(topological([v for o in outputs for v in o.values]))
     named = tuple((name, value) for name, value in kernel.named if value in needed)
     return replace(kernel, name="evaluate", outputs=outputs, named=named)
+
+
+#: The lowering of each kind of step.
+LOWERINGS: Mapping[str, Callable[[Program, Any], Lanes | None]] = {
+    "newton": _of_newton,
+    "explicit": _of_explicit,
+    "path": _of_path,
+    "gauss": _of_gauss,
+    "splitting": _of_splitting,
+    "sweeps": _rows,
+}

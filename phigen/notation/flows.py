@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from phigen.compilation import CompiledSplitting
 from phigen.notation import parts
-from phigen.scheme.steps import Splitting, Step
+from phigen.scheme.steps import Step
 from phigen.splitting.flow import Flow
 from phigen.splitting.matrices import MatrixExponential
 from phigen.symbolic.expression import Expression, substitute, symbol
@@ -84,9 +84,8 @@ def formulas(compilation: CompiledSplitting, most: int | None) -> list[tuple[str
 
 def schedule(step: Step) -> list[tuple[int, float]]:
     """The flows of a splitting in order, as pairs of a part and a fraction of the step; none for other steps."""
-    if not isinstance(step, Splitting):
-        return []
-    return [(part, step.schedule.times[row]) for part, row in step.schedule.flows]
+    schedule = step.flow_schedule
+    return [(part, schedule.times[row]) for part, row in schedule.flows] if schedule else []
 
 
 def described(compilation: CompiledSplitting) -> dict[str, object]:

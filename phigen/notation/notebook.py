@@ -44,7 +44,7 @@ def system_html(system: System) -> str:
 def compilation_html(compilation: Compilation) -> str:
     """The system and its method."""
     program = compilation.program
-    said = f"compiled to order {program.order}: {compilation.label}, {program.step.manner}"
+    said = f"compiled to order {program.order}: {compilation.label}, {program.step.kind.manner}"
     about = _cell_html(compilation.by_sweeps().cell) if compilation.spec.lattice else system_html(compilation.system)
     return about.removesuffix("</div>") + f"<p>{escape(said)}</p></div>"
 

@@ -50,7 +50,7 @@ def choices_section(compilation: Compilation) -> Markup:
             pairs.append((name, text))
         elif not colon:
             pairs.append(("note", fact))
-    pairs.append((f"one {program.step.unit}", program.about.counts or "nothing to compute"))
+    pairs.append((f"one {program.step.kind.unit}", program.about.counts or "nothing to compute"))
     return page.facts((name, page.typeset(text)) for name, text in pairs)
 
 

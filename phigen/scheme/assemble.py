@@ -205,7 +205,7 @@ def _facts(
     halves = f", impulse h {g}f by halves before and after" if system.forces and acts(system.forces.vector) else ""
     yield from force_facts(system, f"p = h {g}(grad H + zeta){halves}")
     yield from noise_facts(system, weak=1)
-    yield f"step: {step.manner}"
+    yield f"step: {step.kind.manner}"
     yield scheme.note
     yield order.note
 

@@ -186,5 +186,5 @@ def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge,
         yield "structure: exact, as the brackets are constant"
     yield from gauge.facts
     yield from force_facts(system, "pi(grad H + zeta) + f at the stages")
-    yield f"step: {step.manner}"
+    yield f"step: {step.kind.manner}"
     yield order.note

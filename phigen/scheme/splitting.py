@@ -144,14 +144,14 @@ def facts(choice: Choice, step: Splitting, sources: int = 0) -> list[str]:
     """What the header says of the method; the first parts are ``sources`` of noise."""
     count, flows, method = len(step.flows) - sources, len(step.schedule.flows) - 2 * sources, choice.method
     if count == 1 and choice.carrier is None:
-        return ["scheme: the exact flow of H, which is elementary", f"step: {step.manner}"]
+        return ["scheme: the exact flow of H, which is elementary", f"step: {step.kind.manner}"]
     names = [(f"{flow.letter}_{k}", flow.force) for k, flow in enumerate(choice.splitting.flows, 1)]
     parts, forces = (" + ".join(n for n, force in names if bool(force) == acting) for acting in (False, True))
     why = f", since {choice.why}" if choice.why else ""
     return [
         f"scheme: splitting, H = {parts}" + f", forces {forces}" * bool(forces) + ", with the exact flow of each",
         f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{why}",
-        f"step: {step.manner}",
+        f"step: {step.kind.manner}",
     ]
 
 

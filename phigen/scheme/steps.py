@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from phigen.gauss.tableau import Tableau
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.path import PathSlopes, Recurrences
+from phigen.scheme.step_kinds import EXPLICIT, GAUSS, NEWTON, PATH, SPLITTING, SWEEPS, StepKind
 
 #: The end of the name of a kernel of lattices that is the transpose of another.
 BACK = "_back"
@@ -58,10 +60,87 @@ class _Staged:
     refresh: Kernel | None = field(default=None, kw_only=True)
     adjoint: Adjoint | None = field(default=None, kw_only=True)
 
+    #: The facts about steps of this kind.
+    kind: ClassVar[StepKind]
+
     @property
     def transposed(self) -> tuple[Kernel, ...]:
         """The kernels of the transpose."""
         return self.adjoint.kernels if self.adjoint else ()
+
+    @property
+    def inner_solve(self) -> InnerSolve | None:
+        """The solution of the equation for one point; None where there is no such equation."""
+        return None
+
+    @property
+    def eliminate(self) -> Kernel | None:
+        """The solution with one Newton matrix, where it is unrolled."""
+        return None
+
+    @property
+    def eliminate_transposed(self) -> Kernel | None:
+        """The solution with the transpose of one, where it is unrolled."""
+        return None
+
+    @property
+    def invert(self) -> Kernel | None:
+        """The inverse of a Newton matrix, where it is unrolled."""
+        return None
+
+    @property
+    def centred(self) -> bool:
+        """Whether the point of an implicit step is the mean of its ends."""
+        return False
+
+    @property
+    def frame(self) -> Kernel | None:
+        """The turn from the frame of a step to that of the next, where steps have frames."""
+        return None
+
+    @property
+    def path(self) -> Recurrences | None:
+        """The recurrences of the path that a step follows, if it follows one."""
+        return None
+
+    @property
+    def varied_path(self) -> Recurrences | None:
+        """Those of the path with its variation, if derivatives of such a step were asked for."""
+        return None
+
+    @property
+    def back(self) -> PathAdjoint | None:
+        """The path traced back, if a step follows one and its adjoint was asked for."""
+        return self.adjoint.path if self.adjoint else None
+
+    @property
+    def flow_schedule(self) -> Schedule | None:
+        """The schedule of the flows of a step; None where it is no sequence of flows."""
+        return None
+
+    @property
+    def flow_kernels(self) -> tuple[Kernel, ...]:
+        """The flows of a splitting with their derivatives and transposes."""
+        return ()
+
+    @property
+    def multiples(self) -> tuple[float, ...]:
+        """The multiples of the modified potential in kicks, by rows of the schedule; nothing where there are none."""
+        return self.flow_schedule.multiples if self.flow_schedule else ()
+
+    @property
+    def method_name(self) -> str:
+        """The name of the composition of flows or stages, where the step has it."""
+        return ""
+
+    @property
+    def swept(self) -> Sweeps | None:
+        """The step, if it is one of a lattice."""
+        return None
+
+    def maps(self, stages: int) -> int:
+        """The number of maps that a step of so many stages is composed of."""
+        return stages
 
     @property
     def prepared(self) -> int:
@@ -122,10 +201,12 @@ class Newton(_Staged):
     centred: bool = False
     eliminate_transposed: Kernel | None = None
 
-    #: What the operation counts of `main` refer to.
-    unit = "Newton iteration"
-    #: What the header says of the step.
-    manner = "implicit, Newton iteration with the analytic matrix"
+    kind = NEWTON
+
+    @property
+    def inner_solve(self) -> InnerSolve:
+        """The solution of the equation."""
+        return self.inner
 
     @property
     def main(self) -> Kernel:
@@ -147,8 +228,7 @@ class Explicit(_Staged):
     increment: Kernel
     tangent: Kernel | None = None
 
-    unit = "step"
-    manner = "explicit"
+    kind = EXPLICIT
 
     @property
     def main(self) -> Kernel:
@@ -190,8 +270,22 @@ class Path(_Staged):
     lanes: PathLanes | None = None
     tangent: PathTangent | None = None
 
-    unit = "evaluation of the equation for p"
-    manner = "implicit in p, each path followed by its Taylor series to round-off"
+    kind = PATH
+
+    @property
+    def inner_solve(self) -> InnerSolve:
+        """The solution of the equation for p."""
+        return self.inner
+
+    @property
+    def path(self) -> Recurrences:
+        """The recurrences of the path."""
+        return self.recurrences
+
+    @property
+    def varied_path(self) -> Recurrences | None:
+        """Those of the path with its variation, if derivatives were asked for."""
+        return self.tangent.recurrences if self.tangent else None
 
     @property
     def main(self) -> Kernel:
@@ -205,11 +299,6 @@ class Path(_Staged):
         varied = (self.curvature,) if not self.lanes else ()
         own = (self.prepare, self.refresh, self.generate, self.eliminate)
         return _present((*own, *lanes, *varied, *self.transposed))
-
-    @property
-    def back(self) -> PathAdjoint | None:
-        """What going back along the path needs, if that was asked for."""
-        return self.adjoint.path if self.adjoint else None
 
     @property
     def curvature(self) -> Kernel | None:
@@ -245,8 +334,7 @@ class Gauss(_Staged):
     most_sweeps: int = 100
     tangent: GaussTangent | None = None
 
-    unit = "evaluation at a stage"
-    manner = "implicit, all stages by fixed-point sweeps to round-off"
+    kind = GAUSS
 
     @property
     def main(self) -> Kernel:
@@ -271,18 +359,7 @@ class Gauss(_Staged):
 
 
 @dataclass(frozen=True)
-class _Scheduled(_Staged):
-    """A step whose coefficients are rows, one for each of the times of its schedule."""
-
-    @property
-    def coefficients(self) -> int:
-        """Coefficients of one step, in all rows."""
-        schedule: Schedule = self.schedule  # type: ignore[attr-defined]
-        return self.row * len(schedule.times)
-
-
-@dataclass(frozen=True)
-class Splitting(_Scheduled):
+class Splitting(_Staged):
     """The exact flows of the parts of H, one after another as the ``schedule`` lists them.
 
     ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the method;
@@ -294,8 +371,31 @@ class Splitting(_Scheduled):
     composition: str
     tangents: tuple[Kernel, ...] = ()
 
-    unit = "step"
-    manner = "explicit"
+    kind = SPLITTING
+
+    @property
+    def flow_schedule(self) -> Schedule:
+        """The schedule."""
+        return self.schedule
+
+    @property
+    def method_name(self) -> str:
+        """The name of the composition."""
+        return self.composition
+
+    @property
+    def coefficients(self) -> int:
+        """Coefficients of one step, in all rows."""
+        return self.row * len(self.schedule.times)
+
+    @property
+    def flow_kernels(self) -> tuple[Kernel, ...]:
+        """The flows with their derivatives and transposes."""
+        return (*self.flows, *self.tangents, *(self.adjoint.steps if self.adjoint else ()))
+
+    def maps(self, stages: int) -> int:
+        """The number of flows."""
+        return len(self.schedule.flows)
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
@@ -446,7 +546,7 @@ class Equation:
 
 
 @dataclass(frozen=True)
-class Sweeps(_Scheduled):
+class Sweeps(_Staged):
     """A step of a lattice, by sweeps over its sites.
 
     Of a splitting each of the ``parts`` is a list of sweeps, which may be made in any order, and the ``schedule`` is
@@ -465,8 +565,27 @@ class Sweeps(_Scheduled):
     by_colour: tuple[bool, ...] = ()  # of graphs: the parts that belong to one colour, and are done for each
     equation: Equation | None = None
 
-    unit = "step of one site"
-    manner = "explicit"
+    kind = SWEEPS
+
+    @property
+    def flow_schedule(self) -> Schedule:
+        """The schedule."""
+        return self.schedule
+
+    @property
+    def method_name(self) -> str:
+        """The name of the composition."""
+        return self.composition
+
+    @property
+    def coefficients(self) -> int:
+        """Coefficients of one step, in all rows."""
+        return self.row * len(self.schedule.times)
+
+    @property
+    def swept(self) -> Sweeps:
+        """The step itself."""
+        return self
 
     @property
     def is_by_hand(self) -> bool:
@@ -526,9 +645,6 @@ class Sweeps(_Scheduled):
 
 
 Step = Newton | Explicit | Path | Gauss | Splitting | Sweeps
-
-#: Those that solve an equation for one point.
-Implicit = Newton | Path
 
 
 def _present(kernels: Iterable[Kernel | None]) -> tuple[Kernel, ...]:

@@ -24,7 +24,6 @@ from phigen.lattice.forcing import noise_statements
 from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, MAX_BALANCED_SITE_STEPS, errors_of, units_of, works
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
-from phigen.scheme.steps import Sweeps
 from phigen.study import gradients, lattice_noise, single_precision
 from phigen.study.conservation import rounding, stated
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification
@@ -137,8 +136,8 @@ def _without_noise(subject: _Subject) -> _Subject:
 def _order(subject: _Subject, *, quiet: bool = False) -> Check:
     """The observed order, from the pair of steps with the smallest errors above rounding."""
     name = "observed order, without the noise" if quiet else "observed order"
-    step = subject.compilation.program.step
-    if isinstance(step, Sweeps) and len(step.parts) == 1 and not step.by_colour:
+    step = subject.compilation.program.step.swept
+    if step and len(step.parts) == 1 and not step.by_colour:
         return Check(name, math.inf)
     order, x, size = subject.compilation.order.order, subject.start.state, _size(subject.start.state)
     span, slopes = 4 * abs(subject.h), dict[float, float]()

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Explicit, Gauss, Implicit, Newton, Path, Splitting, Sweeps
+from phigen.scheme.step_kinds import STEP_KINDS, StepKind
 from phigen.targets.path import kinds, recurrences
 
 
@@ -25,18 +25,18 @@ def _sums(kind: str) -> Callable[[Program], bool]:
     return lambda p: any(kind in kinds(path) for path in recurrences(p))
 
 
+def _is_of(kind: StepKind) -> Callable[[Program], bool]:
+    return lambda p: p.step.kind is kind
+
+
 #: What all languages know, each after what it requires.
 FEATURES = (
-    Feature("NEWTON", lambda p: isinstance(p.step, Newton)),
-    Feature("PATH", lambda p: isinstance(p.step, Path)),
-    Feature("GAUSS", lambda p: isinstance(p.step, Gauss)),
-    Feature("FRAMED", lambda p: isinstance(p.step, Gauss) and p.step.frame),
-    Feature("EXPLICIT", lambda p: isinstance(p.step, Explicit)),
-    Feature("SPLITTING", lambda p: isinstance(p.step, Splitting)),
-    Feature("IMPLICIT", lambda p: isinstance(p.step, Implicit)),
-    Feature("HISTORY", lambda p: isinstance(p.step, Implicit | Gauss)),
+    *(Feature(kind.name.upper(), _is_of(kind)) for kind in STEP_KINDS.values() if not kind.sites),
+    Feature("FRAMED", lambda p: p.step.frame),
+    Feature("IMPLICIT", lambda p: p.step.kind.implicit),
+    Feature("HISTORY", lambda p: p.step.kind.predicted),
     Feature("COMPOSED", lambda p: len(p.fractions) > 1),
-    Feature("KICKS", lambda p: isinstance(p.step, Splitting | Sweeps) and p.step.schedule.multiples),
+    Feature("KICKS", lambda p: p.step.multiples),
     Feature("TIMED", lambda p: p.time),
     Feature("NOISE", lambda p: p.noise),
     Feature("OBSERVED", lambda p: p.observed),

@@ -37,7 +37,7 @@ def header_lines(program: Program, command: str) -> list[str]:
     for fact in about.facts:
         lines += textwrap.wrap(plain(fact), WIDTH, initial_indent="  ", subsequent_indent="    ")
     if counts := about.counts:
-        taken = textwrap.wrap(f"  one {program.step.unit}: {counts}", WIDTH, subsequent_indent="    ")
+        taken = textwrap.wrap(f"  one {program.step.kind.unit}: {counts}", WIDTH, subsequent_indent="    ")
         lines[-1:] = _on_one_line(lines[-1], *taken) if lines[-1].startswith("  step:") else [lines[-1], *taken]
     lines += _on_one_line("DO NOT EDIT: the checksum below notices", f"to regenerate: {command}")
     return [*lines, f"SPDX-License-Identifier: {about.license}"]

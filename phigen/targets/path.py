@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.path import ConvolutionTerm, NodeSeries, Recurrences
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Path, PathAdjoint
+from phigen.scheme.steps import PathAdjoint
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, cotangent, momentum, variation
 from phigen.targets.names import Scope
@@ -76,11 +76,8 @@ def adjoint_program(program: Program, path: PathAdjoint) -> Program:
 def recurrences(program: Program) -> list[Recurrences]:
     """Those of the path, of the path with its variation, and of the path traced back; none for other steps."""
     step = program.step
-    if not isinstance(step, Path):
-        return []
-    varied = [step.tangent.recurrences] if step.tangent else []
-    back = [step.back.recurrences] if step.back else []
-    return [step.recurrences, *varied, *back]
+    back = step.back.recurrences if step.back else None
+    return [path for path in (step.path, step.varied_path, back) if path]
 
 
 def kinds(path: Recurrences) -> list[str]:

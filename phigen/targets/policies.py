@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from phigen.scheme.policies import POLICIES, Constant, MeasurePolicy, Policy
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Implicit
 
 #: Powers of two below this exponent are written as such: they are bounds on rounding.
 _LEAST_EXPONENT = -20
@@ -16,7 +15,7 @@ _LEAST_EXPONENT = -20
 
 def policies_of(program: Program) -> dict[str, Policy]:
     """The policies by the names of their files; coordinates that keep their sign are measured each by itself."""
-    if isinstance(program.step, Implicit) and program.step.inner.relative:
+    if program.step.inner_solve and program.step.inner_solve.relative:
         return {**POLICIES, "measure_policy": MeasurePolicy(floor=0.0)}
     return POLICIES
 

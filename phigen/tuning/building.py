@@ -24,7 +24,6 @@ from phigen.geometry.system import System
 from phigen.runtime import cache
 from phigen.runtime.backend import Backend
 from phigen.runtime.interface import Interface
-from phigen.scheme.steps import Splitting, Sweeps
 from phigen.spec.model import Spec
 from phigen.targets.header import split
 from phigen.tuning.settings import Setting
@@ -92,13 +91,12 @@ def built(compilation: Compilation, setting: Setting, start: float) -> Built:
     files = emit(program, target, f"phigen build {program.name}.yaml")
     step = program.step
     if target == "c":
-        cache.build(files, threads=isinstance(step, Sweeps))
-    flows = step.schedule if isinstance(step, Splitting) or (isinstance(step, Sweeps) and not step.equation) else None
-    stages = flows.stages if flows else len(program.fractions)
-    composition = step.composition if isinstance(step, Splitting | Sweeps) else ""
+        cache.build(files, threads=step.kind.sites)
+    is_sequence = step.flow_schedule and not (step.swept and step.swept.equation)
+    stages = step.flow_schedule.stages if step.flow_schedule and is_sequence else len(program.fractions)
     return Built(
         setting, files, interface_of(program), compilation.label, program.order, compilation.exact,
-        compilation.symmetric, bool(program.gauge), stages, composition,
+        compilation.symmetric, bool(program.gauge), stages, step.method_name,
         time.perf_counter() - start,
     )  # fmt: skip
 

@@ -9,24 +9,24 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 
 from phigen.lanes.in_lanes import LANES, Blocks, Lanes, Packs, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
-from phigen.scheme.path import Recurrences
 from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import BOUND, Attitude, Noise, Program
-from phigen.scheme.steps import Adjoint, Explicit, Gauss, Implicit, Newton, Path, PathAdjoint, Splitting, Sweeps
+from phigen.scheme.steps import Adjoint
 from phigen.spec.model import Parameter
-from phigen.targets.c import functions, gauss, paths, splitting
+from phigen.targets.c import functions, paths
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
-from phigen.targets.c.kernels import declaration, function, members, printer
-from phigen.targets.c.lanes import KNOTS, printed_back, remembered, travels
+from phigen.targets.c.kernels import declaration, function, members
+from phigen.targets.c.lanes import KNOTS, remembered, travels
 from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.single import single
+from phigen.targets.c.step_text import Sizes, text_of
 from phigen.targets.header import header_lines, plain, right_hand_side, sealed
-from phigen.targets.path import TERMS, Syntax, adjoint_program, statements, tangent_program
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
@@ -37,8 +37,6 @@ PASSES, PASSES_OF_CALLS = 2, 1
 
 #: Lines of a file that is read without a table of contents.
 FEW_SCREENS = 240
-
-Sizes = list[tuple[str, int, str]]
 
 
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
@@ -61,7 +59,7 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
 def _unrestricted(program: Program, code: str) -> str:
     """The code where ``restrict`` does no harm to compilers that have no such word: only loops over lanes and sites
     become faster by it."""
-    if program.profile == "small" and not isinstance(program.step, Sweeps) and "_EACH_LANE" not in code:
+    if program.profile == "small" and not program.step.kind.sites and "_EACH_LANE" not in code:
         return re.sub(r"\brestrict\b ?", "", code)
     return render("c", "restrict.c", {"code": code.strip()})
 
@@ -71,7 +69,8 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     lanes = in_lanes(program)
     has = switches(program, lanes)
     policies = _policies(program)
-    if not isinstance(program.step, Sweeps):
+    step = program.step.swept
+    if step is None:
         return Amalgam(program.name, has, policies | printed(program, lanes, has)), "solver.h", "runtime.c"
     from phigen.targets.c.lattice import adjoint as lattice_adjoint
     from phigen.targets.c.lattice import layout as lattice_layout
@@ -79,7 +78,6 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     from phigen.targets.c.lattice.parts import parameters, sweeps
 
     assert isinstance(lanes, Rows)
-    step = program.step
     has |= lattice_layout.switches(program, step, lattice_layout.layout_of(program, step)) | {
         "NEAR": bool(lanes.limited)
     }
@@ -119,28 +117,11 @@ def _sealed(lines: Sequence[str], body: str) -> str:
 
 def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, str]:
     """What the runtime includes of the model, by the names that it has there."""
-    found = {}
     step = program.step
-    if isinstance(step, Path):
-        found["path_model.h"] = _path(program, step.recurrences, "path")
-        if step.tangent:
-            varied = _path(tangent_program(program), step.tangent.recurrences, "tangent")
-            found["tangent_model.h"] = "" if step.adjoint else function(program, step.tangent.curvature) + "\n"
-            found["tangent_model.h"] += varied
-        if step.back:
-            found["adjoint_path.h"] = _adjoint_path(program, step.back)
-        if isinstance(lanes, Blocks | Traces) and lanes.path and (has["BLOCKS"] or has["TRACED"]):
-            found["path_model_lanes.h"] = paths.printed(program, step, lanes.path)
-    if isinstance(step, Splitting):
-        found["flows.h"] = splitting.printed(program, step)
-        found["tangent_flows.h"] = splitting.tangent(program, step) if has["TANGENT"] else ""
-        found["adjoint_flows.h"] = splitting.adjoint(program, step, step.adjoint) if step.adjoint else ""
-    if isinstance(step, Gauss):
-        found["gauss_tables.h"] = gauss.tables(program, step, lanes)
+    found = text_of(program).texts(program, step, lanes, has)
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"] or has["STAGED"]):
-        found["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes))
-    if has["ABREAST"] and isinstance(lanes, Packs) and isinstance(step, Splitting):
-        found["adjoint_flows_lanes.h"] = printed_back(program, lanes)
+        packed = partial(text_of(program).packed, program, step)
+        found["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes, packed))
     declarations = render("c", "declarations.h", _declarations(program, lanes, has))
     return {"declarations.h": declarations, "model.h": _model(program, lanes, has, found.values()), **found}
 
@@ -158,15 +139,15 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         sizes.append(("GAUGES", len(program.held), "the energy level e" if program.monitor else held))
     sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["ADJOINT"]:
-        trail = _trail(program, lanes)
+        trail = text_of(program).trail(program, step, lanes)
         sizes.append(("TRAIL", trail, "numbers on the tape for each step, for the reverse pass"))
         if has["EACH"]:
-            batch = 1 if isinstance(program.step, Splitting) else LANES * _packs_back(lanes, has)
+            batch = 1 if step.kind.flows else LANES * _packs_back(lanes, has)
             sizes.append(("TRAIL_EACH", trail * max(1, batch), "the same for a batch of members"))
     if has["GUESSED"] and not has["RECURRENCES"] and not has["GAUSS"]:
         predictor = PredictorPolicy()
         sizes.append(("DIFFERENCES", predictor.differences, "for the predictor; more would amplify rounding"))
-    sizes += gauss.declared(step, lanes) if isinstance(step, Gauss) else []
+    sizes += text_of(program).declared(step, lanes)
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
         sizes.append(("REMEMBERED", memory["REMEMBERED"], "past solutions that the recurrence is fitted to"))
@@ -193,14 +174,6 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
             for said, kernels in _observables(program)
         ],
     }
-
-
-def _trail(program: Program, lanes: Lanes | None) -> int:
-    """Numbers of a step that its transpose needs."""
-    step = program.step
-    if isinstance(step, Gauss):
-        return gauss.trail(program, step, lanes)
-    return program.dimension * len(step.schedule.flows if isinstance(step, Splitting) else program.fractions)
 
 
 #: Kernels that are functions of the API: each with its name there, and whether it returns its only value.
@@ -275,24 +248,7 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
     step = program.step
     if step.refresh:
         sizes.append(("PREPARED", step.prepared, "number of the first coefficients, functions of params and h only"))
-    if isinstance(step, Implicit):
-        sizes.append(("MAX_ITERATIONS", step.inner.max_iterations, "limit of the iterations of an implicit step"))
-    sizes += gauss.constants(program, step) if isinstance(step, Gauss) else []
-    if isinstance(step, Path):
-        sizes.append(("TERMS", TERMS, "largest number of Taylor terms of a path; a path that needs more is divided"))
-        sizes.append(
-            ("SERIES", len(step.recurrences.series), "Taylor series of a path, those of the coordinates first")
-        )
-        sizes.append(("FIXED", max(1, len(step.recurrences.fixed)), "values that are constant along a path"))
-        if step.tangent:
-            varied = step.tangent.recurrences
-            sizes.append(("TANGENT_SERIES", len(varied.series), "Taylor series of a path and its derivative"))
-            sizes.append(("TANGENT_FIXED", max(1, len(varied.fixed)), "values that are constant along the path"))
-        if step.back:
-            back, n = step.back, program.dimension
-            sizes.append(("BACK", 3 * n + len(back.used), "numbers of a path in the reverse pass, with cotangents"))
-            sizes.append(("BACK_SERIES", len(back.recurrences.series), "Taylor series of such a path"))
-            sizes.append(("BACK_FIXED", max(1, len(back.recurrences.fixed)), "values that are constant along the path"))
+    sizes += text_of(program).constants(program, step)
     if has["ADJOINT"]:
         sizes += [("RENEWED_OF_ROW", step.renewed, "coefficients of a row that depend on the time")] * bool(
             step.refresh
@@ -308,11 +264,11 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
             sizes.append(("FACTORS", entries, "entries of the factors of a Newton matrix"))
     if isinstance(lanes, Blocks | Traces) and lanes.path and (has["BLOCKS"] or has["TRACED"]):
         sizes += paths.sizes(lanes.path, lanes.slope_terms)
-    if has["ALONG"] and isinstance(step, Path) and step.back:
+    if has["ALONG"] and step.back:
         sizes.append(("USED", len(step.back.used), "coefficients that the slope of a path depends on"))
     if has["ABREAST"]:
         sizes.append(("BACK_PACKS", _packs_back(lanes, has), "packs of members that are pulled back together"))
-    return sizes + (splitting.sizes(step) if isinstance(step, Splitting) else [])
+    return sizes + text_of(program).last_constants(step)
 
 
 def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
@@ -325,24 +281,16 @@ def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
 def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
     step = program.step
     body = functions.called(program)
-    own: list[Kernel | None] = []
-    if isinstance(step, Gauss):
-        own = gauss.scalar_kernels(step, staged=has["STAGED"])
-    elif not isinstance(step, Splitting | Sweeps):
-        own = [step.prepare, step.main]
-    if isinstance(step, Implicit) and has["UNROLLED"]:
-        own.append(step.eliminate)
-    if isinstance(step, Newton) and has["UNROLLED_TRANSPOSE"]:
-        own.append(step.eliminate_transposed)
+    own = text_of(program).kernels(step, has)
     own += program.choice
     own += [program.monitor.elapsed] if program.monitor else []
-    own += [step.tangent] if isinstance(step, Explicit) else []
+    own += text_of(program).tangents(step)
     turned = program.attitude
     own += [turned.exponential, turned.turn, turned.rate] if turned else []
-    if step.refresh and not isinstance(step, Splitting):
+    if step.refresh and not step.kind.flows:
         body.append(function(program, step.refresh, name="at_step" if program.noise else "at_time"))
     if step.adjoint:
-        own += [] if isinstance(step, Splitting | Gauss) else step.adjoint.steps
+        own += text_of(program).transposes(step)
         own += _of_adjoint(program, step.adjoint)
         if step.adjoint.refresh:
             body.append(function(program, step.adjoint.refresh, name="at_time_adjoint"))
@@ -355,14 +303,12 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
         f"isfinite(params->{member[p.name]})" + f" && params->{member[p.name]} > 0.0" * p.positive
         for p in program.parameters
     ]
-    schedule = step.schedule if isinstance(step, Splitting) else None
+    schedule, solve = step.flow_schedule, step.inner_solve
     values = {
         "NAME": program.name,
         "defaults": ", ".join(repr(float(p.value)) for p in program.parameters) or "0",
         "constants": _constants(program, lanes, has),
-        "tolerance": repr(step.inner.tolerance)
-        if isinstance(step, Implicit) and (has["NEWTON"] or has["BLOCKS"])
-        else "",
+        "tolerance": repr(solve.tolerance) if solve and (has["NEWTON"] or has["BLOCKS"]) else "",
         "asked": " && ".join(asked),
         "fractions": ", ".join(map(repr, program.fractions)) if has["COMPOSED"] else "",
         "knots": KNOTS,
@@ -371,9 +317,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
         else [],
         "times": ", ".join(map(repr, schedule.times)) if schedule else "",
         "multiples": ", ".join(map(repr, schedule.multiples)) if schedule else "",
-        "path_slopes": ", ".join(map(str, step.recurrences.slopes))
-        if isinstance(step, Path) and (has["BLOCKS"] or has["TRACED"])
-        else "",
+        "path_slopes": ", ".join(map(str, step.path.slopes)) if step.path and (has["BLOCKS"] or has["TRACED"]) else "",
         "apart": has["PACKS"] or has["ABREAST"] or any("_APART" in part for part in [text, *others]),
     }
     values["middles"] = ", ".join(map(repr, program.midpoints))
@@ -388,38 +332,3 @@ def _of_adjoint(program: Program, adjoint: Adjoint) -> list[Kernel]:
     path = [adjoint.path.curvature, adjoint.path.slope] if adjoint.path else []
     found = [*path, *([adjoint.prepare] if program.parameters or program.monitor else [])]
     return [*found, program.monitor.level] if program.monitor and program.monitor.level else found
-
-
-def _adjoint_path(program: Program, path: PathAdjoint) -> str:
-    """The recurrences of a path that is traced back, and which coefficients it depends on."""
-    own = {"NAME": program.name, "count": len(path.used), "used": ", ".join(map(str, path.used))}
-    extended = adjoint_program(program, path)
-    return render("c", "adjoint_path.c", own) + "\n" + _path(extended, path.recurrences, "back")
-
-
-def _path(program: Program, path: Recurrences, kind: str) -> str:
-    """The recurrences of a path, or of one with its variation."""
-    slope = "s[{i}][k + 1] = s[{slope}][k] / (double)(k + 1);"
-    syntax = Syntax(printer, slope, sums=f"{program.name}_taylor_{{kind}}")
-    found = statements(program, path, syntax)
-    begin, rules = [*found["fixed"], *found["first"]], [*found["rules"], *found["slopes"]]
-    return render(
-        "c",
-        "path.c",
-        {
-            **found,
-            "NAME": program.name,
-            "kind": kind,
-            "n": program.dimension,
-            "series": len(path.series),
-            "fixed_count": max(1, len(path.fixed)),
-            "unused_first": _unused(begin, ("coef", "p", "f")),
-            "unused_rules": _unused(rules, ("coef", "p", "f")),
-            "unused_field": _unused([*found["fixed"], *found["nodes"]], ("coef", "p")),
-        },
-    )
-
-
-def _unused(lines: list[str], names: tuple[str, ...]) -> list[str]:
-    text = "\n".join(lines)
-    return [f"(void){name};" for name in names if not re.search(rf"\b{name}\[", text)]

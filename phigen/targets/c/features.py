@@ -6,24 +6,23 @@ from collections.abc import Callable, Iterator
 
 from phigen.lanes.in_lanes import Blocks, Lanes, Packs, Stages, Traces
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Gauss, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets import features
 from phigen.targets.c.lanes import grouped
 from phigen.targets.features import Feature
 
 FEATURES = (
-    Feature("GUESSED", lambda p: isinstance(p.step, Implicit | Gauss) and not p.noise),
+    Feature("GUESSED", lambda p: p.step.kind.predicted and not p.noise),
     Feature("SINGLE", lambda p: p.single),
     Feature("PARAMETERS", lambda p: p.parameters),
-    Feature("RELATIVE", lambda p: isinstance(p.step, Implicit) and p.step.inner.relative),
+    Feature("RELATIVE", lambda p: p.step.inner_solve and p.step.inner_solve.relative),
     Feature("ADJOINT", lambda p: p.step.adjoint),
-    Feature("ASKED", lambda p: isinstance(p.step, Sweeps), ("ADJOINT",)),
-    Feature("ADVANCE", lambda p: not isinstance(p.step, Splitting) or p.extras.tangent or p.offers("kicks")),
-    Feature("UNROLLED", lambda p: isinstance(p.step, Implicit) and p.profile == "fast" and p.step.eliminate),
+    Feature("ASKED", lambda p: p.step.kind.sites, ("ADJOINT",)),
+    Feature("ADVANCE", lambda p: not p.step.kind.flows or p.extras.tangent or p.offers("kicks")),
+    Feature("UNROLLED", lambda p: p.step.kind.implicit and p.profile == "fast" and p.step.eliminate),
     Feature("EACH", lambda p: not p.noise, ("ENSEMBLE",), "members"),
     Feature("ATTITUDES", requires=("ATTITUDE", "ENSEMBLE")),
     Feature("GAUGE_SEARCH", requires=("GAUGE",), part="gauge-search"),
-    Feature("RECURRENCES", lambda p: isinstance(p.step, Implicit), ("GUESSED",), "recurrences"),
+    Feature("RECURRENCES", lambda p: p.step.kind.implicit, ("GUESSED",), "recurrences"),
 )
 
 
@@ -38,12 +37,12 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     packs = lanes if isinstance(lanes, Packs) else None
     stages = lanes if isinstance(lanes, Stages) else None
     yield Feature("BLOCKS", lambda p: blocks, ("RECURRENCES",), "lanes")
-    yield Feature("TRACED", lambda p: (blocks or traces) and isinstance(p.step, Implicit), ("ADJOINT",))
+    yield Feature("TRACED", lambda p: (blocks or traces) and p.step.kind.implicit, ("ADJOINT",))
     blocked = blocks or traces  # their reverse pass solves in lanes, and leaves few stages to single steps
-    yield Feature("UNROLLED_TRANSPOSE", lambda p: isinstance(p.step, Newton) and not blocked, ("UNROLLED", "ADJOINT"))
+    yield Feature("UNROLLED_TRANSPOSE", lambda p: p.step.eliminate_transposed and not blocked, ("UNROLLED", "ADJOINT"))
     yield Feature("STAGED", lambda p: stages, part="lanes")
     yield Feature("NARROW", lambda p: isinstance(lanes, Stages | Traces) and lanes.narrow)
-    yield Feature("ALONG", lambda p: isinstance(p.step, Path) and p.step.back and p.step.back.used, ("TRACED",))
+    yield Feature("ALONG", lambda p: p.step.back and p.step.back.used, ("TRACED",))
     yield Feature("PACKS", lambda p: packs, ("ENSEMBLE",), "lanes")
     yield Feature("FAR", lambda p: packs and packs.small_argument, ("PACKS",))
     yield Feature("GROUPS", lambda p: not p.time and grouped(p, lanes), ("BLOCKS", "ENSEMBLE"))
@@ -53,8 +52,8 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("SPARSE", lambda p: blocks and blocks.factors, ("BLOCKS",))
     full = blocks and blocks.factors is None  # whether Newton matrices are inverted, not kept as factors
     yield Feature("SWEPT", lambda p: full, ("BLOCKS", "COMPOSED"))
-    yield Feature("CENTRED", lambda p: isinstance(p.step, Newton) and p.step.centred, ("SWEPT",))
-    yield Feature("INVERSE_UNROLLED", lambda p: isinstance(p.step, Newton) and p.step.invert, ("BLOCKS",))
+    yield Feature("CENTRED", lambda p: p.step.centred, ("SWEPT",))
+    yield Feature("INVERSE_UNROLLED", lambda p: p.step.invert, ("BLOCKS",))
     yield from (Feature(f"CALLS_{f.upper()}", _calls(lanes, f)) for f in ("exp", "expm1", "log", "sin", "cos"))
 
 

@@ -11,7 +11,6 @@ from fractions import Fraction
 from phigen.lanes.lane_functions import SMALL_ARGUMENT_FUNCTIONS
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Splitting
 from phigen.symbolic.economised import economised
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import topological
@@ -71,11 +70,8 @@ _SMALL = {
 def called(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
     """The functions of phigen's own that kernels call, but those ``unprinted``: φ and its derivatives, `ENTIRE`,
     and for a splitting those that its flows call."""
-    step = program.step
-    flows: tuple[Kernel, ...] = ()  # loops over sites have their own
-    if isinstance(step, Splitting):
-        flows = (*step.flows, *step.tangents, *(step.adjoint.steps if step.adjoint else ()))
-    used = {e.op for e in topological([e for kernel in flows for e in kernel.roots])}
+    # loops over sites have their own
+    used = {e.op for e in topological([e for kernel in program.step.flow_kernels for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program, unprinted)]
     polynomial = [render("c", "polynomial.c", {"NAME": program.name})] if phis else []

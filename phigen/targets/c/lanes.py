@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import accumulate
 from math import prod
 
@@ -60,23 +60,20 @@ def grouped(program: Program, lanes: Lanes | None) -> bool:
     return isinstance(lanes, Blocks) and lanes.grouped(values)
 
 
-def printed(program: Program, lanes: Lanes) -> list[str]:
-    """The kernels in lanes."""
+def printed(program: Program, lanes: Lanes, packed: Callable[[Packs], list[str]]) -> list[str]:
+    """The kernels in lanes; ``packed`` prints those of packs."""
     found = functions.phi_lanes(program, lanes.calls)
     if isinstance(lanes, Blocks | Stages | Traces):
         return found + [
             function(program, k.kernel, lanes=True, single=k.single, sparse=k.sparse, shared=k.shared)
             for k in lanes.kernels
         ]
-    return found + (_packs(program, lanes) if isinstance(lanes, Packs) else [])
+    return found + (packed(lanes) if isinstance(lanes, Packs) else [])
 
 
-def printed_back(program: Program, packs: Packs) -> str:
+def printed_back(program: Program, step: Splitting, packs: Packs) -> str:
     """The transposes of the flows of packs."""
-    assert isinstance(program.step, Splitting)
-    return "\n".join(
-        splitting.adjoint_in_lanes(program, program.step, packs.transposes, _short(program), lane_calls(program))
-    )
+    return "\n".join(splitting.adjoint_in_lanes(program, step, packs.transposes, _short(program), lane_calls(program)))
 
 
 def _short(program: Program) -> dict[str, str]:
@@ -84,13 +81,15 @@ def _short(program: Program) -> dict[str, str]:
     return {**lane_calls(program), **{f: f"{program.name}_{f}_near" for f in SMALL_ARGUMENT_FUNCTIONS}}
 
 
-def _packs(program: Program, packs: Packs) -> list[str]:
-    if not isinstance(program.step, Splitting):
-        found = [function(program, kernel, lanes=True, alike=["coef"]) for kernel in packs.kernels]
-        return found + [function(program, kernel, lanes=True) for kernel in packs.transposes]
+def packed_kernels(program: Program, packs: Packs) -> list[str]:
+    """The kernels of packs whose step is one kernel."""
+    found = [function(program, kernel, lanes=True, alike=["coef"]) for kernel in packs.kernels]
+    return found + [function(program, kernel, lanes=True) for kernel in packs.transposes]
+
+
+def packed_step(program: Program, step: Splitting, packs: Packs) -> list[str]:
+    """The flows of packs, and the step that they are composed to."""
     called = operations([*packs.kernels, *packs.transposes])
     found = functions.near(program, [f for f in SMALL_ARGUMENT_FUNCTIONS if f in called])
-    found += splitting.in_lanes(program, program.step, "", _short(program))
-    return found + (
-        splitting.in_lanes(program, program.step, "_far", lane_calls(program)) if packs.small_argument else []
-    )
+    found += splitting.in_lanes(program, step, "", _short(program))
+    return found + (splitting.in_lanes(program, step, "_far", lane_calls(program)) if packs.small_argument else [])

@@ -4,32 +4,28 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.kernel import Kernel
-from phigen.scheme.path import Recurrences
 from phigen.scheme.policies import POLICIES
 from phigen.scheme.program import Attitude, Program
-from phigen.scheme.steps import Explicit, Gauss, Implicit, Newton, Path, Splitting, Sweeps
+from phigen.scheme.steps import Sweeps
 from phigen.targets import special
 from phigen.targets.features import switches
 from phigen.targets.header import facts, header_lines, sealed
 from phigen.targets.js.functions import definitions
 from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
 from phigen.targets.js.runtime import assembled
-from phigen.targets.path import TERMS, Syntax, statements, tangent_program
+from phigen.targets.js.step_modules import STEP_MODULES
 from phigen.targets.policies import policies_of
 from phigen.targets.rendering import render
-
-PATH_SYNTAX = Syntax(LANGUAGE.printer, slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);", sums="taylor{Kind}")
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
     """The file name and its contents. Raises `SpecError` as `expect_offered` does."""
     expect_offered(program)
-    body = _lattice(program, program.step) if isinstance(program.step, Sweeps) else _system_of_coordinates(program)
+    body = _lattice(program, program.step.swept) if program.step.swept else _system_of_coordinates(program)
     return {f"{program.name}.mjs": sealed(header_lines(program, command), body)}
 
 
@@ -53,10 +49,8 @@ def _lattice(program: Program, step: Sweeps) -> str:
 def _system_of_coordinates(program: Program) -> str:
     """The body of any other module."""
     step, features = program.step, switches(program)
-    assert not isinstance(step, Sweeps)
-    chosen = {Newton: "newton", Explicit: "explicit", Path: "path", Gauss: "gauss", Splitting: "splitting"}[type(step)]
-    modules = ["errors", "march", "solver", chosen]
-    modules += ["taylor"] if isinstance(step, Path) else []
+    text, kind = STEP_MODULES[step.kind.name], step.kind.name
+    modules = ["errors", "march", "solver", kind, *text.modules]
     modules += ["philox", "noise"] if program.noise else []
     modules += ["guess"] if features["IMPLICIT"] else []
     modules += ["gauge" if program.searches_gauge else "gauge_formula"] if program.gauge else []
@@ -64,8 +58,8 @@ def _system_of_coordinates(program: Program) -> str:
     modules += ["attitude", "attitude_matrices" if features["MATRICES"] else "attitude_quaternions"] * features[
         "ATTITUDE"
     ]
-    modules += ["tangent", f"tangent_{chosen}"] if program.extras.tangent else []
-    algebra = not isinstance(step, Splitting) or program.searches_gauge or program.extras.tangent
+    modules += ["tangent", f"tangent_{kind}"] if program.extras.tangent else []
+    algebra = text.algebra or program.searches_gauge or program.extras.tangent
     modules += ["algebra"] if algebra else []
     return f"{_model(program)}\n\n{assembled(modules, features, policies_of(program))}\n"
 
@@ -82,15 +76,12 @@ def _functions(program: Program) -> list[str]:
 def _model(program: Program) -> str:
     """What is printed of the system: constants and kernels."""
     step = program.step
+    text = STEP_MODULES[step.kind.name]
     pieces = [render("js", "system.mjs", _system(program))]
-    pieces += [render("js", "schedule.mjs", _schedule(step, program.attitude))] if isinstance(step, Splitting) else []
-    pieces += [render("js", "implicit.mjs", _inner(step))] if isinstance(step, Implicit) else []
-    pieces += [render("js", "gauss.mjs", _collocation(program, step))] if isinstance(step, Gauss) else []
+    pieces += text.constants(program, step)
     pieces += _functions(program)
     pieces += [_function(kernel) for kernel in _kernels(program)]
-    pieces += [_path(program, step.recurrences, "path")] if isinstance(step, Path) else []
-    if isinstance(step, Path) and step.tangent:
-        pieces.append(_path(tangent_program(program), step.tangent.recurrences, "tangent"))
+    pieces += text.series(program, step)
     return "\n\n".join(piece.strip("\n") for piece in pieces)
 
 
@@ -121,79 +112,27 @@ def _sizes(attitude: Attitude) -> Mapping[str, int]:
     }
 
 
-def _schedule(step: Splitting, attitude: Attitude | None) -> Mapping[str, object]:
-    """The flows of a step, and their times."""
-    schedule = step.schedule
-    return {
-        "times": json.dumps(schedule.times),
-        "multiples": json.dumps(schedule.multiples) if schedule.multiples else "",
-        "schedule": json.dumps(schedule.flows),
-        "flows": _numbered("turn", attitude.turns) if attitude else _numbered("flow", step.flows),
-        "tangents": _numbered("tangent", step.tangents),
-    }
-
-
-def _numbered(name: str, kernels: Sequence[Kernel]) -> str:
-    return ", ".join(f"{name}{k}" for k in range(1, len(kernels) + 1))
-
-
 def _table(program: Program) -> Mapping[str, object]:
     """The sizes of the table of coefficients."""
-    step = program.step
+    step, schedule = program.step, program.step.flow_schedule
     return {
         "middles": json.dumps(program.midpoints) if step.refresh else "",
         "prepared": step.prepared,
         "renewing": "the step" if program.noise else "the time",
         "coefficients": step.row,
-        "moments": json.dumps(step.schedule.moments) if isinstance(step, Splitting) and step.refresh else "",
-        "times": isinstance(step, Splitting),
-    }
-
-
-def _inner(step: Newton | Path) -> Mapping[str, object]:
-    varied = step.tangent.recurrences if isinstance(step, Path) and step.tangent else None
-    return {
-        "max_iterations": step.inner.max_iterations,
-        "tolerance": repr(step.inner.tolerance),
-        "newton": isinstance(step, Newton),
-        "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
-        "fixed": len(step.recurrences.fixed) if isinstance(step, Path) else 0,
-        "tangent_series": len(varied.series) if varied else 0,
-        "tangent_fixed": len(varied.fixed) if varied else 0,
-        "terms": TERMS,
-    }
-
-
-def _collocation(program: Program, step: Gauss) -> Mapping[str, object]:
-    """The coefficients of a Gauss method."""
-    table = step.tableau
-    return {
-        "unknowns": step.unknowns,
-        "plain": step.plain,
-        "point": program.dimension + bool(program.time),
-        "most_sweeps": step.most_sweeps,
-        "weights": json.dumps(table.weights),
-        "mixing": [json.dumps(row) for row in table.mixing],
-        "prediction": [json.dumps(row) for row in table.prediction],
+        "moments": json.dumps(schedule.moments) if schedule and step.refresh else "",
+        "times": schedule is not None,
     }
 
 
 def _contents(program: Program) -> list[str]:
     """The table of contents."""
-    step = program.step
-    how = {
-        Newton: "Newton's method",
-        Explicit: "a formula",
-        Gauss: "Gauss collocation",
-        Path: "paths, each followed by its Taylor series",
-        Splitting: "flows of parts of H",
-    }[type(step)]
     lines = [
         f"import {{ Solver, StepError }} from './{program.name}.mjs';",
         f"const solver = new Solver({{ x0: [...],{' t0,' * bool(program.time)} params: {{ ... }} }});",
         "solver.integrate(h, steps); then solver.x, .t, .hamiltonian(), .casimirs(), .vectorField()",
         "",
-        "Contents: the system, with its kernels; the class Solver; the step, by " + how + ".",
+        "Contents: the system, with its kernels; the class Solver; the step, by " + program.step.kind.title + ".",
     ]
     return lines
 
@@ -202,21 +141,12 @@ def _kernels(program: Program) -> list[Kernel]:
     """The kernels that the runtime calls."""
     step = program.step
     modified = [program.modified.kernel] if program.modified else []
-    refresh = [step.refresh] if step.refresh else []
     timed = [k for k in (program.monitor.elapsed, program.monitor.rate) if k] if program.monitor else []
     noisy = [program.noise.fields] if program.noise and program.noise.fields else []
     turned = program.attitude
     turning = [k for k in (turned.exponential, turned.turn, turned.rate) if k] if turned else []
     others = [*turning, *program.choice, *timed, *noisy, *modified, *program.observables.kernels]
-    if isinstance(step, Splitting):
-        flows = turned.turns if turned else step.flows
-        return [replace(step.prepare, name="prepare_row"), *refresh, *flows, *step.tangents, *others]
-    assert not isinstance(step, Sweeps)
-    if isinstance(step, Gauss):
-        return [*step.kernels, *others]
-    varied = [step.tangent] if isinstance(step, Explicit) and step.tangent else []
-    varied += [step.tangent.curvature] if isinstance(step, Path) and step.tangent else []
-    return [step.prepare, *refresh, step.main, *varied, *others]
+    return [*filter(None, STEP_MODULES[step.kind.name].kernels(program, step)), *others]
 
 
 def _function(kernel: Kernel) -> str:
@@ -228,8 +158,3 @@ def _function(kernel: Kernel) -> str:
     for start, n in kernel.exponentials:
         lines.append(f"  matrixExponential({n}, {stored}.subarray({start}, {start + n * n}));")
     return "\n".join([*comment(kernel.purpose), head, *lines, "}"])
-
-
-def _path(program: Program, path: Recurrences, kind: str) -> str:
-    """The recurrences of a path, or of one with its variation."""
-    return render("js", "path.mjs", {**statements(program, path, PATH_SYNTAX), "kind": kind})

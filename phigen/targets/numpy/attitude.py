@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from phigen.scheme.program import Attitude, Program
-from phigen.scheme.steps import Path, Splitting
 from phigen.targets.numpy.kernels import function
 from phigen.targets.numpy.values import values_of
 from phigen.targets.rendering import render
@@ -12,7 +11,7 @@ from phigen.targets.rendering import render
 def pieces(program: Program, attitude: Attitude) -> list[str]:
     """Attitudes: the kernels, and their use."""
     group, step, rows = attitude.group, program.step, attitude.group.rows
-    solved = "_path(stage[0], x, solved)[1]" if isinstance(step, Path) else "solved"
+    solved = "_path(stage[0], x, solved)[1]" if step.path else "solved"
     shown = f"Attitudes have shape (rows, ..., {rows}, {rows})" if rows else "Attitudes have shape (rows, ..., 4)"
     values = {
         **values_of(program),
@@ -23,7 +22,7 @@ def pieces(program: Program, attitude: Attitude) -> list[str]:
         "exponential": attitude.exponential is not None,
         "uniform": attitude.rate is not None,
         "normalise": group.orthogonal,
-        "splitting": isinstance(step, Splitting),
+        "splitting": step.kind.flows,
         "rates": f"_rate(parameters, {'gauge.T, ' * bool(program.gauge)}x)" if attitude.rate else "None",
         "turn_of_stage": _turn_of_stage(attitude, solved),
         "lengthened": attitude.lengthened,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from phigen.scheme.policies import PathPolicy
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Implicit, InnerSolve, Path, Splitting
+from phigen.scheme.steps import InnerSolve
 from phigen.targets.header import facts, plain
 from phigen.targets.numpy.language import listed, quoted
 from phigen.targets.path import TERMS
@@ -59,21 +59,21 @@ def _of_time(program: Program) -> dict[str, object]:
 def _of_step(program: Program) -> dict[str, object]:
     """The kind of step, its coefficients and stages, and by what its equation is solved."""
     step = program.step
-    inner = step.inner if isinstance(step, Implicit) else InnerSolve()
+    inner, schedule = step.inner_solve or InnerSolve(), step.flow_schedule
     longest = PathPolicy().longest_path
     return {
-        "path": isinstance(step, Path),
-        "splitting": isinstance(step, Splitting),
+        "path": step.path is not None,
+        "splitting": step.kind.flows,
         "renewed": step.renewed,
         "prepared": step.prepared,
-        "moments": listed(step.schedule.moments) if isinstance(step, Splitting) and step.refresh else "",
+        "moments": listed(schedule.moments) if schedule and step.refresh else "",
         "middles": listed(program.midpoints),
         "fractions": listed(program.fractions),
         "max_iterations": inner.max_iterations,
         "tolerance": repr(inner.tolerance),
         "path_pieces": repr(tuple(1 << k for k in range(longest.bit_length()))),
         "terms": TERMS,
-        "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
+        "series": len(step.path.series) if step.path else 0,
     }
 
 

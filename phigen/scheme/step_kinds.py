@@ -1,0 +1,61 @@
+"""The kinds of steps: the facts that other rooms need of each, in one record.
+
+A step (`phigen.scheme.steps`) has its kind and its kernels. Rooms that treat kinds differently have a table with an
+entry for each: `phigen.lanes.in_lanes` for the lowering to lanes, and a module of each target for its text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StepKind:
+    """A kind of step.
+
+    ``title`` names the method in a sentence, ``manner`` is the same for the header, ``unit`` the piece of work that
+    operation counts refer to. ``implicit`` steps solve an equation for one point by an inner solve, ``predicted`` ones
+    begin their iteration with a value that is extrapolated from earlier steps. Those by ``flows`` have a schedule, and
+    a row of coefficients for each of its times; those on ``sites`` take a lattice of any size.
+    """
+
+    name: str
+    title: str
+    manner: str
+    unit: str = "step"
+    implicit: bool = False
+    predicted: bool = False
+    flows: bool = False
+    sites: bool = False
+
+
+NEWTON = StepKind(
+    "newton",
+    "Newton's method",
+    "implicit, Newton iteration with the analytic matrix",
+    unit="Newton iteration",
+    implicit=True,
+    predicted=True,
+)
+EXPLICIT = StepKind("explicit", "a formula", "explicit")
+PATH = StepKind(
+    "path",
+    "paths, each followed by its Taylor series",
+    "implicit in p, each path followed by its Taylor series to round-off",
+    unit="evaluation of the equation for p",
+    implicit=True,
+    predicted=True,
+)
+GAUSS = StepKind(
+    "gauss",
+    "Gauss collocation",
+    "implicit, all stages by fixed-point sweeps to round-off",
+    unit="evaluation at a stage",
+    predicted=True,
+)
+SPLITTING = StepKind("splitting", "flows of parts of H", "explicit", flows=True)
+SWEEPS = StepKind("sweeps", "sweeps over the sites", "explicit", unit="step of one site", sites=True)
+
+#: All kinds by name.
+STEP_KINDS: Mapping[str, StepKind] = {kind.name: kind for kind in (NEWTON, EXPLICIT, PATH, GAUSS, SPLITTING, SWEEPS)}

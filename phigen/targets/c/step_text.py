@@ -1,0 +1,172 @@
+"""The text of steps in C, one record for each kind; `phigen.targets.c.emitter` puts it into the files of a solver."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from phigen.lanes.in_lanes import Blocks, Lanes, Packs, Traces
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.path import Recurrences
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Gauss, Newton, Path, PathAdjoint, Splitting
+from phigen.targets.c import gauss, paths, splitting
+from phigen.targets.c.kernels import function, printer
+from phigen.targets.c.lanes import packed_kernels, packed_step, printed_back
+from phigen.targets.path import TERMS, Syntax, adjoint_program, statements, tangent_program
+from phigen.targets.rendering import render
+
+#: Constants: names, values, and comments.
+Sizes = list[tuple[str, int, str]]
+Switches = Mapping[str, bool]
+
+
+@dataclass(frozen=True)
+class StepText:
+    """The text of one kind of step.
+
+    ``texts`` are the files that the runtime includes of it, ``declared`` the sizes that the struct of the solver needs,
+    ``constants`` and ``last_constants`` the other sizes, before and after those of lanes. ``kernels`` are printed
+    before all others, ``tangents`` after those of the gauge and the monitor, then the ``transposes`` that are not in
+    texts of their own. ``trail`` is the number of values of a step that its transpose needs. ``packed`` prints the
+    kernels of a pack.
+    """
+
+    texts: Callable[[Program, Any, Lanes | None, Switches], dict[str, str]] = lambda program, step, lanes, has: {}
+    declared: Callable[[Any, Lanes | None], Sizes] = lambda step, lanes: []
+    constants: Callable[[Program, Any], Sizes] = lambda program, step: []
+    last_constants: Callable[[Any], Sizes] = lambda step: []
+    kernels: Callable[[Any, Switches], list[Kernel | None]] = lambda step, has: []
+    tangents: Callable[[Any], list[Kernel | None]] = lambda step: []
+    transposes: Callable[[Any], Sequence[Kernel | None]] = lambda step: step.adjoint.steps
+    trail: Callable[[Program, Any, Lanes | None], int] = lambda program, step, lanes: (
+        program.dimension * step.maps(len(program.fractions))
+    )
+    packed: Callable[[Program, Any, Packs], list[str]] = lambda program, step, packs: packed_kernels(program, packs)
+
+
+def _max_iterations(step: Newton | Path) -> Sizes:
+    return [("MAX_ITERATIONS", step.inner.max_iterations, "limit of the iterations of an implicit step")]
+
+
+def _newton_kernels(step: Newton, has: Switches) -> list[Kernel | None]:
+    unrolled = [step.eliminate] if has["UNROLLED"] else []
+    transposed = [step.eliminate_transposed] if has["UNROLLED_TRANSPOSE"] else []
+    return [step.prepare, step.main, *unrolled, *transposed]
+
+
+def _path_kernels(step: Path, has: Switches) -> list[Kernel | None]:
+    return [step.prepare, step.main, *([step.eliminate] if has["UNROLLED"] else [])]
+
+
+def _path_texts(program: Program, step: Path, lanes: Lanes | None, has: Switches) -> dict[str, str]:
+    texts = {"path_model.h": _path(program, step.recurrences, "path")}
+    if step.tangent:
+        varied = _path(tangent_program(program), step.tangent.recurrences, "tangent")
+        texts["tangent_model.h"] = "" if step.adjoint else function(program, step.tangent.curvature) + "\n"
+        texts["tangent_model.h"] += varied
+    if step.back:
+        texts["adjoint_path.h"] = _adjoint_path(program, step.back)
+    if isinstance(lanes, Blocks | Traces) and lanes.path and (has["BLOCKS"] or has["TRACED"]):
+        texts["path_model_lanes.h"] = paths.printed(program, step, lanes.path)
+    return texts
+
+
+def _path_constants(program: Program, step: Path) -> Sizes:
+    sizes = _max_iterations(step)
+    sizes.append(("TERMS", TERMS, "largest number of Taylor terms of a path; a path that needs more is divided"))
+    sizes.append(("SERIES", len(step.recurrences.series), "Taylor series of a path, those of the coordinates first"))
+    sizes.append(("FIXED", max(1, len(step.recurrences.fixed)), "values that are constant along a path"))
+    if step.tangent:
+        varied = step.tangent.recurrences
+        sizes.append(("TANGENT_SERIES", len(varied.series), "Taylor series of a path and its derivative"))
+        sizes.append(("TANGENT_FIXED", max(1, len(varied.fixed)), "values that are constant along the path"))
+    if step.back:
+        back, n = step.back, program.dimension
+        sizes.append(("BACK", 3 * n + len(back.used), "numbers of a path in the reverse pass, with cotangents"))
+        sizes.append(("BACK_SERIES", len(back.recurrences.series), "Taylor series of such a path"))
+        sizes.append(("BACK_FIXED", max(1, len(back.recurrences.fixed)), "values that are constant along the path"))
+    return sizes
+
+
+def _adjoint_path(program: Program, path: PathAdjoint) -> str:
+    """The recurrences of a path that is traced back, and which coefficients it depends on."""
+    own = {"NAME": program.name, "count": len(path.used), "used": ", ".join(map(str, path.used))}
+    extended = adjoint_program(program, path)
+    return render("c", "adjoint_path.c", own) + "\n" + _path(extended, path.recurrences, "back")
+
+
+def _path(program: Program, path: Recurrences, kind: str) -> str:
+    """The recurrences of a path, or of one with its variation."""
+    slope = "s[{i}][k + 1] = s[{slope}][k] / (double)(k + 1);"
+    syntax = Syntax(printer, slope, sums=f"{program.name}_taylor_{{kind}}")
+    found = statements(program, path, syntax)
+    begin, rules = [*found["fixed"], *found["first"]], [*found["rules"], *found["slopes"]]
+    return render(
+        "c",
+        "path.c",
+        {
+            **found,
+            "NAME": program.name,
+            "kind": kind,
+            "n": program.dimension,
+            "series": len(path.series),
+            "fixed_count": max(1, len(path.fixed)),
+            "unused_first": _unused(begin, ("coef", "p", "f")),
+            "unused_rules": _unused(rules, ("coef", "p", "f")),
+            "unused_field": _unused([*found["fixed"], *found["nodes"]], ("coef", "p")),
+        },
+    )
+
+
+def _unused(lines: list[str], names: tuple[str, ...]) -> list[str]:
+    text = "\n".join(lines)
+    return [f"(void){name};" for name in names if not re.search(rf"\b{name}\[", text)]
+
+
+def _gauss_texts(program: Program, step: Gauss, lanes: Lanes | None, has: Switches) -> dict[str, str]:
+    return {"gauss_tables.h": gauss.tables(program, step, lanes)}
+
+
+def _gauss_kernels(step: Gauss, has: Switches) -> list[Kernel | None]:
+    return gauss.scalar_kernels(step, staged=has["STAGED"])
+
+
+def _splitting_texts(program: Program, step: Splitting, lanes: Lanes | None, has: Switches) -> dict[str, str]:
+    texts = {
+        "flows.h": splitting.printed(program, step),
+        "tangent_flows.h": splitting.tangent(program, step) if has["TANGENT"] else "",
+        "adjoint_flows.h": splitting.adjoint(program, step, step.adjoint) if step.adjoint else "",
+    }
+    if has["ABREAST"] and isinstance(lanes, Packs):
+        texts["adjoint_flows_lanes.h"] = printed_back(program, step, lanes)
+    return texts
+
+
+#: The text of each kind of step; that of a lattice is `phigen.targets.c.lattice`.
+STEP_TEXTS: Mapping[str, StepText] = {
+    "newton": StepText(constants=lambda program, step: _max_iterations(step), kernels=_newton_kernels),
+    "explicit": StepText(
+        kernels=lambda step, has: [step.prepare, step.main],
+        tangents=lambda step: [step.tangent],
+    ),
+    "path": StepText(texts=_path_texts, constants=_path_constants, kernels=_path_kernels),
+    "gauss": StepText(
+        texts=_gauss_texts,
+        declared=gauss.declared,
+        constants=gauss.constants,
+        kernels=_gauss_kernels,
+        transposes=lambda step: (),
+        trail=gauss.trail,
+    ),
+    "splitting": StepText(
+        texts=_splitting_texts, last_constants=splitting.sizes, packed=packed_step, transposes=lambda step: ()
+    ),
+}
+
+
+def text_of(program: Program) -> StepText:
+    """The record of the step of a program. Raises `KeyError` for a lattice."""
+    return STEP_TEXTS[program.step.kind.name]

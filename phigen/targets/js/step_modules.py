@@ -1,0 +1,132 @@
+"""The text of steps in JavaScript, one record for each kind; `phigen.targets.js.emitter` puts it into modules."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.path import Recurrences
+from phigen.scheme.program import Attitude, Program
+from phigen.scheme.steps import Explicit, Gauss, Newton, Path, Splitting
+from phigen.targets.js.printing import LANGUAGE
+from phigen.targets.path import TERMS, Syntax, statements, tangent_program
+from phigen.targets.rendering import render
+
+PATH_SYNTAX = Syntax(LANGUAGE.printer, slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);", sums="taylor{Kind}")
+
+
+@dataclass(frozen=True)
+class StepModule:
+    """The text of one kind of step.
+
+    ``constants`` stand before the kernels and ``series`` after them; ``kernels`` are those that the runtime calls, for
+    which the kernels of attitudes may stand in. ``modules`` are parts of the runtime beside the one of the kind's name,
+    ``algebra`` tells that it always solves linear equations.
+    """
+
+    kernels: Callable[[Program, Any], Sequence[Kernel | None]]
+    constants: Callable[[Program, Any], list[str]] = lambda program, step: []
+    series: Callable[[Program, Any], list[str]] = lambda program, step: []
+    modules: tuple[str, ...] = ()
+    algebra: bool = True
+
+
+def _implicit(step: Newton | Path) -> list[str]:
+    """The constants of an inner solve, and those of a path, which are 0 elsewhere."""
+    path, varied = step.path, step.varied_path
+    return [
+        render(
+            "js",
+            "implicit.mjs",
+            {
+                "max_iterations": step.inner.max_iterations,
+                "tolerance": repr(step.inner.tolerance),
+                "newton": path is None,
+                "series": len(path.series) if path else 0,
+                "fixed": len(path.fixed) if path else 0,
+                "tangent_series": len(varied.series) if varied else 0,
+                "tangent_fixed": len(varied.fixed) if varied else 0,
+                "terms": TERMS,
+            },
+        )
+    ]
+
+
+def _path_series(program: Program, step: Path) -> list[str]:
+    varied = [_path(tangent_program(program), step.tangent.recurrences, "tangent")] if step.tangent else []
+    return [_path(program, step.recurrences, "path"), *varied]
+
+
+def _path(program: Program, path: Recurrences, kind: str) -> str:
+    """The recurrences of a path, or of one with its variation."""
+    return render("js", "path.mjs", {**statements(program, path, PATH_SYNTAX), "kind": kind})
+
+
+def _path_kernels(program: Program, step: Path) -> Sequence[Kernel | None]:
+    return [step.prepare, step.refresh, step.main, step.tangent.curvature if step.tangent else None]
+
+
+def _explicit_kernels(program: Program, step: Explicit) -> Sequence[Kernel | None]:
+    return [step.prepare, step.refresh, step.main, step.tangent]
+
+
+def _collocation(program: Program, step: Gauss) -> list[str]:
+    """The coefficients of a Gauss method."""
+    table = step.tableau
+    values = {
+        "unknowns": step.unknowns,
+        "plain": step.plain,
+        "point": program.dimension + bool(program.time),
+        "most_sweeps": step.most_sweeps,
+        "weights": json.dumps(table.weights),
+        "mixing": [json.dumps(row) for row in table.mixing],
+        "prediction": [json.dumps(row) for row in table.prediction],
+    }
+    return [render("js", "gauss.mjs", values)]
+
+
+def _schedule(step: Splitting, attitude: Attitude | None) -> list[str]:
+    """The flows of a step, and their times."""
+    schedule = step.schedule
+    values = {
+        "times": json.dumps(schedule.times),
+        "multiples": json.dumps(schedule.multiples) if schedule.multiples else "",
+        "schedule": json.dumps(schedule.flows),
+        "flows": _numbered("turn", attitude.turns) if attitude else _numbered("flow", step.flows),
+        "tangents": _numbered("tangent", step.tangents),
+    }
+    return [render("js", "schedule.mjs", values)]
+
+
+def _numbered(name: str, kernels: Sequence[Kernel]) -> str:
+    return ", ".join(f"{name}{k}" for k in range(1, len(kernels) + 1))
+
+
+def _splitting_kernels(program: Program, step: Splitting) -> Sequence[Kernel | None]:
+    flows = program.attitude.turns if program.attitude else step.flows
+    return [replace(step.prepare, name="prepare_row"), step.refresh, *flows, *step.tangents]
+
+
+#: The text of each kind of step; that of a lattice is `phigen.targets.js.lattice`.
+STEP_MODULES: Mapping[str, StepModule] = {
+    "newton": StepModule(
+        kernels=lambda program, step: [step.prepare, step.refresh, step.main],
+        constants=lambda program, step: _implicit(step),
+    ),
+    "explicit": StepModule(kernels=_explicit_kernels),
+    "path": StepModule(
+        kernels=_path_kernels,
+        constants=lambda program, step: _implicit(step),
+        series=_path_series,
+        modules=("taylor",),
+    ),
+    "gauss": StepModule(kernels=lambda program, step: step.kernels, constants=_collocation),
+    "splitting": StepModule(
+        kernels=_splitting_kernels,
+        constants=lambda program, step: _schedule(step, program.attitude),
+        algebra=False,
+    ),
+}

@@ -1,0 +1,189 @@
+"""The text of steps in NumPy, one record for each kind; `phigen.targets.numpy.emitter` puts it into modules."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.path import Recurrences
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Explicit, Gauss, Newton, Path, PathAdjoint, Splitting
+from phigen.targets.numpy.kernels import function
+from phigen.targets.numpy.language import LANGUAGE, listed
+from phigen.targets.numpy.values import values_of
+from phigen.targets.path import Syntax, statements, tangent_program
+from phigen.targets.rendering import render
+
+PATH_SYNTAX = Syntax(
+    LANGUAGE.printer,
+    slope="s[{i}].append(s[{slope}][k] / (k + 1))",
+    sums="_{kind}",
+    covector="p[:, {i}]",
+    fixed="f{i} = {value}",
+    held="f{i}",
+    first="s[{i}].append({value} + 0.0)",
+    following="s[{i}].append({value})",
+)
+
+
+@dataclass(frozen=True)
+class StepPart:
+    """Kernels, the templates that use them, and what these read beside the values of all templates."""
+
+    kernels: Sequence[Kernel | None] = ()
+    templates: Sequence[str] = ()
+    values: Mapping[str, object] = field(default_factory=dict)
+
+    def functions(self, program: Program) -> list[str]:
+        """The kernels as functions."""
+        return [function(program, kernel) for kernel in self.kernels if kernel]
+
+    def rendered(self, program: Program, prefix: str = "") -> list[str]:
+        """The templates, whose names begin with a prefix."""
+        values = {**values_of(program), **self.values}
+        return [render("numpy", f"{prefix}{part}.py", values) for part in self.templates]
+
+
+@dataclass(frozen=True)
+class StepFunctions:
+    """The text of one kind of step: that of a stage, of its tangent map, and of its transpose.
+
+    ``adjoint`` has the kernels that the transpose needs beside its own.
+    """
+
+    stage: Callable[[Program, Any], StepPart]
+    tangent: Callable[[Program, Any], StepPart]
+    adjoint: Callable[[Program, Any], StepPart]
+
+
+def _guess(program: Program) -> str:
+    return "anew" if program.noise else "guess"
+
+
+def _newton(program: Program, step: Newton) -> StepPart:
+    return StepPart(
+        (step.prepare, step.refresh, step.linearise), ("solve", "plausible", "newton", f"newton_{_guess(program)}")
+    )
+
+
+def _explicit(program: Program, step: Explicit) -> StepPart:
+    return StepPart((step.prepare, step.refresh, step.increment), ("explicit",))
+
+
+def _path(program: Program, step: Path) -> StepPart:
+    templates = ("holds", "piece", "path", "residual", "solve", "plausible", "path_step", f"path_{_guess(program)}")
+    values = statements(program, step.recurrences, PATH_SYNTAX)
+    return StepPart((step.prepare, step.refresh, step.generate), templates, values)
+
+
+def _path_tangent(program: Program, step: Path) -> StepPart:
+    if step.tangent is None:
+        return StepPart()
+    extended, path = tangent_program(program), step.tangent.recurrences
+    values = {**statements(extended, path, PATH_SYNTAX), "series": len(path.series), "n_twice": extended.dimension}
+    return StepPart((step.tangent.curvature,), ("holds", "piece", "seeds", "path"), values)
+
+
+def _path_adjoint(program: Program, step: Path) -> StepPart:
+    if step.back is None:
+        return StepPart(templates=("newton",))
+    kernels = () if program.extras.tangent else (step.back.curvature,)
+    return StepPart(kernels, ("piece", "path"), _varied(program, step, step.back))
+
+
+def _varied(program: Program, step: Path, adjoint: PathAdjoint) -> dict[str, object]:
+    """A path with its derivatives along its start, p and the coefficients that π depends on, column by column."""
+    path, slopes, n = step.recurrences, adjoint.slopes, program.dimension
+    whole = Recurrences((*path.series, *slopes.series), path.slopes, (*path.fixed, *slopes.fixed))
+    along_p = [(e.row, n + e.column, e.series, True) for e in slopes.tensor]
+    along_c = [(e.row, 2 * n + e.column, e.series, False) for e in slopes.along]
+    return {
+        **statements(program, whole, PATH_SYNTAX),
+        "series": len(whole.series),
+        "width": 2 * n + len(adjoint.used),
+        "used": repr(list(adjoint.used)),
+        "jacobian": [(e.row, e.column, e.series) for e in slopes.jacobian],
+        "sources": [*along_p, *along_c],
+    }
+
+
+def _gauss(program: Program, step: Gauss) -> StepPart:
+    return StepPart((step.prepare, step.refresh, step.slope, step.change, step.frame), ("gauss",), _gauss_values(step))
+
+
+def _gauss_tangent(program: Program, step: Gauss) -> StepPart:
+    kernels = (step.tangent.slope, step.tangent.change) if step.tangent else ()
+    return StepPart(kernels, ("gauss",) if step.tangent else (), _gauss_values(step))
+
+
+def _gauss_adjoint(program: Program, step: Gauss) -> StepPart:
+    stored = 2 * program.dimension + step.unknowns * step.tableau.stages
+    return StepPart((), ("gauss",), {**_gauss_values(step), "kept": stored})
+
+
+def _gauss_values(step: Gauss) -> dict[str, object]:
+    return {
+        "weights": listed(step.tableau.weights),
+        "mixing": [", ".join(map(repr, row)) for row in step.tableau.mixing],
+        "prediction": [", ".join(map(repr, row)) for row in step.tableau.prediction],
+        "framed": step.frame is not None,
+        "plain": step.plain,
+        "unknowns": step.unknowns,
+        "most_sweeps": step.most_sweeps,
+    }
+
+
+def _splitting(program: Program, step: Splitting) -> StepPart:
+    row, rows = replace(step.prepare, name="prepare_row"), "rows_kicks" if step.multiples else "rows"
+    return StepPart((row, step.refresh, *step.flows), ("splitting", rows), _splitting_values(step))
+
+
+def _splitting_adjoint(program: Program, step: Splitting) -> StepPart:
+    names = ", ".join(f"_{kernel.name}" for kernel in step.adjoint.steps) if step.adjoint else ""
+    values = {**_splitting_values(step), "kicks": bool(step.multiples), "adjoints": names}
+    return StepPart((), ("splitting",), values)
+
+
+def _splitting_values(step: Splitting) -> dict[str, object]:
+    schedule, numbers = step.schedule, range(1, len(step.flows) + 1)
+    return {
+        "times": listed(schedule.times),
+        "multiples": listed(schedule.multiples),
+        "row": step.row,
+        "schedule": repr(tuple(schedule.flows)),
+        "flows": ", ".join(f"_flow{k}" for k in numbers),
+        "tangents": ", ".join(f"_tangent{k}" for k in numbers),
+    }
+
+
+#: The text of each kind of step; that of a lattice is `phigen.targets.numpy.lattice`.
+STEP_FUNCTIONS: Mapping[str, StepFunctions] = {
+    "newton": StepFunctions(
+        stage=_newton,
+        tangent=lambda program, step: StepPart(templates=("newton",)),
+        adjoint=lambda program, step: StepPart(templates=("newton",)),
+    ),
+    "explicit": StepFunctions(
+        stage=_explicit,
+        tangent=lambda program, step: StepPart((step.tangent,), ("explicit",)),
+        adjoint=lambda program, step: StepPart(templates=("explicit",)),
+    ),
+    "path": StepFunctions(stage=_path, tangent=_path_tangent, adjoint=_path_adjoint),
+    "gauss": StepFunctions(
+        stage=_gauss,
+        tangent=_gauss_tangent,
+        adjoint=_gauss_adjoint,
+    ),
+    "splitting": StepFunctions(
+        stage=_splitting,
+        tangent=lambda program, step: StepPart(step.tangents, ("splitting",), _splitting_values(step)),
+        adjoint=_splitting_adjoint,
+    ),
+}
+
+
+def functions_of(program: Program) -> StepFunctions:
+    """The record of the step of a program. Raises `KeyError` for a lattice."""
+    return STEP_FUNCTIONS[program.step.kind.name]

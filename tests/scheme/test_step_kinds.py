@@ -1,0 +1,34 @@
+"""Kinds of steps: each has an entry in the tables of the rooms that treat kinds differently."""
+
+import pytest
+
+from phigen.lanes.in_lanes import LOWERINGS
+from phigen.scheme import steps
+from phigen.scheme.step_kinds import STEP_KINDS
+from phigen.targets.c.files import CONDITIONS
+from phigen.targets.c.step_text import STEP_TEXTS
+from phigen.targets.features import FEATURES
+from phigen.targets.js.step_modules import STEP_MODULES
+from phigen.targets.numpy.step_functions import STEP_FUNCTIONS
+
+#: Lattices have emitters of their own.
+ORDINARY = {name for name, kind in STEP_KINDS.items() if not kind.sites}
+
+
+@pytest.mark.parametrize("table", [STEP_TEXTS, STEP_MODULES, STEP_FUNCTIONS])
+def test_each_target_has_the_text_of_each_kind(table):
+    assert set(table) == ORDINARY
+
+
+def test_each_kind_is_lowered_to_lanes_or_left_alone_by_a_rule():
+    assert set(LOWERINGS) == set(STEP_KINDS)
+
+
+def test_each_kind_has_a_switch_of_the_runtimes():
+    assert {name.upper() for name in ORDINARY} <= {feature.name for feature in FEATURES}
+    assert all(any(name.upper() in condition for condition in CONDITIONS.values()) for name in ORDINARY)
+
+
+def test_each_class_of_steps_has_a_kind_of_its_own():
+    kinds = [step.kind for step in steps.Step.__args__]
+    assert kinds == list(STEP_KINDS.values())
