@@ -81,7 +81,9 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     if lattice is None:
         columns |= dict.fromkeys(declared.coordinates, "is recorded with the state")
     summed = [name for name in casimirs if lattice is None or lattice.kinds[name] != "sites"]
-    columns |= dict.fromkeys(["state", "energy", *summed, *numbers], "")
+    # An observable with an error of its own is none of a run that records it.
+    broken = [name for name in raw.get("observables", {}) if name not in observed]
+    columns |= dict.fromkeys(["state", "energy", *summed, *numbers, *broken], "")
     fields = [name for name in observed if name not in numbers]
     watched = declared.dated_scope() if lattice is None else scope_of_numbers(declared, numbers, fields)
     runs = {n: run(n, r, declared, columns, watched) for n, (_, r) in raw.get("runs", {}).items() if r is not None}
