@@ -133,7 +133,7 @@ def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
     """Steps of later segments begin without what earlier ones predict, so digits are lost to rounding only."""
     made, x, bar = method("mixed", target), start("mixed"), weights((4, 5))
     whole = made.pullback(x, H, 30, bar, 10)
-    monkeypatch.setattr(c_solver, "KEPT", 7 * 29)  # seven steps
+    monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 7 * 29)  # seven steps
     if target == "numpy":
         monkeypatch.setattr(made.backend.module, "KEPT", 7 * 22)
     part = made.pullback(x, H, 30, bar, 10)
