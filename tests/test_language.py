@@ -15,6 +15,7 @@ CLEAN = (
     "display.py",
     "drawing",
     "fmu",
+    "gauss",
     "geometry",
     "ir",
     "lanes",

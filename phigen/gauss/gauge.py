@@ -1,7 +1,8 @@
-"""Multiples of Casimirs that make the velocities of group elements small: then sweeps contract faster.
+"""Multiples of Casimirs that reduce the velocities of group elements, so that sweeps contract faster.
 
-H and H − Σ λ_c C_c move the coordinates alike, but the group element G by ∇H and by ∇H − Σ λ_c ∇C_c. The second
-derivatives of a quadratic H and of quadratic Casimirs are constant; the λ_c minimise the norm of their difference.
+H and H − Σ λ_c C_c have the same flow of the coordinates, but the group element G moves by ∇H or by ∇H − Σ λ_c ∇C_c.
+The second derivatives of a quadratic H and of quadratic Casimirs are constant; the λ_c minimise the norm of their
+difference.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from phigen.geometry.system import System
 from phigen.scheme.gauge import Gauge
 from phigen.symbolic.expression import ZERO, Expression, as_expression, gradient, number, symbols_of, total
 
-#: Multiples are rounded to fractions with small denominators: a percent more or less does not matter.
+#: Multiples are rounded to fractions with at most this denominator, far more precise than a flat optimum needs.
 LARGEST_DENOMINATOR = 1000
 
 
 def slowest(system: System, realisation: Realisation) -> Gauge:
-    """The gauge of the quadratic Casimirs; none where the second derivatives of H are not constant."""
+    """Return the gauge of the quadratic Casimirs; none where the second derivatives of H are not constant."""
     indices = [i for group in realisation.groups for i in group.indices]
     names = [system.coordinates[i] for i in indices]
     if not names or not realisation.exact or system.driven:
@@ -38,7 +39,7 @@ def _hessian(e: Expression, names: Sequence[str]) -> list[Expression]:
 
 
 def _projected(vector: Sequence[Expression], basis: Sequence[Sequence[Fraction]]) -> list[Expression]:
-    """The coefficients of the element of the span of a basis that is nearest to a vector."""
+    """Return the coefficients of the element of the span of a basis that is nearest to a vector."""
     orthogonal: list[list[Fraction]] = []
     transform: list[list[Fraction]] = []  # of the orthogonal vectors, by those of the basis
     for k, b in enumerate(basis):

@@ -1,7 +1,7 @@
-"""The kernels of a Gauss step: the vector field of a stage, what the step adds to x, and the change of frame.
+"""Kernels of a Gauss step: the vector field of a stage, the increment of x, and the change of frame.
 
-The unknowns are offsets from the start of the step, which is 0: of a plain coordinate x − x_start, of the time
-t − t_start, of a group element G − 1. So no digits are lost where steps are small.
+The unknowns are offsets, 0 at the start of the step: x − x_start of a plain coordinate, t − t_start of the time, G −
+1 of a group element. So small steps lose no digits.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: The kinds of symbols of unknowns, of the derivatives that are taken into a new frame, of velocities in Lie algebras.
+#: The kinds of symbols of unknowns, of derivatives that are transformed to a new frame, of velocities in Lie algebras.
 OFFSET, SLOPE, VELOCITY = "z", "k", "velocity"
 
 #: The symbol of h b_j, the weight of a stage.
@@ -40,8 +40,9 @@ WEIGHT = Symbol("w")
 class StageMap:
     """Points as expressions in the start of the step and the unknowns.
 
-    ``unknowns`` are symbols, ``change`` is x − x_start by coordinates; the first ``plain`` unknowns are offsets of
-    coordinates, whose indices are ``moved``; then that of the time, if there is one, and those of group elements.
+    ``unknowns`` are symbols, and ``change`` is x − x_start by coordinates. The first ``plain`` unknowns are offsets
+    of the coordinates with the indices ``moved``. Then come the offset of the time, if there is one, and those of
+    group elements.
     """
 
     system: System
@@ -53,34 +54,34 @@ class StageMap:
 
     @property
     def start(self) -> tuple[str, ...]:
-        """The symbols of the point where a step starts: coordinates, then the time."""
+        """The symbols of the start of a step: coordinates, then the time."""
         return (*self.system.coordinates, *self.system.times)
 
 
 def stage_map(system: System, realisation: Realisation) -> StageMap:
-    """The points of a system by the unknowns of a step."""
-    moved = tuple(i for part in realisation.parts if not isinstance(part, Group) for i in part.indices)
-    moved = tuple(i for i in moved if not realisation.exact or any(not e.is_zero for e in system.poisson[i]))
-    count = len(moved) + len(system.times)
+    """Return the points of a system in terms of the unknowns of a step."""
+    plain = tuple(i for part in realisation.parts if not isinstance(part, Group) for i in part.indices)
+    plain = tuple(i for i in plain if not realisation.exact or any(not e.is_zero for e in system.poisson[i]))
+    count = len(plain) + len(system.times)
     starts = []
     for group in realisation.groups:
         starts.append(count)
         count += group.algebra.dimension
     unknowns = tuple(Symbol(OFFSET, k) for k in range(count))
     change = [ZERO] * system.dimension
-    for k, i in enumerate(moved):
+    for k, i in enumerate(plain):
         change[i] = symbol(unknowns[k])
     for group, first in zip(realisation.groups, starts, strict=True):
         offsets = [symbol(s) for s in unknowns[first : first + group.algebra.dimension]]
         for i, value in zip(group.indices, _momentum_change(group, _values(system, group), offsets), strict=False):
             change[i] = value
-    return StageMap(system, realisation, unknowns, moved, tuple(starts), tuple(change))
+    return StageMap(system, realisation, unknowns, plain, tuple(starts), tuple(change))
 
 
 def _values(system: System, group: Group) -> list[Expression]:
-    """The values of the elements E_a of a Lie algebra at the start of a step."""
-    own = [symbol(system.coordinates[i]) + s for i, s in zip(group.indices, group.shift, strict=True)]
-    return [*own, *([ONE] if group.central else [])]
+    """Return the values of the elements E_a of a Lie algebra at the start of a step."""
+    coordinates = [symbol(system.coordinates[i]) + s for i, s in zip(group.indices, group.shift, strict=True)]
+    return [*coordinates, *([ONE] if group.central else [])]
 
 
 def _scalar(algebra: StarAlgebra, value: object) -> Expression:
@@ -88,15 +89,16 @@ def _scalar(algebra: StarAlgebra, value: object) -> Expression:
 
 
 def _combined(algebra: StarAlgebra, factors: Mapping[int, object], values: Sequence[Expression]) -> Expression:
-    """Σ_k factors[k]·values[k]."""
+    """Return Σ_k factors[k]·values[k]."""
     return total(_scalar(algebra, c) * values[k] for k, c in factors.items() if not values[k].is_zero)
 
 
 @dataclass(frozen=True)
 class _Scaled:
-    """The functional x̃ divided by q, frame elements f by numbers c: so products take few multiplications by numbers.
+    """The functional x̃ divided by q, and frame elements f divided by numbers c.
 
-    ``combination`` gives the E_a by the values of x̃/q at the f/c.
+    With suitable q and c the products need few multiplications by numbers. ``combination`` gives the E_a from the
+    values of x̃/q at the f/c.
     """
 
     at_basis: list[Expression]
@@ -122,23 +124,23 @@ def _scaled(group: Group, x: Sequence[Expression]) -> _Scaled:
 
 
 def _momentum_change(group: Group, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
-    """x̃(G E_a G*) − x_a for G = 1 + w: 2x̃(wE_a) + x̃(wE_a w*), as E_a is skew."""
+    """Return x̃(G E_a G*) − x_a for G = 1 + w: 2x̃(wE_a) + x̃(wE_a w*), as E_a is skew."""
     algebra, scaled = group.algebra, _scaled(group, x)
     left = _functional_times(algebra, scaled, w)
-    moved = [number(2) * _combined(algebra, f, left) + _with_star(algebra, f, left, w) for f in scaled.frame]
-    return [_combined(algebra, parts, moved) for parts in scaled.combination]
+    at_frame = [number(2) * _combined(algebra, f, left) + _with_star(algebra, f, left, w) for f in scaled.frame]
+    return [_combined(algebra, parts, at_frame) for parts in scaled.combination]
 
 
 def _momentum(group: Group, x: Sequence[Expression], g: Sequence[Expression]) -> list[Expression]:
-    """x̃(G E_a G*) for a group element G."""
+    """Return x̃(G E_a G*) for a group element G."""
     algebra, scaled = group.algebra, _scaled(group, x)
     left = _functional_times(algebra, scaled, g)
-    moved = [_with_star(algebra, f, left, g) for f in scaled.frame]
-    return [_combined(algebra, parts, moved) for parts in scaled.combination]
+    at_frame = [_with_star(algebra, f, left, g) for f in scaled.frame]
+    return [_combined(algebra, parts, at_frame) for parts in scaled.combination]
 
 
 def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Expression]) -> list[Expression]:
-    """x̃(wb)/q for the elements b of the basis."""
+    """Return x̃(wb)/q for the elements b of the basis."""
     left = []
     for k in range(algebra.dimension):
         values = [_combined(algebra, algebra.table.get((i, k), {}), scaled.at_basis) for i in range(algebra.dimension)]
@@ -149,7 +151,7 @@ def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Express
 def _with_star(
     algebra: StarAlgebra, f: Mapping[int, Scalar], left: Sequence[Expression], w: Sequence[Expression]
 ) -> Expression:
-    """x̃(wfw*)/q, where ``left`` are the values x̃(wb)/q."""
+    """Return x̃(wfw*)/q, where ``left`` are the values x̃(wb)/q."""
     one = algebra.field.one
     terms = []
     for j in range(algebra.dimension):
@@ -160,7 +162,7 @@ def _with_star(
 
 
 def field_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """The vector field of the unknowns at a stage, multiplied by the weight h b_j of the stage."""
+    """Return the vector field of the unknowns at a stage, multiplied by the weight h b_j of the stage."""
     velocities: list[Expression] = []
 
     def hold(value: Expression) -> Expression:
@@ -180,7 +182,7 @@ def field_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
 
 
 def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> list[Expression]:
-    """The roots with velocities in place of their symbols, whose numerical factors are not moved into the products."""
+    """Return the roots with the velocities substituted, without moving numerical factors into the products."""
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if e.op == "symbol" and kind_of(e.value) == VELOCITY:
@@ -192,7 +194,7 @@ def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> 
 
 
 def at_unknowns(points: StageMap) -> dict[str, Expression]:
-    """The coordinates and the time at a stage, by the unknowns."""
+    """Return the coordinates and the time at a stage, in terms of the unknowns."""
     system = points.system
     at = {c: symbol(c) + d for c, d in zip(system.coordinates, points.change, strict=True)}
     for group, first in zip(points.realisation.groups, points.starts, strict=True):
@@ -205,7 +207,7 @@ def at_unknowns(points: StageMap) -> dict[str, Expression]:
 def _element(
     algebra: StarAlgebra, elements: Sequence[Mapping[int, object]], factors: Sequence[Expression]
 ) -> list[Expression]:
-    """The components of Σ_a factors[a]·elements[a]."""
+    """Return the components of Σ_a factors[a]·elements[a]."""
     return [
         total(_scalar(algebra, e[k]) * r for e, r in zip(elements, factors, strict=False) if k in e)
         for k in range(algebra.dimension)
@@ -213,7 +215,7 @@ def _element(
 
 
 def _group_element(points: StageMap, group: Group, first: int) -> list[Expression]:
-    """G = 1 + w, by the unknowns w from the first on."""
+    """Return G = 1 + w, with the unknowns w from the index ``first`` on."""
     algebra = group.algebra
     return [
         symbol(points.unknowns[first + k]) + (_scalar(algebra, algebra.unit[k]) if k in algebra.unit else ZERO)
@@ -227,15 +229,15 @@ def vector_field(
     weight: Expression = ONE,
     hold: Callable[[Expression], Expression] | None = None,
 ) -> list[Expression]:
-    """The derivatives of the unknowns at a stage, where the coordinates have these values, times a weight.
+    """Return the derivatives of the unknowns at a stage, with these values of the coordinates, times a weight.
 
-    ``hold`` receives each component of the velocities in Lie algebras, and returns what stands for it.
+    ``hold`` receives each component of the velocities in Lie algebras, and returns its replacement.
     """
     system, realisation = points.system, points.realisation
     if not realisation.exact:
         field_ = system.vector_field()
-        moved = substitute([field_[i] for i in points.moved], at)
-        return [*(weight * value for value in moved), *(weight for _ in system.times)]
+        plain_rates = substitute([field_[i] for i in points.moved], at)
+        return [*(weight * value for value in plain_rates), *(weight for _ in system.times)]
     slopes = gradient(system.hamiltonian, system.coordinates)
     if system.forces:
         slopes = [s + z for s, z in zip(slopes, system.forces.covector, strict=True)]
@@ -255,7 +257,7 @@ def vector_field(
 
 
 def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:
-    """The product of two elements."""
+    """Return the product of two elements."""
     terms: list[list[Expression]] = [[] for _ in range(algebra.dimension)]
     for (i, j), row in sorted(algebra.table.items()):
         if a[i].is_zero or b[j].is_zero:
@@ -266,7 +268,7 @@ def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expre
 
 
 def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """Kernel of the change of the coordinates in a step."""
+    """Return the kernel of the increment of the coordinates in a step."""
     return Kernel(
         "stage_change",
         "the change of the coordinates from x, by the unknowns",
@@ -276,19 +278,19 @@ def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
 
 
 def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
-    """Derivatives of group elements in the frame of the next step: the inverse of G, which is G*, times them."""
+    """Return the derivatives of group elements in the frame of the next step: G* = G⁻¹ times the derivatives."""
     if not points.realisation.groups:
         return None
     slopes = [symbol(Symbol(SLOPE, k)) for k in range(len(points.unknowns))]
-    found = slopes[: points.starts[0]]
+    values = slopes[: points.starts[0]]
     for group, first in zip(points.realisation.groups, points.starts, strict=True):
         algebra = group.algebra
         w = [symbol(s) for s in points.unknowns[first : first + algebra.dimension]]
         k = slopes[first : first + algebra.dimension]
-        found += [a + b for a, b in zip(k, _multiplied(algebra, _element(algebra, algebra.star, w), k), strict=True)]
+        values += [a + b for a, b in zip(k, _multiplied(algebra, _element(algebra, algebra.star, w), k), strict=True)]
     return Kernel(
         "next_frame",
         "derivatives k of the unknowns as seen from the end z of a step, where the next one starts",
         {"coef": coefficients.slots, "z": points.unknowns, "k": tuple(Symbol(SLOPE, i) for i in range(len(slopes)))},
-        (Output("seen", tuple(coefficients.hoist(found))),),
+        (Output("seen", tuple(coefficients.hoist(values))),),
     )

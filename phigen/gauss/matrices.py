@@ -1,8 +1,8 @@
-"""Star algebras of matrices, for Lie algebras of matrices that keep a bilinear form, and for others twice as large.
+"""Star algebras of matrices, for matrix Lie algebras that preserve a bilinear form, and for others at twice the size.
 
-If the matrices ρ(e) are skew for an invertible form B, ρᵀB + Bρ = 0, the associative algebra that they generate with 1
-has the involution a ↦ B⁻¹aᵀB. If there is no such form, ρ ⊕ −ρᵀ has the form that pairs the two halves. So so(n),
-so(p, q) and sp(2n) need n² or 4n² unknowns, su(n) and sl(n) and gl(n) 2n².
+If the matrices ρ(e) are skew for an invertible form B, ρᵀB + Bρ = 0, the associative algebra that they generate with
+1 has the involution a ↦ B⁻¹aᵀB. If there is no such form, ρ ⊕ −ρᵀ has the form that pairs the two halves. So so(n),
+so(p, q) and sp(2n) need n² or 4n² unknowns, su(n), sl(n) and gl(n) 2n².
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from phigen.geometry.linear import Span, add_multiple, kernel
 from phigen.geometry.matrix_algebras import product
 from phigen.geometry.representations import known_representation
 
-#: Largest algebra that is tried: each sweep takes some third power of its root in operations at every stage.
+#: Largest dimension of an algebra: operations of a sweep at a stage grow as the third power of its square root.
 MOST_UNKNOWNS = 36
 
 
 def of_matrices(lie: LieAlgebra) -> StarAlgebra | None:
-    """The algebra of a Lie algebra that is known by matrices with rational entries; None where there is none."""
+    """Return the algebra of a Lie algebra that is known by matrices with rational entries, or None."""
     known = known_representation(lie)
     if known is None or not lie.field.is_rational:
         return None
@@ -48,13 +48,15 @@ def _transposed(a: SparseMatrix) -> SparseMatrix:
 
 
 def _doubled(a: SparseMatrix, n: int, field: Field) -> SparseMatrix:
-    """a ⊕ −aᵀ."""
+    """Return a ⊕ −aᵀ."""
     return {**a, **{(n + j, n + i): -v for (i, j), v in a.items()}}
 
 
 def _form(matrices: Sequence[SparseMatrix], n: int, field: Field) -> SparseMatrix | None:
-    """An invertible form B, symmetric or skew, with mᵀB + Bm = 0 for all matrices; None if there is none in the basis
-    of all forms."""
+    """Return an invertible form B, symmetric or skew, with mᵀB + Bm = 0 for all matrices.
+
+    None if the basis of all such forms contains none.
+    """
     rows: list[dict[int, Scalar]] = []
     for m in matrices:
         equations: dict[tuple[int, int], dict[int, Scalar]] = {}
@@ -64,10 +66,10 @@ def _form(matrices: Sequence[SparseMatrix], n: int, field: Field) -> SparseMatri
                 add_multiple(equations.setdefault((j, i), {}), {j * n + k: v}, field.one)
         rows += [e for e in equations.values() if e]
     for vector in kernel(field, rows, n * n):
-        found = {divmod(at, n): v for at, v in vector.items()}
+        entries = {divmod(at, n): v for at, v in vector.items()}
         for sign in (field.one, -field.one):
-            form = dict(found)
-            add_multiple(form, _transposed(found), sign)
+            form = dict(entries)
+            add_multiple(form, _transposed(entries), sign)
             if _inverse(form, n, field) is not None:
                 return form
     return None
@@ -78,26 +80,26 @@ def _inverse(a: SparseMatrix, n: int, field: Field) -> SparseMatrix | None:
     span = Span(field, columns)
     if span.dimension < n:
         return None
-    found: SparseMatrix = {}
+    inverse: SparseMatrix = {}
     for j in range(n):
         for i, v in (span.coordinates({j: field.one}) or {}).items():
-            found[i, j] = v
-    return found
+            inverse[i, j] = v
+    return inverse
 
 
 def _hull(generators: Sequence[SparseMatrix], n: int, field: Field) -> list[SparseMatrix]:
-    """A sparse basis of the associative algebra that matrices generate; empty if that is too large."""
-    found: list[SparseMatrix] = []
+    """Return a sparse basis of the associative algebra that matrices generate; empty if that is too large."""
+    basis: list[SparseMatrix] = []
     pending = list(generators)
     while pending:
         candidate = pending.pop(0)
-        if Span(field, [*found, candidate]).dimension == len(found):
+        if Span(field, [*basis, candidate]).dimension == len(basis):
             continue
-        found.append(candidate)
-        if len(found) > MOST_UNKNOWNS:
+        basis.append(candidate)
+        if len(basis) > MOST_UNKNOWNS:
             return []
         pending += [product(candidate, g) for g in generators[1:]]
-    vectors = [{i * n + j: v for (i, j), v in m.items()} for m in found]
+    vectors = [{i * n + j: v for (i, j), v in m.items()} for m in basis]
     reduced = kernel(field, kernel(field, vectors, n * n), n * n)
     return [{divmod(at, n): v for at, v in vector.items()} for vector in reduced]
 
@@ -117,10 +119,10 @@ def _assembled(
     functional = _functional(hull, star, matrices, basis, field)
     if functional is None:
         return None
-    own = [{a: field.one} for a in range(len(basis))]
+    coordinate_vectors = [{a: field.one} for a in range(len(basis))]
     unit = coordinates(_unit(n, field))
-    found = StarAlgebra(field, len(hull), table, star, unit, basis, functional, basis, own)
-    return found if found.sound else None
+    algebra = StarAlgebra(field, len(hull), table, star, unit, basis, functional, basis, coordinate_vectors)
+    return algebra if algebra.sound else None
 
 
 def _functional(
@@ -130,7 +132,10 @@ def _functional(
     basis: Sequence[Vector],
     field: Field,
 ) -> list[Vector] | None:
-    """x̃ at the basis: it vanishes on symmetric elements, and on skew ones orthogonal to g by the trace of products."""
+    """Return x̃ at the basis.
+
+    x̃ vanishes on symmetric elements, and on skew elements orthogonal to g by the trace of products.
+    """
     half = field.one / field.number(2)
     skew: list[Vector] = []
     for i in range(len(hull)):
@@ -143,19 +148,19 @@ def _functional(
         part = {i: half}
         add_multiple(part, star[i], half)
         symmetric.append(part)
-    # what is orthogonal to g and skew: in the kernel of the traces, and of the projection on symmetric elements
+    # skew elements orthogonal to g are in the kernels of the traces and of the projection on symmetric elements
     rows = [{i: v[k] for i, v in enumerate(symmetric) if k in v} for k in range(len(hull))]
     others = kernel(field, [*traces, *(r for r in rows if r)], len(hull))
     span = Span(field, [*basis, *others])
     if span.dimension < len(basis) + len(others):
         return None
-    found = []
+    values = []
     for part in skew:
         value = span.coordinates(combined([part], {0: field.one}))
         if value is None:
             return None
-        found.append({a: v for a, v in value.items() if a < len(basis)})
-    return found
+        values.append({a: v for a, v in value.items() if a < len(basis)})
+    return values
 
 
 def _trace(a: SparseMatrix, b: SparseMatrix, field: Field) -> Scalar:

@@ -1,9 +1,9 @@
-"""Quaternions over commutative algebras, for Lie algebras that are the skew elements of such.
+"""Quaternions over commutative algebras, for Lie algebras of skew elements.
 
-A = K ⊕ g with ab = β(a, b) + ½[a, b] on g, where K commutes with all. It exists if [[a, b], c] = 4(β(b, c)a − β(a, c)b)
-for a symmetric β whose values are maps that commute with the bracket; K is spanned by the identity and those. For so(3)
-these are the quaternions, for sl(2) the 2×2 matrices, for so(3,1) and se(3) quaternions with complex and dual
-coefficients; Heisenberg algebras have β = 0, and so(4) is two copies of so(3).
+A = K ⊕ g with ab = β(a, b) + ½[a, b] on g, where K commutes with all elements. A exists if [[a, b], c] = 4(β(b, c)a −
+β(a, c)b) for a symmetric β whose values are maps that commute with the bracket; K is spanned by the identity and
+these maps. For so(3) these are the quaternions, for sl(2) the 2×2 matrices, for so(3,1) and se(3) quaternions with
+complex and dual coefficients; Heisenberg algebras have β = 0, and so(4) is two copies of so(3).
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from phigen.symbolic.tower import rational
 #: A linear map of g, as entries (row, column).
 Map = dict[tuple[int, int], Scalar]
 
-#: Largest Lie algebra that is tried: the number of unknowns grows with the third power.
+#: Largest dimension of a Lie algebra; the unknowns of the linear equations for β grow as its third power.
 MOST_QUATERNIONIC = 12
 
 
 def quaternionic(algebra: LieAlgebra) -> StarAlgebra | None:
-    """The algebra A of a Lie algebra; None where there is none."""
+    """Return the algebra A of a Lie algebra, or None."""
     m, field = algebra.dimension, algebra.field
     if m > MOST_QUATERNIONIC:
         return None
@@ -37,12 +37,12 @@ def quaternionic(algebra: LieAlgebra) -> StarAlgebra | None:
     if form is None:
         return None
     scalars = _generated(form, m, field)
-    found = _assembled(ad, form, scalars, field)
-    return _split(found, len(scalars)) if found.sound else None
+    candidate = _assembled(ad, form, scalars, field)
+    return _split(candidate, len(scalars)) if candidate.sound else None
 
 
 def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
-    """A basis of the linear maps φ with φ[a, b] = [φa, b], as entries (row, column), the identity first."""
+    """Return a basis of the linear maps φ with φ[a, b] = [φa, b], as entries (row, column), the identity first."""
     m = len(ad)
     rows: list[dict[int, Scalar]] = []
     for i in range(m):
@@ -55,14 +55,14 @@ def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
                 for row, v in ad[k][j].items():
                     add_multiple(equations.setdefault(row, {}), {k * m + i: v}, -field.one)
             rows += [e for e in equations.values() if e]
-    found = [{divmod(at, m): v for at, v in vector.items()} for vector in kernel(field, rows, m * m)]
+    maps = [{divmod(at, m): v for at, v in vector.items()} for vector in kernel(field, rows, m * m)]
     identity = {(i, i): field.one for i in range(m)}
-    independent = Span(field, [identity, *found])
-    return [v for k, v in enumerate([identity, *found]) if k not in independent.dependent]
+    independent = Span(field, [identity, *maps])
+    return [v for k, v in enumerate([identity, *maps]) if k not in independent.dependent]
 
 
 def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> dict[tuple[int, int], Map] | None:
-    """β(e_i, e_j) for all i, j, as maps; None if there is none."""
+    """Return β(e_i, e_j) for all i, j, as maps, or None."""
     m, count = len(ad), len(maps)
     places = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(m) for j in range(i + 1))}
     four, last = field.number(4), len(places) * count
@@ -89,46 +89,49 @@ def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> 
     solution = next((v for v in kernel(field, rows, last + 1) if last in v), None)
     if solution is None:
         return None
-    found: dict[tuple[int, int], Map] = {}
+    form: dict[tuple[int, int], Map] = {}
     for (i, j), place in places.items():
         value: Map = {}
         for number, phi in enumerate(maps):
             if place * count + number in solution:
                 add_multiple(value, phi, solution[place * count + number])
-        found[i, j] = found[j, i] = value
-    return found
+        form[i, j] = form[j, i] = value
+    return form
 
 
 def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> list[Map]:
-    """A basis of the algebra of maps that the identity and the values of β generate, the identity first."""
-    found: list[Map] = [{(i, i): field.one for i in range(m)}]
+    """Return a basis of the algebra of maps that the identity and the values of β generate, the identity first."""
+    basis: list[Map] = [{(i, i): field.one for i in range(m)}]
     pending = [value for value in form.values() if value]
     while pending:
         value = _normalised(pending.pop())
-        if Span(field, [*found, value]).dimension == len(found):
+        if Span(field, [*basis, value]).dimension == len(basis):
             continue
-        found.append(value)
-        pending += [product for a in found for b in found if (product := _composed(a, b))]
-    return found
+        basis.append(value)
+        pending += [product for a in basis for b in basis if (product := _composed(a, b))]
+    return basis
 
 
 def _normalised(a: Map) -> Map:
-    """A multiple whose first entry is 1: products with it take fewer multiplications."""
+    """Return a multiple whose first entry is 1: products with it take fewer multiplications."""
     first = a[min(a)]
     return {at: v / first for at, v in a.items()}
 
 
 def _composed(a: Mapping[tuple[int, int], Scalar], b: Mapping[tuple[int, int], Scalar]) -> Map:
-    found: Map = {}
+    product: Map = {}
     for (i, k), v in a.items():
-        add_multiple(found, {(i, j): w for (row, j), w in b.items() if row == k}, v)
-    return found
+        add_multiple(product, {(i, j): w for (row, j), w in b.items() if row == k}, v)
+    return product
 
 
 def _assembled(
     ad: Sequence[Sequence[Vector]], form: Mapping[tuple[int, int], Map], scalars: Sequence[Map], field: Field
 ) -> StarAlgebra:
-    """The algebra K ⊕ g, if it is one; its basis holds 2e for the basis elements e of g, with 2a·2b = 4β + 2[a, b]."""
+    """Return the algebra K ⊕ g.
+
+    Its basis contains 2e for the basis elements e of g, with 2a·2b = 4β + 2[a, b]. The axioms are not checked here.
+    """
     m, count, one = len(ad), len(scalars), field.one
     span, two, half = Span(field, scalars), field.number(2), one / field.number(2)
     table: dict[tuple[int, int], Vector] = {}
@@ -147,12 +150,12 @@ def _assembled(
     star = [{k: one if k < count else -one} for k in range(count + m)]
     functional: list[Vector] = [{}] * count + [{j: two} for j in range(m)]
     table = {at: v for at, v in table.items() if v}
-    own = [{j: one} for j in range(m)]
-    return StarAlgebra(field, count + m, table, star, {0: one}, basis, functional, basis, own)
+    coordinate_vectors = [{j: one} for j in range(m)]
+    return StarAlgebra(field, count + m, table, star, {0: one}, basis, functional, basis, coordinate_vectors)
 
 
 def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
-    """The same as a sum of two algebras, where K is two-dimensional and has an idempotent with rational entries."""
+    """Return the algebra as a sum of two, where K is two-dimensional and has an idempotent with rational entries."""
     field, one = algebra.field, algebra.field.one
     idempotent = _idempotent(algebra) if count == 2 else None
     if idempotent is None:
@@ -162,14 +165,14 @@ def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
         images = [algebra.product(factor, {i: one}) for i in range(algebra.dimension)]
         dependent = Span(field, images).dependent
         parts += [image for i, image in enumerate(images) if i not in dependent]
-    found = in_basis(algebra, parts)
-    frame = [{i: one} for i, image in enumerate(found.star) if image == {i: -one}]
+    sum_of_two = in_basis(algebra, parts)
+    frame = [{i: one} for i, image in enumerate(sum_of_two.star) if image == {i: -one}]
     span = Span(field, frame)
-    return replace(found, frame=frame, combination=[span.coordinates(e) or {} for e in found.basis])
+    return replace(sum_of_two, frame=frame, combination=[span.coordinates(e) or {} for e in sum_of_two.basis])
 
 
 def _idempotent(algebra: StarAlgebra) -> Vector | None:
-    """(1 + (k − q/2)/r)/2 for the second element k of the basis of K, where k² = p + qk and r² = p + q²/4."""
+    """Return (1 + (k − q/2)/r)/2 for the second basis element k of K, where k² = p + qk and r² = p + q²/4."""
     field = algebra.field
     if not field.is_rational:
         return None

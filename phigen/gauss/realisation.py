@@ -1,9 +1,10 @@
-"""Which coordinates of a system a Gauss method treats in which way, so that its step is a Poisson map.
+"""Treatment of the coordinates of a system by a Gauss method, so that its step is a Poisson map.
 
-Coordinates with constant brackets stand for themselves: Gauss methods are symplectic. Those with the brackets of a Lie
-algebra are x̃(G ξ G*), where G is a group element, 1 at the start of each step, and the method is applied to G
-(`phigen.gauss.star_algebra`). Gauss methods keep quadratic first integrals and constant two-forms, and commute with
-linear maps; so the step of G is presymplectic, and the step of x is a Poisson map, exactly, with all Casimirs.
+Coordinates with constant brackets are unknowns themselves, since Gauss methods are symplectic. Coordinates with the
+brackets of a Lie algebra are x̃(G ξ G*), where G is a group element, 1 at the start of each step, and the method is
+applied to G (`phigen.gauss.star_algebra`). Gauss methods preserve quadratic first integrals and constant two-forms,
+and commute with linear maps. So the step of G is presymplectic, and the step of x is a Poisson map, exactly, with all
+Casimirs.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ from phigen.symbolic.expression import ONE, ZERO, Expression
 
 @dataclass(frozen=True)
 class Plain:
-    """Coordinates (indices) that stand for themselves, as their brackets are constant, or any where the step is
-    Poisson to truncation only."""
+    """Coordinates (indices) that are unknowns themselves.
+
+    Their brackets are constant, or the step is a Poisson map to truncation only.
+    """
 
     indices: tuple[int, ...]
 
@@ -34,7 +37,7 @@ class Plain:
 class Group:
     """Coordinates (indices) with the brackets of a Lie algebra: x_i + ``shift`` is a momentum map of a star algebra.
 
-    With ``central`` the last element of the basis of the Lie algebra has no coordinate: its value is 1.
+    If ``central``, the last basis element of the Lie algebra has no coordinate: its value is 1.
     """
 
     indices: tuple[int, ...]
@@ -49,7 +52,7 @@ Part = Plain | Group
 
 @dataclass(frozen=True)
 class Realisation:
-    """The parts of a system; the step is ``exact``, a Poisson map, or one to truncation only."""
+    """The parts of a system; the step is a Poisson map if ``exact``, else to truncation only."""
 
     parts: tuple[Part, ...]
     exact: bool
@@ -68,26 +71,26 @@ class Realisation:
 
 
 def direct(system: System) -> Realisation:
-    """Gauss on ẋ = π∇H itself: a Poisson map where π is constant, else to truncation."""
+    """Return Gauss on ẋ = π∇H itself: a Poisson map where π is constant, else to truncation."""
     constant = isinstance(system.shape, Constant | Canonical)
     return Realisation((Plain(tuple(range(system.dimension))),), constant)
 
 
 def collective(system: System) -> Realisation | None:
-    """A realisation with which the step is a Poisson map; None where none is known."""
-    found: list[Part] = []
+    """Return a realisation with which the step is a Poisson map, or None if none is known."""
+    parts: list[Part] = []
     for indices, algebra, central in _components(system.shape):
         part = _part(indices, algebra, central=central)
         if part is None:
             return None
-        found.append(part)
-    if not found:
+        parts.append(part)
+    if not parts:
         return direct(system) if isinstance(system.shape, Constant | Canonical) else None
-    return Realisation(tuple(_joined(found)), True)
+    return Realisation(tuple(_joined(parts)), True)
 
 
 def _joined(parts: Sequence[Part]) -> Iterator[Part]:
-    """The same with one plain part, the first."""
+    """Yield the parts, with one plain part first."""
     plain = [i for part in parts if isinstance(part, Plain) for i in part.indices]
     if plain:
         yield Plain(tuple(sorted(plain)))
@@ -95,7 +98,10 @@ def _joined(parts: Sequence[Part]) -> Iterator[Part]:
 
 
 def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
-    """Indecomposable parts of a linear or affine structure; whether the last basis element is the constant 1."""
+    """Yield indecomposable parts of a linear or affine structure.
+
+    The third entry says whether the last basis element is the constant 1.
+    """
     if isinstance(shape, LiePoisson):
         for indices in indecomposable_parts(shape.algebra):
             yield indices, restricted(shape.algebra, indices), False
@@ -103,7 +109,7 @@ def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
         whole = shape.extension
         one = whole.dimension - 1
         linear = {ij: {k: c for k, c in row.items() if k != one} for ij, row in whole.constants.items()}
-        # Coordinates with a constant bracket belong together too: as if it were a multiple of one of them.
+        # A constant bracket couples its coordinates too; here it is replaced by a multiple of one of them.
         joined = {ij: row or {ij[0]: ONE} for ij, row in linear.items()}
         for indices in indecomposable_parts(LieAlgebra("", one, joined)):
             pairs = [ij for ij in whole.constants if set(ij) <= set(indices)]
@@ -127,7 +133,7 @@ def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | N
 
 
 def star_algebra(lie: LieAlgebra) -> StarAlgebra | None:
-    """A star algebra whose skew elements hold the Lie algebra; None where none is known."""
+    """Return a star algebra whose skew elements contain the Lie algebra, or None if none is known."""
     return quaternionic(lie) or of_matrices(lie)
 
 
@@ -137,7 +143,7 @@ def _without_constants(lie: LieAlgebra, last: int) -> LieAlgebra:
 
 
 def _shift(lie: LieAlgebra, last: int) -> list[Expression] | None:
-    """s with {x_i, x_j} = Σ_k c_ij^k (x_k + s_k), which makes a constant part of the brackets go away; None if none."""
+    """Return s with {x_i, x_j} = Σ_k c_ij^k (x_k + s_k), which absorbs the constants of the brackets, or None."""
     field = lie.field
     rows: list[Vector] = []
     for row in lie.constants.values():

@@ -19,12 +19,12 @@ Vector = dict[int, Scalar]
 
 @dataclass(frozen=True)
 class StarAlgebra:
-    """An algebra in a basis: ``table[i, j]`` is the product of two basis elements, ``star[i]`` the image of one under
-    the involution, ``unit`` the unit.
+    """An algebra in a basis, with an involution.
 
-    ``basis`` are the elements E_a of g. ``frame`` are skew elements by which momenta are computed, with E_a =
-    Σ_k frame_k·``combination[a][k]``. The functional x̃ of a point x has the value Σ_a x_a·``functional[i][a]`` at the
-    basis element i.
+    ``table[i, j]`` is the product of two basis elements, ``star[i]`` the image of one under the involution, ``unit``
+    the unit. ``basis`` are the elements E_a of g. ``frame`` are skew elements for the computation of momenta, with
+    E_a = Σ_k frame_k·``combination[a][k]``. The functional x̃ of a point x has the value Σ_a x_a·``functional[i][a]``
+    at the basis element i.
     """
 
     field: Field
@@ -38,24 +38,24 @@ class StarAlgebra:
     combination: Sequence[Vector]
 
     def product(self, a: Mapping[int, Scalar], b: Mapping[int, Scalar]) -> Vector:
-        """The product of two elements."""
-        found: Vector = {}
+        """Return the product of two elements."""
+        product: Vector = {}
         for i, v in a.items():
             for j, w in b.items():
                 if (i, j) in self.table:
-                    add_multiple(found, self.table[i, j], v * w)
-        return found
+                    add_multiple(product, self.table[i, j], v * w)
+        return product
 
     def starred(self, a: Mapping[int, Scalar]) -> Vector:
-        """The image of an element under the involution."""
+        """Return the image of an element under the involution."""
         return combined(self.star, a)
 
     def commutator(self, a: Mapping[int, Scalar], b: Mapping[int, Scalar]) -> Vector:
-        """ab − ba."""
+        """Return ab − ba."""
         return difference(self.product(a, b), self.product(b, a), self.field.one)
 
     def value(self, a: Mapping[int, Scalar]) -> Vector:
-        """x̃(a) as a linear form in x."""
+        """Return x̃(a) as a linear form in x."""
         return combined(self.functional, a)
 
     @cached_property
@@ -75,7 +75,7 @@ class StarAlgebra:
         return not any(any(residuals) for _, residuals in self.axioms())
 
     def axioms(self) -> Iterator[tuple[str, Iterator[Vector]]]:
-        """Statements that the momentum map rests on, each with residuals that are empty where it holds."""
+        """Yield the axioms of the momentum map, each with residuals that are empty where it holds."""
         n, one = range(self.dimension), self.field.one
         units = [{i: one} for i in n]
         yield "A is associative", (self._associator(i, j, k) for i in n for j in n for k in n)
@@ -110,7 +110,7 @@ class StarAlgebra:
             yield difference(self.starred(f), f, -self.field.one)
 
     def _moved(self) -> Iterator[Vector]:
-        """The skew elements on which all x̃ vanish are an ideal of the skew elements: x̃([u, n]) for those n."""
+        """Yield x̃([u, n]) for all skew u, and the skew n on which all x̃ vanish: the n must form an ideal."""
         rows: list[Vector] = [{} for _ in self.basis]
         for i, u in enumerate(self.skew):
             for a, v in self.value(u).items():
@@ -122,22 +122,22 @@ class StarAlgebra:
 
 
 def combined(vectors: Sequence[Mapping[int, Scalar]], factors: Mapping[int, Scalar]) -> Vector:
-    """Σ_k factors[k]·vectors[k]."""
-    found: Vector = {}
+    """Return Σ_k factors[k]·vectors[k]."""
+    combination: Vector = {}
     for k, v in factors.items():
-        add_multiple(found, vectors[k], v)
-    return found
+        add_multiple(combination, vectors[k], v)
+    return combination
 
 
 def difference(a: Mapping[int, Scalar], b: Mapping[int, Scalar], factor: Scalar) -> Vector:
-    """a − factor·b."""
-    found = dict(a)
-    add_multiple(found, b, -factor)
-    return found
+    """Return a − factor·b."""
+    result = dict(a)
+    add_multiple(result, b, -factor)
+    return result
 
 
 def in_basis(algebra: StarAlgebra, vectors: Sequence[Vector]) -> StarAlgebra:
-    """The same algebra in another basis."""
+    """Return the algebra in another basis."""
     span = Span(algebra.field, vectors)
 
     def converted(a: Mapping[int, Scalar]) -> Vector:

@@ -1,8 +1,8 @@
 """Statements about a Gauss step, proved for each build: symplecticity, order, momentum map.
 
-A Gauss method is symplectic and keeps quadratic first integrals if μ_ij + μ_ji = 1 for its coefficients as used. With
-the axioms of `phigen.gauss.star_algebra` the components of J are quadratic, and J is a Poisson map from the
-presymplectic space of group elements; the unit is a section of it. Then the step in x is a Poisson map.
+A Gauss method is symplectic and preserves quadratic first integrals if μ_ij + μ_ji = 1 for its coefficients as used.
+By the axioms of `phigen.gauss.star_algebra` the components of J are quadratic, and J is a Poisson map from the
+presymplectic space of group elements; the unit is a section of it. Hence the step in x is a Poisson map.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, Statement, decide_zero
 
-#: By how much rounding of coefficients may miss the conditions for the order.
+#: Largest residual of the order conditions that rounding of the coefficients explains.
 ROUNDED = Fraction(1, 10**15)
 
 
 def check(system: System, discretised: System, realisation: Realisation, tableau: Tableau) -> Iterator[Statement]:
-    """The statements about coefficients, then those about the realisation."""
+    """Yield the statements about coefficients, then those about the realisation."""
     yield _symplectic(tableau)
     yield _order(tableau)
     points = stage_map(discretised, realisation)
@@ -49,24 +49,24 @@ def _symplectic(tableau: Tableau) -> Statement:
 
 
 def _order(tableau: Tableau) -> Statement:
-    """The conditions B(2s) and C(s), which give the order 2s."""
+    """Decide the conditions B(2s) and C(s), which give the order 2s."""
     s = tableau.stages
     c, b = (list(map(Fraction, values)) for values in (tableau.nodes, tableau.weights))
-    missed = [abs(sum(w * x**k for w, x in zip(b, c, strict=True)) - Fraction(1, k + 1)) for k in range(2 * s)]
+    residuals = [abs(sum(w * x**k for w, x in zip(b, c, strict=True)) - Fraction(1, k + 1)) for k in range(2 * s)]
     for row, x in zip(tableau.mixing, c, strict=True):
         values = [Fraction(m) * w for m, w in zip(row, b, strict=True)]
-        missed += [
+        residuals += [
             abs(sum(v * y**k for v, y in zip(values, c, strict=True)) - x ** (k + 1) / (k + 1)) for k in range(s)
         ]
     name = f"the weights integrate polynomials of degree {2 * s - 1}, the stages those of degree {s - 1}: order {2 * s}"
-    worst = max(missed)
+    worst = max(residuals)
     if worst > ROUNDED:
         return Statement(name, REFUTED, residual=f"{float(worst):.1e}")
     return Statement(name, CHECKED, f"coefficients rounded to double precision, defect {float(worst):.0e}")
 
 
 def _brackets(system: System, realisation: Realisation) -> Statement:
-    """π has the brackets that the parts are treated by: of the Lie algebras, else constant."""
+    """Decide that π has the brackets that the parts assume: of the Lie algebras, else constant."""
     n = system.dimension
     expected: dict[tuple[int, int], Expression] = {}
     grouped = {i: group for group in realisation.groups for i in group.indices}
@@ -90,15 +90,15 @@ def _brackets(system: System, realisation: Realisation) -> Statement:
 def _lie_poisson(system: System, group: Group) -> dict[tuple[int, int], Expression]:
     values = [symbol(system.coordinates[i]) + s for i, s in zip(group.indices, group.shift, strict=True)]
     values += [symbol(system.coordinates[0]) ** 0] if group.central else []
-    found = {}
+    brackets = {}
     for a, i in enumerate(group.indices):
         for b, j in enumerate(group.indices):
-            found[i, j] = total(c * values[k] for k, c in group.lie.bracket(a, b).items())
-    return found
+            brackets[i, j] = total(c * values[k] for k, c in group.lie.bracket(a, b).items())
+    return brackets
 
 
 def _momentum_map(system: System, group: Group) -> Statement:
-    """J is a quadratic momentum map on a star algebra."""
+    """Decide that J is a quadratic momentum map on a star algebra."""
     listed = ", ".join(system.coordinates[i] for i in group.indices)
     algebra = group.algebra
     name = f"({listed}) = x̃(G E_a G*) is a quadratic momentum map on an algebra of dimension {algebra.dimension}"
@@ -107,10 +107,10 @@ def _momentum_map(system: System, group: Group) -> Statement:
     for a, e in enumerate(algebra.basis):
         for b, f in enumerate(algebra.basis):
             constants = group.lie.bracket(a, b)
-            wanted: dict[int, object] = {}
+            expected: dict[int, object] = {}
             for k, c in constants.items():
-                wanted = difference(wanted, algebra.basis[k], -field.convert(c))
-            if difference(algebra.commutator(e, f), wanted, field.one):
+                expected = difference(expected, algebra.basis[k], -field.convert(c))
+            if difference(algebra.commutator(e, f), expected, field.one):
                 failing.append(f"[E_{a + 1}, E_{b + 1}] is that of the brackets")
     if failing:
         return Statement(name, REFUTED, failing[0])
@@ -118,7 +118,7 @@ def _momentum_map(system: System, group: Group) -> Statement:
 
 
 def _follows(system: System, points: StageMap) -> Iterator[Statement]:
-    """Where a step starts the unknowns are 0, and there the method follows ẋ = π∇H."""
+    """Yield that the unknowns are 0 at the start of a step, and that the method follows ẋ = π∇H there."""
     at_start = dict.fromkeys(points.unknowns, ZERO)
     start = [(c, e) for c, e in zip(system.coordinates, substitute(points.change, at_start), strict=True)]
     yield decide_zero("the unknowns 0 belong to the state at the start of a step", start, system.positive)
@@ -128,6 +128,6 @@ def _follows(system: System, points: StageMap) -> Iterator[Statement]:
         total(substitute([e], at_start)[0] * slopes[points.unknowns.index(name)] for name, e in row.items())
         for row in columns
     ]
-    wanted = system.vector_field()
-    residuals = [(c, r - f) for c, r, f in zip(system.coordinates, rates, wanted, strict=True)]
+    field = system.vector_field()
+    residuals = [(c, r - f) for c, r, f in zip(system.coordinates, rates, field, strict=True)]
     yield decide_zero("ẋ = π∇H there", residuals, system.positive)

@@ -1,8 +1,8 @@
-"""Coefficients of Gauss collocation, in the form in which rounding leaves them exactly symplectic.
+"""Coefficients of Gauss collocation, in a form that is exactly symplectic after rounding.
 
-A step from z solves Z_i = z + Σ_j μ_ij L_j with L_j = h b_j f(Z_j), and ends at z + Σ_j L_j; μ_ij = a_ij/b_j. If
-μ_ij + μ_ji = 1 the step is symplectic and keeps the quadratic first integrals of f, whatever the b_j are. The exact
-μ_ij satisfy that (b_i a_ij + b_j a_ji = b_i b_j). Here they are rounded to multiples of 2⁻⁵² below the diagonal; then
+A step from z solves Z_i = z + Σ_j μ_ij L_j with L_j = h b_j f(Z_j), and ends at z + Σ_j L_j; μ_ij = a_ij/b_j. If μ_ij
++ μ_ji = 1, the step is symplectic and preserves the quadratic first integrals of f, for any b_j. The exact μ_ij
+satisfy this (b_i a_ij + b_j a_ji = b_i b_j). Here the μ_ij below the diagonal are rounded to multiples of 2⁻⁵²; then
 1 − μ_ij is a floating-point number too, and the identity holds without error.
 """
 
@@ -14,25 +14,26 @@ from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import cache
 
-#: Decimal digits of the nodes, from which all else follows in exact arithmetic.
+#: Decimal digits of the nodes; all coefficients follow from them in exact arithmetic.
 DIGITS = 60
 
-#: Stages: those of order 2 to 16.
+#: Largest number of stages, for the orders 2 to 16.
 MOST_STAGES = 8
 
-#: Spacing of the floating-point numbers from 1 to 2: multiples of it, and one minus them, are exact below 2.
+#: Spacing of the floating-point numbers from 1 to 2; its multiples below 2, and 1 minus them, are exact.
 GRID = Fraction(1, 2**52)
 
-#: The predictor of the next step's stages is the best one for motions whose frequencies, times h, do not exceed BAND
-#: times the number of stages, known up to relative errors of NOISE. More stages are for longer steps.
+#: The predictor of the stages of the next step is optimal for motions whose frequencies, times h, do not exceed BAND
+#: times the number of stages, known up to relative errors of NOISE. More stages are used with longer steps.
 BAND, NOISE = Fraction(1, 4), Fraction(1, 10**12)
 
 
 @dataclass(frozen=True)
 class Tableau:
-    """The ``nodes`` c_i and ``weights`` b_i, rounded last; ``mixing`` is the matrix μ, with μ_ij + μ_ji = 1 exactly.
+    """Coefficients of a method: ``nodes`` c_i, ``weights`` b_i, and the matrix ``mixing`` μ.
 
-    ``prediction`` gives the offsets Z_i − z of the next step as Σ_j prediction[i][j]·L_j of the last one.
+    μ_ij + μ_ji = 1 holds exactly. Nodes and weights are rounded to floating-point numbers. ``prediction`` gives the
+    offsets Z_i − z of the next step as Σ_j prediction[i][j]·L_j of the last one.
     """
 
     nodes: tuple[float, ...]
@@ -42,19 +43,19 @@ class Tableau:
 
     @property
     def stages(self) -> int:
-        """Number of stages; the order is twice that."""
+        """The number of stages; the order is twice this."""
         return len(self.nodes)
 
     @property
     def defects(self) -> list[Fraction]:
-        """μ_ij + μ_ji − 1 for i ≤ j, in exact arithmetic: all are zero."""
+        """The values μ_ij + μ_ji − 1 for i ≤ j, in exact arithmetic: all are zero."""
         mu = [[Fraction(v) for v in row] for row in self.mixing]
         return [mu[i][j] + mu[j][i] - 1 for i in range(self.stages) for j in range(i + 1)]
 
 
 @cache
 def tableau(stages: int) -> Tableau:
-    """The coefficients of the method with so many stages."""
+    """Return the coefficients of the method with this number of stages."""
     nodes = gauss_nodes(stages)
     basis = _lagrange(nodes)
     weights = [_integral(p, Fraction(1)) for p in basis]
@@ -69,14 +70,14 @@ def tableau(stages: int) -> Tableau:
 
 @cache
 def gauss_nodes(stages: int) -> tuple[Fraction, ...]:
-    """The zeros of the Legendre polynomial of that degree on [0, 1], ascending, right to more than 50 digits."""
+    """Return the zeros of the Legendre polynomial of this degree on [0, 1], ascending, to more than 50 digits."""
     with localcontext() as context:
         context.prec = DIGITS
         return tuple(sorted((1 - Fraction(_legendre_zero(stages, k))) / 2 for k in range(stages)))
 
 
 def _legendre_zero(n: int, k: int) -> Decimal:
-    """A zero on [−1, 1] by Newton's method, deflated by nothing: the starts are near enough (Tricomi)."""
+    """Return a zero on [−1, 1] by Newton's method; no deflation is needed, by the starting values of Tricomi."""
     import math
 
     x = Decimal((1 - (n - 1) / (8 * n**3)) * math.cos(math.pi * (4 * k + 3) / (4 * n + 2)))
@@ -90,14 +91,14 @@ def _legendre_zero(n: int, k: int) -> Decimal:
 
 
 def _lagrange(nodes: Sequence[Fraction]) -> list[list[Fraction]]:
-    """The coefficients, from the lowest, of the polynomials that are 1 at one node and 0 at the others."""
-    found = []
+    """Return the coefficients, from the lowest, of the polynomials that are 1 at one node and 0 at the others."""
+    polynomials = []
     for i, c in enumerate(nodes):
         p = [Fraction(1)]
         for d in (d for j, d in enumerate(nodes) if j != i):
             p = [(a - d * b) / (c - d) for a, b in zip([Fraction(0), *p], [*p, Fraction(0)], strict=True)]
-        found.append(p)
-    return found
+        polynomials.append(p)
+    return polynomials
 
 
 def _integral(p: Sequence[Fraction], end: Fraction) -> Fraction:
@@ -105,7 +106,7 @@ def _integral(p: Sequence[Fraction], end: Fraction) -> Fraction:
 
 
 def _rounded(exact: Sequence[Sequence[Fraction]]) -> list[list[float]]:
-    """The matrix μ as floating-point numbers with μ_ij + μ_ji = 1."""
+    """Return the matrix μ as floating-point numbers with μ_ij + μ_ji = 1."""
     n = len(exact)
     mu = [[Fraction(1, 2)] * n for _ in range(n)]
     for i in range(n):
@@ -118,7 +119,7 @@ def _rounded(exact: Sequence[Sequence[Fraction]]) -> list[list[float]]:
 def _prediction(
     nodes: Sequence[Fraction], weights: Sequence[Fraction], mixing: Sequence[Sequence[Fraction]]
 ) -> list[list[float]]:
-    """μ diag(b) W diag(1/b), where W extrapolates f from the stages of one step to those of the next."""
+    """Return μ diag(b) W diag(1/b), where W extrapolates f from the stages of one step to those of the next."""
     n = len(nodes)
     extrapolation = _extrapolation([c - 1 for c in nodes], nodes, BAND * n)
     return [
@@ -127,17 +128,20 @@ def _prediction(
     ]
 
 
-def _extrapolation(known: Sequence[Fraction], wanted: Sequence[Fraction], band: Fraction) -> list[list[Fraction]]:
-    """For each wanted time the weights of values at the known ones: the best linear prediction of a signal whose
-    spectrum is flat up to a band limit, and zero beyond, from values with errors of the size NOISE."""
+def _extrapolation(known: Sequence[Fraction], times: Sequence[Fraction], band: Fraction) -> list[list[Fraction]]:
+    """Return for each time in ``times`` the weights of values at the times ``known``.
+
+    They give the best linear prediction of a signal whose spectrum is flat up to a band limit, and zero beyond, from
+    values with errors of the size NOISE.
+    """
     rows = [[_sinc(band * (a - b)) + (NOISE**2 if a == b else 0) for b in known] for a in known]
-    sides = [[_sinc(band * (a - b)) for b in wanted] for a in known]
+    sides = [[_sinc(band * (a - b)) for b in times] for a in known]
     solved = _solved(rows, sides)
-    return [[solved[j][i] for j in range(len(known))] for i in range(len(wanted))]
+    return [[solved[j][i] for j in range(len(known))] for i in range(len(times))]
 
 
 def _sinc(x: Fraction) -> Fraction:
-    """sin(x)/x to more digits than are used."""
+    """Return sin(x)/x to more digits than are used."""
     term = value = Fraction(1)
     square = Fraction(round(x * x * 10**DIGITS), 10**DIGITS)
     for k in range(1, 40):
@@ -147,7 +151,7 @@ def _sinc(x: Fraction) -> Fraction:
 
 
 def _solved(rows: Sequence[Sequence[Fraction]], sides: Sequence[Sequence[Fraction]]) -> list[list[Fraction]]:
-    """The solutions of linear equations for several right-hand sides, by elimination."""
+    """Return the solutions of linear equations for several right-hand sides, by elimination."""
     n = len(rows)
     table = [[*row, *side] for row, side in zip(rows, sides, strict=True)]
     for k in range(n):

@@ -5,10 +5,9 @@ method of generalised order (8, 6, 4) has none below εh^8, ε²h^6 and ε³h^4,
 a_i, and B transported along A to c_i, whose Taylor coefficients are free in a Lie algebra, the conditions are as
 follows.
 
-Of order ε: Σ b_i c_i^k = 1/(k + 1), those of a quadrature.
-
-Of order ε²: Σ_{i<j} b_i b_j (c_i^k c_j^l − c_i^l c_j^k) = (1/(k + 1) − 1/(l + 1))/(k + l + 2) for k < l, at
-h^{k+l+2}.
+- of order ε: Σ b_i c_i^k = 1/(k + 1), those of a quadrature;
+- of order ε²: Σ_{i<j} b_i b_j (c_i^k c_j^l − c_i^l c_j^k) = (1/(k + 1) − 1/(l + 1))/(k + l + 2) for k < l, at
+  h^{k+l+2}.
 
 J. Laskar, P. Robutel, High order symplectic integrators for perturbed Hamiltonian systems, Celestial Mechanics and
 Dynamical Astronomy 80 (2001): Gauss's quadrature, (2s, 2). R. I. McLachlan, Composition methods in the presence of

@@ -1,12 +1,8 @@
 """Flows of a single coordinate: ż = r(z) with frozen coefficients, where r is not linear.
 
-The cases are:
-
-r = az² + bz + c: z + r T/(1 − (az + b/2)T), T = tanh(wt)/w with w² = b²/4 − ac, written with cosroot and sinroot;
-
-r' = kr: z − log(1 − krt)/k;
-
-zr' = nr: z(1 + (1 − n) t r/z)^{1/(1 − n)}.
+- r = az² + bz + c: z + r T/(1 − (az + b/2)T), T = tanh(wt)/w with w² = b²/4 − ac, written with cosroot and sinroot
+- r' = kr: z − log(1 − krt)/k
+- zr' = nr: z(1 + (1 − n) t r/z)^{1/(1 − n)}
 
 Each flow ends where the solution becomes infinite; beyond, the increment is not a number, and the step fails.
 """
