@@ -26,6 +26,7 @@ CLEAN = (
     "realisations",
     "report",
     "runtime",
+    "scheme",
     "series",
     "spec",
     "splitting",

@@ -11,7 +11,7 @@ from dataclasses import replace
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import expand_powers, with_numbers_shared
 from phigen.scheme.program import Program
-from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, turned_back
+from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, over_negative_time
 from phigen.scheme.steps import Splitting
 from phigen.symbolic.expression import ZERO, symbol, symbols_of
 
@@ -32,7 +32,7 @@ def recomputing_transposes(program: Program, step: Splitting) -> tuple[Kernel, .
 
 def _recomputing(flow: Kernel, transpose: Kernel, parities: Mapping[str, int]) -> Kernel:
     state, changes = flow.inputs["state"], flow.outputs[0].values
-    inverse_changes = dict(zip(state, turned_back(changes, parities), strict=True))
+    inverse_changes = dict(zip(state, over_negative_time(changes, parities), strict=True))
     nonzero = {s: change for s, change in inverse_changes.items() if not change.is_zero}
     expressions = before(transpose.roots, nonzero) + [symbol(s) + nonzero[s] if s in nonzero else ZERO for s in state]
     values = iter(with_numbers_shared(expand_powers(expressions)))

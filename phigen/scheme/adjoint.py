@@ -95,12 +95,14 @@ def explicit_adjoint(explicit: Kernel, coefficients: Coefficients, name: str = "
 def gauss_adjoint(
     field: Kernel, change: Kernel, coordinates: Sequence[str], coefficients: Coefficients
 ) -> list[Kernel]:
-    """The transposes of the kernels of a Gauss step.
+    """Return the transposes of the kernels of a Gauss step.
 
-    With Z_i = Σ_j μ_ij L_j, L_j = w_j f(x, Z_j) and x' = x + D(x, Σ_j L_j), the cotangent λ of x' gives ε = (∂D/∂z)ᵀ λ,
-    and those of the unknowns, ζ_i = w_i (∂f/∂z)ᵀ κ_i, with those of the moves, κ_i = ε + Σ_j μ_ji ζ_j: equations that
-    sweeps solve as well as those of the stages. The first kernel is that of a sweep, and the second gives what a stage
-    adds to the cotangents of the start of the step and of the coefficients. The third is the transpose of D.
+    The stages are Z_i = Σ_j μ_ij L_j with L_j = w_j f(x, Z_j), and x' = x + D(x, Σ_j L_j). From the cotangent λ of x'
+    follows ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of the unknowns and κ_i of the moves L_i satisfy ζ_i = w_i (∂f/∂z)ᵀ κ_i
+    and κ_i = ε + Σ_j μ_ji ζ_j, which sweeps solve as they do the stages.
+
+    The first kernel belongs to a sweep. The second returns the contribution of a stage to the cotangents of the start
+    of the step and of the coefficients. The third is the transpose of D.
     """
     seeds = {"move_bar": field.outputs[0].values}
     start = {"x": tuple(coordinates), TABLE: coefficients.table}

@@ -1,7 +1,7 @@
-"""Numerical policies of the runtimes: when a solve has ended, how far a predictor may go, how a gauge is searched for.
+"""Numerical policies of the runtimes: convergence of a solve, range of a predictor, search for a gauge.
 
-Each number is written here, once, with its reason, and printed as a named constant into C, JavaScript and NumPy
-(`phigen.targets.policies`). What only one runtime has, such as blocks of steps in C, stays a constant of that runtime.
+Each number is defined here, once, with its reason, and printed as a named constant into C, JavaScript and NumPy
+(`phigen.targets.policies`). Constants of a single runtime, such as blocks of steps in C, are in that runtime.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields
 
 
 @dataclass(frozen=True)
-class Constant:
+class PolicyConstant:
     """A named number of a policy; ``about`` is the comment in generated code: its meaning, unit or reason."""
 
     name: str
@@ -21,41 +21,41 @@ class Constant:
 
 @dataclass(frozen=True)
 class Policy:
-    """Numbers that belong together: the fields of a subclass, each made by `number`."""
+    """Numbers that belong together: the fields of a subclass, each defined by `number` or `count`."""
 
-    def constants(self) -> Iterator[Constant]:
-        """The numbers, named as in generated code."""
+    def constants(self) -> Iterator[PolicyConstant]:
+        """Yield the numbers, with their names in generated code."""
         for each in fields(self):
-            yield Constant(each.name.upper(), getattr(self, each.name), each.metadata["about"])
+            yield PolicyConstant(each.name.upper(), getattr(self, each.name), each.metadata["about"])
 
 
 def number(value: float, about: str) -> float:
-    """The default of a field of a policy that is a real number."""
+    """Return the default of a field of a policy that is a real number."""
     return field(default=float(value), metadata={"about": about})
 
 
 def count(value: int, about: str) -> int:
-    """The default of a field of a policy that is a whole number."""
+    """Return the default of a field of a policy that is a whole number."""
     return field(default=value, metadata={"about": about})
 
 
 @dataclass(frozen=True)
 class StartPolicy(Policy):
-    """The first evaluation of coefficients, where parameters are looked at before a step size is known."""
+    """The first evaluation of coefficients, which checks parameters before a step size is known."""
 
     probe_step: float = number(1e-100, "so short that coefficients are finite")
 
 
 @dataclass(frozen=True)
 class MeasurePolicy(Policy):
-    """The size of a correction of y; 0 where coordinates keep their sign, and may be of very different size."""
+    """The scale of a correction of y; 0 where coordinates keep their sign, and may be of very different size."""
 
     floor: float = number(1e-6, "components of y are measured no finer than by this part of the largest")
 
 
 @dataclass(frozen=True)
 class NewtonPolicy(Policy):
-    """Newton's method for the point of an implicit step; the tolerance is that of its `InnerSolve`."""
+    """Newton's method for the point of an implicit step; its tolerance is in `InnerSolve`."""
 
     nearly_solved: float = number(1e-8, "corrections below this have reached the level of rounding, ...")
     shrinking: float = number(0.25, "... if one is more than this part of the one before")
@@ -65,8 +65,8 @@ class NewtonPolicy(Policy):
 class PathPolicy(Policy):
     """The solve of a step along paths dm/dt = π(m)p, and the Taylor series of a path.
 
-    ``longest_path`` and ``most_pieces`` were measured on the corpus: steps that take more pieces are wrong by as much
-    as the state, as a rule.
+    ``longest_path`` and ``most_pieces`` were measured on the corpus: steps that take more pieces usually have an
+    error as large as the state.
     """
 
     longest_path: int = count(128, "pieces of a path, a power of 2")
@@ -103,7 +103,7 @@ class PredictorPolicy(Policy):
 
 @dataclass(frozen=True)
 class PlausibilityPolicy(Policy):
-    """Which solutions of an implicit step have nothing to do with the motion: far ones at another energy."""
+    """Criteria for solutions of an implicit step far from the motion: distant ones at another energy."""
 
     plausible: float = number(1.5, "how far any step may lead, in sizes of the state and of its motion")
     lost: float = number(0.5, "part of the energy that one which leads farther must not lose")
@@ -135,7 +135,7 @@ class TangentPolicy(Policy):
 
 @dataclass(frozen=True)
 class GaussTangentPolicy(Policy):
-    """Sweeps of the linear equations that derivatives of Gauss stages satisfy."""
+    """Sweeps for the linear equations of the derivatives of Gauss stages."""
 
     tangent_solved: float = number(1e-17, "a relative change of this size is rounding;")
     tangent_nearly_solved: float = number(1e-13, "one below this is so too if it is ...")
@@ -176,7 +176,7 @@ class LatticeSweepPolicy(Policy):
 
 @dataclass(frozen=True)
 class LatticeNewtonPolicy(Policy):
-    """Newton's method for a stage that sweeps do not solve, its linear equations in Krylov spaces."""
+    """Newton's method for a stage where sweeps do not converge, with linear equations in Krylov spaces."""
 
     directions: int = count(24, "of the Krylov space that a correction is taken from")
     solved: float = number(1e-6, "how well a correction solves the equation for it, if the space allows, ...")

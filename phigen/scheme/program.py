@@ -1,7 +1,7 @@
-"""The program representation: what the scheme hands to the targets.
+"""The program representation, which the scheme passes to the targets.
 
-A `Program` is a step (`phigen.scheme.steps`), whose kernels are straight-line functions, with what describes it and
-what is computed beside it.
+A `Program` has a step (`phigen.scheme.steps`), whose kernels are straight-line functions, its description, and
+further kernels such as observables.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class About:
-    """What a generated file says of itself: ``facts`` are the lines of the header, ``operations`` those of the step."""
+    """The contents of the header of a generated file: ``facts`` are its lines, ``operations`` those of the step."""
 
     title: str = ""
     license: str = "0BSD"
@@ -41,10 +41,10 @@ class About:
 
 @dataclass(frozen=True)
 class Observables:
-    """The Hamiltonian, the Casimirs, the vector field, and the observables that the spec names, if it names any.
+    """The Hamiltonian, the Casimirs, the vector field, and the observables of the spec, if there are any.
 
-    Of lattices ``named`` has the densities of observables, which ``reductions`` make numbers of; ``at_sites`` has those
-    that are fields, whose names are ``fields``.
+    For lattices ``named`` has the densities of observables that ``reductions`` turn into numbers; ``at_sites`` has
+    the observables that are fields, whose names are ``fields``.
     """
 
     energy: Kernel
@@ -57,13 +57,13 @@ class Observables:
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All of them."""
+        """All kernels."""
         return (self.energy, self.casimirs, self.vector_field, *(k for k in (self.named, self.at_sites) if k))
 
 
 @dataclass(frozen=True)
 class FreeGauge:
-    """The Casimirs whose multiple the solver chooses for each trajectory, and what it chooses by."""
+    """The Casimirs whose multiples the solver chooses for each trajectory, and the kernels for the choice."""
 
     casimirs: tuple[str, ...]
     guide: Kernel
@@ -72,10 +72,10 @@ class FreeGauge:
 
 @dataclass(frozen=True)
 class Monitor:
-    """Steps of equal size in τ: ``rate`` is dt/dτ at a state, ``elapsed`` the time that a step takes (at its point y).
+    """Steps of equal size in τ: ``rate`` is dt/dτ at a state, ``elapsed`` the time of a step (at its point y).
 
-    In a splitting the flows themselves say what time they take, and ``elapsed`` is None. ``level`` is the gradient of
-    H, on which e depends, if the transpose of steps was asked for.
+    In a splitting the flows themselves return their time, and ``elapsed`` is None. ``level`` is the gradient of H, on
+    which e depends, if the transpose of steps was requested.
     """
 
     rate: Kernel
@@ -83,16 +83,16 @@ class Monitor:
     level: Kernel | None = None
 
 
-#: Normal variates are cut off where they are larger, so that no rare one makes a step impossible: one pair in 7e7 is,
-#: which takes 1.5e-8 from the variance.
-BOUND = 6.0
+#: Normal variates are truncated at this value, so that no rare one makes a step impossible. One pair in 7e7 is larger;
+#: the truncation reduces the variance by 1.5e-8.
+MAX_NORMAL_VARIATE = 6.0
 
 
 @dataclass(frozen=True)
 class Noise:
     """Sources of noise by their names; each has ``parts`` increments in a step, independent and equal in law.
 
-    ``fields`` are σπ∇g of each source, one after the other; of lattices, where each site has sources of its own, None.
+    ``fields`` are σπ∇g of each source, one after the other; None for lattices, where each site has its own sources.
     """
 
     sources: tuple[str, ...]
@@ -101,13 +101,13 @@ class Noise:
 
     @property
     def draws(self) -> int:
-        """The increments of a step."""
+        """The number of increments of a step."""
         return self.parts * len(self.sources)
 
 
 @dataclass(frozen=True)
 class Modified:
-    """The modified Hamiltonian as a kernel, and the first power of h that it leaves out."""
+    """The modified Hamiltonian as a kernel, and the first power of h that it omits."""
 
     kernel: Kernel
     power: int
@@ -117,11 +117,11 @@ class Modified:
 class Attitude:
     """The group element that each stage, or each flow, is the action of.
 
-    ``turn`` is that of an implicit stage as a function of the solved y, ``along`` as one of p. Elements are less 1; in
-    place of exp(P) for a matrix P they give the covector p of which it is made, and a bound for the square of its size:
-    ``exponential`` is exp(P) − 1 for a size of 1/2 at most. ``turns`` are the flows of a splitting, each with the
-    product of the elements of the flows before it in a step and its own. ``rate`` is the gradient of the Casimirs that
-    were taken from H: the body turns by them too, without moving x.
+    ``turn`` is the element of an implicit stage as a function of the solved y, ``along`` as a function of p. Elements
+    are less 1. Instead of exp(P) for a matrix P they return the covector p of P and a bound for the square of its
+    size; ``exponential`` is exp(P) − 1 for a size of at most 1/2. ``turns`` are the flows of a splitting, each with
+    the product of the elements up to it in a step. ``rate`` is the gradient of the Casimirs that were subtracted from
+    H: they rotate the body too, without moving x.
     """
 
     group: Group
@@ -140,12 +140,12 @@ class Attitude:
 
     @property
     def quaternion(self) -> bool:
-        """Whether an element is a quaternion, with nothing beside it."""
+        """Whether an element is a quaternion alone."""
         return not (self.group.matrices or self.group.translation)
 
     @property
     def lengthened(self) -> bool:
-        """Whether the quaternion of a step is still to be divided by its length, as those of flows are not."""
+        """Whether the quaternion of a step must still be normalised, as must products of the elements of flows."""
         return bool(self.turns) and self.quaternion
 
     @property
@@ -159,11 +159,12 @@ class Program:
     """A solver, ready to be printed.
 
     A step of size h is the composition of one ``step`` of each of the ``fractions`` of h. ``time`` is the name of t,
-    where H depends on it, ``pushed`` the Casimirs that forces change. ``extras`` are what was asked for beside it,
-    ``observed`` are the names of the observables of the spec.
-    ``lanes`` asks for C that does several steps or members at once, ``profile`` (``fast``, ``small``) says how much
-    it does for speed. ``compensated`` asks for compensated sums over the steps of a lattice that splits.
-    ``truncated`` says that a step is a Poisson map up to its truncation error only.
+    if H depends on it; ``pushed`` are the Casimirs that forces change. ``extras`` are the requested parts beyond the
+    step; ``observed`` has the names of the observables of the spec.
+
+    ``lanes`` requests C that makes several steps or members at once; ``profile`` (``fast``, ``small``) says whether
+    the C is optimised for speed or for size. ``compensated`` requests compensated sums over the steps of a lattice
+    that splits. ``truncated`` says that a step is a Poisson map only up to its truncation error.
     """
 
     name: str
@@ -201,7 +202,7 @@ class Program:
         return len(self.coordinates)
 
     def offers(self, part: str) -> bool:
-        """Whether the code has a part of `phigen.spec.names.PARTS`, where it applies."""
+        """Whether the code has a part of `phigen.spec.names.PARTS`, where the part applies."""
         return self.extras.offers(part, self.profile)
 
     @property
@@ -211,24 +212,24 @@ class Program:
 
     @property
     def searches_gauge(self) -> bool:
-        """Whether the gauge of a trajectory is searched for, and not given by a formula."""
+        """Whether the solver searches for the gauge of a trajectory, instead of computing it by a formula."""
         return self.gauge is not None and self.offers("gauge-search")
 
     @property
     def choice(self) -> tuple[Kernel, ...]:
-        """The kernels by which the gauge of a trajectory is chosen."""
+        """The kernels for the choice of the gauge of a trajectory."""
         guide = (self.gauge.guide,) if self.gauge and self.searches_gauge else ()
         return (*guide, *((self.gauge.products,) if self.gauge else ()))
 
     @property
     def midpoints(self) -> tuple[float, ...]:
-        """Where the middle of each stage lies, as a fraction of the step."""
+        """The middles of the stages, as fractions of the step."""
         ends = [Fraction(0), *accumulate(Fraction(f) for f in self.fractions)]
         return tuple(float((a + b) / 2) for a, b in pairwise(ends))
 
     @property
     def held(self) -> tuple[str, ...]:
-        """What each trajectory holds fixed at a value of its own: Casimirs, for their multiples, or e."""
+        """The quantities with a fixed value for each trajectory: Casimirs, for their multiples, or e."""
         return (LEVEL.kind,) if self.monitor else self.gauge.casimirs if self.gauge else ()
 
     @property

@@ -1,6 +1,6 @@
-"""Flows over the time −h, written term by term: what is odd in h changes its sign, and what is even stays.
+"""Flows over the time −h, written term by term: terms odd in h change their sign, and even terms stay.
 
-So a flow is undone with the sines, exponentials and forces that its transpose reads: they are computed once.
+The inverse of a flow so shares the sines, exponentials and forces that the transpose of the flow reads.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol, coefficient
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: The output of a transpose that is the moved values before the flow, and the input of those that it reads for that.
+#: The output of a transpose with the state before the flow, and its input with the values that it needs for that.
 UNDONE = "undone"
 
 ODD, NEITHER, EVEN = -1, 0, 1
@@ -32,89 +32,93 @@ Form = Mapping[str, int]
 
 
 def of_coefficients(step: Splitting | Sweeps) -> dict[str, int]:
-    """How the coefficients of a flow follow the sign of its time."""
-    found = [parity for parity, _ in _parities(step.prepare.roots, dict.fromkeys(step.prepare.inputs["h"], ODD))]
+    """Return the parities of the coefficients of a flow in its time."""
+    parities = [parity for parity, _ in _parities(step.prepare.roots, dict.fromkeys(step.prepare.inputs["h"], ODD))]
     if step.refresh:
-        slots: dict[str, int] = {coefficient(k): parity for k, parity in enumerate(found)}
-        found += [parity for parity, _ in _parities(step.refresh.roots, slots)]
-    return {coefficient(k): parity for k, parity in enumerate(found)}
+        slots: dict[str, int] = {coefficient(k): parity for k, parity in enumerate(parities)}
+        parities += [parity for parity, _ in _parities(step.refresh.roots, slots)]
+    return {coefficient(k): parity for k, parity in enumerate(parities)}
 
 
-def turned_back(values: Sequence[Expression], parities: Mapping[str, int]) -> list[Expression]:
-    """The values over the time −h."""
+def over_negative_time(values: Sequence[Expression], parities: Mapping[str, int]) -> list[Expression]:
+    """Return the values over the time −h."""
     return [turned for _, turned in _parities(values, parities)]
 
 
 def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> list[Expression]:
-    """Values of the state before a flow, which is that after it with ``changes``.
+    """Return values at the state before a flow, in symbols of the state after it; the inverse flow adds ``changes``.
 
-    What is the same before and after is not computed once more: sums, as that of two spins which turn about it, and
-    arguments of functions, as |ψ|² that moves only phases, where that is proved.
+    Invariant sub-expressions are not computed twice. Sums are such, as that of two spins that rotate about it, and
+    arguments of functions, as |ψ|² if the flow changes phases only; the invariance is proved.
     """
-    moved = {s: symbol(s) + change for s, change in changes.items()}
+    previous = {s: symbol(s) + change for s, change in changes.items()}
 
     def visit(node: Expression, args: list[tuple[Expression, Form | None]]) -> tuple[Expression, Form | None]:
         form = _form(node, [of for _, of in args])
         if form and _stays(form, changes):
             return node, form
-        return moved.get(node.value, node) if node.op == "symbol" else rebuild(node, [e for e, _ in args]), form
+        return previous.get(node.value, node) if node.op == "symbol" else rebuild(node, [e for e, _ in args]), form
 
-    called = dict.fromkeys(e.args[0] for e in topological(values) if e.op in FUNCTIONS and len(e.args) == 1)
-    read = [e for e in called if not moved.keys().isdisjoint(symbols_of(e)) and not _called_in(e)]
-    kept = {
-        e: symbol(Symbol("kept", k))
-        for k, (e, (other, _)) in enumerate(zip(read, fold(read, visit), strict=True))
-        if len(_called_in(other)) < 2 and decide_zero("", [("", other - e)]).verdict == PROVED  # of more it takes long
+    arguments = dict.fromkeys(e.args[0] for e in topological(values) if e.op in FUNCTIONS and len(e.args) == 1)
+    candidates = [e for e in arguments if not previous.keys().isdisjoint(symbols_of(e)) and not _called_in(e)]
+    # with several functions the proof is slow
+    invariants = {
+        e: symbol(Symbol("invariant", k))
+        for k, (e, (other, _)) in enumerate(zip(candidates, fold(candidates, visit), strict=True))
+        if len(_called_in(other)) < 2 and decide_zero("", [("", other - e)]).verdict == PROVED
     }
-    held = {value.value: e for e, value in kept.items()}
-    without = fold(values, lambda e, args: kept.get(e) or rebuild(e, args))
-    return substitute([found for found, _ in fold(without, visit)], held)
+    values_of = {value.value: e for e, value in invariants.items()}
+    with_symbols = fold(values, lambda e, args: invariants.get(e) or rebuild(e, args))
+    return substitute([value for value, _ in fold(with_symbols, visit)], values_of)
 
 
 def _called_in(value: Expression) -> set[Expression]:
-    """The arguments of all functions in a value."""
+    """Return the arguments of all functions in a value."""
     return {e.args[0] for e in topological([value]) if e.op in FUNCTIONS}
 
 
 def _form(node: Expression, args: Sequence[Form | None]) -> Form | None:
-    """A node as a sum of symbols, if that is what it is."""
+    """Return a node as a sum of symbols, or None if it is none."""
     if node.op == "symbol":
         return {node.value: 1}
     if node.op not in ("add", "sub", "neg") or None in args:
         return None
-    found: dict[str, int] = {}
+    factors: dict[str, int] = {}
     for form, sign in zip(args, {"add": (1, 1), "sub": (1, -1), "neg": (-1,)}[node.op], strict=True):
         for name, factor in (form or {}).items():
-            found[name] = found.get(name, 0) + sign * factor
-    return found
+            factors[name] = factors.get(name, 0) + sign * factor
+    return factors
 
 
-def _stays(form: Form, moved: Mapping[str, Expression]) -> bool:
-    """Whether what the flow changes in a sum cancels, term by term."""
-    left: dict[Expression, int] = {}
+def _stays(form: Form, changes: Mapping[str, Expression]) -> bool:
+    """Whether the increments of the symbols in a sum cancel, term by term."""
+    remaining: dict[Expression, int] = {}
     for name, factor in form.items():
-        if name in moved:
-            change, sign = moved[name], factor
+        if name in changes:
+            change, sign = changes[name], factor
             while change.op == "neg":
                 change, sign = change.args[0], -sign
-            left[change] = left.get(change, 0) + sign
-    return not any(left.values())
+            remaining[change] = remaining.get(change, 0) + sign
+    return not any(remaining.values())
 
 
 def _parities(values: Sequence[Expression], of_symbols: Mapping[str, int]) -> list[tuple[int, Expression]]:
-    """Whether values are odd or even in the time, and what they are over −h; symbols that are not listed are even."""
+    """Return for each value whether it is odd or even in the time, and its value over −h.
+
+    Symbols that are not listed are even.
+    """
 
     def visit(node: Expression, args: list[tuple[int, Expression]]) -> tuple[int, Expression]:
         parity = of_symbols.get(node.value, EVEN) if node.op == "symbol" else _parity(node, [p for p, _ in args])
         if parity == NEITHER:
-            return parity, rebuild(node, [turned for _, turned in args])
+            return parity, rebuild(node, [reversed_ for _, reversed_ in args])
         return parity, node if parity == EVEN else neg(node)
 
     return fold(values, visit)
 
 
 def _parity(node: Expression, of_args: Sequence[int]) -> int:
-    """That of a number, a sum, a product, a power or a value of a function."""
+    """Return the parity of a number, a sum, a product, a power or a value of a function."""
     if all(parity == EVEN for parity in of_args):
         return EVEN
     first = of_args[0]

@@ -44,15 +44,15 @@ def build_splitting(
     group: Group | None = None,
     monitor: Logarithmic | None = None,
 ) -> Program:
-    """The explicit solver as a program. LimitError if a kernel is too large."""
+    """Return the explicit solver as a program. Raises `LimitError` if a kernel is too large."""
     extras = spec.extras
     _expect_no_modified(system, extras)
     sources = driven(system)
     if sources:
         expect_no_adjoint(system, extras.adjoint)
     flows = [*sources, *choice.splitting.flows]
-    held = (LEVEL,) if monitor else ()
-    coefficients = Coefficients([*system.parameter_names, *held, TIME, KICK], [*system.times, *system.increments[:1]])
+    fixed = (LEVEL,) if monitor else ()
+    coefficients = Coefficients([*system.parameter_names, *fixed, TIME, KICK], [*system.times, *system.increments[:1]])
     _expect_steady(system, flows, monitor)
     coefficients.include(e for flow in flows for e in flow.exponentials)
     kernels = tuple(_flow_kernel(system, flow, k, coefficients, monitor) for k, flow in enumerate(flows, 1))
@@ -61,20 +61,20 @@ def build_splitting(
     if group:
         from phigen.scheme.attitude import flow_attitude
 
-        moved = [monitor.outputs(flow) if monitor else flow.increment for flow in flows]
+        increments = [monitor.outputs(flow) if monitor else flow.increment for flow in flows]
         time_of = monitor.time if monitor else None
-        attitude = flow_attitude(system, group, choice.splitting.flows, moved, gauge, coefficients, time_of)
+        attitude = flow_attitude(system, group, choice.splitting.flows, increments, gauge, coefficients, time_of)
     schedule = with_noise(choice.schedule(), len(sources)) if sources else choice.schedule()
-    step = _step(system, kernels, schedule, coefficients, held, choice.method.name, tangents, adjoint=extras.adjoint)
+    step = _step(system, kernels, schedule, coefficients, fixed, choice.method.name, tangents, adjoint=extras.adjoint)
     for kernel in step.kernels:
         expect_few(system, kernel, other="")
     level = level_adjoint(system) if monitor and extras.adjoint else None
-    said = [*([monitor.fact] if monitor else []), *gauge.facts, *facts(choice, step, len(sources))]
-    said += [*force_facts(system, ""), *noise_facts(system, weak=2), _clock(choice), choice.order.note]
+    lines = [*([monitor.fact] if monitor else []), *gauge.facts, *facts(choice, step, len(sources))]
+    lines += [*force_facts(system, ""), *noise_facts(system, weak=2), _clock(choice), choice.order.note]
     return Program(
         name=system.name,
         about=About(
-            spec.title, spec.license, spec.source_sha256, tuple(fact for fact in said if fact), _operations(step)
+            spec.title, spec.license, spec.source_sha256, tuple(fact for fact in lines if fact), _operations(step)
         ),
         coordinates=system.coordinates,
         time=system.time,
@@ -115,16 +115,16 @@ def _step(
     flows: tuple[Kernel, ...],
     schedule: Schedule,
     coefficients: Coefficients,
-    held: tuple[str, ...],
+    fixed: tuple[str, ...],
     method: str,
     tangents: tuple[Kernel, ...],
     *,
     adjoint: bool,
 ) -> Splitting:
-    """The step, all whose coefficients are known but for those that are computed anew in each flow."""
-    dated = {"t": system.times, "dw": system.increments[:1]}
-    refresh = coefficients.refresh(**{name: symbols for name, symbols in dated.items() if symbols})
-    inputs = {"gauge": held, "h": (TIME,), "kick": (KICK,) if schedule.multiples else ()}
+    """Return the step; the coefficients are all known except those that are computed anew in each flow."""
+    renewed_inputs = {"t": system.times, "dw": system.increments[:1]}
+    refresh = coefficients.refresh(**{name: symbols for name, symbols in renewed_inputs.items() if symbols})
+    inputs = {"gauge": fixed, "h": (TIME,), "kick": (KICK,) if schedule.multiples else ()}
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters and the time of a flow only",
@@ -134,14 +134,14 @@ def _step(
     )
     step = Splitting(prepare, flows, schedule, method, tangents, refresh=refresh)
     if adjoint:
-        own = [trimmed(flow, system.dimension) for flow in flows]
-        back = [explicit_adjoint(flow, coefficients, f"flow{k}_adjoint") for k, flow in enumerate(own, 1)]
-        step = replace(step, adjoint=completed(coefficients, back, prepare, refresh))
+        untimed = [trimmed(flow, system.dimension) for flow in flows]
+        transposes = [explicit_adjoint(flow, coefficients, f"flow{k}_adjoint") for k, flow in enumerate(untimed, 1)]
+        step = replace(step, adjoint=completed(coefficients, transposes, prepare, refresh))
     return coefficients.settled(step)
 
 
 def facts(choice: Choice, step: Splitting, sources: int = 0) -> list[str]:
-    """What the header says of the method; the first parts are ``sources`` of noise."""
+    """Return the lines of the header on the method; the first parts are ``sources`` of noise."""
     count, flows, method = len(step.flows) - sources, len(step.schedule.flows) - 2 * sources, choice.method
     if count == 1 and choice.carrier is None:
         return ["scheme: the exact flow of H, which is elementary", f"step: {step.kind.manner}"]
@@ -156,7 +156,7 @@ def facts(choice: Choice, step: Splitting, sources: int = 0) -> list[str]:
 
 
 def _clock(choice: Choice) -> str:
-    """How the time advances, empty without a time."""
+    """Return the line of the header on the time; empty without a time."""
     if choice.carrier is None:
         return ""
     flows = choice.splitting.flows
@@ -166,7 +166,7 @@ def _clock(choice: Choice) -> str:
 
 
 def _named(system: System, flow: Flow, k: int) -> str:
-    """What a flow is that of; those of the noise come first, and their time is σ ΔW."""
+    """Return the Hamiltonian or force of a flow, in words; flows of the noise come first, and their time is σ ΔW."""
     sources = system.noise
     if k <= len(sources):
         return f"{flow.hamiltonian}, for the noise {sources[k - 1].name}"
@@ -176,7 +176,7 @@ def _named(system: System, flow: Flow, k: int) -> str:
 
 
 def _operations(step: Splitting) -> dict[str, int]:
-    """The operations of a step, without those of compensated summation."""
+    """Return the operations of a step, without those of compensated summation."""
     times = Counter(part for part, _ in step.schedule.flows)
     counted: Counter[str] = Counter()
     for part, kernel in enumerate(step.flows):
@@ -186,7 +186,7 @@ def _operations(step: Splitting) -> dict[str, int]:
 
 
 def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic | None) -> None:
-    """`SpecError` for matrix exponentials whose time depends on the state."""
+    """Raise `SpecError` for matrix exponentials whose time depends on the state."""
     for flow in flows if monitor else ():
         if flow.exponentials:
             message = "monitor: log: the flow of {} takes a matrix exponential, whose time must not depend on the state"

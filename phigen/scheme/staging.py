@@ -1,10 +1,10 @@
-"""Staging: values that do not depend on the state move to ``prepare``, or to ``refresh``.
+"""Staging: state-independent values are computed in ``prepare`` or in ``refresh``.
 
-Symbols are of three stages. *Static* ones, parameters and the step size, are known before the first step; *inputs* of a
-step, such as the time in its middle, are new in every step; all others belong to the state, and change with every
-evaluation. What depends on static symbols only is computed by ``prepare``, once; what depends on inputs too by
-``refresh``, once in every stage of a step. Both fill one table, that of the coefficients ``c:0``, ``c:1``, …, in which
-the static ones come first.
+There are three kinds of symbols. *Static* symbols, parameters and the step size, are known before the first step.
+*Inputs* of a step, such as the time in its middle, are new in every step. All other symbols belong to the state and
+change with every evaluation. ``prepare`` computes, once, the values that depend on static symbols only; ``refresh``
+computes, once in every stage of a step, those that depend on inputs too. Both fill one table, that of the
+coefficients ``c:0``, ``c:1``, …, in which the static values come first.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from phigen.symbolic.symbols import COEFFICIENT, RENEWED, Symbol, coefficient, k
 
 T = TypeVar("T")
 
-#: What the inputs of a step are.
+#: The inputs of a step, with their description.
 INPUTS = {"t": "the time", "dw": "the increments of the noise"}
 
-#: The argument of kernels that is the table of coefficients, and the output of ``refresh``, its last part.
+#: The argument of kernels that holds the table of coefficients, and the output of ``refresh``, the end of the table.
 TABLE, NOW = "coef", "now"
 
 
@@ -31,8 +31,8 @@ class Coefficients:
     """The table of state-independent values; `hoist` fills it and is idempotent on equal values.
 
     ``values`` are those of ``prepare``, ``renewed`` those that depend on ``inputs`` of a step. Between them lie the
-    entries of ``exponentials``, exp(tA) − 1. Of these two nobody knows the place in the table before it is full: until
-    `settled` they are symbols of their own kinds.
+    entries of ``exponentials``, exp(tA) − 1. The places of the latter two are unknown until the table is full: until
+    `settled` they have symbols of different kinds.
     """
 
     def __init__(self, static: Iterable[str], inputs: Iterable[str] = ()) -> None:
@@ -55,34 +55,34 @@ class Coefficients:
 
     @property
     def everything(self) -> list[Expression]:
-        """What the symbols of the table stand for; of entries of an exponential, a sum of all that they depend on."""
+        """The expressions of the table; for entries of an exponential, a sum of all that they depend on."""
         sums = (total(e.exponents) for e in self.exponentials for _ in e.rates)
         return [*self.values, *sums, *self.renewed]
 
     @property
     def prepared(self) -> list[Expression]:
-        """What ``prepare`` stores: the values, and the entries of tA, which `blocks` take the exponentials of."""
+        """The values that ``prepare`` stores: expressions, then the entries of tA whose exponentials `blocks` lists."""
         return [*self.values, *(e for exponential in self.exponentials for e in exponential.exponents)]
 
     @property
     def blocks(self) -> tuple[tuple[int, int], ...]:
-        """Where the matrices tA begin in the table, with their sizes."""
-        found, start = [], len(self.values)
+        """The places of the matrices tA in the table, with their sizes."""
+        places, start = [], len(self.values)
         for exponential in self.exponentials:
-            found.append((start, exponential.size))
+            places.append((start, exponential.size))
             start += exponential.size**2
-        return tuple(found)
+        return tuple(places)
 
     def include(self, exponentials: Iterable[MatrixExponential]) -> None:
-        """Make room for matrix exponentials, each once."""
+        """Add matrix exponentials to the table, each once."""
         self.exponentials += [e for e in dict.fromkeys(exponentials) if e not in self.exponentials]
 
     def empty(self) -> Coefficients:
-        """A table with the same symbols and no values."""
+        """Return a table with the same symbols and no values."""
         return Coefficients(self._static, self._inputs)
 
     def hoist(self, roots: Sequence[Expression]) -> list[Expression]:
-        """The roots with each largest state-independent part replaced by a coefficient ``c:k``.
+        """Return the roots with each largest state-independent part replaced by a coefficient ``c:k``.
 
         Plain numbers stay where they are: a literal is cheaper than a load.
         """
@@ -96,36 +96,38 @@ class Coefficients:
         def visit(e: Expression, args: list[Expression]) -> Expression:
             if fixed[id(e)]:
                 return e
-            ready = [self.slot(self._written_out(a)) if fixed[id(a)] else b for a, b in zip(e.args, args, strict=True)]
-            return rebuild(e, ready)
+            arguments = [
+                self.slot(self._written_out(a)) if fixed[id(a)] else b for a, b in zip(e.args, args, strict=True)
+            ]
+            return rebuild(e, arguments)
 
-        done = fold(roots, visit)
-        return [self.slot(self._written_out(r)) if fixed[id(r)] else d for r, d in zip(roots, done, strict=True)]
+        replaced = fold(roots, visit)
+        return [self.slot(self._written_out(r)) if fixed[id(r)] else d for r, d in zip(roots, replaced, strict=True)]
 
     def is_static(self, e: Expression) -> bool:
         """Whether an expression does not depend on the state."""
         return all(name in self._static or name in self._inputs for name in symbols_of(e))
 
     def written_out(self, roots: Sequence[Expression]) -> list[Expression]:
-        """The roots with all coefficients replaced by what they stand for."""
+        """Return the roots with all coefficients replaced by their expressions."""
         return [self._written_out(e) for e in roots]
 
     def slot(self, e: Expression) -> Expression:
-        """The coefficient that stands for a state-independent expression; a number stands for itself."""
+        """Return the coefficient of a state-independent expression; a number stands for itself."""
         if e.is_number:
             return e
-        found = self._index.get(id(e))
-        if found is None:
-            new = any(map(self._is_new, symbols_of(e)))
-            kept = self.renewed if new else self.values
-            found = self._index[id(e)] = Symbol(RENEWED if new else COEFFICIENT, len(kept))
-            kept.append(e)
-        return symbol(found)
+        name = self._index.get(id(e))
+        if name is None:
+            is_renewed = any(map(self._is_new, symbols_of(e)))
+            entries = self.renewed if is_renewed else self.values
+            name = self._index[id(e)] = Symbol(RENEWED if is_renewed else COEFFICIENT, len(entries))
+            entries.append(e)
+        return symbol(name)
 
     def refresh(self, **inputs: Sequence[str]) -> Kernel | None:
-        """The kernel that computes what depends on the inputs of a step, None if nothing does.
+        """Return the kernel of the values that depend on the inputs of a step, or None if there are none.
 
-        Call it before ``prepare`` is made, for which it may find more values.
+        Must be called before ``prepare`` is built, since it may add values to ``prepare``.
         """
         if not self.renewed:
             return None
@@ -139,19 +141,20 @@ class Coefficients:
             (Output(NOW, values),),
         )
 
-    def settled(self, made: T) -> T:
-        """What was made with a table that is full now: kernels, recurrences, in whatever frozen dataclasses and tuples.
+    def settled(self, built: T) -> T:
+        """Return an object built with this table, which is full now, with the final places of the coefficients.
 
-        Every coefficient has its place: those that are renewed in each step come after those that are not.
+        The object consists of kernels, recurrences and other frozen dataclasses and tuples. Coefficients that are
+        renewed in each step come after all others.
         """
-        late = self.table[len(self.values) :]
-        if not late:
-            return made
-        places = [coefficient(len(self.values) + k) for k in range(len(late))]
-        names: dict[str, Expression] = {name: symbol(place) for name, place in zip(late, places, strict=True)}
-        listed = list(_expressions(made))
+        provisional = self.table[len(self.values) :]
+        if not provisional:
+            return built
+        places = [coefficient(len(self.values) + k) for k in range(len(provisional))]
+        names: dict[str, Expression] = {name: symbol(place) for name, place in zip(provisional, places, strict=True)}
+        listed = list(_expressions(built))
         renamed = {id(e): r for e, r in zip(listed, substitute(listed, names), strict=True)}
-        settled: T = _rebuilt(made, renamed, (*self.slots, *places))
+        settled: T = _rebuilt(built, renamed, (*self.slots, *places))
         return settled
 
     def _is_fixed(self, name: str) -> bool:
@@ -161,33 +164,33 @@ class Coefficients:
         return name in self._inputs or kind_of(name) == RENEWED
 
     def _written_out(self, e: Expression) -> Expression:
-        """The expression with coefficients that occur in it replaced by what they stand for."""
+        """Return the expression with its coefficients replaced by their expressions."""
         used = [n for n in symbols_of(e) if isinstance(n, Symbol) and n.kind in (COEFFICIENT, RENEWED)]
         tables = {COEFFICIENT: self.values, RENEWED: self.renewed}
         return substitute([e], {n: tables[n.kind][int(n.key[0])] for n in used})[0] if used else e
 
 
-def _expressions(made: Any) -> Iterable[Expression]:
-    """All expressions inside tuples and dataclasses."""
-    if isinstance(made, Expression):
-        yield made
-    elif isinstance(made, tuple):
-        for part in made:
+def _expressions(built: Any) -> Iterable[Expression]:
+    """Yield all expressions inside tuples and dataclasses."""
+    if isinstance(built, Expression):
+        yield built
+    elif isinstance(built, tuple):
+        for part in built:
             yield from _expressions(part)
-    elif is_dataclass(made):
-        for f in fields(made):
-            yield from _expressions(getattr(made, f.name))
+    elif is_dataclass(built):
+        for f in fields(built):
+            yield from _expressions(getattr(built, f.name))
 
 
-def _rebuilt(made: Any, renamed: dict[int, Expression], slots: tuple[str, ...]) -> Any:
-    """The same with other expressions; kernels that read the table are told of all of it."""
-    if isinstance(made, Expression):
-        return renamed[id(made)]
-    if isinstance(made, tuple):
-        return tuple(_rebuilt(part, renamed, slots) for part in made)
-    if not is_dataclass(made) or isinstance(made, type):
-        return made
-    parts: dict[str, Any] = {f.name: _rebuilt(getattr(made, f.name), renamed, slots) for f in fields(made)}
-    if isinstance(made, Kernel) and TABLE in made.inputs and made.outputs[0].name != NOW:
-        parts["inputs"] = {**made.inputs, TABLE: slots}
-    return replace(made, **parts)
+def _rebuilt(built: Any, renamed: dict[int, Expression], slots: tuple[str, ...]) -> Any:
+    """Return the object with other expressions; kernels that read the table receive all of its ``slots``."""
+    if isinstance(built, Expression):
+        return renamed[id(built)]
+    if isinstance(built, tuple):
+        return tuple(_rebuilt(part, renamed, slots) for part in built)
+    if not is_dataclass(built) or isinstance(built, type):
+        return built
+    parts: dict[str, Any] = {f.name: _rebuilt(getattr(built, f.name), renamed, slots) for f in fields(built)}
+    if isinstance(built, Kernel) and TABLE in built.inputs and built.outputs[0].name != NOW:
+        parts["inputs"] = {**built.inputs, TABLE: slots}
+    return replace(built, **parts)

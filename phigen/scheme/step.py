@@ -35,7 +35,7 @@ SparseRow = dict[int, Expression]
 
 @dataclass(frozen=True)
 class Linearised:
-    """What one Newton iteration needs at y: a, d (n), J, M (n×n)."""
+    """The values of one Newton iteration at y: a, d (n), J, M (n×n)."""
 
     displacement: list[Expression]
     increment: list[Expression]
@@ -46,7 +46,7 @@ class Linearised:
 def at_momenta(
     expressions: Sequence[Expression], coordinates: Sequence[str], slope: Sequence[Expression]
 ) -> list[Expression]:
-    """The expressions with the covector p put equal to ∇S_h."""
+    """Return the expressions with p = ∇S_h."""
     return substitute(expressions, {momentum(c): g for c, g in zip(coordinates, slope, strict=True)})
 
 
@@ -56,19 +56,19 @@ def linearise(
     coordinates: Sequence[str],
     generating: GeneratingFunction,
 ) -> Linearised:
-    """a, d and their total derivatives along y, with p = ∇S_h(y)."""
+    """Return a, d and their total derivatives along y, with p = ∇S_h(y)."""
     n = len(coordinates)
-    # Momenta that are 0 are left out at once: of a large system, H depends on few coordinates.
+    # Momenta that are 0 are substituted first: H of a large system may depend on few coordinates.
     absent: dict[str, Expression] = {
         momentum(c): ZERO for c, g in zip(coordinates, generating.slope, strict=True) if g.is_zero
     }
-    both = substitute([*displacement, *increment], absent)
-    by_x = _rows(both, coordinates)
-    by_p = _rows(both, [momentum(c) for c in coordinates])
-    flat = [*both, *(e for row in (*by_x, *by_p) for e in row.values())]
-    values = at_momenta(flat, coordinates, generating.slope)
-    rest = iter(values[2 * n :])
-    by_x, by_p = ([{j: next(rest) for j in row} for row in rows] for rows in (by_x, by_p))
+    maps = substitute([*displacement, *increment], absent)
+    by_x = _rows(maps, coordinates)
+    by_p = _rows(maps, [momentum(c) for c in coordinates])
+    expressions = [*maps, *(e for row in (*by_x, *by_p) for e in row.values())]
+    values = at_momenta(expressions, coordinates, generating.slope)
+    slopes = iter(values[2 * n :])
+    by_x, by_p = ([{j: next(slopes) for j in row} for row in rows] for rows in (by_x, by_p))
     hessian = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in generating.hessian]
     jacobians = []
     with progress.stage("Newton matrix", 2 * n) as running:
@@ -80,13 +80,13 @@ def linearise(
 
 
 def _rows(expressions: Sequence[Expression], names: Sequence[str]) -> list[SparseRow]:
-    """The derivatives that are not 0, by the index of the name."""
+    """Return the derivatives that are not 0, by the index of the name."""
     index = {name: j for j, name in enumerate(names)}
     return [{index[name]: d for name, d in row.items()} for row in sparse_derivatives(expressions, names)]
 
 
 def _along(x_part: SparseRow, p_part: SparseRow, hessian: Sequence[SparseRow]) -> list[Expression]:
-    """A row of ∂_x + ∂_p · Hess S_h."""
+    """Return a row of ∂_x + ∂_p · Hess S_h."""
     n = len(hessian)
     products: list[SparseRow] = [{} for _ in range(n)]
     for k, e in p_part.items():
@@ -96,7 +96,7 @@ def _along(x_part: SparseRow, p_part: SparseRow, hessian: Sequence[SparseRow]) -
 
 
 def explicit_order(displacement: Sequence[Expression], coordinates: Sequence[str]) -> list[int] | None:
-    """An order in which y_i = x_i − a_i(y) can be solved by substitution, or None if there is a cycle."""
+    """Return an order in which y_i = x_i − a_i(y) can be solved by substitution, or None if there is a cycle."""
     index = {c: i for i, c in enumerate(coordinates)}
     graph = {i: [index[s] for s in symbols_of(a) if s in index] for i, a in enumerate(displacement)}
     try:
@@ -111,7 +111,7 @@ def explicit_increment(
     coordinates: Sequence[str],
     order: Sequence[int],
 ) -> list[Expression]:
-    """The increment as a function of x, the equation for y having been solved in the given order."""
+    """Return the increment as a function of x, by solving the equation for y in the given order."""
     solved: dict[str, Expression] = {}
     for i in order:
         (shift,) = substitute([displacement[i]], solved)

@@ -1,4 +1,4 @@
-"""The kinds of steps: the facts that other rooms need of each, in one record.
+"""The kinds of steps: one record for each, with the facts that other rooms need.
 
 A step (`phigen.scheme.steps`) has its kind and its kernels. Rooms that treat kinds differently have a table with an
 entry for each: `phigen.lanes.in_lanes` for the lowering to lanes, and a module of each target for its text.
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 class StepKind:
     """A kind of step.
 
-    ``title`` names the method in a sentence, ``manner`` is the same for the header, ``unit`` the piece of work that
-    operation counts refer to. ``implicit`` steps solve an equation for one point by an inner solve, ``predicted`` ones
-    begin their iteration with a value that is extrapolated from earlier steps. Those by ``flows`` have a schedule, and
-    a row of coefficients for each of its times; those on ``sites`` take a lattice of any size.
+    ``title`` names the method in a sentence, ``manner`` in the header; ``unit`` is the unit of operation counts.
+    ``implicit`` steps solve an equation for one point by an inner solve; ``predicted`` ones start their iteration
+    with a value extrapolated from earlier steps. Steps by ``flows`` have a schedule, and a row of coefficients for
+    each of its times; steps on ``sites`` are those of lattices.
     """
 
     name: str

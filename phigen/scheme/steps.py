@@ -1,9 +1,9 @@
-"""The kinds of steps, with their kernels: ``Step = Newton | Explicit | Path | Gauss | Splitting | Sweeps``.
+"""The kinds of steps, with their kernels: ``Step = Newton Explicit Path Gauss Splitting Sweeps``.
 
-Kernels of a step are of three stages. ``prepare`` computes, from parameters and step size, every value that does not
-depend on the state, nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … Where H depends on the time,
-``refresh`` computes from these, and from the time in the middle of a stage, those that come after them, once in each
-stage; so it does with the increments of noise. All others read the coefficients and the state only.
+Kernels of a step are of three stages. ``prepare`` computes, from parameters and step size, the values that depend
+neither on the state nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … Where H depends on the
+time, or there is noise, ``refresh`` computes further coefficients once in each stage, from these and from the time in
+the middle of the stage or the increments of the noise. All other kernels read the coefficients and the state only.
 """
 
 from __future__ import annotations
@@ -18,15 +18,18 @@ from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.path import PathSlopes, Recurrences
 from phigen.scheme.step_kinds import EXPLICIT, GAUSS, NEWTON, PATH, SPLITTING, SWEEPS, StepKind
 
-#: The end of the name of a kernel of lattices that is the transpose of another.
+#: The end of the name of a transposed kernel of a lattice.
 BACK = "_back"
 
 
 @dataclass(frozen=True)
 class PathAdjoint:
-    """The path traced back with cotangents (`phigen.scheme.adjoint`): their ``recurrences``, those of the ``used``
-    coefficients last; ∇S_h and its Hessian at the mean, and the transpose of ∇S_h along coefficients; ``slopes``, from
-    which the derivatives of many paths at once follow."""
+    """The path traced back with cotangents (`phigen.scheme.adjoint`).
+
+    ``recurrences`` are those of the cotangents, with those of the ``used`` coefficients last. ``curvature`` is ∇S_h and
+    its Hessian at the mean, ``slope`` the transpose of ∇S_h along coefficients. ``slopes`` are the recurrences for the
+    derivatives of a path, for many paths at once.
+    """
 
     recurrences: Recurrences
     used: tuple[int, ...]
@@ -37,8 +40,11 @@ class PathAdjoint:
 
 @dataclass(frozen=True)
 class Adjoint:
-    """The transpose of a step: of the kernels of the ``steps`` (one, or one for each flow), of ``prepare`` and of
-    ``refresh``; if the step follows a path, that of the ``path``."""
+    """The transpose of a step.
+
+    It has the transposes of the kernels of ``steps`` (one, or one for each flow), of ``prepare``, of ``refresh``, and
+    of the ``path`` if the step follows one.
+    """
 
     steps: tuple[Kernel, ...]
     prepare: Kernel
@@ -54,7 +60,7 @@ class Adjoint:
 
 @dataclass(frozen=True)
 class _Staged:
-    """Any step; ``adjoint`` is there if it was asked for."""
+    """Any step; ``adjoint`` is its transpose, if requested."""
 
     prepare: Kernel
     refresh: Kernel | None = field(default=None, kw_only=True)
@@ -70,22 +76,22 @@ class _Staged:
 
     @property
     def inner_solve(self) -> InnerSolve | None:
-        """The solution of the equation for one point; None where there is no such equation."""
+        """Settings of the solve for one point; None for steps without an equation for one point."""
         return None
 
     @property
     def eliminate(self) -> Kernel | None:
-        """The solution with one Newton matrix, where it is unrolled."""
+        """Kernel that solves with one Newton matrix, if it is unrolled."""
         return None
 
     @property
     def eliminate_transposed(self) -> Kernel | None:
-        """The solution with the transpose of one, where it is unrolled."""
+        """Kernel that solves with the transpose of a Newton matrix, if it is unrolled."""
         return None
 
     @property
     def invert(self) -> Kernel | None:
-        """The inverse of a Newton matrix, where it is unrolled."""
+        """Kernel of the inverse of a Newton matrix, if it is unrolled."""
         return None
 
     @property
@@ -95,7 +101,7 @@ class _Staged:
 
     @property
     def frame(self) -> Kernel | None:
-        """The turn from the frame of a step to that of the next, where steps have frames."""
+        """Kernel of the change from the frame of a step to that of the next, if steps have frames."""
         return None
 
     @property
@@ -105,12 +111,12 @@ class _Staged:
 
     @property
     def varied_path(self) -> Recurrences | None:
-        """Those of the path with its variation, if derivatives of such a step were asked for."""
+        """The recurrences of the path with its variation, if the step follows one and its derivatives were requested."""
         return None
 
     @property
     def back(self) -> PathAdjoint | None:
-        """The path traced back, if a step follows one and its adjoint was asked for."""
+        """The path traced back with cotangents, if the step follows one and its adjoint was requested."""
         return self.adjoint.path if self.adjoint else None
 
     @property
@@ -139,35 +145,35 @@ class _Staged:
         return None
 
     def maps(self, stages: int) -> int:
-        """The number of maps that a step of so many stages is composed of."""
+        """Return the number of maps that a step with this number of stages is composed of."""
         return stages
 
     @property
     def prepared(self) -> int:
-        """Values that ``prepare`` computes in one call."""
+        """The number of values that ``prepare`` computes in one call."""
         return len(self.prepare.outputs[0].values)
 
     @property
     def renewed(self) -> int:
-        """Values that ``refresh`` computes in one call."""
+        """The number of values that ``refresh`` computes in one call."""
         return len(self.refresh.outputs[0].values) if self.refresh else 0
 
     @property
     def row(self) -> int:
-        """Values that are computed by one call of each."""
+        """The number of values that one call of each computes."""
         return self.prepared + self.renewed
 
     @property
     def coefficients(self) -> int:
-        """Coefficients of one stage."""
+        """The number of coefficients of one stage."""
         return self.row
 
 
 @dataclass(frozen=True)
 class InnerSolve:
-    """How the equation of an implicit step is solved.
+    """Settings of the solve of an implicit step.
 
-    ``relative`` tells that the coordinates are positive or keep their sign (log-canonical π), so that errors count
+    ``relative`` says that the coordinates are positive or keep their sign (log-canonical π), so that errors count
     relative to each coordinate.
     """
 
@@ -188,9 +194,9 @@ class Factorisation:
 class Newton(_Staged):
     """α(y, ∇S_h(y)) = x, solved for y by Newton's method; then x + (β − α)(y, ∇S_h(y)).
 
-    ``eliminate`` solves with one matrix, ``eliminate_transposed`` with the transpose of one, if the adjoint was asked
-    for; of ``invert`` and ``factors``, for many right-hand sides, there is at most one. What is None is left to a loop.
-    ``centred`` says that y is the mean of x and x'.
+    ``eliminate`` solves with one matrix, ``eliminate_transposed`` with its transpose, if the adjoint was requested.
+    For many right-hand sides there is ``invert``, ``factors``, or neither. Where a kernel is None, the runtime uses a
+    loop. ``centred`` says that y is the mean of x and x'.
     """
 
     linearise: Kernel
@@ -205,7 +211,7 @@ class Newton(_Staged):
 
     @property
     def inner_solve(self) -> InnerSolve:
-        """The solution of the equation."""
+        """Settings of the solve for y."""
         return self.inner
 
     @property
@@ -217,13 +223,13 @@ class Newton(_Staged):
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         factors = (self.factors.factorise, self.factors.substitute) if self.factors else ()
-        own = (self.prepare, self.refresh, self.linearise, self.eliminate, self.eliminate_transposed, self.invert)
-        return _present((*own, *factors, *self.transposed))
+        kernels = (self.prepare, self.refresh, self.linearise, self.eliminate, self.eliminate_transposed, self.invert)
+        return _present((*kernels, *factors, *self.transposed))
 
 
 @dataclass(frozen=True)
 class Explicit(_Staged):
-    """The increment of a step as a formula; ``tangent`` is its Jacobian, if the tangent map was asked for."""
+    """The increment of a step as a formula; ``tangent`` is its Jacobian, if the tangent map was requested."""
 
     increment: Kernel
     tangent: Kernel | None = None
@@ -243,7 +249,7 @@ class Explicit(_Staged):
 
 @dataclass(frozen=True)
 class PathLanes:
-    """What following several paths at once needs: the recurrences of the derivatives of a path, and their use."""
+    """Kernels for several paths in lanes: the recurrences of the derivatives of a path, and their use."""
 
     slopes: PathSlopes
     curvature: Kernel
@@ -274,7 +280,7 @@ class Path(_Staged):
 
     @property
     def inner_solve(self) -> InnerSolve:
-        """The solution of the equation for p."""
+        """Settings of the solve for p."""
         return self.inner
 
     @property
@@ -284,7 +290,7 @@ class Path(_Staged):
 
     @property
     def varied_path(self) -> Recurrences | None:
-        """Those of the path with its variation, if derivatives were asked for."""
+        """The recurrences of the path with its variation, if derivatives were requested."""
         return self.tangent.recurrences if self.tangent else None
 
     @property
@@ -297,12 +303,12 @@ class Path(_Staged):
         """All kernels, each once."""
         lanes = (self.lanes.curvature, self.lanes.along_mean, self.lanes.invert) if self.lanes else ()
         varied = (self.curvature,) if not self.lanes else ()
-        own = (self.prepare, self.refresh, self.generate, self.eliminate)
-        return _present((*own, *lanes, *varied, *self.transposed))
+        kernels = (self.prepare, self.refresh, self.generate, self.eliminate)
+        return _present((*kernels, *lanes, *varied, *self.transposed))
 
     @property
     def curvature(self) -> Kernel | None:
-        """∇S_h and its Hessian, where derivatives of a step were asked for."""
+        """∇S_h and its Hessian, if derivatives of a step were requested."""
         if self.tangent:
             return self.tangent.curvature
         return self.back.curvature if self.back else None
@@ -321,9 +327,9 @@ class Gauss(_Staged):
     """Gauss collocation: Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j), by fixed-point sweeps; then x + D(x, Σ_j L_j).
 
     The unknowns Z are offsets, 0 at the start of the step. ``slope`` is f; the input x is the point, with the time as
-    the last entry if f depends on it. ``change`` is D. ``frame`` turns the L_j of a step into those that the next one
-    would see, where that starts in another frame. The first ``plain`` unknowns are of the size of the state, those of
-    group elements of that of the unit.
+    the last entry if f depends on it. ``change`` is D. ``frame`` transforms the L_j of a step to the frame of the
+    next step, where that differs. The first ``plain`` unknowns have the scale of the state; the others, of group
+    elements, have the scale 1.
     """
 
     slope: Kernel
@@ -362,8 +368,8 @@ class Gauss(_Staged):
 class Splitting(_Staged):
     """The exact flows of the parts of H, one after another as the ``schedule`` lists them.
 
-    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the method;
-    ``tangents`` are the Jacobians of the increments of the flows, if the tangent map was asked for.
+    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the
+    method; ``tangents`` are the Jacobians of the increments of the flows, if the tangent map was requested.
     """
 
     flows: tuple[Kernel, ...]
@@ -405,10 +411,11 @@ class Splitting(_Staged):
 
 @dataclass(frozen=True)
 class Seam:
-    """Where the last site along an axis meets the first, of sizes that are no multiples of the ``period`` of colours.
+    """The boundary seam along an axis, for sizes that are no multiples of the ``period`` of the colours.
 
-    It is as many of the last sites as are left over, and so many periods more that it is at least so ``wide``. Sites on
-    it and so ``near`` it are moved by its terms too. Others have colours that fit those around them.
+    The seam consists of the last sites: the remainder of the size, and as many periods as make it at least ``wide``.
+    The terms that begin on it also move sites up to ``near`` it. All other terms have colours that fit their
+    neighbours.
     """
 
     period: int = 1
@@ -417,7 +424,7 @@ class Seam:
 
     @property
     def least(self) -> int:
-        """The smallest size, whatever is left over: the seam and as many sites beside it."""
+        """The smallest size for any remainder: the seam and as many sites beside it."""
         return 2 * self.wide + self.period - 1
 
 
@@ -425,9 +432,9 @@ class Seam:
 class Sites:
     """The sites of a lattice, whose number is an argument of the solver.
 
-    ``places`` tells of each symbol of kernels the field, or parameter at sites, and the offset, the fastest axis last.
-    A site has the colour Σ ``weights``·position modulo ``colours``; sizes are multiples of ``periods``, at least
-    ``least``.
+    ``places`` maps each symbol of kernels to the field, or parameter at sites, and the offset, with the fastest axis
+    last. A site has the colour Σ ``weights``·position modulo ``colours``; sizes are multiples of ``periods``, at
+    least ``least``.
     """
 
     axes: tuple[str, ...]
@@ -438,19 +445,21 @@ class Sites:
     weights: tuple[int, ...] = ()
     periods: tuple[int, ...] = ()
     least: tuple[int, ...] = ()
-    ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # of bonds, pairs: what is read at a, or at b
+    ends: Mapping[str, tuple[str, str]] = field(
+        default_factory=dict
+    )  # symbols of kernels of bonds or pairs: field and end
     at_bonds: tuple[str, ...] = ()  # parameters at bonds
-    increments: tuple[str, ...] = ()  # of the noise that each site has in a part of a step
-    seams: tuple[Seam, ...] = ()  # along each axis, where colours take every size
+    increments: tuple[str, ...] = ()  # of the noise of a site in a part of a step
+    seams: tuple[Seam, ...] = ()  # along each axis, where the colours fit every size
 
 
 @dataclass(frozen=True)
 class Ends:
     """A ``kernel`` of bonds or pairs between a site, a, and another, b.
 
-    Its inputs are ``coef`` or ``params``, ``site`` and ``bonds``, the parameters at bonds. ``end`` tells of bonds at
-    which end, as they are given, the site is: a, b, or either; ``chosen`` which of the two must have the colour of the
-    sweep: ``here``, ``there``, or none.
+    Its inputs are ``coef`` or ``params``, ``site`` and ``bonds``, the parameters at bonds. ``end`` is the end of the
+    bond, as the user lists it, at which the site is: a, b, or "" for either. ``chosen`` says which of the two must
+    have the colour of the sweep: ``here``, ``there``, or "" for neither.
     """
 
     kernel: Kernel
@@ -459,13 +468,13 @@ class Ends:
 
     @property
     def of_all(self) -> bool:
-        """Whether both sites of every bond or pair add up what it gives them."""
+        """Whether both sites of every bond or pair add its contribution."""
         return not (self.end or self.chosen)
 
 
 @dataclass(frozen=True)
 class Gather:
-    """What all bonds, or pairs with other sites, add up at a site, a value for each of some ``names``."""
+    """Sums over the bonds of a site, or over its pairs with other sites: a value for each of the ``names``."""
 
     ends: tuple[Ends, ...]
     names: tuple[str, ...]
@@ -478,10 +487,10 @@ class Gather:
 
 @dataclass(frozen=True)
 class Partners:
-    """The sites of a graph or all pairs: half the energies of a site with others, and what moves it, by parameters.
+    """Sums over bonds or pairs at a site: half the energies, and the forces or rates, as functions of the parameters.
 
-    ``varied`` is the latter with its derivative along variations of the fields, where a step solves an `Equation`.
-    ``observed`` are the densities of observables of bonds and pairs.
+    ``varied`` has the forces with their derivatives along variations of the fields, where a step solves an
+    `Equation`. ``observed`` are the densities of observables of bonds and pairs.
     """
 
     energy: Gather
@@ -492,21 +501,21 @@ class Partners:
 
     @property
     def gathers(self) -> tuple[Gather, ...]:
-        """All sums, also those of nothing."""
+        """All sums, including empty ones."""
         return (self.energy, self.field, self.varied, self.observed)
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Changes of the ``moved`` fields (indices) at all sites of one ``colour``, read from what stands still.
+    """Increments of the fields with the indices ``moved`` at all sites of one ``colour``, from values that stand still.
 
-    Without a colour it is made at every site. If it is ``inside``, it leaves out sites near seams. With a ``window`` it
-    is made at these alone, for terms that begin on these seams, as bits of their axes, or on none.
+    Without a colour the sweep updates every site. If it is ``inside``, it omits sites near seams. With a ``window``
+    it updates only sites near seams, by the terms that begin on the seams of these axes (bits), or on none.
 
-    The inputs of the ``kernel`` are ``coef``, ``site``, ``present``, symbols that are 1 where a term of H reaches
-    beyond no open end, or where a site has the colour of the sweep, else 0, and ``gathered``, what ``gather`` adds up.
-    ``tangent`` is there if derivatives of a step were asked for: how the variations of the moved fields change, from
-    what this sweep reads and from variations, ``varied``, of it.
+    The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. The symbols of ``present`` are
+    1 where a term of H reaches beyond no open end, or where a site has the colour of the sweep, else 0; ``gathered``
+    are the sums of ``gather``. ``tangent`` is there if derivatives of a step were requested: the increments of the
+    variations of the fields, from the inputs of this sweep and the variations ``varied``.
     """
 
     kernel: Kernel
@@ -519,7 +528,7 @@ class Sweep:
 
     @property
     def is_tangent(self) -> bool:
-        """Whether it changes variations."""
+        """Whether the sweep updates variations."""
         return self.kernel.role is Role.SWEEP_TANGENT
 
 
@@ -527,10 +536,10 @@ class Sweep:
 class Equation:
     """y = x − (α − x)(y, h∇H(y)) at all sites of a lattice, solved for y; then x moves by (β − α)(y, h∇H(y)).
 
-    The inputs of the kernels are those of sweeps, where ``site`` are values of y, and of ``relax``, the right-hand
-    side at a site, also ``start``: x there. ``advance`` is what x moves by. ``slope`` is the derivative of ``relax``
-    along a variation of y, for Newton's method. ``tangents`` are there if derivatives of a step were asked for: that
-    of ``relax`` along a variation of x, and that of ``advance`` along one of y.
+    The inputs of the kernels are those of sweeps, with values of y as ``site``. ``relax``, the right-hand side at a
+    site, also reads ``start``, the x of the site. ``advance`` is the increment of x. ``slope`` is the derivative of
+    ``relax`` along a variation of y, for Newton's method. ``tangents`` are there if derivatives of a step were
+    requested: those of ``relax`` along a variation of x, and of ``advance`` along one of y.
     """
 
     relax: Kernel
@@ -549,11 +558,15 @@ class Equation:
 class Sweeps(_Staged):
     """A step of a lattice, by sweeps over its sites.
 
-    Of a splitting each of the ``parts`` is a list of sweeps, which may be made in any order, and the ``schedule`` is
-    that of the parts. Where some are ``by_colour``, the flows are those of all parts, of each colour where they are so,
-    and the ``schedule`` has in place of parts: 0 the first flow, 1 those in the middle, 2 the last, 3 the middle
-    backwards; where H depends on the time, which advances in place of the last, that one is in the middle too. Of the
-    series there is an ``equation`` in place of parts, and the schedule has its stages.
+    In a splitting each of the ``parts`` is a list of sweeps, which may run in any order, and the ``schedule`` lists
+    the parts.
+
+    If some parts belong to one colour of a graph (``by_colour``), the flows of a step are those of all parts,
+    repeated for each colour. The ``schedule`` then has these numbers in place of parts: 0 the first flow, 1 the flows
+    in the middle, 2 the last, 3 the flows in the middle backwards. If H depends on the time, which advances in place
+    of the last flow, the last flow is in the middle too.
+
+    In the series there is an ``equation`` in place of parts, and the schedule lists its stages.
     """
 
     sites: Sites
@@ -562,7 +575,7 @@ class Sweeps(_Staged):
     composition: str
     casimir_kinds: tuple[str, ...] = ()
     partners: Partners | None = None
-    by_colour: tuple[bool, ...] = ()  # of graphs: the parts that belong to one colour, and are done for each
+    by_colour: tuple[bool, ...] = ()  # graphs: whether a part belongs to one colour
     equation: Equation | None = None
 
     kind = SWEEPS
@@ -589,23 +602,25 @@ class Sweeps(_Staged):
 
     @property
     def is_by_hand(self) -> bool:
-        """Whether the sweeps of a step can be driven one by one over planes: those of a grid that is split.
+        """Whether a caller can drive the sweeps of a step one by one over planes: those of a grid that is split.
 
-        Noise is drawn with the sweep that reads it, so that must not be that of neighbours. Seams are where the lattice
-        has its ends, of which those who have but a piece of it know nothing.
+        Noise is drawn with the sweep that reads it, so no sweep may read that of neighbours. A seam lies at the ends
+        of the lattice, which a caller with a piece of the lattice does not have.
         """
         beside = any(base in self.sites.increments and any(offset) for base, offset in self.sites.places.values())
         return self.partners is None and self.equation is None and not beside and not self.sites.seams
 
     def stage(self, part: int, fields: Sequence[str]) -> tuple[int, int, int, int]:
-        """Of a part on a grid: how far behind and ahead it reads along the first axis, and as bits of a number the
-        fields that it reads there, and those that it changes."""
+        """Return the access of a part on a grid: its extent behind and ahead along the first axis, and two sets.
+
+        The sets, as bits of numbers, are the fields that it reads at these distances, and the fields that it updates.
+        """
         places = [self.sites.places[s] for sweep in self.parts[part] for s in sweep.kernel.inputs["site"]]
-        far = [(f, offset[0]) for f, offset in places if offset[0]]
-        read = {f for f, _ in far if f in fields}
-        changed = {fields[i] for sweep in self.parts[part] for i in sweep.moved}
-        behind, ahead = max([0, *(-o for _, o in far)]), max([0, *(o for _, o in far)])
-        bits = [sum(1 << k for k, f in enumerate(fields) if f in names) for names in (read, changed)]
+        distant = [(f, offset[0]) for f, offset in places if offset[0]]
+        read_fields = {f for f, _ in distant if f in fields}
+        updated = {fields[i] for sweep in self.parts[part] for i in sweep.moved}
+        behind, ahead = max([0, *(-o for _, o in distant)]), max([0, *(o for _, o in distant)])
+        bits = [sum(1 << k for k, f in enumerate(fields) if f in names) for names in (read_fields, updated)]
         return behind, ahead, bits[0], bits[1]
 
     @property
@@ -615,19 +630,19 @@ class Sweeps(_Staged):
 
     @property
     def tangents(self) -> tuple[tuple[Sweep, ...], ...]:
-        """The derivatives of the sweeps of each part; nothing where they were not asked for."""
+        """The derivatives of the sweeps of each part; empty if they were not requested."""
         if any(sweep.tangent is None for part in self.parts for sweep in part):
             return ()
         return tuple(tuple(sweep.tangent for sweep in part if sweep.tangent) for part in self.parts)
 
     @property
     def others(self) -> Partners:
-        """Bonds or pairs; nothing where there are none."""
+        """The sums over bonds or pairs; empty on grids."""
         return self.partners or Partners(Gather((), ()), Gather((), ()))
 
     @property
     def sums(self) -> int:
-        """The most sums over other sites that are held for each."""
+        """The largest number of sums over other sites that a site stores."""
         swept = [sweep.gather for sweep in self.sweeps if sweep.gather]
         return max(len(g.names) for g in (*swept, *self.others.gathers))
 
@@ -640,8 +655,8 @@ class Sweeps(_Staged):
         swept_kernels += self.equation.kernels if self.equation else ()
         gathers = [sweep.gather for sweep in swept if sweep.gather]
         gathers += self.others.gathers
-        own = (*swept_kernels, *(k for g in gathers for k in g.kernels))
-        return _present((self.prepare, self.refresh, *own, *self.transposed))
+        kernels = (*swept_kernels, *(k for g in gathers for k in g.kernels))
+        return _present((self.prepare, self.refresh, *kernels, *self.transposed))
 
 
 Step = Newton | Explicit | Path | Gauss | Splitting | Sweeps

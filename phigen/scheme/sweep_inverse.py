@@ -1,7 +1,7 @@
 """Inverse sweeps of lattices: the fields before a flow, computed from those after it by the flow over the time −h.
 
-Of what bonds or pairs add up nothing is computed twice either: it reads nothing that the sweep moves. Where forces
-damp, a multiple of a field that is added to it is divided away; other damping is left out.
+Sums over bonds or pairs are not computed twice either: they read no field that the sweep updates. A damping force
+that adds a multiple of a field to the field itself is inverted by division; for other damping there is no inverse.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
-from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, turned_back
+from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, over_negative_time
 from phigen.scheme.steps import BACK, Sites, Sweep, Sweeps
 from phigen.scheme.sweep_collecting import collecting
 from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, rebuild, substitute, symbol, symbols_of
@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 def once(function: Callable[[Program, Sweeps], T]) -> Callable[[Program, Sweeps], T]:
-    """Keep the last result for calls with the same two objects: a printer asks dozens of times for each."""
+    """Cache the last result, for calls with the same two objects: a printer makes dozens of calls for each pair."""
     last: list[tuple[Program, Sweeps, T]] = []
 
     @wraps(function)
@@ -38,45 +38,51 @@ def once(function: Callable[[Program, Sweeps], T]) -> Callable[[Program, Sweeps]
 
 
 @once
-def can_be_undone(program: Program, step: Sweeps) -> bool:
-    """Whether the transpose of a step finds the fields before its sweeps from those after them."""
+def can_recompute_fields(program: Program, step: Sweeps) -> bool:
+    """Whether the transpose of a step can recompute the fields before its sweeps by the inverse flow."""
     if not step.adjoint or step.equation:
         return False
     parities, sweeps = of_coefficients(step), [sweep for part in step.parts for sweep in part]
     summed = {s for sweep in sweeps if sweep.gather for k in sweep.gather.kernels for s in symbols_of(*k.roots)}
-    found = all(_changes(program, sweep, parities) for sweep in sweeps)
-    return found and all(parities.get(s, EVEN) == EVEN for s in summed)
+    invertible = all(_changes(program, sweep, parities) for sweep in sweeps)
+    return invertible and all(parities.get(s, EVEN) == EVEN for s in summed)
 
 
 @once
 def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
-    """The transposes of the sweeps of each part, which undo them and collect where they can."""
+    """Return the transposes of the sweeps of each part, which recompute the fields and collect where possible."""
     kernels = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
-    undone = can_be_undone(program, step)
-    found = []
+    invertible = can_recompute_fields(program, step)
+    transposes_of_parts = []
     for part in step.parts if step.adjoint else ():
-        found.append([unweighted(step.sites, kernels[sweep.kernel.name + BACK]) for sweep in part])
-        for k, sweep in enumerate(part if undone else ()):
-            back = found[-1][k]
-            found[-1][k] = undoing(program, step, sweep, collecting(program.coordinates, step, sweep, back) or back)
-    return found
+        transposes_of_parts.append([unweighted(step.sites, kernels[sweep.kernel.name + BACK]) for sweep in part])
+        for k, sweep in enumerate(part if invertible else ()):
+            transpose = transposes_of_parts[-1][k]
+            transposes_of_parts[-1][k] = recomputing_transpose(
+                program, step, sweep, collecting(program.coordinates, step, sweep, transpose) or transpose
+            )
+    return transposes_of_parts
 
 
-def unweighted(sites: Sites, back: Kernel) -> Kernel:
-    """The transpose without weights of open ends in what it hands on, so that this is one value for many neighbours.
+def unweighted(sites: Sites, transpose: Kernel) -> Kernel:
+    """Return the transpose without weights of open ends in values for neighbours.
 
-    A neighbour that takes it is there, and so is the term, if that reaches no further."""
+    Each value is then the same for many neighbours. A neighbour that reads a value is on the lattice, and so is the
+    term, unless the term reaches further.
+    """
 
-    def handed(name: str, value: Expression) -> Expression:
+    def without_weights(name: str, value: Expression) -> Expression:
         offset = sites.places[name][1]
         return _without_factors(value, offset) if any(offset) else value
 
-    values = tuple(handed(name, value) for name, value in back.along("site"))
-    return replace(back, outputs=tuple(replace(o, values=values) if o.name == "site_bar" else o for o in back.outputs))
+    values = tuple(without_weights(name, value) for name, value in transpose.along("site"))
+    return replace(
+        transpose, outputs=tuple(replace(o, values=values) if o.name == "site_bar" else o for o in transpose.outputs)
+    )
 
 
 def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
-    """A product without the weights of terms that are there for every site that has a neighbour at an offset."""
+    """Return a product without the weights that are 1 at every site that has a neighbour at the offset."""
     if value.op in ("mul", "neg"):
         return rebuild(value, [_without_factors(e, offset) for e in value.args])
     if value.op != "symbol" or not isinstance(value.value, Symbol) or value.value.kind != PRESENT:
@@ -86,47 +92,53 @@ def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
     return ONE if all(low >= min(0, o) and high <= max(0, o) for low, high, o in pairs) else value
 
 
-def undoing(program: Program, step: Sweeps, sweep: Sweep, back: Kernel) -> Kernel:
-    """The transpose of a sweep that reads the moved fields as they are after it, and finds what they were, `UNDONE`."""
-    moved = [program.coordinates[f] for f in sweep.moved]
+def recomputing_transpose(program: Program, step: Sweeps, sweep: Sweep, transpose: Kernel) -> Kernel:
+    """Return the transpose of a sweep that reads the updated fields after the sweep and recomputes them, `UNDONE`."""
+    updated = [program.coordinates[f] for f in sweep.moved]
     changes = _changes(program, sweep, of_coefficients(step))
-    values = iter(before(back.roots, changes))
-    outputs = [replace(o, values=tuple(next(values) for _ in o.values)) for o in back.outputs]
-    unread = tuple(f for f in moved if f not in back.inputs["site"])
+    values = iter(before(transpose.roots, changes))
+    outputs = [replace(o, values=tuple(next(values) for _ in o.values)) for o in transpose.outputs]
+    unread = tuple(f for f in updated if f not in transpose.inputs["site"])
     return replace(
-        back,
-        inputs={**back.inputs, UNDONE: unread},
+        transpose,
+        inputs={**transpose.inputs, UNDONE: unread},
         outputs=(*outputs, Output(UNDONE, tuple(symbol(f) + change for f, change in changes.items()))),
     )
 
 
 def _changes(program: Program, sweep: Sweep, parities: Mapping[str, int]) -> dict[str, Expression]:
-    """What undoes a sweep, added to the fields after it that it has moved; nothing where that is not found."""
-    moved, changes = [program.coordinates[f] for f in sweep.moved], sweep.kernel.roots
+    """Return the increments of the inverse of a sweep, by field; empty where there is no inverse."""
+    updated, changes = [program.coordinates[f] for f in sweep.moved], sweep.kernel.roots
     if all(parities.get(s, EVEN) for s in symbols_of(*changes)):
-        return dict(zip(moved, turned_back(changes, parities), strict=True))
-    found = {f: _divided(f, moved, change) for f, change in zip(moved, changes, strict=True)}
-    return {f: e for f, e in found.items() if e is not None} if None not in found.values() else {}
+        return dict(zip(updated, over_negative_time(changes, parities), strict=True))
+    increments = {f: _divided(f, updated, change) for f, change in zip(updated, changes, strict=True)}
+    return {f: e for f, e in increments.items() if e is not None} if None not in increments.values() else {}
 
 
-def _divided(field: str, moved: Sequence[str], change: Expression) -> Expression | None:
-    """What undoes the change of a field by a multiple of itself, and more without moved fields; None for others."""
-    (factor,), (more,) = gradient(change, [field]), substitute([change], {field: ZERO})
-    if not {*moved}.isdisjoint(symbols_of(factor, more)):
+def _divided(field: str, updated: Sequence[str], change: Expression) -> Expression | None:
+    """Return the increment of the inverse where a field gains a multiple of itself, and terms without updated fields.
+
+    None where the increment is of another form.
+    """
+    (factor,), (rest,) = gradient(change, [field]), substitute([change], {field: ZERO})
+    if not {*updated}.isdisjoint(symbols_of(factor, rest)):
         return None
-    return -(factor * symbol(field) + more) * (ONE / (ONE + factor))
+    return -(factor * symbol(field) + rest) * (ONE / (ONE + factor))
 
 
-def apart(back: Kernel) -> tuple[Kernel, Kernel] | None:
-    """A transpose that undoes a sweep as two kernels, of which the latter alone reads what bonds or pairs add up: that
-    is then found with the cotangents that these give back, by the same functions.
+def apart(transpose: Kernel) -> tuple[Kernel, Kernel] | None:
+    """Return a transpose that recomputes as two kernels; None if the transpose reads sums over bonds or pairs.
 
-    None where the transpose itself reads it, so that it has to be found before."""
-    rest = tuple(o for o in back.outputs if o.name != UNDONE)
-    undo = tuple(o for o in back.outputs if o.name == UNDONE)
-    read = symbols_of(*(e for o in rest for e in o.values))
-    if not undo or not {*back.inputs["gathered"]}.isdisjoint(read):
+    Only the second kernel, which recomputes, reads these sums, so they can be computed together with the cotangents
+    of bonds or pairs, by the same functions.
+    """
+    cotangent_outputs = tuple(o for o in transpose.outputs if o.name != UNDONE)
+    state_outputs = tuple(o for o in transpose.outputs if o.name == UNDONE)
+    read = symbols_of(*(e for o in cotangent_outputs for e in o.values))
+    if not state_outputs or not {*transpose.inputs["gathered"]}.isdisjoint(read):
         return None
     purpose = "the fields before the sweep, from what has been added up for them"
-    name = back.name.removesuffix(BACK) + f"_{UNDONE}"
-    return replace(back, outputs=rest), replace(back, name=name, purpose=purpose, outputs=undo)
+    name = transpose.name.removesuffix(BACK) + f"_{UNDONE}"
+    return replace(transpose, outputs=cotangent_outputs), replace(
+        transpose, name=name, purpose=purpose, outputs=state_outputs
+    )

@@ -14,7 +14,7 @@ from phigen.compiler import compile_spec
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeSolver
-from phigen.scheme.program import BOUND
+from phigen.scheme.program import MAX_NORMAL_VARIATE
 from phigen.spec.model import Spec, SpecForces
 from phigen.study.stochastic import BEYOND, LEVELS, SEED, SIGNS
 from phigen.symbolic.arrays import Floats
@@ -69,7 +69,9 @@ def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any]
     for _ in range(SIGNS):
         signs = random.choice([-1.0, 1.0], size=(1, noise.parts, len(noise.sources), *x0.shape[1:]))
         try:
-            _session(solver, x0, parameters, t0).advance_along(h, BOUND * np.sqrt(abs(h) / noise.parts) * signs)
+            _session(solver, x0, parameters, t0).advance_along(
+                h, MAX_NORMAL_VARIATE * np.sqrt(abs(h) / noise.parts) * signs
+            )
         except BackendError:
             failed += 1
     return failed

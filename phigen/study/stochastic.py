@@ -9,7 +9,7 @@ import numpy as np
 
 from phigen.errors import StepError
 from phigen.runtime.solver import Solver
-from phigen.scheme.program import BOUND
+from phigen.scheme.program import MAX_NORMAL_VARIATE
 from phigen.symbolic.arrays import Floats
 
 #: Paths that are followed, the halvings of the step, how many more the reference has, and the seed of all paths.
@@ -71,7 +71,7 @@ def failures(solver: Solver, states: Sequence[Floats], parameters: Mapping[str, 
     for x in states:
         for _ in range(SIGNS):
             size = np.sqrt(abs(h) * len(solver.interface.noise) / draws)
-            largest = BOUND * size * random.choice([-1.0, 1.0], size=(1, draws))
+            largest = MAX_NORMAL_VARIATE * size * random.choice([-1.0, 1.0], size=(1, draws))
             try:
                 solver.integrate(x, h, 1, t0=begin, increments=largest, parameters=parameters)
             except StepError:

@@ -8,7 +8,7 @@ import textwrap
 import unicodedata
 from collections.abc import Callable, Sequence
 
-from phigen.scheme.program import BOUND, Program
+from phigen.scheme.program import MAX_NORMAL_VARIATE, Program
 
 CHECKSUM = "body-sha256:"
 
@@ -81,7 +81,7 @@ def facts(program: Program, listed: Callable[[Sequence[object]], str], key: Call
         "sources": listed(noise.sources) if noise else "",
         "parts": noise.parts if noise else 0,
         "draws": noise.draws if noise else 0,
-        "bound": repr(BOUND),
+        "bound": repr(MAX_NORMAL_VARIATE),
     }
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from phigen.scheme.policies import POLICIES, Constant, MeasurePolicy, Policy
+from phigen.scheme.policies import POLICIES, MeasurePolicy, Policy, PolicyConstant
 from phigen.scheme.program import Program
 
 #: Powers of two below this exponent are written as such: they are bounds on rounding.
@@ -25,7 +25,7 @@ class Spelling:
     """How a language writes a power of two of a negative exponent, and the constants of a policy."""
 
     power: str
-    written: Callable[[list[tuple[Constant, str]]], str]
+    written: Callable[[list[tuple[PolicyConstant, str]]], str]
 
     def value(self, value: float) -> str:
         """A number."""
@@ -40,7 +40,7 @@ class Spelling:
         return self.written([(c, self.value(c.value)) for c in constants])
 
 
-def _c(constants: list[tuple[Constant, str]]) -> str:
+def _c(constants: list[tuple[PolicyConstant, str]]) -> str:
     """Real numbers as macros, so that `single` sees thresholds; whole numbers as enumerators, without a type."""
     whole = [(f"PHI_{c.name} = {value},", c.about) for c, value in constants if isinstance(c.value, int)]
     real = [(f"#define PHI_{c.name} {value}", c.about) for c, value in constants if isinstance(c.value, float)]
@@ -53,11 +53,11 @@ def _aligned(lines: list[tuple[str, str]]) -> list[str]:
     return [f"{text:{width}} /* {about} */" for text, about in lines]
 
 
-def _js(constants: list[tuple[Constant, str]]) -> str:
+def _js(constants: list[tuple[PolicyConstant, str]]) -> str:
     return "\n".join(f"/** {c.about[:1].upper()}{c.about[1:]} */\nconst {c.name} = {value};" for c, value in constants)
 
 
-def _python(constants: list[tuple[Constant, str]]) -> str:
+def _python(constants: list[tuple[PolicyConstant, str]]) -> str:
     return "\n".join(f"{c.name} = {value}  # {c.about}" for c, value in constants)
 
 

@@ -13,7 +13,7 @@ import phigen
 from phigen.compiler import emit, examine
 from phigen.errors import SpecError
 from phigen.report.live import gathered
-from phigen.scheme.program import BOUND
+from phigen.scheme.program import MAX_NORMAL_VARIATE
 from phigen.study.stochastic import strong_order
 from phigen.study.verification import verify
 
@@ -127,7 +127,7 @@ def normals(seed, member, step, count):
     for pair in range((count + 1) // 2):
         a, b, c, d = philox4x32([step % 2**32, step >> 32, member, pair], [seed % 2**32, seed >> 32])
         u, v = (((high >> 5) * 2**26 + (low >> 6)) / 2**53 for high, low in ((a, b), (c, d)))
-        radius = min(np.sqrt(-2 * np.log(u + 2.0**-54)), BOUND)
+        radius = min(np.sqrt(-2 * np.log(u + 2.0**-54)), MAX_NORMAL_VARIATE)
         found += [radius * np.cos(2 * np.pi * v), radius * np.sin(2 * np.pi * v)]
     return np.array(found[:count])
 
@@ -158,12 +158,12 @@ def test_the_numbers_are_normal_and_bounded():
     drawn = np.concatenate([module._normals(3, np.arange(40_000), step).ravel() for step in range(3)])
     for power, moment in ((1, 0), (2, 1), (3, 0), (4, 3)):
         assert np.mean(drawn**power) == pytest.approx(moment, abs=5 * np.std(drawn**power) / np.sqrt(drawn.size))
-    assert np.abs(drawn).max() < BOUND
+    assert np.abs(drawn).max() < MAX_NORMAL_VARIATE
     still = SimpleNamespace(**vars(module))
     zero = [np.zeros(1, dtype=np.uint64)] * 4  # the rarest: log of 2^-54
     module._philox, kept = (lambda counter, key: zero), module._philox
     try:
-        assert module._normals(0, np.zeros(1, dtype=int), 0)[0, 0] == BOUND
+        assert module._normals(0, np.zeros(1, dtype=int), 0)[0, 0] == MAX_NORMAL_VARIATE
     finally:
         module._philox = kept
     del still

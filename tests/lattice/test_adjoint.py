@@ -18,7 +18,7 @@ from phigen.compiler import compile_spec
 from phigen.lanes.in_lanes import in_lanes
 from phigen.resources import bundled
 from phigen.runtime import c_lattice
-from phigen.scheme.sweep_inverse import can_be_undone, transposes
+from phigen.scheme.sweep_inverse import can_recompute_fields, transposes
 from phigen.symbolic.expression import topological
 
 H, STEPS, SITES = 0.05, 4, 6
@@ -363,7 +363,7 @@ def test_fields_before_sweeps_are_found_again():
     for name in ("ablowitz_ladik", "volterra", "chiral_magnet", "food_web", "outer_planets", "driven", "relaxing"):
         spec = phigen.spec.loads(OWN[name]) if name in OWN else phigen.spec.load(bundled()[name])
         program = compile_spec(spec, adjoint=True).program
-        assert can_be_undone(program, program.step), name
+        assert can_recompute_fields(program, program.step), name
 
 
 def test_derivatives_that_transposes_call_have_the_short_way_of_their_functions():

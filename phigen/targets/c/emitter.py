@@ -14,7 +14,7 @@ from functools import partial
 from phigen.lanes.in_lanes import LANES, Blocks, Lanes, Packs, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.policies import PredictorPolicy
-from phigen.scheme.program import BOUND, Attitude, Noise, Program
+from phigen.scheme.program import MAX_NORMAL_VARIATE, Attitude, Noise, Program
 from phigen.scheme.steps import Adjoint
 from phigen.spec.model import Parameter
 from phigen.targets.c import functions, paths
@@ -323,7 +323,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     values["middles"] = ", ".join(map(repr, program.midpoints))
     values["moments"] = ", ".join(map(repr, schedule.moments)) if schedule else ""
     values["middles"] = render("c", "middles.c", values) if step.refresh and program.time else ""
-    values["bound"] = repr(BOUND) if program.noise else ""
+    values["bound"] = repr(MAX_NORMAL_VARIATE) if program.noise else ""
     return render("c", "constants.c", values) + text
 
 

@@ -17,7 +17,7 @@ from phigen.lanes.in_lanes import Rows
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import BACK, Adjoint, Ends, Gather, Sweep, Sweeps
-from phigen.scheme.sweep_inverse import apart, can_be_undone, transposes
+from phigen.scheme.sweep_inverse import apart, can_recompute_fields, transposes
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets.c.kernels import function, members
@@ -121,7 +121,7 @@ def _has_ends(calls: Sequence[str]) -> bool:
 
 def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
     """The two goes of all sweeps of each part, or the one of those that take what the flow after them has handed."""
-    undone, back = can_be_undone(program, layout.step), transposes(program, layout.step)
+    undone, back = can_recompute_fields(program, layout.step), transposes(program, layout.step)
     around = {
         layout.bar(program.coordinates[sweep.moved[int(s.key[0])]])
         for part, own in zip(layout.step.parts, back, strict=True)
@@ -299,9 +299,9 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
         "kernels": [f"{name.upper()} = {k}" for k, (name, *_) in enumerate(KERNELS, 1)] if step.equation else (),
         "kept": 1 + starts_are_read(step),
         "sums": _sums(program, step),
-        "keeps": "" if can_be_undone(program, step) else ", ".join(f"{{ {row} }}" for row in rows),
+        "keeps": "" if can_recompute_fields(program, step) else ", ".join(f"{{ {row} }}" for row in rows),
         "hands": ", ".join(str(int(bool(part.second))) for part in parts),
-        "handing": not ways_of and (any(handed_apart(program, step)) or can_be_undone(program, step)),
+        "handing": not ways_of and (any(handed_apart(program, step)) or can_recompute_fields(program, step)),
         "handed": max(1, *(part.handed for part in parts)) * (2 if ways_of else 1) if parts else 1,
         "ways": ", ".join(str(1 + [*dict.fromkeys(ways_of)].index(way)) for way in ways_of),
         "bars": program.dimension + len(step.sites.parameters) + len(step.sites.at_bonds),

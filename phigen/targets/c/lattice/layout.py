@@ -11,7 +11,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
 from phigen.scheme.steps import BACK, Gather, Partners, Sweep, Sweeps
-from phigen.scheme.sweep_inverse import can_be_undone, once, transposes
+from phigen.scheme.sweep_inverse import can_recompute_fields, once, transposes
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets import lattice
@@ -154,7 +154,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "TAKES": takes(program, step),
         "SHARES": shares(step),
         "STARTS": starts_are_read(step),
-        "UNDONE": can_be_undone(program, step),
+        "UNDONE": can_recompute_fields(program, step),
         "APART": (program.profile == "small" or step.sites.colours > 1) and shares(step),
         "GIVERS": givers(step) and (takes(program, step) or any(handed_apart(program, step))),
         "SITE_PARAMETERS": bool(step.sites.parameters),
@@ -214,7 +214,7 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
 
 def takes(program: Program, step: Sweeps) -> bool:
     """Whether what a flow hands to sites of a grid on the way back is taken by the loop of the next: in long code."""
-    if program.profile == "small" or step.partners or step.sites.colours > 1 or not can_be_undone(program, step):
+    if program.profile == "small" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False
     kernels = [kernel for part in transposes(program, step) for kernel in part]
     alone = all(len(part) == 1 for part in step.parts) and not any(kernel.inputs.get(AROUND) for kernel in kernels)

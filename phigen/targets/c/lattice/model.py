@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from phigen.ir.lattice_loops import bounds
 from phigen.scheme.policies import LatticeNewtonPolicy, LatticeSweepPolicy
-from phigen.scheme.program import BOUND, Program
+from phigen.scheme.program import MAX_NORMAL_VARIATE, Program
 from phigen.scheme.steps import Sweeps
 from phigen.spec.model import Parameter, Reduction
 from phigen.spec.names import OVER, REDUCTIONS
@@ -136,7 +136,7 @@ def model(program: Program, step: Sweeps) -> str:
         **_tables_of_flows(step),
         "middles": ", ".join(map(repr, program.midpoints)),
         "fractions": len(program.fractions) > 1,
-        "bound": repr(BOUND) if program.noise else "",
+        "bound": repr(MAX_NORMAL_VARIATE) if program.noise else "",
         "reductions": ", ".join(_braced(_reduction(r)) for r in program.observables.reductions),
         "joined": not program.noise,
         "allowed": [*_allowed(program, graph=layout.graph)],
