@@ -111,7 +111,7 @@ class _Staged:
 
     @property
     def varied_path(self) -> Recurrences | None:
-        """The recurrences of the path with its variation, if the step follows one and its derivatives were requested."""
+        """The recurrences of the path with its variation, if the step follows one, for derivatives."""
         return None
 
     @property
