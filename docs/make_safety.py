@@ -1,0 +1,153 @@
+"""Measures what docs/safety.md says of generated C, and writes its tables: python docs/make_safety.py
+
+Needs gcc, and cppcheck with its MISRA addon.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tempfile
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from phigen import resources, spec
+from phigen.compilation import Compilation
+from phigen.compiler import compile_spec, emit
+
+PAGE = Path(__file__).resolve().parent / "safety.md"
+#: The systems of the tables, one for each kind of step that microcontrollers are likely to make.
+SYSTEMS = ("pendulum_euler", "pendulum", "henon_heiles", "rigid_body", "dzhanibekov", "predator_prey", "satellite")
+#: Functions of libc and libm that generated C may call.
+LIBRARY = {
+    "acos", "asin", "atan", "atan2", "cbrt", "ceil", "cos", "cosh", "erf", "exp", "expm1", "fabs", "floor", "fmod",
+    "frexp", "hypot", "ldexp", "log", "log1p", "memcmp", "memcpy", "memmove", "memset", "nearbyint", "pow", "rint",
+    "round", "scalbn", "sin", "sincos", "sinh", "sqrt", "tan", "tanh", "trunc",
+}  # fmt: skip
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fcallgraph-info=su")
+_NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n[^"]*?(?:\\n(\d+) bytes \((\w+(?:,\w+)?)\))?"')
+_EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
+
+
+@dataclass(frozen=True)
+class CallGraph:
+    """Functions of a solver: bytes of stack and the functions called by each; those of libraries have no bytes."""
+
+    stack: Mapping[str, int]
+    calls: Mapping[str, set[str]]
+    kinds: set[str]
+
+    def deepest(self, function: str, above: tuple[str, ...] = ()) -> int:
+        """Bytes of stack of a call of a function, libraries apart. Raises `ValueError` if it can call itself."""
+        if function in above:
+            raise ValueError(f"{function} can call itself: {' → '.join((*above, function))}")
+        below = (self.deepest(callee, (*above, function)) for callee in self.calls.get(function, ()))
+        return self.stack.get(function, 0) + max(below, default=0)
+
+    def external(self) -> set[str]:
+        """Names of functions that are called and not defined."""
+        return {callee for callees in self.calls.values() for callee in callees} - self.stack.keys()
+
+
+def small(name: str) -> Compilation:
+    """A system of the corpus for a microcontroller: the short profile, without ensembles and kicks."""
+    source = spec.load(resources.bundled()[name]).overridden(profile="small", without=("ensemble", "kicks"))
+    return compile_spec(source)
+
+
+def call_graph(compilation: Compilation) -> CallGraph:
+    """The call graph of the C of a system, by gcc."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder, name = Path(scratch), compilation.spec.name
+        for file, text in emit(compilation.program, "c", "").items():
+            (folder / file).write_text(text, encoding="utf-8")
+        subprocess.run(["gcc", *_FLAGS, "-c", f"{name}.c", "-o", "a.o"], cwd=folder, check=True)
+        text = (folder / "a.ci").read_text(encoding="utf-8")
+    stack, kinds = {}, set()
+    for title, size, kind in _NODE.findall(text):
+        if size:
+            stack[_plain(title)] = int(size)
+            kinds.add(kind)
+    calls: dict[str, set[str]] = {}
+    for caller, callee in _EDGE.findall(text):
+        calls.setdefault(_plain(caller), set()).add(_plain(callee))
+    return CallGraph(stack, calls, kinds)
+
+
+def _plain(title: str) -> str:
+    """A function without the file of static ones, and without what gcc adds to copies of it."""
+    return title.rpartition(":")[2].partition(".")[0]
+
+
+def misra(compilation: Compilation) -> Counter[str]:
+    """The number of places of the C of a system at which each rule of MISRA C:2012 is not kept, by cppcheck."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder, name = Path(scratch), compilation.spec.name
+        for file, text in emit(compilation.program, "c", "").items():
+            (folder / file).write_text(text, encoding="utf-8")
+        command = ["cppcheck", "--addon=misra", "--std=c99", "-q", "--template={id}", f"{name}.c"]
+        done = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
+    return Counter(re.findall(r"^misra-c2012-([\d.]+)$", done.stderr, re.M))
+
+
+def row_of_bounds(name: str) -> str:
+    """A row of the table of bounds: RAM, stack, and operations of one evaluation."""
+    compilation = small(name)
+    graph, operations = call_graph(compilation), compilation.program.about.operations
+    stacks = (graph.deepest(f"{name}_{function}") for function in ("init", "step"))
+    counts = (operations[kind] for kind in ("additions", "multiplications", "divisions", "functions"))
+    cells = (name, compilation.program.order, *stacks, *counts)
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def rows_of_rules() -> list[str]:
+    """Rows of the table of rules: the number of places at which each is not kept, with its reason."""
+    counts = misra(small("rigid_body"))
+    return [
+        f"| {rule} | {CATEGORIES[rule]} | {counts[rule]} | {REASONS[rule]} |"
+        for rule in sorted(REASONS, key=lambda r: [int(part) for part in r.split(".")])
+    ]
+
+
+#: Rules of MISRA C:2012 that generated C does not keep everywhere, with the reasons.
+REASONS = {
+    "2.4": "structs are typedefs without a use of their tag, so that a tag cannot clash",
+    "2.5": "macros that say orders, versions and checksums are for the code that includes the header",
+    "8.7": "functions of the interface are called by the code that uses the solver",
+    "9.3": "`{0}` sets all of an array to zero",
+    "10.3": "results of comparisons are stored as int, and counts of members converted to size_t",
+    "10.4": "a size_t is compared with an enumeration constant",
+    "10.8": "a count of steps becomes a double, exact below 2⁵³",
+    "12.1": "formulas are written with the precedence of * over +, as in mathematics",
+    "12.3": "several variables are declared in one line where they belong together",
+    "13.3": "an index is decremented inside the subscript of the one loop that runs over coefficients backwards",
+    "15.5": "arguments that are not valid are refused at the top of a function",
+    "15.6": "a loop or an if of one short statement has no braces",
+    "17.7": "the results of memcpy, memmove and memset, which are their first argument, are not used",
+    "18.4": "an address in a table of quaternions is computed with +",
+    "21.16": "the step is compared bit by bit with the one before, so that NaN equals NaN",
+}
+CATEGORIES = dict.fromkeys(REASONS, "required") | dict.fromkeys(
+    ("2.4", "2.5", "8.7", "12.1", "12.3", "13.3", "15.5", "18.4"), "advisory"
+)
+
+
+def with_table(page: str, name: str, rows: list[str]) -> str:
+    """The page with the body of a table, which stands between two comments."""
+    begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
+    before, after = page.split(begin)[0], page.split(end)[1]
+    head = page.split(begin)[1].split(end)[0].strip().splitlines()[:2]
+    return before + "\n".join([begin, "", *head, *rows, "", end]) + after
+
+
+def main() -> None:
+    """Measure all and write the tables."""
+    page = PAGE.read_text(encoding="utf-8")
+    page = with_table(page, "bounds", [row_of_bounds(name) for name in SYSTEMS])
+    PAGE.write_text(with_table(page, "rules", rows_of_rules()), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

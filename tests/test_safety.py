@@ -1,0 +1,91 @@
+"""docs/safety.md: what it says of generated C is so."""
+
+import importlib.util
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support import tool
+
+from phigen.compiler import emit
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+_location = importlib.util.spec_from_file_location("make_safety", DOCS / "make_safety.py")
+safety = importlib.util.module_from_spec(_location)
+sys.modules[safety.__name__] = safety  # where dataclasses look for it
+_location.loader.exec_module(safety)
+
+#: Tables without the numbers that a compiler decides.
+PAGE = safety.PAGE.read_text(encoding="utf-8")
+#: Stacks of another version of gcc may be larger than those of the page by this factor.
+OTHER_COMPILERS = 1.5
+
+
+def written(folder, compilation):
+    for file, text in emit(compilation.program, "c", "").items():
+        (folder / file).write_text(text, encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", safety.SYSTEMS)
+def test_stack_is_bounded_and_nothing_but_libm_is_called(name):
+    graph = safety.call_graph(safety.small(name))
+    assert graph.kinds == {"static"}, "no function has a stack that depends on its arguments"
+    assert {f for f in graph.external() if not f.startswith(name)} <= safety.LIBRARY
+    (row,) = re.findall(rf"^\| {name} \| \d+ \| (\d+) \| (\d+) \|", PAGE, re.M)
+    measured = [graph.deepest(f"{name}_{function}") for function in ("init", "step")]
+    assert all(m <= OTHER_COMPILERS * int(shown) for m, shown in zip(measured, row, strict=True)), measured
+
+
+def test_recursion_is_seen():
+    graph = safety.CallGraph({"a": 8, "b": 16}, {"a": {"b"}, "b": {"a"}}, {"static"})
+    with pytest.raises(ValueError, match="a can call itself: a → b → a"):
+        graph.deepest("a")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["pendulum_euler", "rigid_body", "dzhanibekov", "predator_prey"])
+def test_rules_that_are_not_kept_are_listed_with_a_reason(name):
+    tool("cppcheck")
+    assert safety.misra(safety.small(name)).keys() <= safety.REASONS.keys()
+
+
+FAILING = """
+#include <stdio.h>
+#include "rigid_body.h"
+int main(void)
+{
+    const double x0[3] = {1.0, 2.0, 3.0};
+    rigid_body_solver s;
+    size_t most = 0;
+    int failed = 0;
+    for (double h = 0.05; h < 1e4; h *= 1.05) {
+        if (rigid_body_init(&s, NULL, x0) != rigid_body_OK) return 1;
+        (void)rigid_body_integrate(&s, 0.01, 20); /* a history that misleads the predictor */
+        for (int step = 0; step < 3; ++step) {
+            const size_t before = s.evaluations;
+            failed += rigid_body_step(&s, h) != rigid_body_OK;
+            if (s.evaluations - before > most) most = s.evaluations - before;
+        }
+    }
+    printf("%zu %d %d\\n", most, failed, 2 * rigid_body_MAX_ITERATIONS);
+    return 0;
+}
+"""
+
+
+def test_a_step_evaluates_its_kernel_no_more_often_than_the_page_says(tmp_path):
+    written(tmp_path, safety.small("rigid_body"))
+    (tmp_path / "main.c").write_text('#include "rigid_body.c"\n' + FAILING, encoding="utf-8")
+    subprocess.run(["cc", "-std=c99", "-O1", "main.c", "-lm", "-o", "main"], cwd=tmp_path, check=True)
+    most, failed, bound = map(int, subprocess.run([tmp_path / "main"], capture_output=True, check=True).stdout.split())
+    assert failed > 10
+    assert 10 < most <= bound == 40
+
+
+def test_code_has_no_jumps_pointers_to_functions_or_unions():
+    for name in ("rigid_body", "pendulum_euler", "dzhanibekov"):
+        (text,) = (t for f, t in emit(safety.small(name).program, "c", "").items() if f.endswith(".c"))
+        assert not re.search(r"\b(goto|union|setjmp|errno|malloc|free|printf)\b|\(\*\w+\)\(", text)
