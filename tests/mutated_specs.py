@@ -222,6 +222,8 @@ solver: {compensated: true}
 order: 2
 runs:
   a: {sizes: [6], initial: {q: {random: normal, seed: 1, scale: 0.5, mean: i/2}, p: 0}, step: 0.1, steps: 4, start: 1}
+  e: {sizes: [6], initial: {q: 1, p: 0}, step: 0.1, until: 0.55, every: 0.1, stop: M - 5, section: E - t,
+      direction: both, spectrum: {of: [q, p], after: 0.1}, correlation: {of: q, with: p, axis: i, up to: 2, after: 0.2}}
   b: {sizes: [6], initial: {random: uniform, seed: 1, scale: 0.5, mean: i/2}, step: 0.1, steps: 4, stride: 2,
       record: [M, energy]}
   c: {sizes: [6], initial: [1, 2], step: 0.1, duration: 0.4, parameters: {B: [1, 2, 3, 4, 5, 6], k: i + 1, g: 0}}

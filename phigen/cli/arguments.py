@@ -72,7 +72,10 @@ def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str
             return None
         if Path(value).suffix.lower() not in suffixes:
             raise click.BadParameter(f"{value!r} must end in {_one_of(suffixes)}")
-        expect_writable(Path(value))
+        if Path(value).suffix.lower() == ".zarr" and Path(value).is_dir():
+            expect_writable(Path(value) / "zarr")  # a store is a folder, which is replaced as a whole
+        else:
+            expect_writable(Path(value))
         return Path(value)
 
     return checked

@@ -65,7 +65,8 @@ class LatticeExperiment(Experiment):
             rows = strided(at.h, run.steps, run.stride, self.end)
         else:
             rows = timed(at.h, run.steps, self.spans, self.end)
-        return Plan(at, rows, self.begin, section=solver.section_of(run, at.values), past=self.past)
+        section, transforms = solver.section_of(run, at.values), solver.transforms_of(run)
+        return Plan(at, rows, self.begin, section=section, transforms=transforms, past=self.past)
 
 
 def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) -> tuple[Run, Start]:

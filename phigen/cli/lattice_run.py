@@ -73,7 +73,7 @@ def run_lattice(
     solver = lattice_solver_of(compilation, chosen_target(target, console.note))
     if source:
         run, start = started_from(run, start, source, solver)
-    _expect_columns(run, start, {"--output": output, "--section": section})
+    _expect_files(run, start, {"--output": output, "--section": section})
     experiment = LatticeExperiment(run, (), start.arguments | parameters, start=start)
     if extend:
         if output is None or not output.exists():
@@ -163,6 +163,11 @@ def _integrated(
     if checkpoint and (refused := objection(checkpoint, finished, resume=resume, how="--resume")):
         raise click.UsageError(refused)
     plan, of = experiment.plan(solver), run.record if run.records_numbers else ()
+    try:
+        if plan.transforms:
+            plan.transforms.expect_frames(plan.times, plan.at.h)
+    except ValueError as error:
+        raise click.UsageError(f"spectrum: and correlation: of the run {run.name}: {error}") from None
     with console.progress(f"{solver.interface.name} {run.name}", run.steps) as progress:
         try:
             result = solver.carried_out(
@@ -177,16 +182,21 @@ def _integrated(
     return result, None
 
 
-def _expect_columns(run: Run, start: Start, files: Mapping[str, Path | None]) -> None:
-    """Refuse tables of more states than they have columns for."""
-    from phigen.runtime.lattice_frames import TABLES, expect_columns
+def _expect_files(run: Run, start: Start, files: Mapping[str, Path | None]) -> None:
+    """Refuse files that cannot hold the rows of the run."""
+    from phigen.runtime.lattice_frames import expect_columns, expect_store
 
     for option, path in files.items():
-        if path and path.suffix.lower() in TABLES and not run.records_numbers:
-            try:
+        try:
+            if path and path.suffix.lower() == ".csv" and not run.records_numbers:
                 expect_columns(start.state.shape)
-            except ValueError as error:
-                raise click.BadParameter(str(error), param_hint=option) from None
+            if path and path.suffix.lower() == ".zarr":
+                expect_store(path)
+        except ValueError as error:
+            raise click.BadParameter(str(error), param_hint=option) from None
+        if path and path.suffix.lower() == ".zarr" and run.records_numbers:
+            message = "a .zarr holds frames, and the run has record: without state; its columns go to .csv or .npz"
+            raise click.BadParameter(message, param_hint=option)
 
 
 def _draw(

@@ -67,7 +67,11 @@ _TABLES = (".csv", ".npz")
 @click.option("--extend", is_flag=True, help="Continue the finished run in the file of --output beyond its end.")
 @settings_option
 @click.option(
-    "-o", "--output", metavar="FILE", callback=file_ending(*_TABLES), help="Store the trajectory: FILE.csv or FILE.npz."
+    "-o",
+    "--output",
+    metavar="FILE",
+    callback=file_ending(*_TABLES, ".zarr"),
+    help="Store the trajectory: FILE.csv or FILE.npz; a lattice as FILE.zarr too.",
 )
 @click.option("--section", metavar="FILE", callback=file_ending(*_TABLES),
               help="Store the crossings of the run's Poincaré section: FILE.csv or FILE.npz.")  # fmt: skip
@@ -141,6 +145,8 @@ def command(
         rows: Any = {"source": source, "extend": extend, "every": every, "at": at}
         run_lattice(console, spec, chosen, settings=settings, **method, **written, **rows)
         return
+    if output and output.suffix.lower() == ".zarr":
+        raise click.BadParameter(f"a .zarr is for lattices; the table of {spec.name} is .csv or .npz", param_hint="-o")
     if plot and plot.suffix.lower() in FILMS:
         raise click.BadParameter(f"films are for lattices, and {spec.name} is not a lattice", param_hint="--plot")
     experiment = prepared(spec, name, step, steps, settings, until)

@@ -10,6 +10,7 @@ import numpy as np
 from phigen.drawing.exponents import draw_exponents
 from phigen.drawing.palette import SERIES, styled
 from phigen.drawing.shades import shades_of
+from phigen.drawing.spectra import draw_correlation, draw_spectrum
 from phigen.lattice.placing import placed
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.runtime.lattice_series import LatticeSeries
@@ -38,7 +39,7 @@ def lattice_figure(
 ) -> Figure:
     """The coordinates over space and time, and the ``errors`` (frames,) of what is conserved, by name.
 
-    Below are the observables against the time, and Lyapunov exponents, if there are any.
+    Below are the observables against the time, S(q, ω), a correlation, and Lyapunov exponents, if there are any.
 
     A diagram has at most ``dots`` dots along the time.
     """
@@ -46,7 +47,8 @@ def lattice_figure(
 
     names = run.coordinates[:MOST_PANELS]
     observed = run.solver.interface.observables[:MOST_PANELS]
-    below = [1.4] * len(observed) + ([1.8] if spectrum is None else [1.8, 1.8])
+    transforms = [2.6] * (run.structure_factor is not None) + [1.8] * (run.correlated is not None)
+    below = [1.4] * len(observed) + [1.8] + transforms + [1.8] * (spectrum is not None)
     figure = Figure(figsize=(8.2, 2.2 * len(names) + 0.6 + sum(below)), layout="constrained")
     if title:
         figure.suptitle(title, fontsize=10)
@@ -64,6 +66,11 @@ def lattice_figure(
     for k, name in enumerate(observed):
         _draw_series(parts[len(names) + k].add_subplot(), name, run.t, run.observed[:, k])
     _draw_errors(parts[len(names) + len(observed)].add_subplot(), run, errors)
+    further = len(names) + len(observed) + 1
+    if run.structure_factor is not None:
+        draw_spectrum(parts[further], run.structure_factor)
+    if run.correlated is not None:
+        draw_correlation(parts[further + len(transforms) - 1].add_subplot(), run.correlated)
     if spectrum is not None:
         draw_exponents(parts[-1].add_subplot(), spectrum)
     return figure

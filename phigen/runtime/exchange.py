@@ -58,6 +58,7 @@ def lattice_to_xarray(trajectory: LatticeTrajectory) -> xr.Dataset:
             **{n: (("t", *axes)[: np.ndim(v)], v) for n, v in trajectory.observables.items()},
             **{f"parameter_{n}": (shapes[n], v) for n, v in arrays.items() if n in shapes},
             **({"bonds": (("bond", "end"), arrays["bonds"])} if "bonds" in arrays else {}),
+            **trajectory.transforms(),
         },
         coords={"t": trajectory.t, "coordinate": list(trajectory.coordinates)},
         attrs={"h": trajectory.h, "steps": trajectory.steps, **numbers},

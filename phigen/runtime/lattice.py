@@ -36,7 +36,7 @@ from phigen.runtime.lattice_frames import (
     add_member,
     expect_columns,
     stream_path,
-    write_table,
+    write_whole,
 )
 from phigen.runtime.lattice_rows import Crossed, Plan, strided, timed
 from phigen.runtime.lattice_run import LatticeRun
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
     from phigen.spec.model import Run, Spec
     from phigen.study.conservation import Unit
-    from phigen.study.spectra import DynamicSpectrum
+    from phigen.study.spectra import Correlation, DynamicSpectrum, Transforms
     from phigen.symbolic.expression import Expression
 
 
@@ -168,6 +168,7 @@ class LatticeTrajectory:
     size ``h``, or at given times, and for the end, which may be a part of a step later. ``observed`` (frames,
     observables) are the observables that are one number each. ``crossings`` are the frames where the section of a run
     is crossed, ``retried`` the steps that were made in parts. ``joined`` tells whether the run continues another.
+    ``structure_factor`` and ``correlated`` are the results of ``spectrum`` and ``correlation`` of a run.
     """
 
     t: Floats
@@ -183,6 +184,8 @@ class LatticeTrajectory:
     crossings: LatticeTrajectory | None = field(default=None, repr=False)
     retried: tuple[int, ...] = ()
     joined: bool = False
+    structure_factor: DynamicSpectrum | None = field(default=None, repr=False)
+    correlated: Correlation | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -270,6 +273,14 @@ class LatticeTrajectory:
         rows += [{name: float(np.abs(row[name] - first[name]).max()) for name in first} for row in frames]
         return {name: np.array([row[name] for row in rows]) for name in first}
 
+    def transforms(self) -> dict[str, tuple[tuple[str, ...], Floats]]:
+        """Return the names of dimensions and the values of ``spectrum``, ``spectrum_q_AXIS``, ``spectrum_omega`` and
+        ``correlation``, as far as the run asks for them.
+        """
+        spectrum, pair = self.structure_factor, self.correlated
+        arrays = spectrum.variables("spectrum", "spectrum_") if spectrum else {}
+        return arrays | ({"correlation": (("distance",), pair.values)} if pair else {})
+
     def column(self, coordinate: str) -> Floats:
         """Return the frames (frames, *sizes) of one coordinate. Raises `KeyError` if there is no such coordinate."""
         if coordinate not in self.coordinates:
@@ -306,7 +317,7 @@ class LatticeTrajectory:
         """
         target = stream_path(path)
         if target is None:
-            write_table(Path(path), self)
+            write_whole(Path(path), self)
             return
         if target.suffix == ".npy":
             with replacing(target) as file:
@@ -320,6 +331,7 @@ class LatticeTrajectory:
     def _further(self) -> dict[str, Any]:
         about = {"t": self.t, "energy": self.energy, "steps": self.steps, "h": self.h}
         about |= {f"observable_{name}": values for name, values in self.observables.items()}
+        about |= {name: values for name, (_, values) in self.transforms().items()}
         named = {"coordinates": np.array(self.coordinates), "axes": np.array(self.axes)}
         return {**about, **named, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
 
@@ -414,8 +426,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """Integrate as planned, with a frame for each row. Files and errors are those of `integrate`."""
         shape, stream = plan.at.x.shape, stream_path(output) if output else None
         table = Path(output) if output and stream is None else None
-        if table:
+        if table and table.suffix == ".csv":
             expect_columns(shape)
+        if plan.transforms:
+            plan.transforms.expect_frames(plan.times, plan.at.h)
         count = len(plan.times)
         frames = Frames(stream, (count, *shape))
         grown = GrowingFrames()
@@ -443,8 +457,11 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             failed = made(t, states, done + (plan.past.steps if plan.past else 0))
             raise self.failure(error, plan.at.h, failed, plan.at.values) from error
         trajectory = made(run.times, frames.array, plan.steps)
+        if plan.transforms:
+            structure_factor, correlated = plan.transforms.of(trajectory)
+            trajectory = replace(trajectory, structure_factor=structure_factor, correlated=correlated)
         if table:
-            write_table(table, trajectory)
+            trajectory.save(table)
         frames.finish(trajectory)
         run.forget()
         return trajectory
@@ -519,13 +536,22 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         if run.every is not None:
             span = at.h * run.steps if end is None else end.span
             rows = timed(at.h, run.steps, runs.spans_of(float(run.every), span), end)
-        return Plan(at, rows, at.t0, retry, self.section_of(run, at.values))
+        return Plan(at, rows, at.t0, retry, self.section_of(run, at.values), self.transforms_of(run))
 
     def function(self, expression: Expression, values: Mapping[str, Any]) -> Function:
         """An expression in observables, parameters and the time as a function of observables (rows, observables)."""
         from phigen.study.sections import function_of
 
         return function_of(expression, self.interface.observables, values, self.interface.time)
+
+    def transforms_of(self, run: Run) -> Transforms | None:
+        """Spectrum and correlation of the frames of a run, if it asks for any."""
+        from phigen.study.spectra import Transforms
+
+        asked = run.lattice
+        return (
+            Transforms(asked.spectrum, asked.correlation) if asked and (asked.spectrum or asked.correlation) else None
+        )
 
     def section_of(self, run: Run, values: Mapping[str, Any]) -> Crossed | None:
         """The section of a run, if it has one."""

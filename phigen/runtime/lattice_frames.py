@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -24,9 +25,9 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver, LatticeTrajectory
     from phigen.runtime.lattice_rows import Past
 
-#: Suffixes of files that frames can be written to one by one, and of tables, which are written at the end.
+#: Suffixes of files that frames can be written to one by one, and of those that are written at the end.
 STREAMS = (".npy", ".npz")
-TABLES = (".csv",)
+WHOLE = (".csv", ".zarr")
 #: Columns of a table of states at most: programs that read tables show some hundred.
 MAX_COLUMNS = 1000
 
@@ -199,10 +200,10 @@ class Frames:
 def stream_path(path: str | Path) -> Path | None:
     """The path of a file that frames can go to one by one, None for a table. Raises `ValueError` for any other."""
     target = Path(path)
-    if target.suffix in TABLES:
+    if target.suffix in WHOLE:
         return None
     if target.suffix not in STREAMS:
-        names = ", ".join([*STREAMS, *TABLES[:-1]]) + f" or {TABLES[-1]}"
+        names = ", ".join([*STREAMS, *WHOLE[:-1]]) + f" or {WHOLE[-1]}"
         raise ValueError(f"frames are written to files that end in {names}, not {str(path)!r}")
     return target
 
@@ -226,13 +227,48 @@ def state_columns(about: LatticeInterface, sizes: Sequence[int]) -> list[Column]
     return trajectory_columns(site_names(about.coordinates, sizes), summed, (), about.observables)
 
 
+def write_whole(path: Path, trajectory: LatticeTrajectory) -> None:
+    """Write a trajectory as ``.csv`` or ``.zarr``. Raises `ValueError` where it does not fit or the path is in use."""
+    if path.suffix == ".csv":
+        write_table(path, trajectory)
+    else:
+        _write_store(path, trajectory)
+
+
+def expect_store(path: Path) -> None:
+    """Raise `ValueError` where a Zarr store would replace what is none."""
+    if path.exists() and not any((path / name).is_file() for name in ("zarr.json", ".zgroup")):
+        raise ValueError(f"{path} is there, and is no Zarr store")
+
+
+def _write_store(path: Path, trajectory: LatticeTrajectory) -> None:
+    """Write the variables of `LatticeTrajectory.to_xarray` as arrays with names of dimensions.
+
+    An old store is replaced when the new one is complete.
+    """
+    from phigen.sweeping.store import imported
+
+    expect_store(path)
+    data = trajectory.to_xarray()
+    part = path.with_name(path.name + ".part")
+    root = imported("zarr").open_group(str(part), mode="w", zarr_format=2)
+    for name in data.variables:
+        values, attributes = data[name].to_numpy(), {"_ARRAY_DIMENSIONS": list(data[name].dims)}
+        if values.dtype.kind in "fiu":
+            root.create_array(str(name), data=values, fill_value=None, attributes=attributes)
+        else:
+            root.attrs[str(name)] = values.tolist()
+    root.attrs.update({str(name): value for name, value in data.attrs.items()})
+    if path.exists():
+        shutil.rmtree(path)
+    part.rename(path)
+
+
 def write_table(path: Path, trajectory: LatticeTrajectory) -> None:
     """Write a trajectory as ``.csv``. Raises `ValueError` for more sites than it has columns."""
     expect_columns(trajectory.x.shape[1:])
-    about, states = (
-        trajectory.solver.interface,
-        trajectory.x.reshape(len(trajectory), int(np.prod(trajectory.x.shape[1:]))),
-    )
+    about, shape = trajectory.solver.interface, trajectory.x.shape
+    states = trajectory.x.reshape(shape[0], int(np.prod(shape[1:])))
     columns = state_columns(about, trajectory.x.shape[2:])
     summed = [trajectory.casimirs[c.key.removeprefix("casimir_")] for c in columns if c.key.startswith("casimir_")]
     write(path, columns, np.column_stack([trajectory.t, states, trajectory.energy, *summed, trajectory.observed]), {})

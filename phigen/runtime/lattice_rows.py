@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,9 @@ from phigen.runtime.crossings import Function
 from phigen.runtime.ending import End
 from phigen.runtime.interface import Floats, row_steps
 from phigen.runtime.timed import EQUAL, whole_steps
+
+if TYPE_CHECKING:
+    from phigen.study.spectra import Transforms
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,8 @@ class Past:
 class Plan:
     """An integration: where it begins, its rows, and in how many halvings a failing step may be made.
 
-    ``begin`` is the time of its start, which `Beginning` has only where H depends on the time.
+    ``begin`` is the time of its start, which `Beginning` has only where H depends on the time. ``transforms`` are made
+    of its frames.
     """
 
     at: Beginning
@@ -104,6 +109,7 @@ class Plan:
     begin: float = 0.0
     retry: int = 0
     section: Crossed | None = None
+    transforms: Transforms | None = None
     past: Past | None = field(default=None, compare=False)
 
     @property

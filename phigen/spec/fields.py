@@ -267,6 +267,25 @@ AVERAGE = Record(
     ),
     example="{after: 200, blocks: 20}",
 )
+SPECTRUM = Record(
+    "spectrum",
+    (
+        Field("of", ListOf(NAME, least=1), "the fields f of the mean over frames of Σ |f(q, ω)|²", required=True),
+        Field("after", CONSTANT, "states before this time are left out"),
+    ),
+    example="{of: [x, y], after: 100}",
+)
+CORRELATION = Record(
+    "correlation",
+    (
+        Field("of", NAME, "the field f of ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩", required=True),
+        Field("with", NAME, "the field g; f if not given"),
+        Field("axis", NAME, "the axis of d; the first if not given"),
+        Field("up to", Integer(0, limits.SITES), "the largest distance d, in sites", required=True),
+        Field("after", CONSTANT, "states before this time are left out"),
+    ),
+    example="{of: x, with: y, axis: i, up to: 32}",
+)
 RUN = Record(
     "a run",
     (
@@ -308,6 +327,8 @@ RUN = Record(
         Field("direction", Choice(DIRECTIONS), "how the section is crossed: rising, falling or both", default="rising"),
         Field("record", ListOf(NAME, least=1), "columns of the output: state, energy, Casimirs, observables; or all"),
         Field("average", AVERAGE, "time averages of the observables: the rows to average over"),
+        Field("spectrum", SPECTRUM, "grids: the dynamic structure factor S(q, ω) of fields"),
+        Field("correlation", CORRELATION, "grids: the correlation of two fields over distances along an axis"),
         Field("description", PROSE, "what the run shows"),
     ),
     one=("steps", "duration", "until"),

@@ -15,6 +15,7 @@ from phigen.spec.grammar import Scope
 from phigen.spec.indices import Indices
 from phigen.spec.model import Lattice, LatticeRun, Values
 from phigen.spec.problems import counted, did_you_mean, shown
+from phigen.spec.spectra import correlation_of, spectrum_of
 from phigen.spec.values import values
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
@@ -93,15 +94,20 @@ def scope_of_numbers(declared: Declarations, observables: Iterable[str], fields:
 def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRun | None:
     """Read the sizes, bonds, initial state and array parameters of a run."""
     if declared.lattice is None:
-        for key in ("sizes", "bonds"):
+        for key in ("sizes", "bonds", "spectrum", "correlation"):
             if key in raw:
                 _fail(name, key, f"{key} is for specs with lattice:", declared)
         return None
     for key, hint in _ABSENT_IN_RUNS.items():
         if key in raw:
             _fail(name, key, f"{key} is not available for lattices", declared, hint)
+    sizes = _sizes(name, raw, declared)
     return LatticeRun(
-        _sizes(name, raw, declared), _state(name, raw.get("initial"), declared), _bonds(name, raw, declared)
+        sizes,
+        _state(name, raw.get("initial"), declared),
+        _bonds(name, raw, declared),
+        spectrum=spectrum_of(name, raw, declared),
+        correlation=correlation_of(name, raw, sizes, declared),
     )
 
 

@@ -240,18 +240,40 @@ class Run:
 
 
 @dataclass(frozen=True)
+class SpectrumChoice:
+    """``spectrum:`` of a run of a lattice: S(q, ω) of the fields ``of``, over the frames from a time ``after`` on."""
+
+    of: tuple[str, ...]
+    after: Fraction | None = None
+
+
+@dataclass(frozen=True)
+class CorrelationChoice:
+    """``correlation:`` of a run of a lattice: two fields, the ``axis`` and the largest distance, and `after`."""
+
+    of: str
+    other: str
+    axis: str
+    up_to: int
+    after: Fraction | None = None
+
+
+@dataclass(frozen=True)
 class LatticeRun:
     """Further settings of a run of a lattice.
 
     ``sizes`` are those of the axes; where there are none, the number of sites. ``state`` has initial values by field,
     or of all fields under the name ``""``. ``bonds`` are pairs of sites, counted from 0, or a file with them.
-    ``arrays`` are the values of parameters at sites and bonds that differ from the defaults.
+    ``arrays`` are the values of parameters at sites and bonds that differ from the defaults. ``spectrum`` and
+    ``correlation`` are computed from the frames.
     """
 
     sizes: tuple[int, ...] = ()
     state: Mapping[str, Values] = field(default_factory=dict)
     bonds: tuple[tuple[int, int], ...] | str = ()
     arrays: Mapping[str, Values] = field(default_factory=dict)
+    spectrum: SpectrumChoice | None = None
+    correlation: CorrelationChoice | None = None
 
 
 @dataclass(frozen=True)

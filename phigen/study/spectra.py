@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from phigen.runtime.lattice import LatticeTrajectory
+    from phigen.spec.model import CorrelationChoice, SpectrumChoice
 
 #: Frames that a spectrum needs at least: with fewer the window leaves nothing.
 LEAST_FRAMES = 4
@@ -39,6 +41,12 @@ class DynamicSpectrum:
     axes: tuple[str, ...]
     of: tuple[str, ...]
 
+    def variables(self, name: str, prefix: str = "") -> dict[str, tuple[tuple[str, ...], Floats]]:
+        """Return dimensions and values of S, under a ``name``, and of ``q_AXIS`` and ``omega``, with a ``prefix``."""
+        names = [f"{prefix}q_{axis}" for axis in self.axes] + [f"{prefix}omega"]
+        coordinates = zip(names, [*self.q, self.omega], strict=True)
+        return {name: (tuple(names), self.values)} | {n: ((n,), values) for n, values in coordinates}
+
     def save(self, path: str | Path) -> None:
         """Write a Zarr store: arrays ``S``, ``q_AXIS`` and ``omega``, which xarray opens too.
 
@@ -46,11 +54,10 @@ class DynamicSpectrum:
         """
         from phigen.sweeping.store import imported
 
-        root = imported("zarr").open_group(str(path), mode="w")
-        names = [f"q_{axis}" for axis in self.axes]
-        for name, values in [*zip(names, self.q, strict=True), ("omega", self.omega)]:
-            root.create_array(name, data=values, attributes={"_ARRAY_DIMENSIONS": [name]})
-        root.create_array("S", data=self.values, attributes={"_ARRAY_DIMENSIONS": [*names, "omega"]})
+        root = imported("zarr").open_group(str(path), mode="w", zarr_format=2)
+        for name, (dimensions, values) in self.variables("S").items():
+            about = {"_ARRAY_DIMENSIONS": list(dimensions)}
+            root.create_array(name, data=values, fill_value=None, attributes=about)  # 0 is a value like others
         root.attrs["of"] = list(self.of)
 
     def plot(self, title: str = "") -> Figure:
@@ -63,6 +70,49 @@ class DynamicSpectrum:
         return spectrum_figure(self, title)
 
 
+@dataclass(frozen=True)
+class Correlation:
+    """⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ of two fields ``of``.
+
+    ``values`` (distances,) are for d = 0, 1, … sites along an ``axis``.
+    """
+
+    values: Floats
+    of: tuple[str, str]
+    axis: str
+
+
+@dataclass(frozen=True)
+class Transforms:
+    """Spectrum and correlation that a run of a spec asks for; None where it does not."""
+
+    spectrum: SpectrumChoice | None = None
+    correlation: CorrelationChoice | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.spectrum or self.correlation)
+
+    def expect_frames(self, t: Floats, h: float) -> None:
+        """Raise `ValueError` where frames at the times ``t`` do not serve."""
+        if self.spectrum:
+            equal_times(t, h, _number(self.spectrum.after))
+        if self.correlation:
+            expect_frames(t, h, _number(self.correlation.after))
+
+    def of(self, run: LatticeTrajectory) -> tuple[DynamicSpectrum | None, Correlation | None]:
+        """Return both of a trajectory."""
+        asked, pair = self.spectrum, self.correlation
+        structure_factor = spectrum(run, asked.of, after=_number(asked.after)) if asked else None
+        if pair is None:
+            return structure_factor, None
+        values = correlation(run, pair.of, pair.other, pair.axis, pair.up_to, after=_number(pair.after))
+        return structure_factor, Correlation(values, (pair.of, pair.other), pair.axis)
+
+
+def _number(value: Fraction | None) -> float | None:
+    return None if value is None else float(value)
+
+
 def spectrum(run: LatticeTrajectory, of: Sequence[str], *, after: float | None = None) -> DynamicSpectrum:
     """Return S(q, ω) of some coordinates, over the frames from the time ``after`` on, with a Hann window in time.
 
@@ -73,14 +123,8 @@ def spectrum(run: LatticeTrajectory, of: Sequence[str], *, after: float | None =
     _expect_grid(run, "a spectrum")
     if not fields:
         raise ValueError("a spectrum is of one coordinate or more")
-    frames = _frames(run, after)
-    if len(frames) > 2 and abs(frames[-1] - 2 * frames[-2] + frames[-3]) > _EQUAL * abs(frames[1] - frames[0]):
-        frames = frames[:-1]
-    first, count, sizes = len(run.t) - len(_frames(run, after)), len(frames), run.x.shape[2:]
-    if count < LEAST_FRAMES:
-        raise ValueError(f"a spectrum needs {LEAST_FRAMES} frames that are equal times apart, not {count}")
-    if np.ptp(np.diff(frames)) > _EQUAL * abs(frames[1] - frames[0]):
-        raise ValueError("a spectrum needs frames that are equal times apart")
+    frames = equal_times(run.t, run.h, after)
+    first, count, sizes = len(run.t) - len(_later(run.t, run.h, after)), len(frames), run.x.shape[2:]
     expect_room("the transform of the frames", 3 * 16 * count * int(np.prod(sizes)))
     window = np.hanning(count + 2)[1:-1]
     window *= np.sqrt(count / (window**2).sum())
@@ -114,7 +158,7 @@ def correlation(
     count, sums = 0, np.zeros(up_to + 1)
     numbers, means = np.zeros(up_to + 1), np.zeros(2)
     pair, wraps = (_index(run, of), _index(run, other)), not run.solver.interface.open_axes[along - 1]
-    for x in itertools.islice(run.x, len(run.t) - len(_frames(run, after)), None):
+    for x in itertools.islice(run.x, len(run.t) - len(_later(run.t, run.h, after)), None):
         f, g = (np.moveaxis(np.asarray(x[k]), along - 1, 0) for k in pair)
         means += f.mean(), g.mean()
         count += 1
@@ -122,15 +166,35 @@ def correlation(
             product = f * np.roll(g, -d, axis=0) if wraps else f[: size - d] * g[d:]
             sums[d] += product.sum()
             numbers[d] += product.size
-    if not count:
-        raise ValueError(f"there are no frames from t = {after!r} on")
+    expect_frames(run.t, run.h, after)
     return sums / numbers - np.prod(means / count)
 
 
-def _frames(run: LatticeTrajectory, after: float | None) -> Floats:
+def equal_times(t: Floats, h: float, after: float | None) -> Floats:
+    """Return the times of the frames of a spectrum: from a time on, without a last one that comes early.
+
+    Raises `ValueError` for fewer than four, and for frames that are not equal times apart.
+    """
+    frames = _later(t, h, after)
+    if len(frames) > 2 and abs(frames[-1] - 2 * frames[-2] + frames[-3]) > _EQUAL * abs(frames[1] - frames[0]):
+        frames = frames[:-1]
+    if len(frames) < LEAST_FRAMES:
+        raise ValueError(f"a spectrum needs {LEAST_FRAMES} frames that are equal times apart, not {len(frames)}")
+    if np.ptp(np.diff(frames)) > _EQUAL * abs(frames[1] - frames[0]):
+        raise ValueError("a spectrum needs frames that are equal times apart")
+    return frames
+
+
+def expect_frames(t: Floats, h: float, after: float | None) -> None:
+    """Raise `ValueError` where there is no frame from a time on."""
+    if not len(_later(t, h, after)):
+        raise ValueError(f"there are no frames from t = {after!r} on")
+
+
+def _later(t: Floats, h: float, after: float | None) -> Floats:
     """Return the times of the frames from a time on, in the direction of the run."""
-    sign = np.sign(run.h)
-    return run.t if after is None else run.t[sign * run.t >= sign * after - 1e-9 * abs(run.h)]
+    sign = np.sign(h)
+    return t if after is None else t[sign * t >= sign * after - 1e-9 * abs(h)]
 
 
 def _index(run: LatticeTrajectory, name: str) -> int:

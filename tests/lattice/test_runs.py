@@ -139,6 +139,47 @@ def test_steps_that_fail_are_made_in_parts_at_the_right_times(monkeypatch):
         solver.integrate(x0, 0.1, 4, t0=0.3)
 
 
+def test_a_crossing_in_the_last_part_of_a_step_is_found(rotors):
+    crossings = rotors.run("both").crossings.t
+    assert 1.5 < crossings[0] < 1.56  # the end is a part of the step from 1.5 on
+    assert list(rotors.run("both", until=1.56).crossings.t) == pytest.approx([crossings[0]], rel=1e-12)
+    assert not len(rotors.run("both", until=1.52).crossings)
+
+
+def test_retries_and_extremes_of_a_section_outlast_an_interrupt(rotors, tmp_path, monkeypatch):
+    every = rotors.run("both", stride=1)
+    k = 20 + int(np.argmin(every.columns["T"][20:35]))
+    near, advance = every.columns["T"][k - 1 : k + 2], NumpyLatticeSession.advance
+    lowest = near[1] - (near[2] - near[0]) ** 2 / (8 * (near[0] - 2 * near[1] + near[2]))
+    level = near[1] - 0.5 * (near[1] - lowest)  # both crossings are between two steps
+    monkeypatch.setattr(lattice_series, "CHECKPOINT_SECONDS", 0.0)
+
+    def failing(session, h, steps):
+        if h == 0.1:
+            raise BackendError("NO_CONVERGENCE", session.steps, session.state()[None])
+        advance(session, h, steps)
+
+    def interrupt(step):
+        if step == k:
+            raise KeyboardInterrupt
+
+    settings = {"stride": 1, "level": level, "steps": k + 3}
+    retried = rotors.run("both", **settings)
+    assert len(retried.crossings) == 2
+    for retry in (0, 1):
+        with monkeypatch.context() as patched:
+            if retry:
+                patched.setattr(NumpyLatticeSession, "advance", failing)
+            whole = rotors.run("both", retry=retry, **settings)
+            with pytest.raises(KeyboardInterrupt):
+                rotors.run("both", retry=retry, checkpoints=tmp_path / "kept", progress=interrupt, **settings)
+            resumed = rotors.run("both", retry=retry, checkpoints=tmp_path / "kept", **settings)
+        assert len(resumed.crossings) == len(whole.crossings)
+        np.testing.assert_array_equal(resumed.t, whole.t)
+        np.testing.assert_array_equal(resumed.last, whole.last)
+        np.testing.assert_array_equal(resumed.crossings.t, whole.crossings.t)
+
+
 def test_processes_refuse_parts_of_steps():
     lattice = object.__new__(DistributedLattice)
     lattice.solver = phigen.compile(phigen.spec.loads(ROTORS), target="numpy")

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import phigen
 import phigen.spec
+from phigen.cli import group
 from phigen.study.spectra import spectrum
 
 #: A ferromagnetic chain near its ground state; linear spin-wave theory has ω(q) = B + 2J(1 − cos q).
@@ -81,13 +83,61 @@ def test_what_has_no_spectrum_is_told():
 
 
 def test_a_spectrum_goes_to_zarr_and_pictures(tmp_path):
-    zarr = pytest.importorskip("zarr")
+    xarray = pytest.importorskip("xarray")
     run = phigen.compile(phigen.spec.loads(FERROMAGNET), target="numpy").integrate(
         near_the_ground_state(6, 0.3), 0.1, 9
     )
     found = run.spectrum(["x"])
     found.save(tmp_path / "s.zarr")
-    stored = zarr.open_group(str(tmp_path / "s.zarr"), mode="r")
-    np.testing.assert_array_equal(stored["S"][:], found.values)
-    np.testing.assert_array_equal(stored["q_i"][:], found.q[0])
+    stored = xarray.open_zarr(tmp_path / "s.zarr", consolidated=False)
+    np.testing.assert_array_equal(stored.S.transpose("q_i", "omega"), found.values)
+    np.testing.assert_array_equal(stored.q_i, found.q[0])
     found.plot("chain").savefig(tmp_path / "s.png")
+
+
+#: The same chain, whose run asks for both; waves along a plane.
+ASKING = (
+    FERROMAGNET.replace("steps: 10", "steps: 640, stride: 5, spectrum: {of: [x, y], after: 2.5}")
+    .replace("x: 0, y: 0, z: 1}", "x: 0.001*cos(2*pi*3*i/N_i), y: -0.001*sin(2*pi*3*i/N_i), z: 1}")
+    .replace("after: 2.5}", "after: 2.5}, correlation: {of: x, with: y, up to: 5, after: 60}")
+)
+
+
+def test_a_run_puts_what_it_asks_for_into_its_files(tmp_path, monkeypatch):
+    xarray = pytest.importorskip("xarray")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "waves.yaml").write_text(ASKING)
+    run = phigen.compile("waves.yaml", target="numpy").run()
+    spectrum, correlation = run.spectrum(["x", "y"], after=2.5), run.correlation("x", "y", up_to=5, after=60)
+    k, n = np.unravel_index(np.argmax(spectrum.values), spectrum.values.shape)
+    assert abs(spectrum.q[0][k]) == pytest.approx(2 * np.pi * 3 / 32)
+    assert abs(spectrum.omega[n]) == pytest.approx(0.1 + 2 * (1 - np.cos(2 * np.pi * 3 / 32)), abs=np.pi / 60)
+    np.testing.assert_array_equal(run.structure_factor.values, spectrum.values)
+    np.testing.assert_array_equal(run.correlated.values, correlation)
+    for name in ("a.npz", "a.zarr", "a.zarr"):  # a store is replaced
+        result = CliRunner().invoke(group, ["run", "waves.yaml", "-t", "numpy", "-o", name, "--plot", "a.svg"])
+        assert result.exit_code == 0, result.output
+    with np.load("a.npz") as arrays, xarray.open_zarr("a.zarr", consolidated=False) as stored:
+        for name, values in (("spectrum", spectrum.values), ("correlation", correlation), ("x", run.x)):
+            np.testing.assert_array_equal(arrays[name], values)
+            np.testing.assert_array_equal(stored[name], values)
+        assert stored.spectrum.dims == ("spectrum_q_i", "spectrum_omega")
+        np.testing.assert_array_equal(stored.spectrum_omega, arrays["spectrum_omega"])
+    assert (tmp_path / "a.svg").read_text().count("S(q, ω)") >= 1
+    assert not [*tmp_path.glob("*.part"), *tmp_path.glob("*.checkpoint")]
+
+
+def test_times_that_give_no_spectrum_are_refused_before_the_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "waves.yaml").write_text(ASKING)
+    (tmp_path / "folder.zarr").mkdir()
+    for options, message in (
+        (["--at", "3,4,6,7"], "a spectrum needs frames that are equal times apart"),
+        (["--until", "3"], "needs 4 frames that are equal times apart, not 2"),
+        (["--until", "50"], "there are no frames from t = 60.0 on"),
+        (["-o", "folder.zarr"], "folder.zarr is there, and is no Zarr store"),
+    ):
+        result = CliRunner().invoke(group, ["run", "waves.yaml", "-t", "numpy", *options])
+        assert (result.exit_code, message in " ".join(result.output.split())) == (2, True), result.output
+    with pytest.raises(ValueError, match="needs 4 frames"):
+        phigen.compile("waves.yaml", target="numpy").run(until=3)

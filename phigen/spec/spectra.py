@@ -1,0 +1,74 @@
+"""``spectrum`` and ``correlation`` of runs of lattices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from phigen.spec.declarations import Declarations
+from phigen.spec.model import CorrelationChoice, SpectrumChoice
+from phigen.spec.problems import did_you_mean, one_of, shown
+from phigen.spec.yaml_source import Scalar
+
+#: The key of the largest distance.
+UP_TO = "up to"
+
+
+def spectrum_of(name: str, raw: Mapping[str, Any], declared: Declarations) -> SpectrumChoice | None:
+    """Return ``spectrum`` of the run of that name, None without one or after errors, which are reported."""
+    entries = raw.get("spectrum")
+    if entries is None or not _is_allowed(name, "spectrum", raw, declared):
+        return None
+    fields = [_field(node, "spectrum", declared) for node in entries.get("of") or () if node is not None]
+    after = declared.number(entries.get("after"), declared.numbers())
+    return SpectrumChoice(tuple(f for f in fields if f), after) if all(fields) and fields else None
+
+
+def correlation_of(
+    name: str, raw: Mapping[str, Any], sizes: tuple[int, ...], declared: Declarations
+) -> CorrelationChoice | None:
+    """Return ``correlation`` of the run of that name, of a lattice with ``sizes``; None as for `spectrum_of`."""
+    entries = raw.get("correlation")
+    if entries is None or not _is_allowed(name, "correlation", raw, declared):
+        return None
+    assert declared.lattice is not None
+    of, other, axis = (entries.get(key) for key in ("of", "with", "axis"))
+    first = _field(of, "correlation", declared) if of is not None else ""
+    second = _field(other, "correlation", declared) if other is not None else first
+    axes, up_to = declared.lattice.axes, entries.get(UP_TO)
+    if axis is not None and axis.text not in axes:
+        hint = did_you_mean(axis.text, axes) or one_of(axes)
+        declared.reader.error(axis, f"correlation: {shown(axis.text)} is not an axis", hint)
+        return None
+    along = axis.text if axis is not None else axes[0]
+    after = declared.number(entries.get("after"), declared.numbers())
+    if not (first and second) or up_to is None:
+        return None
+    size = dict(zip(axes, sizes, strict=False)).get(along)
+    if size is not None and up_to >= size:
+        message = f"correlation: {UP_TO}: {up_to} is farther than {size - 1}, the last distance along {along}"
+        declared.reader.problems.add(message, declared.reader.locations["runs", name, "correlation", UP_TO])
+        return None
+    return CorrelationChoice(first, second, along, up_to, after)
+
+
+def _is_allowed(name: str, key: str, raw: Mapping[str, Any], declared: Declarations) -> bool:
+    """Whether a run has frames on a grid; what is wrong is reported at the key."""
+    place, add = declared.reader.locations["runs", name, key], declared.reader.problems.add
+    if declared.relation != "grid":
+        add(f"{key} is along the axes of a grid", place, "lattice: {axes: [i]} declares one")
+        return False
+    record = [node.text for node in raw.get("record") or () if node is not None]
+    if record and "state" not in record:
+        add(f"{key} needs states, and record: does not name them", place, "record: [state, …], or no record")
+        return False
+    return True
+
+
+def _field(node: Scalar, key: str, declared: Declarations) -> str:
+    """Return the coordinate that a node names; "" after an error."""
+    if node.text in declared.coordinates or declared.incomplete:
+        return node.text
+    hint = did_you_mean(node.text, declared.coordinates) or one_of(declared.coordinates)
+    declared.reader.error(node, f"{key}: {shown(node.text)} is not a coordinate", hint)
+    return ""
