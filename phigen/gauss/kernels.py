@@ -51,6 +51,7 @@ class StageMap:
     moved: tuple[int, ...]
     starts: tuple[int, ...]  # the first unknown of each group
     change: tuple[Expression, ...] = field(default=())
+    pace: Expression = ONE  # what ∇H + ζ is multiplied by, where a monitor and forces act
 
     @property
     def start(self) -> tuple[str, ...]:
@@ -58,10 +59,13 @@ class StageMap:
         return (*self.system.coordinates, *self.system.times)
 
 
-def stage_map(system: System, realisation: Realisation) -> StageMap:
-    """Return the points of a system in terms of the unknowns of a step."""
+def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) -> StageMap:
+    """Return the points of a system in terms of the unknowns of a step; ``pace`` multiplies ∇H and covector forces."""
     plain = tuple(i for part in realisation.parts if not isinstance(part, Group) for i in part.indices)
-    plain = tuple(i for i in plain if not realisation.exact or any(not e.is_zero for e in system.poisson[i]))
+    if realisation.exact:
+        plain = tuple(i for i in plain if any(not e.is_zero for e in system.poisson[i]))
+    if not (plain or realisation.groups or system.times):
+        plain = (0,)  # all brackets are zero; arrays in C have at least one entry
     count = len(plain) + len(system.times)
     starts = []
     for group in realisation.groups:
@@ -75,7 +79,7 @@ def stage_map(system: System, realisation: Realisation) -> StageMap:
         offsets = [symbol(s) for s in unknowns[first : first + group.algebra.dimension]]
         for i, value in zip(group.indices, _momentum_change(group, _values(system, group), offsets), strict=False):
             change[i] = value
-    return StageMap(system, realisation, unknowns, plain, tuple(starts), tuple(change))
+    return StageMap(system, realisation, unknowns, plain, tuple(starts), tuple(change), pace)
 
 
 def _values(system: System, group: Group) -> list[Expression]:
@@ -234,17 +238,14 @@ def vector_field(
     ``hold`` receives each component of the velocities in Lie algebras, and returns its replacement.
     """
     system, realisation = points.system, points.realisation
-    if not realisation.exact:
-        field_ = system.vector_field()
-        plain_rates = substitute([field_[i] for i in points.moved], at)
-        return [*(weight * value for value in plain_rates), *(weight for _ in system.times)]
     slopes = gradient(system.hamiltonian, system.coordinates)
     if system.forces:
         slopes = [s + z for s, z in zip(slopes, system.forces.covector, strict=True)]
-    constant = hamiltonian_vector_field(system.poisson, slopes)
+    slopes = [points.pace * s for s in slopes]
+    field_ = hamiltonian_vector_field(system.poisson, slopes)
     if system.forces:
-        constant = tuple(a + b for a, b in zip(constant, system.forces.vector, strict=True))
-    plain = substitute([constant[i] for i in points.moved], at)
+        field_ = tuple(a + b for a, b in zip(field_, system.forces.vector, strict=True))
+    plain = substitute([field_[i] for i in points.moved], at)
     derivatives = [*(weight * value for value in plain), *(weight for _ in system.times)]
     rates = [-weight * value for value in substitute(slopes, at)]
     for group, first in zip(realisation.groups, points.starts, strict=True):
@@ -265,6 +266,17 @@ def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expre
         for k, c in row.items():
             terms[k].append(_scalar(algebra, c) * (a[i] * b[j]))
     return [total(t) for t in terms]
+
+
+def elapsed_kernel(points: StageMap, monitor: Expression, coefficients: Coefficients) -> Kernel:
+    """Kernel of the time that passes at a stage: the weight times dt/dτ."""
+    (rate,) = coefficients.hoist(substitute([monitor], at_unknowns(points)))
+    return Kernel(
+        "elapsed",
+        "w times dt/dtau at a stage",
+        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "w": (WEIGHT,)},
+        (Output("elapsed", (symbol(WEIGHT) * rate,)),),
+    )
 
 
 def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:

@@ -7,7 +7,7 @@ presymplectic space of group elements; the unit is a section of it. Hence the st
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from phigen.gauss.kernels import StageMap, at_unknowns, stage_map, vector_field
@@ -16,6 +16,7 @@ from phigen.gauss.star_algebra import difference
 from phigen.gauss.tableau import Tableau
 from phigen.geometry.system import System
 from phigen.symbolic.expression import (
+    ONE,
     ZERO,
     Expression,
     gradient,
@@ -30,16 +31,22 @@ from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, Statement, decide_
 ROUNDED = Fraction(1, 10**15)
 
 
-def check(system: System, discretised: System, realisation: Realisation, tableau: Tableau) -> Iterator[Statement]:
-    """Yield the statements about coefficients, then those about the realisation."""
+def check(
+    system: System, discretised: System, realisation: Realisation, tableau: Tableau, pace: Expression = ONE
+) -> Iterator[Statement]:
+    """Yield the statements about coefficients, then those about the realisation.
+
+    ``pace`` multiplies ∇H and covector forces, where a monitor and forces act.
+    """
     yield _symplectic(tableau)
     yield _order(tableau)
-    points = stage_map(discretised, realisation)
+    points = stage_map(discretised, realisation, pace)
     if realisation.exact:
         yield _brackets(system, realisation)
     for group in realisation.groups:
         yield _momentum_map(system, group)
-    yield from _follows(system, points)
+    field = discretised.vector_field() if pace is ONE else [pace * f for f in system.vector_field()]
+    yield from _follows(system, points, field)
 
 
 def _symplectic(tableau: Tableau) -> Statement:
@@ -117,7 +124,7 @@ def _momentum_map(system: System, group: Group) -> Statement:
     return Statement(name, PROVED, "associative, with involution; its skew elements have the brackets")
 
 
-def _follows(system: System, points: StageMap) -> Iterator[Statement]:
+def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> Iterator[Statement]:
     """Yield that the unknowns are 0 at the start of a step, and that the method follows ẋ = π∇H there."""
     at_start = dict.fromkeys(points.unknowns, ZERO)
     start = [(c, e) for c, e in zip(system.coordinates, substitute(points.change, at_start), strict=True)]
@@ -128,6 +135,5 @@ def _follows(system: System, points: StageMap) -> Iterator[Statement]:
         total(substitute([e], at_start)[0] * slopes[points.unknowns.index(name)] for name, e in row.items())
         for row in columns
     ]
-    field = system.vector_field()
     residuals = [(c, r - f) for c, r, f in zip(system.coordinates, rates, field, strict=True)]
     yield decide_zero("ẋ = π∇H there", residuals, system.positive)

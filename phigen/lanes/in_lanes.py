@@ -198,7 +198,7 @@ def _of_splitting(program: Program, step: Splitting) -> Packs | None:
 
 
 def _of_gauss(program: Program, step: Gauss) -> Stages | None:
-    return _stages(step) if program.lanes and program.offers("lanes") else None
+    return _stages(program, step) if program.lanes and program.offers("lanes") else None
 
 
 def _rows(program: Program, step: Sweeps) -> Rows:
@@ -243,13 +243,14 @@ def _called_in_forms(step: Sweeps) -> set[str]:
     return operations([*kernels, *(kernel for kernel in transposes if "sums_bar" not in kernel.inputs)])
 
 
-def _stages(step: Gauss) -> Stages:
+def _stages(program: Program, step: Gauss) -> Stages:
     """The vector field of a Gauss method at all stages, with its transposes; what lies where a step starts is the same
     for all of them."""
     kernels = [LaneKernel(step.slope, ("coef", "x"))]
     kernels += [LaneKernel(step.frame, ("coef", "z"))] if step.frame else []
-    kernels += [LaneKernel(kernel, ("coef", "x")) for kernel in step.stage_transposes]
-    called = with_formulas(operations([step.slope, *step.stage_transposes]))
+    others = [*step.stage_transposes, *(k.kernel for k in _elapsed(program))]
+    kernels += [LaneKernel(kernel, ("coef", "x")) for kernel in others]
+    called = with_formulas(operations([step.slope, *others]))
     return Stages(tuple(kernels), called, step.tableau.stages <= LANES // 2)
 
 

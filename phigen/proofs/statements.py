@@ -122,7 +122,8 @@ def _method_by_splitting(compilation: CompiledSplitting) -> dict[str, tuple[Stat
 
 
 def _method_by_gauss(compilation: CompiledGauss) -> dict[str, tuple[Statement, ...]]:
-    proved = check_gauss(compilation.system, compilation.discretised, compilation.gauss, compilation.tableau)
+    system, pace = compilation.system, compilation.gauge.pace(compilation.system)
+    proved = check_gauss(system, compilation.discretised, compilation.gauss, compilation.tableau, pace)
     return {compilation.label: tuple(proved)}
 
 

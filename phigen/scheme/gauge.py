@@ -19,7 +19,7 @@ from phigen.scheme.discretisation import hamilton_jacobi
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import FreeGauge
 from phigen.series.hamilton_jacobi import HamiltonJacobi, PolynomialSeries
-from phigen.symbolic.expression import Expression, gradient, symbol, symbols_of, total
+from phigen.symbolic.expression import ONE, Expression, gradient, symbol, symbols_of, total
 from phigen.symbolic.symbols import GAUGE, LEVEL, Symbol
 from phigen.symbolic.tower import Tower
 
@@ -86,6 +86,10 @@ class Gauge:
     def timed(self, hamiltonian: Expression) -> Expression:
         """Return H, or K = g(H + e)."""
         return self.monitor * (hamiltonian + symbol(LEVEL)) if self.monitor else hamiltonian
+
+    def pace(self, system: System) -> Expression:
+        """What multiplies ∇H + ζ of the system that is discretised: g where there is no K."""
+        return self.monitor if self.monitor and system.forces else ONE
 
     def applied(self, system: System) -> System:
         """Return the system with H − Σ λ_c C_c, or K − Σ λ_c C_c, in place of H, to be discretised.

@@ -9,6 +9,7 @@ from phigen.gauss.kernels import (
     StageMap,
     at_unknowns,
     change_kernel,
+    elapsed_kernel,
     field_kernel,
     frame_kernel,
     stage_map,
@@ -17,15 +18,16 @@ from phigen.gauss.kernels import (
 from phigen.gauss.realisation import Realisation, collective, direct
 from phigen.gauss.tableau import MOST_STAGES, tableau
 from phigen.geometry.system import System
-from phigen.scheme.adjoint import completed, gauss_adjoint
+from phigen.scheme.adjoint import completed, gauss_adjoint, level_adjoint
 from phigen.scheme.discretisation import expect_few
 from phigen.scheme.forces import force_facts
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import observables
 from phigen.scheme.lowering import operation_counts
+from phigen.scheme.monitor import monitor_facts, rate_kernel
 from phigen.scheme.order import Order
-from phigen.scheme.program import About, Program
+from phigen.scheme.program import About, Monitor, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Gauss, GaussTangent
 from phigen.spec.model import Spec
@@ -53,8 +55,6 @@ def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
         yield ("lattice",), "not for lattices", "scheme: auto, splitting or series"
     if spec.noise:
         yield ("noise",), "not with noise", "scheme: series or splitting"
-    if spec.monitor is not None:
-        yield ("monitor",), "not with a monitor", "scheme: series or splitting"
     if extras.modified_hamiltonian:
         yield ("modified_hamiltonian",), "the modified Hamiltonian is not computed", series
     if spec.reconstruct:
@@ -100,15 +100,16 @@ def _is_pushed(system: System, i: int) -> bool:
 def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: Order, spec: Spec) -> Program:
     """Return the solver as a program, with H less the Casimirs of the gauge. `LimitError` if it is too large."""
     discretised = gauge.applied(system)
-    points = stage_map(discretised, realisation)
-    coefficients = Coefficients(system.parameter_names)
+    points = stage_map(discretised, realisation, gauge.pace(system))
+    coefficients = Coefficients((*system.parameter_names, *gauge.symbols))
     slope, change = field_kernel(points, coefficients), change_kernel(points, coefficients)
     frame = frame_kernel(points, coefficients)
     tangent = _tangent(points, coefficients) if spec.extras.tangent else None
+    elapsed = elapsed_kernel(points, gauge.monitor, coefficients) if gauge.monitor else None
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters only",
-        {"params": system.parameter_names, "h": (STEP,)},
+        {"params": system.parameter_names, **gauge.inputs, "h": (STEP,)},
         (Output("coef", tuple(coefficients.values)),),
     )
     slope, change = _full(slope, coefficients), _full(change, coefficients)
@@ -141,6 +142,7 @@ def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: O
         casimirs=tuple(system.casimirs),
         order=order.order,
         step=step,
+        monitor=_monitor(system, gauge, elapsed and _full(elapsed, coefficients), spec),
         observables=observables(system),
         extras=spec.extras,
         lanes=spec.solver.lanes,
@@ -148,6 +150,14 @@ def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: O
         observed=tuple(system.observables),
         truncated=not realisation.exact,
     )
+
+
+def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -> Monitor | None:
+    """The time of a monitored solver."""
+    if gauge.monitor is None:
+        return None
+    level = level_adjoint(system) if spec.extras.adjoint else None
+    return Monitor(rate_kernel(system, gauge.monitor), elapsed, level)
 
 
 def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
@@ -185,6 +195,7 @@ def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge,
     else:
         yield "structure: exact, as the brackets are constant"
     yield from gauge.facts
+    yield from monitor_facts(gauge.monitor, forced=system.forces is not None)
     yield from force_facts(system, "pi(grad H + zeta) + f at the stages")
     yield f"step: {step.kind.manner}"
     yield order.note

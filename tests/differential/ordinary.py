@@ -386,7 +386,7 @@ _NOT_OF_GAUSS = ("birealisation", "composition", "reconstruct", "real", "solver"
 
 def _collocated(source: random.Random, drawn: Ordinary) -> Ordinary:
     """The system, now and then with Gauss collocation in place of its scheme."""
-    if source.random() > 0.25 or drawn.noise or drawn.monitor is not None:
+    if source.random() > 0.25 or drawn.noise or drawn.monitor == "log":
         return drawn
     options = {k: v for k, v in drawn.options.items() if k not in _NOT_OF_GAUSS}
     options |= {"scheme": "gauss", "order": source.choice([2, 4, 6, 8, 12, 16])}

@@ -159,7 +159,7 @@ def test_check_proves_what_a_step_is():
 REFUSED = {
     "structure": (f"{SPECIES}scheme: gauss\n", "no exact Poisson map is known", "to truncation"),
     "noise": (f"{BODY}noise: {{w: {{hamiltonian: x1}}}}\nscheme: gauss\n", "not with noise", "series"),
-    "monitor": (f"{BODY}monitor: 1 + x1**2\nscheme: gauss\n", "not with a monitor", "series"),
+    "monitor": (f"{BODY}monitor: log\nscheme: gauss\n", "log needs H = A + B split in two", "splitting"),
     "modified": (f"{BODY}modified_hamiltonian: 1\nscheme: gauss\n", "belongs to scheme: series", "remove"),
     "attitude": (f"{BODY}reconstruct: quaternion\nscheme: gauss\n", "attitudes are not offered", "series"),
     "float": (f"{BODY}real: float\nscheme: gauss\n", "single precision", "series"),

@@ -283,7 +283,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     body = functions.called(program)
     own = text_of(program).kernels(step, has)
     own += program.choice
-    own += [program.monitor.elapsed] if program.monitor else []
+    own += [program.monitor.elapsed] if program.monitor and not has["STAGED"] else []
     own += text_of(program).tangents(step)
     turned = program.attitude
     own += [turned.exponential, turned.turn, turned.rate] if turned else []

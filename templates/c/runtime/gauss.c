@@ -150,6 +150,30 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
     return PHI_NO_CONVERGENCE;
 }
 
+#if PHI_MONITOR
+/* The time that a step takes: the integral of dt/dtau by the values at its stages. */
+static double phi_time_of(const phi_solver *s, double point[PHI_POINT], phi_lanes *moves)
+{
+    double sum = 0.0;
+    phi_lanes z[PHI_UNKNOWNS], weights[1] = { { 0.0 } };
+    for (int i = 0; i < PHI_NODES; ++i) weights[0][i] = s->h * phi_weights[i];
+    phi_mixed(phi_mixing, moves, z);
+#if PHI_STAGED
+    phi_lanes elapsed[1];
+    phi_elapsed_lanes(s->coef, point, z, weights, elapsed);
+    for (int i = 0; i < PHI_NODES; ++i) sum += elapsed[0][i];
+#else
+    double at[PHI_UNKNOWNS], elapsed[1];
+    for (int i = 0; i < PHI_NODES; ++i) {
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) at[k] = z[k][i];
+        phi_elapsed(s->coef, point, at, &weights[0][i], elapsed);
+        sum += elapsed[0];
+    }
+#endif
+    return sum;
+}
+
+#endif
 /* One step. If it fails, the state is as before. */
 static phi_status phi_attempt(phi_solver *s)
 {
@@ -161,7 +185,12 @@ static phi_status phi_attempt(phi_solver *s)
     if (status != PHI_OK) return status;
     phi_end(moves, end);
     phi_stage_change(s->coef, point, end, change);
+#if PHI_MONITOR
+    const double elapsed = phi_time_of(s, point, moves);
+    if (!(elapsed * s->h > 0.0)) return PHI_NOT_FINITE;
+#endif
     if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
+    PHI_PASS(s, elapsed)
     memcpy(past->moves, moves, sizeof moves);
     past->count = 1;
     return PHI_OK;

@@ -2,6 +2,9 @@ import { advance } from "./algebra.mjs";
 import { MOST_RISING, NEARLY_ROUNDING, ROUNDING, SOLVED, STALLED } from "./gauss_policy.mjs";
 import { DIM, MAX_SWEEPS, MIXING, PLAIN, POINT, PREDICTION, UNKNOWNS, WEIGHTS } from "./model.mjs";
 import { stageChange, stageField } from "./model.mjs";
+// #if MONITOR
+import { pass, timeOf } from "./level.mjs";
+// #endif
 // #if FRAMED
 import { nextFrame } from "./model.mjs";
 // #endif
@@ -146,7 +149,15 @@ function attempt(solver, stage) {
   if (status !== "OK") return status;
   const end = endOf(work.now);
   stageChange(solver.coef[stage], start, end, change);
+  // #if MONITOR
+  mixed(MIXING, work.now, mixedMoves);
+  const time = timeOf(solver, stage, start, mixedMoves);
+  if (Number.isNaN(time)) return "NOT_FINITE";
+  // #endif
   if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
+  // #if MONITOR
+  pass(solver, time);
+  // #endif
   // #if FRAMED
   work.now.forEach((move, i) => nextFrame(solver.coef[stage], end, move, history.moves[i]));
   // #else

@@ -1,4 +1,7 @@
 import { FRACTIONS, elapsed, energy, monitor } from "./model.mjs";
+// #if GAUSS
+import { WEIGHTS } from "./model.mjs";
+// #endif
 // #if SPLITTING
 import { TIMES, prepareRow } from "./model.mjs";
 // #endif
@@ -28,6 +31,18 @@ export function timeOf(solver, stage, y) {
 
 // #endif
 
+// #if GAUSS
+/** The time that a step takes, by its start and the unknowns at its stages; NaN unless it has the sign of the step. */
+export function timeOf(solver, stage, start, z) {
+  let sum = 0;
+  WEIGHTS.forEach((b, i) => {
+    elapsed(solver.coef[stage], start, z[i], Float64Array.of(solver.h * b), one);
+    sum += one[0];
+  });
+  return sum * solver.h > 0 ? sum : NaN;
+}
+
+// #endif
 /** The time of a solver gains that of a stage. */
 export function pass(solver, time) {
   const sum = solver.t + time;
