@@ -12,7 +12,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from phigen.ir import nodes as ir
-from phigen.scheme.kernel import Kernel
+from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.program import Program
 from phigen.scheme.reversal import UNDONE
 from phigen.scheme.steps import Ends, Gather, Sweep, Sweeps
@@ -36,9 +36,8 @@ class LatticeLoops:
         storage = ir.Storage.VARIATION if sweep.is_tangent else ir.Storage.STATE
         arrays = (ir.Array(storage, k, self.program.coordinates[k]) for k in sweep.moved)
         stores = [ir.Store(array, e) for array, e in zip(arrays, sweep.kernel.roots, strict=True)]
-        role = ir.LoopRole.TANGENT_SWEEP if sweep.is_tangent else ir.LoopRole.SWEEP
         parameters = ("coef", "state", *["varied"] * sweep.is_tangent, "sites", *["colour"] * bool(self.step.by_colour))
-        return self._over_sites(sweep.kernel, role, parameters, stores, sweep.gather, self._selection(sweep))
+        return self._over_sites(sweep.kernel, parameters, stores, sweep.gather, self._selection(sweep))
 
     def _selection(self, sweep: Sweep) -> ir.Selection:
         coloured = self.step.sites.colours > 1
@@ -50,22 +49,18 @@ class LatticeLoops:
         read = gather if kernel.inputs["gathered"] else None
         starts, varied = ["start"] * kernel.reads_start, ["varied"] * kernel.reads_variations
         parameters = ("coef", *starts, "state", *varied, "sites", "out")
-        return self._over_sites(
-            kernel, ir.LoopRole.STAGE, parameters, self._outputs(ir.Storage.OUTPUT, kernel.roots), read
-        )
+        return self._over_sites(kernel, parameters, self._outputs(ir.Storage.OUTPUT, kernel.roots), read)
 
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function of a density, an energy or the vector field; sites share the energy of bonds."""
         others = self.step.others
-        gathers = {"energy": others.energy, "vector_field": others.field, "observables": others.observed}
-        gather = gathers.get(kernel.name)
+        gather = others.sums_of(kernel)
         body: list[ir.Statement] = [*self._outputs(ir.Storage.OBSERVABLE, kernel.roots)]
-        if kernel.name == "energy" and others.energy.names:
+        if kernel.role is Role.ENERGY and gather.names:
             shared, out = Symbol(symbols.GATHERED, "energy"), ir.Array(ir.Storage.OBSERVABLE, 0)
             body.insert(0, ir.real(shared, ir.Load(ir.Array(ir.Storage.SUM, 0))))
             body.append(ir.Store(out, _HALF * symbol(shared)))
-        gather = gather if gather and gather.names else None
-        return self._over_sites(kernel, ir.LoopRole.OBSERVABLE, ("params", "state", "sites", "out"), body, gather)
+        return self._over_sites(kernel, ("params", "state", "sites", "out"), body, gather if gather.names else None)
 
     def sums(self, ends: Ends) -> ir.Function:
         """Return the function that sums over the bonds of one kind, or over the pairs, of each site."""
@@ -78,18 +73,17 @@ class LatticeLoops:
         varied = "varied" in kernel.inputs or ends in self.step.others.varied.ends
         colour = source == "coef" and bool(self.step.by_colour)
         parameters = (source, "state", *["varied"] * varied, "sites", *["colour"] * colour)
-        return ir.Function(kernel.name, kernel.purpose, ir.LoopRole.GATHER, parameters, (*once, loop))
+        return ir.Function(kernel.name, kernel.purpose, kernel.role, parameters, (*once, loop))
 
     def transposed_sweep(self, sweep: Sweep, kernel: Kernel) -> ir.Function:
         """Return the transpose of a sweep, whose kernel is ``kernel``."""
         stores = self._cotangents(kernel, sweep.gather.names if sweep.gather else ())
-        role = ir.LoopRole.TRANSPOSED_SWEEP
-        return self._over_sites(kernel, role, ("coef",), stores, sweep.gather, self._selection(sweep))
+        return self._over_sites(kernel, ("coef",), stores, sweep.gather, self._selection(sweep))
 
     def transposed_stage(self, kernel: Kernel, gather: Gather | None) -> ir.Function:
         """Return the transpose of a kernel of the equation of a stage; ``gather`` has the sums that it reads."""
         stores = self._cotangents(kernel, gather.names if gather else ())
-        return self._over_sites(kernel, ir.LoopRole.TRANSPOSED_STAGE, ("coef",), stores, gather)
+        return self._over_sites(kernel, ("coef",), stores, gather)
 
     def recomputing(self, kernel: Kernel, sums: Sequence[str], fields: Sequence[str]) -> ir.Function:
         """Return the transpose of a sweep or of a stage.
@@ -98,7 +92,7 @@ class LatticeLoops:
         """
         once, reads = self._reads(kernel, sums)
         loop = ir.Loop("sites", (*reads, *self._cotangents(kernel, sums, fields)))
-        return ir.Function(kernel.name, kernel.purpose, ir.LoopRole.TRANSPOSED_SWEEP, ("coef",), (*once, loop))
+        return ir.Function(kernel.name, kernel.purpose, kernel.role, ("coef",), (*once, loop))
 
     def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
         """Return the transpose of the function that sums over bonds or pairs; ``kernel`` is the transposed kernel."""
@@ -106,7 +100,7 @@ class LatticeLoops:
         source = "params" if "params" in kernel.inputs else "coef"
         body = (*reads, *self._cotangents(kernel))
         loop = ir.Loop("bonds" if self.step.others.graph else "pairs", body, end=ends.end, chosen=ends.chosen)
-        return ir.Function(kernel.name, kernel.purpose, ir.LoopRole.TRANSPOSED_GATHER, (source,), (*once, loop))
+        return ir.Function(kernel.name, kernel.purpose, kernel.role, (source,), (*once, loop))
 
     def _cotangents(self, kernel: Kernel, sums: Sequence[str] = (), fields: Sequence[str] = ()) -> Iterator[ir.Update]:
         """Yield the stores of a transposed kernel, without zeros; ``fields`` are the fields that it recomputes."""
@@ -140,7 +134,6 @@ class LatticeLoops:
     def _over_sites(
         self,
         kernel: Kernel,
-        role: ir.LoopRole,
         parameters: tuple[str, ...],
         updates: Iterable[ir.Statement],
         gather: Gather | None,
@@ -149,7 +142,7 @@ class LatticeLoops:
         once, reads = self._reads(kernel, gather.names if gather else ())
         gathered = (ir.GatherSums(tuple(k.name for k in gather.kernels), len(gather.names)),) if gather else ()
         body = (*gathered, *once, ir.Loop("sites", (*reads, *updates), selection=selection))
-        return ir.Function(kernel.name, kernel.purpose, role, parameters, body)
+        return ir.Function(kernel.name, kernel.purpose, kernel.role, parameters, body)
 
     def _outputs(self, storage: ir.Storage, values: Sequence[Expression], *, adds: bool = False) -> list[ir.Store]:
         return [ir.Store(ir.Array(storage, k), e, adds) for k, e in enumerate(values)]

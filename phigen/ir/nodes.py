@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 
+from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
@@ -420,26 +421,16 @@ Block = tuple[Statement, ...]
 PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "out")
 
 
-class LoopRole(Enum):
-    """Purpose of a function of loops, as `phigen.scheme.kernel.Role` is the purpose of a kernel."""
-
-    SWEEP = auto()
-    TANGENT_SWEEP = auto()
-    STAGE = auto()  # a kernel of the equation of a stage
-    OBSERVABLE = auto()
-    GATHER = auto()  # sums over bonds or pairs
-    TRANSPOSED_SWEEP = auto()
-    TRANSPOSED_STAGE = auto()
-    TRANSPOSED_GATHER = auto()
-
-
 @dataclass(frozen=True)
 class Function:
-    """A function; ``doc`` is its purpose. On the level of sites its parameters are some of `PARAMETERS`."""
+    """A function; ``doc`` is its purpose, ``role`` that of its kernel.
+
+    On the level of sites its parameters are some of `PARAMETERS`.
+    """
 
     name: str
     doc: str
-    role: LoopRole
+    role: Role
     parameters: tuple[str, ...]
     body: Block
 

@@ -6,6 +6,7 @@ reach beyond an open end a sum takes none, as H does; an extreme leaves out the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -14,6 +15,7 @@ from phigen.lattice.cell import PAIRS, Cell
 from phigen.lattice.graphs import field_with_sums
 from phigen.lattice.site_kernels import site_kernel
 from phigen.lattice.site_parts import BondSum, present, summands_of
+from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.program import Observables
 from phigen.spec.names import ADDITIVE
 from phigen.symbolic.expression import ONE, Expression, call, number, symbol, total
@@ -31,13 +33,19 @@ def observables(cell: Cell, *, single: bool = False) -> Observables:
     fields = {name: e for name, e in cell.observables.items() if name not in cell.reductions}
     densities = [_density(cell, name, single=single) for name in cell.reductions]
     at_sites = [_within(cell, e) for e in fields.values()]
+
+    def kernel(role: Role, name: str, purpose: str, values: Sequence[Expression]) -> Kernel:
+        return site_kernel(cell, name, purpose, values, "out", role=role)
+
+    numbers = kernel(Role.OBSERVABLES, "observables", "the densities of the observables", densities)
+    sites = kernel(Role.SITE_OBSERVABLES, "observed_fields", "the observables of sites", at_sites)
     return Observables(
-        site_kernel(cell, "energy", "the density of the Hamiltonian", [density], "out"),
-        site_kernel(cell, "casimirs", "the densities of the Casimirs", casimirs, "out"),
-        site_kernel(cell, "vector_field", "pi grad H", field_with_sums(cell), "out"),
-        site_kernel(cell, "observables", "the densities of the observables", densities, "out") if densities else None,
+        kernel(Role.ENERGY, "energy", "the density of the Hamiltonian", [density]),
+        kernel(Role.CASIMIRS, "casimirs", "the densities of the Casimirs", casimirs),
+        kernel(Role.VECTOR_FIELD, "vector_field", "pi grad H", field_with_sums(cell)),
+        numbers if densities else None,
         tuple(cell.reductions.values()),
-        site_kernel(cell, "observed_fields", "the observables of sites", at_sites, "out") if fields else None,
+        sites if fields else None,
         tuple(fields),
     )
 

@@ -43,10 +43,11 @@ def _transposed_kernel(kernel: Kernel, coefficients: Coefficients) -> Kernel:
     table_input = {} if "params" in kernel.inputs else {TABLE: coefficients.table}
     (output,) = kernel.outputs
     variables = {array: kernel.inputs[array] for array in _DIFFERENTIATED_INPUTS if kernel.inputs.get(array)}
-    return pulled_back(
+    transpose = pulled_back(
         replace(kernel, inputs={**kernel.inputs, **table_input}),
         kernel.name + BACK,
         {f"{output.name}_bar": output.values},
         variables | table_input,
         "cotangents of all that is read, from those of what is found",
     )
+    return replace(transpose, role=kernel.role.transposed)

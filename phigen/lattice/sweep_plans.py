@@ -413,7 +413,11 @@ def _gather(
         verb = {"a": "begin", "b": "end"}.get(s.end)
         suffix, condition = (f"_{s.end}", f", by bonds that {verb} there") if verb else ("", "")
         ends.append(
-            Ends(site_kernel(cell, name + suffix, purpose + condition, values, "sums", coefficients), s.end, s.chosen)
+            Ends(
+                site_kernel(cell, name + suffix, purpose + condition, values, "sums", coefficients, Role.GATHER),
+                s.end,
+                s.chosen,
+            )
         )
     return Gather(tuple(ends), tuple(sums[0].values))
 

@@ -19,7 +19,7 @@ EXPONENTS = "exponents_bar"
 
 
 class Role(Enum):
-    """Purpose of a kernel at a site of a lattice, from which loops derive the arrays that they read and write."""
+    """Purpose of a kernel, and of the function with its loops, from which loops derive the arrays that they use."""
 
     OTHER = auto()
     SWEEP = auto()  # the increment of a state by a flow
@@ -30,6 +30,41 @@ class Role(Enum):
     OWN_SLOPE = auto()  # the part of SLOPE at the site itself, as a matrix
     SIDE = auto()  # the derivative of RELAX along a variation of x
     FOLLOW = auto()  # the derivative of ADVANCE along a variation of y
+    GATHER = auto()  # terms of sums over bonds or pairs
+    ENERGY = auto()  # the Hamiltonian, or its density
+    CASIMIRS = auto()
+    VECTOR_FIELD = auto()
+    OBSERVABLES = auto()  # observables that are numbers, or their densities
+    SITE_OBSERVABLES = auto()  # observables that are fields
+    TRANSPOSED_SWEEP = auto()
+    TRANSPOSED_RELAX = auto()
+    TRANSPOSED_ADVANCE = auto()
+    TRANSPOSED_GATHER = auto()
+
+    @property
+    def is_sweep(self) -> bool:
+        """Whether a kernel has the increments of a state, or of a variation."""
+        return self in (Role.SWEEP, Role.SWEEP_TANGENT)
+
+    @property
+    def is_stage(self) -> bool:
+        """Whether a kernel belongs to the equation of a stage."""
+        return self in (Role.RELAX, Role.ADVANCE, Role.OWN_SLOPE, *_OF_STARTS, *_OF_VARIATIONS) and not self.is_sweep
+
+    @property
+    def is_observable(self) -> bool:
+        """Whether a kernel computes observables, which are no part of a step."""
+        return self in (Role.ENERGY, Role.CASIMIRS, Role.VECTOR_FIELD, Role.OBSERVABLES, Role.SITE_OBSERVABLES)
+
+    @property
+    def is_transposed_stage(self) -> bool:
+        """Whether a kernel is the transpose of one of the equation of a stage."""
+        return self in (Role.TRANSPOSED_RELAX, Role.TRANSPOSED_ADVANCE)
+
+    @property
+    def transposed(self) -> Role:
+        """The role of the transpose. Raises `KeyError` for roles without one."""
+        return Role[f"TRANSPOSED_{self.name}"]
 
 
 #: Kernels that read the start of a stage, and those that read variations.

@@ -19,7 +19,7 @@ from phigen.scheme.elimination import (
     transposed_elimination,
 )
 from phigen.scheme.generating import GeneratingFunction
-from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.program import Observables
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.step import at_momenta, explicit_increment, explicit_order, linearise
@@ -257,9 +257,10 @@ def observables(system: System) -> Observables:
     inputs, timeless = system_inputs(system), {"params": system.parameter_names, "x": system.coordinates}
     field, listed = system.vector_field(), tuple(system.observables.values())
     named = Kernel("observables", "the observables", inputs, (Output("out", listed),)) if listed else None
+    casimirs = tuple(system.casimirs.values())
     return Observables(
         Kernel("energy", "the Hamiltonian", inputs, (Output("energy", (system.hamiltonian,)),)),
-        Kernel("casimirs", "the Casimirs", timeless, (Output("out", tuple(system.casimirs.values())),)),
+        Kernel("casimirs", "the Casimirs", timeless, (Output("out", casimirs),), role=Role.CASIMIRS),
         Kernel("vector_field", "pi(x) grad H(x)", inputs, (Output("out", field),)),
         named,
     )

@@ -499,6 +499,11 @@ class Partners:
     varied: Gather = Gather((), ())
     observed: Gather = Gather((), ())
 
+    def sums_of(self, kernel: Kernel) -> Gather:
+        """The sums that an observable reads; empty where it reads none."""
+        sums = {Role.ENERGY: self.energy, Role.VECTOR_FIELD: self.field, Role.OBSERVABLES: self.observed}
+        return sums.get(kernel.role, Gather((), ()))
+
     @property
     def gathers(self) -> tuple[Gather, ...]:
         """All sums, including empty ones."""

@@ -12,6 +12,7 @@ from phigen.ir.passes.by_tables import by_tables
 from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries
 from phigen.ir.passes.whole_arrays import WholeArrays, identical
+from phigen.scheme.kernel import Role
 from phigen.scheme.steps import Sweeps
 from phigen.spec import loads
 from phigen.symbolic.expression import call, symbol
@@ -19,7 +20,7 @@ from phigen.symbolic.expression import call, symbol
 Q, P = ir.Array(ir.Storage.STATE, 0, "q"), ir.Array(ir.Storage.STATE, 1, "p")
 
 
-def sweep(*body: ir.Statement, role: ir.LoopRole = ir.LoopRole.SWEEP) -> ir.Function:
+def sweep(*body: ir.Statement, role: Role = Role.SWEEP) -> ir.Function:
     return ir.Function("sweep", "a sweep", role, ("coef",), (ir.Loop("sites", body),))
 
 
@@ -62,7 +63,7 @@ def test_simultaneous_changes_are_computed_before_any_is_made() -> None:
             x[q] += change0
             x[p] += change1
         """)  # fmt: skip
-    one, other_role = sweep(ir.Store(Q, symbol("p"))), sweep(*before.body[0].body, role=ir.LoopRole.STAGE)
+    one, other_role = sweep(ir.Store(Q, symbol("p"))), sweep(*before.body[0].body, role=Role.ADVANCE)
     assert simultaneous(one) == one
     assert simultaneous(other_role) == other_role
 
@@ -143,8 +144,8 @@ def test_sums_over_all_bonds_are_one_function_of_whole_arrays() -> None:
 
 
 def test_sweeps_that_differ_in_their_colour_share_a_function() -> None:
-    one = ir.Function("one", "", ir.LoopRole.SWEEP, ("x", "colour=0"), (ir.Return(ir.fixed("x")),))
-    other = ir.Function("other", "", ir.LoopRole.SWEEP, ("x", "colour=1"), one.body)
+    one = ir.Function("one", "", Role.SWEEP, ("x", "colour=0"), (ir.Return(ir.fixed("x")),))
+    other = ir.Function("other", "", Role.SWEEP, ("x", "colour=1"), one.body)
     first, second = identical([one, other])
     assert first == one
     expect(second, """

@@ -10,6 +10,7 @@ from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.passes import row_loops, row_transposes
 from phigen.ir.passes.by_rows import RowLayout
+from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import symbol
 from phigen.symbolic.symbols import Symbol, coefficient
 
@@ -18,7 +19,7 @@ SEED = Symbol("change_bar", 0)
 Q_READ, NEXT = ir.real("q", ir.Load(Q, (0,))), ir.real("q[i+1]", ir.Load(Q, (1,)))
 
 
-def built(role: ir.LoopRole, *body: ir.Statement, once: tuple[ir.Statement, ...] = ()) -> ir.Function:
+def built(role: Role, *body: ir.Statement, once: tuple[ir.Statement, ...] = ()) -> ir.Function:
     return ir.Function("f", "", role, ("coef",), (*once, ir.Loop("sites", body)))
 
 
@@ -28,14 +29,14 @@ def rows(loops: LatticeLoops) -> RowLayout:
 
 
 def expect(body: ir.Block, expected: str) -> None:
-    function = ir.Function("f", "", ir.LoopRole.SWEEP, (), body)
+    function = ir.Function("f", "", Role.SWEEP, (), body)
     assert text(function).splitlines()[1:] == [f"  {line}" for line in dedent(expected).strip().splitlines()]
 
 
 def test_a_sweep_reads_neighbours_in_place_and_adds_to_what_it_has_read() -> None:
     once = (ir.real(coefficient(0), ir.Coefficient(0)),)
     change = ir.Store(Q, symbol(coefficient(0)) * symbol("q[i+1]"))
-    function = built(ir.LoopRole.SWEEP, Q_READ, NEXT, change, once=once)
+    function = built(Role.SWEEP, Q_READ, NEXT, change, once=once)
     expect(row_loops.sweep(function, rows(lattice("fput")), None), """
         real c:0 := c0
         real q[i+1] := q_row[(i + 1)]
@@ -48,7 +49,7 @@ def test_a_sweep_reads_neighbours_in_place_and_adds_to_what_it_has_read() -> Non
 
 
 def test_a_compensated_sweep_carries_what_rounding_leaves_out() -> None:
-    function = built(ir.LoopRole.SWEEP, ir.Store(P, symbol("h")))
+    function = built(Role.SWEEP, ir.Store(P, symbol("h")))
     expect(row_loops.sweep(function, rows(lattice("fput")), None, compensated=True), """
         Discard
         pointer carry:p = row.s.carry[1]
@@ -61,7 +62,7 @@ def test_a_compensated_sweep_carries_what_rounding_leaves_out() -> None:
 
 
 def test_a_sweep_of_one_colour_steps_from_one_of_its_sites_to_the_next() -> None:
-    function = built(ir.LoopRole.SWEEP, ir.Store(ir.Array(ir.Storage.STATE, 0, "a"), symbol("h")))
+    function = built(Role.SWEEP, ir.Store(ir.Array(ir.Storage.STATE, 0, "a"), symbol("h")))
     body = row_loops.sweep(function, rows(lattice("volterra")), ir.Constant(1))
     assert text(replace(function, body=body)).splitlines()[-2] == "  row i in first(row, 1, row.from)..row.to by 2:"
 
@@ -90,7 +91,7 @@ def test_sums_over_bonds_pass_over_those_without_a_site_of_the_colour() -> None:
 def transpose(*body: ir.Statement) -> row_transposes.Transpose:
     seed = ir.real(SEED, ir.Load(ir.Array(ir.Storage.SEED, 0, "change_bar")))
     handed = (row_transposes.Handed(0, 0, (1,)),)
-    return row_transposes.Transpose(built(ir.LoopRole.TRANSPOSED_SWEEP, seed, *body), "change_bar", (1,), handed)
+    return row_transposes.Transpose(built(Role.TRANSPOSED_SWEEP, seed, *body), "change_bar", (1,), handed)
 
 
 def test_cotangents_of_neighbours_are_handed_over() -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.walk import names_in, statements
+from phigen.scheme.kernel import Role
 from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
 
 SITE, OTHER, NUMBER, SITES, COUNT, COLOUR = (ir.fixed(name) for name in ("i", "j", "k", "sites", "count", "colour"))
@@ -58,7 +59,8 @@ class _Tables:
 
     def _gather_sums(self, s: ir.GatherSums) -> Iterator[ir.Statement]:
         others = [p for p in self.function.parameters if p not in ("coef", "params", "start", "out")]
-        source = self.params if self.function.role in (ir.LoopRole.STAGE, ir.LoopRole.OBSERVABLE) else ir.fixed("coef")
+        role = self.function.role
+        source = self.params if role.is_stage or role.is_observable else ir.fixed("coef")
         yield ir.Call("fill", (ir.Constant(0),), ir.Member(SITES, "sums"))
         yield from (ir.Call(name, (source, *map(ir.fixed, others))) for name in s.functions)
 
@@ -125,7 +127,7 @@ class _Tables:
         fields, increments = self.lattice.program.coordinates, self.lattice.step.sites.increments
         if array.storage is not ir.Storage.STATE or array.name in fields:
             whole = ir.fixed(_ARRAYS.get(array.storage, "out"))
-            sums = array.storage is ir.Storage.SUM and self.function.role is not ir.LoopRole.GATHER
+            sums = array.storage is ir.Storage.SUM and self.function.role is not Role.GATHER
             return ir.Entry(ir.Member(SITES, "sums") if sums else whole, _of_field(site, array.number))
         if array.name in increments:
             increments_array = self._hoisted(Symbol("at", "dw"), ir.Member(SITES, "dw"))

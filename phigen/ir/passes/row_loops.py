@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from phigen.ir import nodes as ir
-from phigen.ir.nodes import LoopRole
 from phigen.ir.passes.by_rows import (
     AT_BONDS,
     BOND,
@@ -25,6 +24,7 @@ from phigen.ir.passes.by_rows import (
     over_sites,
     together,
 )  # fmt: skip
+from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import ZERO as NOTHING
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
@@ -38,7 +38,7 @@ SITES: ir.Value = ir.Cast(ir.Member(SOLVER, "sites"))
 
 def sweep(function: ir.Function, layout: RowLayout, swept: ir.Value | None, *, compensated: bool = False) -> ir.Block:
     """Return the statements of a sweep; a coloured one updates the sites of the colour ``swept``."""
-    loop, tangent = lowered(function), function.role is LoopRole.TANGENT_SWEEP
+    loop, tangent = lowered(function), function.role is Role.SWEEP_TANGENT
     stores = [s for s in loop.body if isinstance(s, ir.Store)]
     updated = frozenset(s.array.name for s in stores) if not tangent else frozenset[str]()
     rows = RowDeclarations(layout, Reading(updated)).read((*function.body, *loop.body))

@@ -11,7 +11,7 @@ from phigen.ir.walk import map_blocks
 
 def simultaneous(function: ir.Function) -> ir.Function:
     """Return a sweep with a name for each increment, if there are several; other functions unchanged."""
-    if function.role not in (ir.LoopRole.SWEEP, ir.LoopRole.TANGENT_SWEEP):
+    if not function.role.is_sweep:
         return function
 
     def change(body: ir.Block) -> Iterator[ir.Statement]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
-from phigen.ir.nodes import LoopRole, Storage
+from phigen.ir.nodes import Storage
+from phigen.scheme.kernel import Role
 from phigen.symbolic.symbols import HERE
 
 X, V, SITES, NP, BAR, COLOUR, BOND, SUMS, MOVED, OUT, AXIS = (
@@ -45,7 +46,7 @@ class WholeArrays:
 
     def sweep(self, function: ir.Function) -> ir.Function:
         """Return a sweep as a function from a state, or from its variation, to the next."""
-        loop, array = _loop(function), V if function.role is LoopRole.TANGENT_SWEEP else X
+        loop, array = _loop(function), V if function.role is Role.SWEEP_TANGENT else X
         body = [*_unless_beside(loop, array), *self._sums(function), *self._reads(function), *_copied(MOVED, array)]
         for s in _stores(loop):
             old = ir.Entry(array, ir.Constant(s.array.number))
@@ -183,8 +184,8 @@ class WholeArrays:
 
     def _sums_value(self, function: ir.Function, s: ir.GatherSums) -> ir.Value:
         varied = (V,) if "varied" in function.parameters else ()
-        source: ir.Value = ir.fixed("parameters" if function.role is LoopRole.OBSERVABLE else "coef")
-        if function.role in (LoopRole.STAGE, LoopRole.TRANSPOSED_STAGE):
+        source: ir.Value = ir.fixed("parameters" if function.role.is_observable else "coef")
+        if function.role.is_stage or function.role.is_transposed_stage:
             source = ir.Member(SITES, "parameters")
         return ir.Called(f"_{sums_name(s.functions[0])}", (source, X, *varied, SITES))
 
@@ -225,7 +226,7 @@ class WholeArrays:
             case ir.OnSeam(_, colour, offset):
                 return ir.Called("begins", (ir.fixed("window"), *map(ir.Constant, (colour, *offset))), SITES)
             case ir.Load(array, offset, end):
-                if function.role is LoopRole.OBSERVABLE and array.storage is Storage.SUM and function.name == "energy":
+                if function.role is Role.ENERGY and array.storage is Storage.SUM:
                     return next(self._sums_value(function, s) for s in function.body if isinstance(s, ir.GatherSums))
                 return self._load(array, offset, end)
         return value

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from phigen.lanes.lane_functions import LANE_FORMULAS, LANE_FUNCTIONS
-from phigen.scheme.kernel import EXPONENTS, SCALARS, Kernel
+from phigen.scheme.kernel import EXPONENTS, SCALARS, Kernel, Role
 from phigen.scheme.lowering import Assignment
 from phigen.scheme.program import Program
 from phigen.symbolic import functions as elementary
@@ -209,7 +209,7 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
     arguments += ["int own"] if form.alike else []
     for o in () if form.returning else kernel.outputs:
         # The caller of NAME_casimirs sizes the array by NAME_CASIMIRS, which may be 0.
-        length = "" if form.exported and kernel.name == "casimirs" else f"{qualifier}{max(1, len(o.values))}"
+        length = "" if form.exported and kernel.role is Role.CASIMIRS else f"{qualifier}{max(1, len(o.values))}"
         arguments.append(f"{form.number(program, o.name)} {o.name}[{length}]")
     if form.workspace:
         arguments.append(f"{form.number(program, 'work')} work[restrict {form.workspace}]")

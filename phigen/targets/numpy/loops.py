@@ -5,32 +5,37 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from phigen.ir import nodes as ir
-from phigen.ir.nodes import LoopRole
+from phigen.scheme.kernel import Role
 from phigen.targets.numpy.language import LANGUAGE
 from phigen.targets.spelling import Dialect, Spelling
 
 #: Identifiers that lowered functions of each role use, which names of users make way for.
 _ALWAYS = {"coef", "x", "sites", "parameters", "h", "kick", "np", *LANGUAGE.functions.values()}
 _BONDS = {"here", "there", "bond", "gathered"}
-_SWEEPS = {"v", "moved", "gathered", "colour", "window"}
 _TRANSPOSED = {"start", "bar", "own", "coef_bar", *_BONDS}
 _RESERVED = {
-    LoopRole.SWEEP: _SWEEPS,
-    LoopRole.TANGENT_SWEEP: _SWEEPS,
-    LoopRole.STAGE: {"start", "gathered", "v"},
-    LoopRole.OBSERVABLE: {"out", "gathered"},
-    LoopRole.GATHER: {"v", "sums", *_BONDS},
-    LoopRole.TRANSPOSED_SWEEP: {"change_bar", "colour", "window", *_TRANSPOSED},
-    LoopRole.TRANSPOSED_STAGE: {"start_bar", *_TRANSPOSED},
-    LoopRole.TRANSPOSED_GATHER: {"gathered_bar", "sums_bar", *_TRANSPOSED},
+    Role.GATHER: {"v", "sums", *_BONDS},
+    Role.TRANSPOSED_SWEEP: {"change_bar", "colour", "window", *_TRANSPOSED},
+    Role.TRANSPOSED_GATHER: {"gathered_bar", "sums_bar", *_TRANSPOSED},
 }
+
+
+def _reserved(role: Role) -> set[str]:
+    if role.is_sweep:
+        return {"v", "moved", "gathered", "colour", "window"}
+    if role.is_stage:
+        return {"start", "gathered", "v"}
+    if role.is_observable:
+        return {"out", "gathered"}
+    return {"start_bar", *_TRANSPOSED} if role.is_transposed_stage else _RESERVED[role]
+
 
 DIALECT = Dialect(LANGUAGE, operators={"not": "not "}, select="np.where({0}, {1}, {2})")
 
 
 def function(lowered: ir.Function) -> str:
     """Return the text of a function on whole arrays."""
-    spelling = Spelling(DIALECT, _ALWAYS | _RESERVED[lowered.role] | {*lowered.parameters}, lowered.body)
+    spelling = Spelling(DIALECT, _ALWAYS | _reserved(lowered.role) | {*lowered.parameters}, lowered.body)
     lines = [line for s in lowered.body for line in _statement(s, spelling, "    ")]
     return "\n".join([f"def _{lowered.name}({', '.join(lowered.parameters)}):", *lines, ""])
 

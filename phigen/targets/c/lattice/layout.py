@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 from phigen.ir.lattice_loops import LatticeLoops, begins, weights
 from phigen.ir.passes.by_rows import RowLayout
-from phigen.scheme.kernel import Kernel
+from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
-from phigen.scheme.steps import BACK, Gather, Partners, Sweep, Sweeps
+from phigen.scheme.steps import Gather, Partners, Sweep, Sweeps
 from phigen.scheme.sweep_inverse import can_recompute_fields, once, transposes
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
@@ -251,5 +251,5 @@ def givers(step: Sweeps) -> bool:
 
 def starts_are_read(step: Sweeps) -> bool:
     """Whether the transpose of a stage reads x at its start, beside y."""
-    relax = next((k for k in step.adjoint.steps if k.name == "relax" + BACK), None) if step.adjoint else None
+    relax = next((k for k in step.adjoint.steps if k.role is Role.TRANSPOSED_RELAX), None) if step.adjoint else None
     return relax is not None and not {*relax.inputs.get("start", ())}.isdisjoint(symbols_of(*relax.roots))

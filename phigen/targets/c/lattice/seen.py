@@ -5,9 +5,8 @@ from __future__ import annotations
 from phigen.ir import nodes as ir
 from phigen.ir.passes import row_loops
 from phigen.ir.passes.temporaries import temporaries
-from phigen.scheme.kernel import Kernel
+from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Gather
 from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.c.lattice.loops import seen_calls
@@ -31,9 +30,7 @@ def seen_loop(program: Program, layout: Layout, kernel: Kernel) -> str:
 
     What bonds or pairs add is summed before, or at each site where nothing else needs these sums.
     """
-    partners = layout.partners
-    gathers = {"energy": partners.energy, "vector_field": partners.field, "observables": partners.observed}
-    gather, several = gathers.get(kernel.name, Gather((), ())), kernel.name == "observables"
+    gather, several = layout.partners.sums_of(kernel), kernel.role is Role.OBSERVABLES
     apart = ir.Constant(share(kernel)) if several else row_loops.SITES
     built, rows, meant = temporaries(layout.loops(program).observable(kernel)), layout.rows(program), over_ends(gather)
     if meant and layout.sums_up:
