@@ -299,6 +299,12 @@ class CompiledSplitting(_CompiledSystem):
     splitting: Splitting
 
     @property
+    def symmetric(self) -> bool:
+        """Whether a step of −h undoes one of h; a corrector of −h is not that of h, but for terms of order ε²."""
+        schedule = self.program.step.flow_schedule
+        return schedule is None or len(schedule.end) < 2
+
+    @property
     def scheme_name(self) -> str:
         """The scheme, as in specs."""
         return "splitting"

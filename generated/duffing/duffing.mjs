@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 39ed93d1aba9d233d68412ac5a6fae3be00c71f8907facdaa320292dec7e2465
+ * body-sha256: 9471c0ca048d3338820501fbab2f02d0b64aa3ac798f8b57cc29ab1f01b0a150
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -225,12 +225,12 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
-function march(solver, h, count) {
+/** Steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
   }
-  for (let k = 0; k < count; k++) solver.step(h);
+  for (let k = 0; k < count; k++) makeStep();
   return solver;
 }
 

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b2b0d28fda2984fa2d429a9f87090a49a30e2892a6ce325901f875ecebe4c62b
+ * body-sha256: 740ba57a3a54c456489aa75ec7726ff3f57b9be63e21cae0d82cd4cda77ff988
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -114,12 +114,12 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
-function march(solver, h, count) {
+/** Steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
   }
-  for (let k = 0; k < count; k++) solver.step(h);
+  for (let k = 0; k < count; k++) makeStep();
   return solver;
 }
 

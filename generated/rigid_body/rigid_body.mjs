@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0222ebc14373b74e8a0f513e9ba52dd753f9f17e82bc20365fadf29676e2e452
+ * body-sha256: 40c37c37a43ead83cb05c7df5737e7cf993b1d76d6ff254d63ccc37c02af5941
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -526,12 +526,12 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
-function march(solver, h, count) {
+/** Steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
   }
-  for (let k = 0; k < count; k++) solver.step(h);
+  for (let k = 0; k < count; k++) makeStep();
   return solver;
 }
 

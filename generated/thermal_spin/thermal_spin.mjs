@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2cec8b54bd50651d88b2b4b55a9b1a83480843fc97be762097acd369adfa8a8f
+ * body-sha256: ffe9b2bf317f6fd1ea65e0bf86db025b9db61d14ea5e2a7a579e09749ef021d0
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -320,12 +320,12 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
-function march(solver, h, count) {
+/** Steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
   }
-  for (let k = 0; k < count; k++) solver.step(h);
+  for (let k = 0; k < count; k++) makeStep();
   return solver;
 }
 

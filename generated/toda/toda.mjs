@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0f442f1af0ae5bd4b5bf42dc93b583038a1a1e5aef00888049f4d05f28868fce
+ * body-sha256: c53ebbe8186f1b76beb65a708b551ed0cbb0ea6d96ed49236d11ab4e80c40552
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -175,12 +175,12 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
-function march(solver, h, count) {
+/** Steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
   }
-  for (let k = 0; k < count; k++) solver.step(h);
+  for (let k = 0; k < count; k++) makeStep();
   return solver;
 }
 

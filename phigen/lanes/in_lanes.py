@@ -328,6 +328,8 @@ def _packs(program: Program, kernels: Sequence[Kernel], small_argument: tuple[st
     """Return packs, if all members have the same coefficients and every function has a vector version."""
     ops = operations(kernels)
     states = 2 * PACKS_PER_GROUP * LANES * 3 * program.dimension
+    if program.step.corrected:
+        return None  # members of a pack begin and end their runs at different steps
     if program.held or library_calls(ops) or library_powers(kernels) or _DOUBLE * states > MAX_STACK_BYTES:
         return None
     return Packs(tuple(kernels), with_formulas(ops), small_argument)

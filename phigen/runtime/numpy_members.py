@@ -55,22 +55,50 @@ class MemberBatch:
             still = module._identity(len(members))
             self._rate, self._turned = module._rates(values, self.x, gauge), (still, np.zeros_like(still))
             self.turned = first.copy()
+        self._before, self._running = self.x, False
         self._select_settings()
 
     def advance(self, steps: int) -> None:
         """Make ``steps`` steps. A step in which members fail is repeated without them."""
         with np.errstate(all="ignore"):
+            self._begin_run(steps)
             while steps and len(self.who):
                 failed = self._step()
                 if failed:
                     self._leave(failed)
                 else:
                     steps -= 1
+            self._end_run()
         self._report()
+
+    def _begin_run(self, steps: int) -> None:
+        """Follow the flows of a corrector before steps."""
+        if hasattr(self._module, "_followed") and steps and len(self.who):
+            self._before = self.x
+            self.x, self._carry = self._module._followed(self._module.BEGIN, self._stages[0], self.x, self._carry)
+            self._running = True
+
+    def _end_run(self) -> None:
+        """Follow those after steps. Members that they lead nowhere failed, and are as before the run."""
+        if not self._running:
+            return
+        x, carry = self._state()
+        lost = np.flatnonzero(~np.isfinite(x).all(axis=-1))
+        self.x, self._carry, self._running = np.where(np.isfinite(x), x, self._before), carry, False
+        if len(lost):
+            self._leave(dict.fromkeys(lost.tolist(), "NOT_FINITE"))
+
+    def _state(self) -> tuple[Floats, Floats]:
+        """The states of those who are left, and the compensation terms, inside a run too."""
+        if not self._running:
+            return self.x, self._carry
+        end: tuple[Floats, Floats] = self._module._followed(self._module.END, self._stages[0], self.x, self._carry)
+        return end
 
     def _report(self) -> None:
         """Copy states and attitudes of the remaining members to ``final`` and ``turned``."""
-        self.final[self.who] = self.x
+        x, _ = self._state()
+        self.final[self.who] = np.where(np.isfinite(x), x, self._before) if self._running else x
         if self._first is not None:
             elapsed = self._done * self._h
             elapsed = elapsed[:, np.newaxis] if np.ndim(elapsed) else elapsed
@@ -116,6 +144,7 @@ class MemberBatch:
         self.failures |= {int(self.who[m]): status for m, status in failed.items()}
         self.failed_at = self._done if self.failed_at < 0 else self.failed_at
         self.who, self.x, self._carry = self.who[remaining], self.x[remaining], self._carry[remaining]
+        self._before = self._before[remaining]
         self._memory = [(a[remaining], b[remaining]) for a, b in self._memory]
         self._stages = [self._module._stage_at(stage, remaining) for stage in self._stages]
         if self._first is not None:

@@ -153,8 +153,40 @@ class NumpySession:
         """See `Session`."""
         self._prepare(h)
         with np.errstate(all="ignore"):
-            for _ in range(steps):
-                self._commit(*self._tried())
+            if hasattr(self._module, "_followed") and steps:
+                self._run_corrected(steps)
+            else:
+                self._make(steps)
+
+    def _make(self, steps: int) -> None:
+        for _ in range(steps):
+            self._commit(*self._tried())
+
+    def _run_corrected(self, steps: int) -> None:
+        """Make steps between correctors. Without a good step, or where a corrector fails, the state is as before."""
+        start, status = (self._x, self._carry, self.steps), ""
+        try:
+            self._follow("BEGIN")
+            self._make(steps)
+        except BackendError as error:
+            status = error.status
+        if self.steps > start[2]:
+            try:
+                self._follow("END")
+            except BackendError as error:
+                self._x, self._carry, self.steps = start
+                status = status or error.status
+        else:
+            self._x, self._carry, _ = start
+        if status:
+            raise BackendError(status, self.steps, self._x.copy())
+
+    def _follow(self, flows: str) -> None:
+        """Follow the flows of a corrector."""
+        x, carry = self._module._followed(getattr(self._module, flows), self._stages[0], self._x, self._carry)
+        if not np.isfinite(x).all():
+            raise BackendError("NOT_FINITE", self.steps, self._x.copy())
+        self._x, self._carry = x, carry
 
     def advance_along(self, h: float, increments: Floats) -> None:
         """See `Session`."""
@@ -176,7 +208,10 @@ class NumpySession:
                 if not (converged.all() and np.isfinite(stage).all()):
                     raise BackendError("NO_CONVERGENCE", self.steps, self._x.copy())
                 tangent = stage[0] @ tangent
-        self._commit(x, carry, memory, stages)
+        if hasattr(self._module, "_followed"):
+            self.advance(h, 1)  # the stage is differentiated along a whole run, from its beginning
+        else:
+            self._commit(x, carry, memory, stages)
         return tangent
 
     def branch(self) -> NumpySession:

@@ -89,6 +89,8 @@ class Schedule:
     The pattern lists parts with the row of ``times`` of each, counted from the first row of the stage. Kicks with
     modified potential have a multiple in units of h² each: ``multiples`` by row, 0 for other flows. Where H depends
     on the time, ``moments`` has for each row the fraction of the step at which the time stands still.
+
+    A run begins and ends with the flows ``begin`` and ``end``, whose rows follow those of the step: a corrector.
     """
 
     times: tuple[float, ...]
@@ -96,17 +98,25 @@ class Schedule:
     pattern: tuple[tuple[int, int], ...]
     multiples: tuple[float, ...] = ()
     moments: tuple[float, ...] = ()
+    begin: tuple[tuple[int, int], ...] = ()
+    end: tuple[tuple[int, int], ...] = ()
 
     @property
     def rows(self) -> int:
         """Rows of ``times`` in one stage."""
-        return (len(self.times) - 1) // self.stages if self.stages else 0
+        of_step = len(self.times) - len(self.begin) - len(self.end)
+        return (of_step - 1) // self.stages if self.stages else 0
 
     @property
     def flows(self) -> list[tuple[int, int]]:
         """All flows of a step in order: part and row of ``times``."""
         later = [(part, 1 + k * self.rows + row) for k in range(self.stages) for part, row in self.pattern]
         return [(0, 0), *later]
+
+    @property
+    def flows_of_run(self) -> list[tuple[int, int]]:
+        """All flows of a run of one step, with its corrector."""
+        return [*self.begin, *self.flows, *self.end]
 
 
 def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:

@@ -18,7 +18,7 @@ from phigen.geometry.system import System
 from phigen.scheme import alternation, near_integrable, nystrom
 from phigen.scheme.alternation import Alternation, Schedule
 from phigen.scheme.lowering import cost
-from phigen.scheme.near_integrable import NearIntegrable
+from phigen.scheme.near_integrable import Corrected, NearIntegrable
 from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.order import Order
 from phigen.splitting.flow import Flow
@@ -51,7 +51,9 @@ class Choice:
         """Return the flows of a step."""
         count, method = len(self.splitting.flows), self.method
         if self.carrier is None:
-            return method.schedule() if isinstance(method, Nystrom) else alternation.schedule(method, count)
+            if isinstance(method, Nystrom | Corrected):
+                return method.schedule()
+            return alternation.schedule(method, count)
         parts = max(count, self.carrier + 1)
         flows = method.schedule() if isinstance(method, Nystrom) else alternation.schedule(method, parts)
         return alternation.with_clock(flows, self.carrier, count)
@@ -151,9 +153,15 @@ def planned(
 
 
 def _near_integrable(splitting: Splitting, order: Order, method: NearIntegrable) -> Choice:
-    """Return the choice of a method for H = A + εB, with the flow of A first."""
+    """Return the choice of a method for H = A + εB, with the flow of A first.
+
+    Between correctors, which begin and end with a flow of A, a step is a flow of B and one of A.
+    """
     assert splitting.small is not None
     large, small = splitting.flows[1 - splitting.small], splitting.flows[splitting.small]
+    if isinstance(method, Corrected):
+        why = f"H_1 is small, of size ε: errors {method.errors}"
+        return Choice(order, method, Splitting((small, large), small=0), why)
     why = f"H_2 is small, of size ε: errors {method.errors}"
     return Choice(order, method, Splitting((large, small), small=1), why)
 

@@ -23,7 +23,8 @@ from fractions import Fraction
 from itertools import pairwise
 
 from phigen.gauss.tableau import gauss_nodes
-from phigen.scheme.alternation import Alternation
+from phigen.scheme.alternation import Alternation, Schedule
+from phigen.scheme.corrector import corrector, schedule
 
 # The first halves of a and b with their middles, to 60 digits: zeros of the conditions by Newton's method.
 _8_4 = (
@@ -76,6 +77,17 @@ class NearIntegrable(Alternation):
         return " + ".join(f"{power} h^{m}" for power, m in zip(powers, self.generalised, strict=False))
 
 
+@dataclass(frozen=True)
+class Corrected(NearIntegrable):
+    """Steps of one flow of B and one of A, between a `corrector`, given by its times, and its inverse."""
+
+    corrector: tuple[Fraction, ...] = ()
+
+    def schedule(self) -> Schedule:
+        """Return the flows of a step, where part 0 is B, and those of the corrector."""
+        return schedule(self.corrector)
+
+
 def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[Fraction]) -> NearIntegrable:
     """Return the method with these fractions, which sum to 1."""
     times = [t for pair in zip(a, b, strict=False) for t in pair]
@@ -115,12 +127,20 @@ def _weight(nodes: list[Fraction], i: int) -> Fraction:
     return sum((x / (k + 1) for k, x in enumerate(p)), Fraction(0))
 
 
+def _wisdom_holman(order: int) -> Corrected:
+    """Return the method with the corrector of an order; 1 is that without a corrector."""
+    name = "wisdom-holman" if order == 1 else f"wisdom-holman-{order}"
+    half = Fraction(1, 2)
+    return Corrected(name, 2, (half, half), (order + 1, 2), (half, half), (Fraction(1),), corrector(order))
+
+
 #: All methods, the recommended one of each order first.
 METHODS = (
     _quadrature(4),
     _quadrature(2),
     _quadrature(3),
     _quadrature(5),
+    *(_wisdom_holman(order) for order in (1, 3, 5, 7, 11, 17)),
     _listed("aba-10-6-4", (10, 6, 4), 8, _10_6_4),
     _listed("aba-8-6-4", (8, 6, 4), 7, _8_6_4),
     _listed("aba-8-4", (8, 4), 5, _8_4),

@@ -20,6 +20,7 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import noise_fields, observables
 from phigen.scheme.logarithmic import Logarithmic, trimmed
 from phigen.scheme.lowering import operation_counts
+from phigen.scheme.near_integrable import Corrected
 from phigen.scheme.noise import driven, expect_no_adjoint, noise_facts, with_noise
 from phigen.scheme.program import About, Noise, Program
 from phigen.scheme.staging import Coefficients
@@ -47,6 +48,8 @@ def build_splitting(
     """Return the explicit solver as a program. Raises `LimitError` if a kernel is too large."""
     extras = spec.extras
     _expect_no_modified(system, extras)
+    if isinstance(choice.method, Corrected):
+        _expect_correctable(system, spec, choice.method)
     sources = driven(system)
     if sources:
         expect_no_adjoint(system, extras.adjoint)
@@ -143,6 +146,7 @@ def _step(
 def facts(choice: Choice, step: Splitting, sources: int = 0) -> list[str]:
     """Return the lines of the header on the method; the first parts are ``sources`` of noise."""
     count, flows, method = len(step.flows) - sources, len(step.schedule.flows) - 2 * sources, choice.method
+    further = f", {len(step.schedule.begin)} more before and after a run" * bool(step.schedule.begin)
     if count == 1 and choice.carrier is None:
         return ["scheme: the exact flow of H, which is elementary", f"step: {step.kind.manner}"]
     names = [(f"{flow.letter}_{k}", flow.force) for k, flow in enumerate(choice.splitting.flows, 1)]
@@ -150,7 +154,7 @@ def facts(choice: Choice, step: Splitting, sources: int = 0) -> list[str]:
     why = f", since {choice.why}" if choice.why else ""
     return [
         f"scheme: splitting, H = {parts}" + f", forces {forces}" * bool(forces) + ", with the exact flow of each",
-        f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{why}",
+        f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{further}{why}",
         f"step: {step.kind.manner}",
     ]
 
@@ -196,6 +200,24 @@ def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic |
                 "scheme: series takes a monitor with every H",
             )
             raise SpecError([diagnostic])
+
+
+def _expect_correctable(system: System, spec: Spec, method: Corrected) -> None:
+    """`SpecError` for what does not go with a corrector: values that belong to a step between those of a run."""
+    refused = {
+        "time": (bool(system.time), "the corrector would need its own times"),
+        "noise": (bool(system.noise), "the corrector would undo random increments"),
+        "forces": (system.forces is not None, "the corrector would undo dissipation"),
+        "monitor": (spec.monitor is not None, "the corrector takes equal steps of the physical time"),
+        "reconstruct": (bool(spec.reconstruct), "attitudes are those of single steps"),
+        "adjoint": (spec.extras.adjoint, "gradients are those of single steps"),
+    }
+    for key, (present, reason) in refused.items():
+        if present:
+            message = f"scheme splitting: composition {method.name} is not offered together with {key}: {reason}"
+            place = system.locations.get(("composition",)) or system.locations.get((key,))
+            hint = "composition: saba-8-2 at order 2 or aba-10-6-4 at order 4, which need no corrector"
+            raise SpecError([Diagnostic(message, place, hint)])
 
 
 def _expect_no_modified(system: System, extras: Extras) -> None:

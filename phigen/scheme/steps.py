@@ -168,6 +168,11 @@ class _Staged:
         """The number of coefficients of one stage."""
         return self.row
 
+    @property
+    def corrected(self) -> bool:
+        """Whether a run of steps begins and ends with a corrector."""
+        return self.flow_schedule is not None and bool(self.flow_schedule.begin)
+
 
 @dataclass(frozen=True)
 class InnerSolve:

@@ -36,6 +36,7 @@ FEATURES = (
     Feature("IMPLICIT", lambda p: p.step.kind.implicit),
     Feature("HISTORY", lambda p: p.step.kind.predicted),
     Feature("COMPOSED", lambda p: len(p.fractions) > 1),
+    Feature("CORRECTED", lambda p: p.step.corrected),
     Feature("KICKS", lambda p: p.step.multiples),
     Feature("TIMED", lambda p: p.time),
     Feature("NOISE", lambda p: p.noise),

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import groupby
 
 from phigen.lanes.lane_functions import SMALL_ARGUMENT_FUNCTIONS, operations
+from phigen.scheme.alternation import Schedule
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Adjoint, Splitting
@@ -20,7 +21,9 @@ def sizes(step: Splitting) -> list[tuple[str, int, str]]:
     """The constants of a splitting."""
     found = [("ROWS_OF_FLOWS", len(step.schedule.times), "times of flows in a step, each with its coefficients")]
     found.append(("ROW", max(1, step.row), "coefficients for one of them"))
-    return found + ([("FLOWS", len(step.schedule.flows), "in a step")] if step.tangents or step.adjoint else [])
+    flows = len(step.schedule.flows_of_run)
+    said = "in a run of one step" if step.schedule.begin else "in a step"
+    return found + ([("FLOWS", flows, said)] if step.tangents or step.adjoint else [])
 
 
 def printed(program: Program, step: Splitting) -> str:
@@ -39,7 +42,17 @@ def printed(program: Program, step: Splitting) -> str:
     passed = _moves(bool(program.attitude))
     kept = f", double (*kept)[{program.dimension}]" if step.adjoint else ""
     found.append(_steps(program, step, "", "static inline ", arguments + more + kept, passed, kept=bool(kept)))
+    found += [_corrector(program, step.schedule, along)] if step.schedule.begin else []
     return "\n".join(found)
+
+
+def _corrector(program: Program, schedule: Schedule, along: int) -> str:
+    """The flows before the first and after the last step of a run, in alternation."""
+    (outer, row), *others = schedule.begin
+    (_, last_row), *_ = schedule.end
+    inner = others[0][0] + 1 if others else 0
+    values = {"n": along, "outer": outer + 1, "inner": inner, "first": row, "last": last_row}
+    return render("c", "corrector.c", {"NAME": program.name, "count": len(schedule.begin), **values})
 
 
 def in_lanes(program: Program, step: Splitting, form: str, functions: Mapping[str, str]) -> list[str]:
@@ -57,7 +70,7 @@ def in_lanes(program: Program, step: Splitting, form: str, functions: Mapping[st
 
 def tangent(program: Program, step: Splitting) -> str:
     """The derivatives of the flows."""
-    count, flows, turned = len(step.flows), step.schedule.flows, bool(program.attitude)
+    count, flows, turned = len(step.flows), step.schedule.flows_of_run, bool(program.attitude)
     own = {
         "turned": turned,
         "moves": _moves(turned),

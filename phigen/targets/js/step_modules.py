@@ -95,6 +95,8 @@ def _schedule(step: Splitting, attitude: Attitude | None) -> list[str]:
         "times": json.dumps(schedule.times),
         "multiples": json.dumps(schedule.multiples) if schedule.multiples else "",
         "schedule": json.dumps(schedule.flows),
+        "begin": json.dumps(schedule.begin) if schedule.begin else "",
+        "end": json.dumps(schedule.end),
         "flows": _numbered("turn", attitude.turns) if attitude else _numbered("flow", step.flows),
         "tangents": _numbered("tangent", step.tangents),
     }

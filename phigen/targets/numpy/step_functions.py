@@ -153,6 +153,8 @@ def _splitting_values(step: Splitting) -> dict[str, object]:
         "multiples": listed(schedule.multiples),
         "row": step.row,
         "schedule": repr(tuple(schedule.flows)),
+        "begin": repr(schedule.begin),
+        "end": repr(schedule.end),
         "flows": ", ".join(f"_flow{k}" for k in numbers),
         "tangents": ", ".join(f"_tangent{k}" for k in numbers),
     }

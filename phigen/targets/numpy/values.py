@@ -33,10 +33,14 @@ def values_of(program: Program) -> dict[str, object]:
 
 
 def _of_fixed(program: Program) -> dict[str, object]:
-    """What a trajectory holds fixed, and steps in tau."""
+    """What a trajectory holds fixed, steps in tau, and runs between correctors."""
+    corrected = program.step.corrected
     return {
         "gauge": listed(program.held),
         "monitored": program.monitor is not None,
+        "corrected": corrected,
+        "state_of_run": "_followed(END, stages[0], x, carry)[0]" if corrected else "x",
+        "flows_of_run": "BEGIN + SCHEDULE + END" if corrected else "SCHEDULE",
         "said_of_tau": _OF_TAU * bool(program.monitor),
         "said_of_gauge": _OF_LEVEL if program.monitor else _OF_GAUGE,
         "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), PROBE_STEP" if program.held else "values, PROBE_STEP",

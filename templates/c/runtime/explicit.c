@@ -109,6 +109,29 @@ static phi_status phi_stages(phi_solver *s)
     return PHI_OK;
 }
 
+#if PHI_CORRECTED
+/* Bring the state to where the steps of a run move it, or after them back. If it fails, the state is as before. */
+static phi_status phi_correct(phi_solver *s, int after)
+{
+    double x[PHI_DIM], moved[PHI_DIM];
+    memcpy(x, s->x, sizeof x);
+    memcpy(moved, s->carry, sizeof moved);
+    phi_corrector(after, s->coef, x, moved, s->x);
+    if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
+    phi_settle(s->x, s->carry, moved);
+    return PHI_OK;
+}
+
+/* End a run that began at before: the status of its last step, or that of the corrector. Without a good step, or where
+   the corrector fails, the state is as before the run. */
+static phi_status phi_end_run(phi_solver *s, const phi_solver *before, phi_status status)
+{
+    const phi_status corrected = s->steps == before->steps ? PHI_OK : phi_correct(s, 1);
+    if (s->steps == before->steps || corrected != PHI_OK) *s = *before;
+    return status != PHI_OK ? status : corrected;
+}
+
+#endif
 #endif
 #endif
 #endif

@@ -159,6 +159,13 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
             phi_prepare(&s->params PHI_AND_GAUGE(s->gauge), PHI_FRACTION(h), PHI_OF(s->coef, stage));
 #include "state_reset.h"
     }
+#if PHI_CORRECTED
+    const phi_solver before = *s;
+    if (steps > 0) {
+        const phi_status status = phi_correct(s, 0);
+        if (status != PHI_OK) return status;
+    }
+#endif
     for (; steps > 0; --steps) {
 #if PHI_NOISE && PHI_ATTITUDE
         if (!phi_draw(s, dw)) {
@@ -191,7 +198,11 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_ATTITUDE && !PHI_BLOCKS
         if (status != PHI_OK) phi_read_attitude(s);
 #endif
+#if PHI_CORRECTED
+        if (status != PHI_OK) return phi_end_run(s, &before, status);
+#else
         if (status != PHI_OK) return status;
+#endif
 #endif
         ++s->steps;
 #if PHI_MONITOR
@@ -203,7 +214,11 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_ATTITUDE && !PHI_BLOCKS
     phi_read_attitude(s);
 #endif
+#if PHI_CORRECTED
+    return phi_end_run(s, &before, PHI_OK);
+#else
     return PHI_OK;
+#endif
 }
 
 #if PHI_BLOCKS && PHI_ATTITUDE

@@ -16,6 +16,9 @@ import { casimirs, energy, prepare, vectorField } from "./model.mjs";
 // #if SPLITTING
 import { TIMES } from "./model.mjs";
 // #endif
+// #if CORRECTED
+import { BEGIN, END } from "./model.mjs";
+// #endif
 // #if RENEWED
 import { MIDDLES, MOMENTS, PREPARED, refresh } from "./model.mjs";
 // #endif
@@ -306,6 +309,13 @@ export class Solver {
    * @returns {this}
    */
   step(h) {
+    // #if CORRECTED
+    return this.integrate(h, 1);
+  }
+
+  /** One step between correctors. Throws StepError; then the state is as before. */
+  #stepOfRun(h) {
+    // #endif
     this.#setStep(h);
     // #if NOISE
     const [, dw] = arguments;
@@ -356,9 +366,34 @@ export class Solver {
    */
   integrate(h, count) {
     this.#setStep(h);
+    // #if CORRECTED
+    const { steps, t } = this;
+    const before = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry), steps, t };
+    const begun = count > 0 ? makeStage(this, 0, BEGIN) : "OK";
+    if (begun !== "OK") throw new StepError(begun, this.steps);
+    try {
+      march(this, h, count, () => this.#stepOfRun(h));
+    } finally {
+      this.#endRun(before);
+    }
+    return this;
+    // #else
     return march(this, h, count);
+    // #endif
   }
 
+  // #if CORRECTED
+  /** End a run. StepError where the corrector fails; then, or without a step, the state is as before. */
+  #endRun(before) {
+    const status = this.steps > before.steps ? makeStage(this, 0, END) : "";
+    if (status === "OK") return;
+    this.x.set(before.x);
+    this.carry.set(before.carry);
+    Object.assign(this, { steps: before.steps, t: before.t });
+    if (status) throw new StepError(status, this.steps);
+  }
+
+  // #endif
   /**
    * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
    *

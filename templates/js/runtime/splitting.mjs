@@ -35,8 +35,8 @@ let elementOfStep = new Float64Array(ELEMENT);
 let elementAfter = new Float64Array(ELEMENT);
 // #endif
 
-/** One step: a status. If it fails, the state is as before. */
-export function makeStage(solver) {
+/** The flows of one step, or those of a corrector: a status. If it fails, the state is as before. */
+export function makeStage(solver, _, flows = SCHEDULE) {
   const { x, carry } = solver;
   const [rows] = solver.coef;
   at.set(x);
@@ -47,7 +47,7 @@ export function makeStage(solver) {
   // #if ATTITUDE
   elementOfStep.fill(0);
   // #endif
-  for (const [part, row] of SCHEDULE) {
+  for (const [part, row] of flows) {
     // #if ATTITUDE
     FLOWS[part](rows[row], at, elementOfStep, change, elementAfter);
     [elementOfStep, elementAfter] = [elementAfter, elementOfStep];

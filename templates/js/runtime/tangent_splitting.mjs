@@ -1,7 +1,19 @@
 import { DIM, FLOWS, SCHEDULE, TANGENTS } from "./model.mjs";
+// #if CORRECTED
+import { BEGIN, END } from "./model.mjs";
+// #endif
 import { identity, multiplied } from "./tangent.mjs";
 
 // ---- The derivative of a step of flows ----
+
+/** The flows of a run of one step: with a corrector, if there is one. */
+function flowsOfRun() {
+  // #if CORRECTED
+  return [...BEGIN, ...SCHEDULE, ...END];
+  // #else
+  return SCHEDULE;
+  // #endif
+}
 
 /** The product of the derivatives of the flows. */
 export function differentiateStage(solver, stage, at) {
@@ -10,7 +22,7 @@ export function differentiateStage(solver, stage, at) {
   const increment = new Float64Array(DIM);
   const slope = new Float64Array(DIM * DIM);
   const derivative = identity();
-  for (const [part, row] of SCHEDULE) {
+  for (const [part, row] of flowsOfRun()) {
     TANGENTS[part](solver.coef[0][row], y, slope);
     FLOWS[part](solver.coef[0][row], y, increment);
     const product = multiplied(slope, derivative);
