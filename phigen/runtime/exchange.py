@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from phigen.errors import MissingPackageError
-from phigen.runtime.lattice import LatticeTrajectory
-from phigen.runtime.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+    from phigen.runtime.lattice import LatticeTrajectory
+    from phigen.runtime.trajectory import Trajectory
 
 
 def to_xarray(trajectory: Trajectory) -> xr.Dataset:

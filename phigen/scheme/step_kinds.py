@@ -27,6 +27,7 @@ class StepKind:
     implicit: bool = False
     predicted: bool = False
     flows: bool = False
+    collocates: bool = False
     sites: bool = False
 
 
@@ -53,6 +54,7 @@ GAUSS = StepKind(
     "implicit, all stages by fixed-point sweeps to round-off",
     unit="evaluation at a stage",
     predicted=True,
+    collocates=True,
 )
 SPLITTING = StepKind("splitting", "flows of parts of H", "explicit", flows=True)
 SWEEPS = StepKind("sweeps", "sweeps over the sites", "explicit", unit="step of one site", sites=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from phigen.scheme.policies import PathPolicy
 from phigen.scheme.program import Program
-from phigen.scheme.step_kinds import GAUSS
 from phigen.scheme.steps import InnerSolve
 from phigen.targets.header import facts, plain
 from phigen.targets.numpy.language import listed, quoted
@@ -69,7 +68,7 @@ def _of_step(program: Program) -> dict[str, object]:
     return {
         "path": step.path is not None,
         "splitting": step.kind.flows,
-        "collocation": step.kind is GAUSS,
+        "collocation": step.kind.collocates,
         "renewed": step.renewed,
         "prepared": step.prepared,
         "moments": listed(schedule.moments) if schedule and step.refresh else "",
