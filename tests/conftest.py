@@ -6,7 +6,7 @@ import signal
 
 import pytest
 from hypothesis import settings
-from systems import NAMES, QUICK
+from systems import ALIKE, NAMES, QUICK
 from tools import WARNINGS, not_tested
 
 from phigen.runtime import toolchain
@@ -19,8 +19,9 @@ APART = ("tests/random/test_differential.py",)
 
 def pytest_addoption(parser):
     parser.addoption(
-        "--all", action="store_true", help="the long tests too, and the corpus compiled with the flags users get"
+        "--all", action="store_true", help="the long tests too, and one system of each kind as users compile it"
     )
+    parser.addoption("--corpus", action="store_true", help="with --all, systems as well that are like others")
     parser.addoption("--random", type=int, metavar="N", help="N random systems of each kind, in tests/random")
     parser.addoption("--seed", type=int, default=0, metavar="S", help="the seed of the first of them")
 
@@ -40,21 +41,32 @@ def pytest_configure(config):
     if not toolchain.available():
         raise pytest.UsageError("the tests need a C compiler; on Debian: apt-get install gcc libc6-dev")
     config.addinivalue_line("markers", "slow: long; left out unless --all or -m is given, or the test is named by `::`")
-    config.addinivalue_line("markers", "corpus: of the systems of the corpus, those beside `systems.QUICK` are slow")
+    config.addinivalue_line(
+        "markers", "corpus: of the corpus, systems beside `systems.QUICK` are slow, and those like others need --corpus"
+    )
     config.addinivalue_line("markers", "few(*cases, of): of the cases `of`, those beside the named ones are slow")
 
 
 def pytest_collection_modifyitems(config, items):
     named = any("::" in argument for argument in config.args)
-    if config.option.all or config.option.markexpr or named:
+    if named or config.option.corpus:
         return
-    slow = [item for item in items if _is_slow(item)]
-    config.hook.pytest_deselected(items=slow)
-    items[:] = [item for item in items if not _is_slow(item)]
+    left_out = _is_alike if config.option.all or config.option.markexpr else _is_slow
+    config.hook.pytest_deselected(items=[item for item in items if left_out(item)])
+    items[:] = [item for item in items if not left_out(item)]
+
+
+def _is_alike(item):
+    return bool(item.get_closest_marker("corpus")) and not _texts(item).isdisjoint(ALIKE)
+
+
+def _texts(item):
+    """The parameters of a test that are texts."""
+    return {v for v in item.callspec.params.values() if isinstance(v, str)} if hasattr(item, "callspec") else set()
 
 
 def _is_slow(item):
-    given = {v for v in item.callspec.params.values() if isinstance(v, str)} if hasattr(item, "callspec") else set()
+    given = _texts(item)
     thinned = [(QUICK, NAMES)] if item.get_closest_marker("corpus") else []
     thinned += [(mark.args, mark.kwargs["of"]) for mark in item.iter_markers("few")]
     return item.get_closest_marker("slow") or any(given & {*of} - {*few} for few, of in thinned)
@@ -85,19 +97,18 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def compiled_solvers(request, tmp_path_factory):
+def compiled_solvers(tmp_path_factory):
     """Compiled C is shared by all tests and workers of one session, and not left in the cache of the user.
 
     Every solver that a test compiles must compile without a warning. Compilers take a sixth of the time with -O0 that
-    they take with -O3, a quarter with -Og, which warns of more; tests of what -O3 makes of loops ask for it themselves,
-    those of the corpus by `as_users_compile`.
+    they take with -O3, which warns of more; tests of what -O3 makes of loops ask for it themselves, those of the corpus
+    by `as_users_compile`.
     """
-    how = "-Og" if request.config.option.all else "-O0"
     base = tmp_path_factory.getbasetemp()
     shared = (base.parent if base.name.startswith("popen-") else base) / "solvers"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PHIGEN_CACHE_DIR", str(shared))
-        patch.setattr(toolchain, "BASE_FLAGS", (*_optimised(how), *WARNINGS))
+        patch.setattr(toolchain, "BASE_FLAGS", (*_optimised("-O0"), *WARNINGS))
         yield shared
 
 

@@ -61,6 +61,15 @@ QUICK = (
 )  # fmt: skip
 
 
+#: Systems whose steps, bi-realisations and functions others have, of few coordinates as well: what is marked `corpus`
+#: goes through them where `--corpus` is given. That the C and NumPy of them is what it was, golden files tell.
+ALIKE = (
+    "charged_particle", "cyclotron", "dzhanibekov", "engel_geodesics", "gaussian_moments", "guiding_centre",
+    "harmonic_oscillator", "kowalevski_top", "predator_prey", "quaternion_top", "rigid_body_dual", "rigid_body_paper",
+    "satellite", "sir_epidemic", "so4_manakov", "toda3_quadratic", "volterra5",
+)  # fmt: skip
+
+
 def slow_but(quick: Iterable[Any], of: Iterable[Any] = NAMES) -> list[Any]:
     """Parameters of a test, some of them quick and the others slow; tuples are several parameters."""
     values = [each if isinstance(each, tuple) else (each,) for each in of]

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 
+@pytest.mark.slow
 def test_who_asks_for_slow_tests_only_is_told_how_to_have_them_made():
     file = Path(__file__).with_name("test_tutorial.py")
     command = [sys.executable, "-m", "pytest", "-p", "no:xdist", "-p", "no:cacheprovider", file]

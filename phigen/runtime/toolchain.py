@@ -266,13 +266,19 @@ def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tupl
         return 126, f"it could not be started: {error.strerror or error}"
     with process:
         listener = threading.Thread(target=listen, args=(process.stdout,), daemon=True)
+        # A thread that waits hears of the end at once; `wait(timeout)` asks every twentieth of a second.
+        waiter = threading.Thread(target=process.wait, daemon=True)
         listener.start()
+        waiter.start()
         try:
-            code = process.wait(timeout)
+            waiter.join(timeout)
+            if waiter.is_alive():
+                raise subprocess.TimeoutExpired(command, timeout)
             listener.join(_GRACE)
         finally:  # a keyboard interrupt too: the new session does not hear the terminal's
-            if process.returncode is None or listener.is_alive():
+            if waiter.is_alive() or listener.is_alive():
                 with contextlib.suppress(ProcessLookupError):
                     os.killpg(process.pid, signal.SIGKILL)
             listener.join()
-    return code, heard.decode("utf-8", "replace")
+            waiter.join()
+    return process.returncode, heard.decode("utf-8", "replace")

@@ -44,6 +44,7 @@ def test_large_derivatives_of_paths_and_explicit_steps_have_no_blocks():
     assert not [name for name in WITHOUT_BLOCKS if isinstance(in_lanes(compiled(name).program), Blocks)]
 
 
+@pytest.mark.corpus
 @pytest.mark.parametrize("name", slow_but(QUICK, WITH_BLOCKS))
 def test_blocks_and_groups_equal_single_steps(name, tmp_path):
     exercise(compiled(name), "-O0", tmp_path)

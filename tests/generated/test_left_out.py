@@ -58,8 +58,12 @@ def test_gradients_compile_whatever_is_left_out(name, without, profile, tmp_path
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_code_compiles_with_and_without_each_part(name, tmp_path):
-    every = ("gcc", "clang", "g++")
-    for asked in ({"adjoint": True}, {"adjoint": True, "tangent": True}, {"tangent": True}):
-        for without in WITHOUT:
-            expect_clean(name, tmp_path, every[:2], without=without, profile="fast", **asked)
-        expect_clean(name, tmp_path, every, profile="small", **asked)
+    """All that is left out with gradients, one thing by turns with tangent maps; clang warns of what gcc does."""
+    turn = [*SYSTEMS].index(name)
+    for without in WITHOUT:
+        expect_clean(name, tmp_path, ("clang",), without=without, profile="fast", adjoint=True)
+    both, tangent = ({"without": WITHOUT[(turn + k) % 4], "profile": "fast", "tangent": True} for k in (0, 1))
+    expect_clean(name, tmp_path, ("gcc", "clang"), adjoint=True, **both)
+    expect_clean(name, tmp_path, ("clang",), **tangent)
+    expect_clean(name, tmp_path, ("clang",), profile="small", tangent=True)
+    expect_clean(name, tmp_path, ("gcc", "clang", "g++"), profile="small", adjoint=True, tangent=turn % 2 == 0)

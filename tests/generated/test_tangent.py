@@ -77,6 +77,7 @@ def differences(step, x, width=1e-3):
 FEW = [("c", name) for name in QUICK if name not in KINDS] + [("numpy", "lotka_volterra")]
 
 
+@pytest.mark.corpus
 @pytest.mark.parametrize(("target", "name"), slow_but(FEW, product(TARGETS, NAMES)))
 def test_step_is_a_poisson_map(name, target):
     compilation = with_tangent(name) if name in QUICK else small(with_tangent(name))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import pytest
 from differential.suites import SUITES
 
-from phigen.runtime import toolchain
 from phigen.runtime.gradients import Pullback
 from phigen.runtime.solver import Solver
 
@@ -30,13 +29,6 @@ def pytest_generate_tests(metafunc):
         quick = seeds if asked.random else QUICK[kind]
         drawn += [pytest.param(kind, s, marks=() if s in quick else pytest.mark.slow) for s in seeds]
     metafunc.parametrize(("kind", "seed"), drawn)
-
-
-@pytest.fixture(autouse=True)
-def unoptimised(compiled_solvers, monkeypatch):
-    """Compilers would take most of the time."""
-    flags = tuple("-O0" if flag.startswith("-O") else flag for flag in toolchain.BASE_FLAGS)
-    monkeypatch.setattr(toolchain, "BASE_FLAGS", flags)
 
 
 def test_everything_holds_for_a_random_system(kind, seed):
