@@ -14,10 +14,14 @@ from phigen.drawing.groups import Group, groups
 from phigen.errors import PhigenError
 from phigen.geometry.system import System
 from phigen.report import page
+from phigen.scheme.kernel import Kernel, Output
 from phigen.spec.model import NO_EXTRAS, Extras, Parameter, Run
 from phigen.study.conservation import ENERGY, moving
-from phigen.symbolic.expression import symbols_of
+from phigen.symbolic.expression import Expression, symbols_of
+from phigen.targets.code import lower
 from phigen.targets.js.emitter import emit
+from phigen.targets.js.printing import LANGUAGE
+from phigen.targets.names import Scope
 
 #: Orders that are offered beside that of the page, where they are less; the most characters of all solvers together.
 ORDERS, MOST = (2, 4), 200_000
@@ -26,8 +30,8 @@ FEW, COORDINATES = 4, 15
 STEP, SPEED, PARAMETER = 16, 20, 8
 
 HELP = """Drag a picture of space, or use the arrow keys, to turn both; + and − zoom; 0 resets. Between steps the curves
-are interpolated. It begins with a step that is large for RK4, if there is one that phigen takes well; with smaller
-ones both come closer to the truth."""
+are interpolated. The panel begins with a step that is large for RK4, if there is one that phigen takes with margin: at
+most half of the step with which it breaks down. With smaller steps both come closer to the true motion."""
 
 NOISE = "RK4, which it has beside the solver, takes no noise"
 NOTHING = "Time or forces act on this system, so nothing is conserved that errors could be counted in."
@@ -44,6 +48,7 @@ class Live:
     run: Run | None = None
     parameters: Mapping[str, float] | None = None
     why_not: str = ""
+    invariants: str = ""
 
 
 @dataclass(frozen=True)
@@ -70,7 +75,7 @@ def gathered(
     if compilation.system.noise:
         return Live({}, why_not=NOISE)
     by_order, why_not = solvers(compilation, scheme, orders)
-    return Live(by_order, run, parameters, why_not)
+    return Live(by_order, run, parameters, why_not, _invariants(compilation.system))
 
 
 def solvers(compilation: Compilation, scheme: str | None, orders: Sequence[int]) -> tuple[dict[int, str], str]:
@@ -111,8 +116,29 @@ def enclosed(module: str) -> str:
 
 
 def script(live: Live) -> str:
-    """The solvers for the script of the page."""
-    return f"const liveSolvers = {{ {', '.join(f'{order}: {text}' for order, text in live.solvers.items())} }};"
+    """The solvers and the invariants for the script of the page."""
+    invariants = f"const liveInvariants = [ {live.invariants} ];\n"
+    by_order = ", ".join(f"{order}: {text}" for order, text in live.solvers.items())
+    return f"{invariants}const liveSolvers = {{ {by_order} }};"
+
+
+def function_of(formula: Expression, names: Sequence[str]) -> str:
+    """A formula as an arrow function in JavaScript of the named symbols."""
+    code = lower(Kernel("formula", "", {"symbols": tuple(symbols_of(formula))}, (Output("out", (formula,)),)))
+    scope = Scope(LANGUAGE.reserved | set(LANGUAGE.functions.values()))
+    arguments = [scope[name] for name in names]
+    show = LANGUAGE.printer(scope)
+    lines = [f"const {scope[a.target]} = {show(a.value)};" for a in code.assignments]
+    return f"({', '.join(arguments)}) => {{ {' '.join(lines)} return {show(code.stores[0].value)}; }}"
+
+
+def _invariants(system: System) -> str:
+    """The functions (x, params, t) of the declared invariants in JavaScript, with commas between them."""
+    parameters = [p.name for p in system.parameters]
+    names = [*system.coordinates, *parameters, *system.times]
+    values = ["...x", *(f"params.{name}" for name in parameters), *(["t"] if system.time else [])]
+    functions = (function_of(invariant, names) for invariant in system.invariants.values())
+    return ", ".join(f"(x, params, t) => ({function})({', '.join(values)})" for function in functions)
 
 
 def live_section(compilation: Compilation, live: Live) -> Markup:
@@ -164,17 +190,23 @@ def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
     """The two methods."""
     return [
         (1, "ours", "phigen", "id=live-order", f"order {compilation.order.order}"),
-        (2, "theirs", "RK4", "class=about", "the classical method of Runge and Kutta"),
+        (2, "theirs", "RK4", "id=live-cost", ""),
     ]
 
 
 def _quantities(system: System) -> list[dict[str, object]]:
-    """The quantities that the flow conserves: the energy, and all its Casimirs as one."""
+    """The quantities that the flow conserves: the energy, all its Casimirs as one, and all invariants as one."""
     moved = moving(system)
     quantities: list[dict[str, object]] = [] if ENERGY in moved else [{"name": "energy error", "casimirs": None}]
     casimirs = {name: i for i, name in enumerate(system.casimirs) if name not in moved}
     if casimirs:
         quantities.append({"name": _named(system, casimirs), "casimirs": [*casimirs.values()]})
+    invariants = {} if system.noise else {name: i for i, name in enumerate(system.invariants)}
+    if invariants:
+        name = f"error{'s' * (len(invariants) > 1)} of {', '.join(invariants)}"
+        if len(invariants) > 3:
+            name = f"error of {len(invariants)} invariants"
+        quantities.append({"name": name, "invariants": [*invariants.values()]})
     return quantities
 
 
@@ -207,15 +239,15 @@ def _leaf(system: System, group: Group) -> int | None:
 
 def _say(system: System, conserved: Sequence[Mapping[str, object]], drawn: bool) -> str:
     """The sentence above the panel that describes the picture."""
-    said = "Two solvers take the same steps from the same start, in your browser, now. "
-    properties = ["keeps its energy"] if any(not q["casimirs"] for q in conserved) else []
+    said = "Two solvers follow the motion from the same start, in your browser, now. "
+    properties = ["keeps its energy"] if any(q["name"] == "energy error" for q in conserved) else []
     if drawn:
         properties.append(f"never leaves the {'curve' if system.dimension == 2 else 'surface'} drawn here")
     elif len(conserved) > len(properties):
         properties.append("keeps its Casimirs")
     if not properties:
         return f"{said}{NOTHING}"
-    return f"{said}The true motion {' and '.join(properties)}. Watch which of the two does."
+    return f"{said}The true motion {' and '.join(properties)}. The numbers say how far each of the two is from that."
 
 
 def general(live: Live) -> Iterable[Slider]:

@@ -23,6 +23,7 @@ from phigen.report.live import (
     ORDERS,
     Live,
     Slider,
+    function_of,
     general,
     script,
     sides,
@@ -30,12 +31,7 @@ from phigen.report.live import (
     slider_of,
     solvers,
 )
-from phigen.scheme.kernel import Kernel, Output
 from phigen.spec.model import LieAlgebraForm, Parameter, Run, Spec, Values
-from phigen.symbolic.expression import Expression, symbols_of
-from phigen.targets.code import lower
-from phigen.targets.js.printing import LANGUAGE
-from phigen.targets.names import Scope
 
 #: The least number of sites along an axis for halved sizes, and the largest numbers of sites for doubled ones.
 FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
@@ -69,7 +65,7 @@ def gathered_lattice(
     if _numbers(compilation.spec, run, start) > MOST_NUMBERS:
         return LatticeLive({}, why_not="the lists of its start are too long for a page")
     by_order, why_not = solvers(compilation, scheme, orders)
-    return LatticeLive(by_order, run, None, why_not, start, _formulas(compilation.spec, run))
+    return LatticeLive(by_order, run, None, why_not, start=start, formulas=_formulas(compilation.spec, run))
 
 
 def lattice_script(live: LatticeLive) -> str:
@@ -232,16 +228,8 @@ def _formulas(spec: Spec, run: Run) -> str:
     assert spec.lattice is not None
     indices = spec.lattice.indices
     listed = {n: v.formula for n, v in arrays.items() if v is not None and v.formula is not None and not v.random}
-    return ", ".join(f"{json.dumps(name)}: {_function(formula, indices)}" for name, formula in listed.items())
-
-
-def _function(formula: Expression, indices: Sequence[str]) -> str:
-    code = lower(Kernel("start", "", {"site": tuple(symbols_of(formula))}, (Output("out", (formula,)),)))
-    scope = Scope(LANGUAGE.reserved | set(LANGUAGE.functions.values()))
-    arguments = [scope[name] for name in (*indices, *(f"N_{i}" for i in indices))]
-    show = LANGUAGE.printer(scope)
-    lines = [f"const {scope[a.target]} = {show(a.value)};" for a in code.assignments]
-    return f"({', '.join(arguments)}) => {{ {' '.join(lines)} return {show(code.stores[0].value)}; }}"
+    names = (*indices, *(f"N_{i}" for i in indices))
+    return ", ".join(f"{json.dumps(name)}: {function_of(formula, names)}" for name, formula in listed.items())
 
 
 def _sign(spec: Spec, start: Start) -> str:
@@ -269,8 +257,8 @@ def _quantities(compilation: CompiledLattice) -> list[dict[str, Any]]:
 
 
 def _say(compilation: CompiledLattice) -> str:
-    said = "Two solvers take the same steps from the same start, in your browser, now. "
+    said = "Two solvers follow the motion from the same start, in your browser, now. "
     conserved_words = " and ".join("its Casimirs" if q["casimirs"] else "its energy" for q in _quantities(compilation))
     if not conserved_words:
         return f"{said}{NOTHING}"
-    return f"{said}The true motion keeps {conserved_words}. Watch which of the two does."
+    return f"{said}The true motion keeps {conserved_words}. The numbers say how far each of the two is from that."

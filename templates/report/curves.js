@@ -53,12 +53,15 @@ function makeView(panel) {
       return { x: solver.vectorField(x, t).map((v) => v * rate), t: rate };
     };
     const start = Float64Array.from(given.start);
-    const groups = data.quantities.map(({ name, casimirs }) => {
-      const parts = casimirs ? casimirs.map((c) => (x) => solver.casimirs(x)[c]) : [(x) => solver.hamiltonian(x)];
-      const [values, units] = [parts.map((part) => part(start)), parts.map((part) => unitOf(part, start))];
-      return { name, error: (x) => Math.max(...parts.map((part, k) => Math.abs(part(x) - values[k]) / units[k])) };
+    const groups = data.quantities.map(({ name, casimirs, invariants }) => {
+      const parts = casimirs ? casimirs.map((c) => (x) => solver.casimirs(x)[c])
+        : invariants ? invariants.map((i) => (x, t) => liveInvariants[i](x, solver.params, t))
+        : [(x) => solver.hamiltonian(x)];
+      const values = parts.map((part) => part(start, data.t0));
+      const units = parts.map((part) => unitOf((x) => part(x, data.t0), start));
+      return { name, error: (x, t) => Math.max(...parts.map((part, k) => Math.abs(part(x, t) - values[k]) / units[k])) };
     });
-    return new Race(solver, { h: given.h, field, groups, remember: (runner) => remember(runner, field, given.h) });
+    return new Race(solver, { h: given.h, parts: given.parts, field, groups, remember: (runner) => remember(runner, field, given.h) });
   }
 
   // The steps behind a method, with the slopes at their ends.

@@ -68,7 +68,7 @@ function makeView(panel) {
     const solver = new Solver({ x0: startOf(data, sizes, count), t0: data.t0, sizes, params, bonds: data.bonds });
     const groups = data.quantities.map(({ name, casimirs }) => ({ name, error: casimirs ? offCasimirs(solver, casimirs) : energyError(solver) }));
     const field = (x, t) => ({ x: solver.vectorField(x, t), t: 1 }), chosen = data.groups[given.group];
-    return new Race(solver, { h: given.h, field, groups, remember: (runner) => remember(runner, solver, chosen, sizes) });
+    return new Race(solver, { h: given.h, parts: given.parts, field, groups, remember: (runner) => remember(runner, solver, chosen, sizes) });
   }
 
   // The energy error, relative to |H| at the start or, where that is nearly 0, to the magnitudes of the energies of all sites.

@@ -11,7 +11,7 @@ if (document.getElementById("live-panel")) {
   const ahead = 100; // steps of the button, for those who ask for less motion
   // What sliders that go from one to the next choose from.
   const lists = { order: data.orders, sites: (data.sizes ?? []).map((_, k) => k) };
-  let settings, standard, race, playing = false, waiting = 1, before = 0, seen = true;
+  let settings, standard, race, changed = false, playing = false, waiting = 1, before = 0, seen = true;
 
   // -- settings, and the links that hold them
 
@@ -54,10 +54,21 @@ if (document.getElementById("live-panel")) {
     const differs = (kind, name) => get(settings, kind, name) !== get(standard, kind, name);
     if (differs("speed")) parts.set("speed", settings.speed);
     if (differs("group")) parts.set("group", settings.group);
+    if (settings.compare === "work") parts.set("rk4", settings.parts);
+    if (differs("compare")) parts.set("compare", settings.compare);
     if (differs("sites")) parts.set("sites", settings.sites);
     for (const name of Object.keys(settings.params)) if (differs("params", name)) parts.set(`p.${name}`, settings.params[name]);
     settings.start.forEach((value, i) => { if (differs("start", i)) parts.set(`x.${data.coordinates[i]}`, value); });
     return `#live&${parts}`;
+  }
+
+  // The link to the settings; the address bar follows once a setting has changed.
+  function linkHere() {
+    at("link").href = link();
+    if (!changed) return;
+    try {
+      history.replaceState(null, "", link());
+    } catch { /* pages without an origin of their own may not */ }
   }
 
   // The settings of an address; whatever is no number, or not allowed, is as usual.
@@ -68,6 +79,7 @@ if (document.getElementById("live-panel")) {
       if (Number.isFinite(value) && allowed(value)) take(value);
     };
     const positive = (v) => v > 0;
+    if (["step", "work"].includes(parts.get("compare"))) found.compare = parts.get("compare");
     number("h", (v) => v !== 0, (v) => { found.h = v; });
     number("speed", (v) => v > 0 && v <= 1e4, (v) => { found.speed = v; });
     number("order", (v) => data.orders.includes(v), (v) => { found.order = v; });
@@ -76,6 +88,8 @@ if (document.getElementById("live-panel")) {
     for (const { name, positive: only } of data.parameters) {
       number(`p.${name}`, only ? positive : () => true, (v) => { found.params[name] = v; });
     }
+    // A link shows what its sender saw, whatever this browser would measure.
+    number("rk4", (v) => v >= 1 && v <= MOST_PARTS && Number.isInteger(v), (v) => { measured[alike(found)] = v; });
     found.start.forEach((_, i) => number(`x.${data.coordinates[i]}`, () => true, (v) => { found.start[i] = v; }));
     return found;
   }
@@ -83,6 +97,12 @@ if (document.getElementById("live-panel")) {
   // -- the motion
 
   const begin = (given) => view.begin(solverOf(given.order), given);
+
+  // How many steps RK4 takes for one of the solver: one, or as many as take as long here. Measured once for each order
+  // and size and for steps of about one length, so that it does not change while a slider moves.
+  const measured = {};
+  const alike = ({ order, sites, h }) => [order, sites, Math.round(2 * Math.log2(Math.abs(h)))].join();
+  const partsOf = (given) => (given.compare === "step" ? 1 : (measured[alike(given)] ??= equalWork(begin(given))));
 
   // The first steps, no more than take so many milliseconds, each of ours watched: the largest errors on the way.
   function tried(given, steps, milliseconds, watch = () => {}) {
@@ -96,15 +116,20 @@ if (document.getElementById("live-panel")) {
     return { trial, ours: worst(ours), theirs: worst(theirs) };
   }
 
+  // Whether the solver has margin with a step: it does not break down with twice that.
+  const hasMargin = (given) => tried({ ...given, h: 2 * given.h }, 100, 60).ours < 0.5;
+
   // A step, and its speed, with which RK4 fails within some ten seconds, where there is one with which the solver
-  // does not.
+  // does not, and has margin.
   function showing() {
-    let best = { h: data.step, speed: view.pace(standard).speed, gain: 0 };
-    const end = performance.now() + 800;
+    let h = data.step;
+    const end = performance.now() + 1000, at = (step) => ({ ...view.rehearsed(standard), h: step });
+    for (let k = 0; data.quantities.length && k < 5 && !hasMargin(at(h)); k++) h = shortened(h / 2);
+    let best = { h, speed: view.pace({ ...standard, h }).speed, gain: 0 };
     for (let k = 0; data.quantities.length && k <= 7 && performance.now() < end; k++) {
-      const given = { ...view.rehearsed(standard), h: shortened(data.step * 2 ** k) }, { longest, speed } = view.pace(given);
+      const given = at(shortened(h * 2 ** k)), { longest, speed } = view.pace(given);
       const { ours, theirs } = tried(given, Math.min(400, 10 * speed), 200);
-      if (ours > 0.03 || longest > 0.8) break;
+      if (ours > 0.03 || longest > 0.8 || (k > 0 && !hasMargin(given))) break;
       const gain = Math.min(theirs, 0.3) / Math.max(ours, 3e-3);
       if (gain > 1.2 * best.gain) best = { h: given.h, speed, gain };
       if (theirs > 0.2) break;
@@ -115,6 +140,7 @@ if (document.getElementById("live-panel")) {
   function restart() {
     waiting = 1;
     try {
+      settings.parts = partsOf(settings);
       race = begin(settings);
       view.look();
       at("told").textContent = "";
@@ -123,9 +149,12 @@ if (document.getElementById("live-panel")) {
       race = null;
       at("told").textContent = `No start: ${error.message}.`;
     }
-    const address = link();
-    at("link").href = address;
+    linkHere();
     inputs.forEach(show);
+    at("compare").value = settings.compare;
+    at("cost").textContent = settings.compare === "step" ? "one step for each step of phigen"
+      : settings.parts === 1 ? "one step for each step of phigen: equal work in this browser"
+      : `${settings.parts} steps for each step of phigen: equal work in this browser`;
     draw();
     report();
   }
@@ -229,6 +258,7 @@ if (document.getElementById("live-panel")) {
       const told = (runner) => race.groups.map(({ name }, i) => `${name} ${readable(runner.histories[i].last)}`).join(", ");
       at("told").textContent = `After ${race.ours.steps} steps: phigen, ${told(race.ours)}; RK4, ${told(race.theirs)}.`;
       if (!race.groups.length) at("told").textContent = `After ${race.ours.steps} steps.`;
+      else at("told").textContent += ` ${whereRk4IsCloser(race)}`.trimEnd();
     }
     draw();
     report();
@@ -272,18 +302,26 @@ if (document.getElementById("live-panel")) {
   at("reset").addEventListener("click", restart);
   at("usual").addEventListener("click", () => {
     settings = copy(standard);
+    changed = true;
     restart();
   });
   for (const input of inputs) {
     input.addEventListener("input", () => {
       set(settings, input.dataset.kind, input.dataset.name, valueOf(input));
+      changed = true;
       if (input.dataset.kind !== "speed") return restart();
-      at("link").href = link();
+      linkHere();
       show(input);
     });
   }
   at("group")?.addEventListener("change", () => {
     settings.group = Number(at("group").value);
+    changed = true;
+    restart();
+  });
+  at("compare").addEventListener("change", () => {
+    settings.compare = at("compare").value;
+    changed = true;
     restart();
   });
   function follow() {
@@ -298,7 +336,7 @@ if (document.getElementById("live-panel")) {
   new ResizeObserver(draw).observe(at("ours"));
   new IntersectionObserver((entries) => { seen = entries.at(-1).isIntersecting; }).observe(at("ours"));
 
-  standard = { h: data.step, order: data.order, speed: 30, group: 0, params: {}, start: data.start, sites: data.site };
+  standard = { h: data.step, order: data.order, speed: 30, group: 0, compare: "work", parts: 1, params: {}, start: data.start, sites: data.site };
   for (const { name, value } of data.parameters) standard.params[name] = value;
   at("panel").hidden = false;
   const { h, speed } = showing();

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from chromium import Browser
 from lattice.lattices import LATTICES
-from support import tool
+from support import compiled, tool
 
 import phigen
 from phigen import spec
@@ -98,7 +98,7 @@ def test_slider_moves_along_the_trajectory(browser):
 
 # -- the live panel
 
-SET = "#live&h=0.3&order=2&p.I1=1.5&x.x1=0.25"
+SET = "#live&h=0.3&order=2&p.I1=1.5&x.x1=0.25&compare=step"
 
 
 def settled(browser, made, fragment=""):
@@ -144,6 +144,75 @@ def test_link_of_the_panel_holds_its_settings(browser, made):
     assert len(set(chosen["start"])) == 3
     settled(browser, made, link)
     assert told(browser, "settings") == chosen
+
+
+def test_equal_work_gives_rk4_as_many_steps_as_the_link_says(browser, made):
+    settled(browser, made, SET.replace("compare=step", "rk4=3"))
+    click(browser, "step", 5)
+    solver = phigen.compile(made.parent / "attack.yaml", target="numpy", order=2)
+    x = np.array([0.25, 1, 0.2])
+    for _ in range(15):
+        x = rk4(lambda y: solver.vector_field(y, I1=1.5), x, 0.1)
+    assert told(browser, "theirs")["x"] == pytest.approx(x, rel=1e-13)
+    assert told(browser, "theirs")["t"] == pytest.approx(1.5)
+    about = browser.value("document.getElementById('live-cost').textContent")
+    assert about == "3 steps for each step of phigen: equal work in this browser"
+    settled(browser, made, "#live&order=4")
+    assert 1 <= told(browser, "settings")["parts"] <= 64
+
+
+def test_address_bar_follows_the_settings(browser, made):
+    settled(browser, made)
+    assert browser.value("location.hash") == ""
+    browser.value(
+        "{const s = document.querySelector('[data-kind=h]'); s.value = 3; s.dispatchEvent(new Event('input'))}"
+    )
+    assert browser.value("location.hash") == browser.value("document.getElementById('live-link').hash")
+
+
+GROWN = [1e-6 * k for k in range(40)]
+#: (errors of phigen, errors of RK4) and what is said of them.
+CLOSER = [
+    ([1e-3] * 40, GROWN, "energy: RK4 is closer so far, but its error grows while that of phigen does not."),
+    ([1e-3] * 40, [1e-6] * 40, "energy: RK4 is closer with these settings."),
+    ([1e3 * e for e in GROWN], GROWN, "energy: RK4 is closer with these settings."),
+    ([1e-6] * 40, [1e-3] * 40, ""),
+    ([1e-14] * 40, [1e-15] * 40, ""),
+]
+
+
+@pytest.mark.parametrize(("ours", "theirs", "said"), CLOSER)
+def test_where_rk4_is_closer_the_panel_says_so(browser, made, ours, theirs, said):
+    histories = ", ".join(
+        f"{side}: {{histories: [{{values: {v}}}]}}" for side, v in (("ours", ours), ("theirs", theirs))
+    )
+    assert browser.value(f"whereRk4IsCloser({{groups: [{{name: 'energy'}}], {histories}}})") == said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["lotka_volterra", "nambu_pendulum", "pendulum", "rigid_body"])
+def test_panels_of_the_corpus_begin_with_half_of_a_step_that_works(browser, tmp_path, name):
+    compilation = compiled(name)
+    run = next(iter(compilation.spec.runs.values()))
+    path = tmp_path / "panel.html"
+    text = panel_page(compilation, run)
+    if text is None:
+        assert compilation.spec.noise
+        return
+    path.write_text(text, encoding="utf-8")
+    settled(browser, path)
+    chosen = told(browser, "settings")
+    parameters = dict(chosen["params"]) | ({"t0": float(run.start)} if compilation.spec.time else {})
+    solver = phigen.compile(compilation.spec, target="numpy", order=chosen["order"])
+    start = solver.integrate(chosen["start"], chosen["h"], 50, **parameters)
+    wide = solver.integrate(chosen["start"], 2 * chosen["h"], 50, **parameters)
+    assert np.isfinite(start.x).all()
+    assert np.isfinite(wide.x).all(), "twice the first step is taken too"
+    click(browser, "play")
+    assert told(browser, "ours")["steps"] == 100
+    nothing = "nothing is conserved" in path.read_text(encoding="utf-8")
+    assert nothing == (not told(browser, "theirs")["errors"])
+    assert browser.complaints == []
 
 
 def test_panel_moves_by_itself_unless_less_motion_is_asked_for(browser, made):
@@ -224,7 +293,7 @@ def panels(tmp_path_factory):
 
 @pytest.mark.parametrize("name", LATTICE_PANELS)
 def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name):
-    settled(browser, panels[name], "#live&h=0.05")
+    settled(browser, panels[name], "#live&h=0.05&compare=step")
     given = spec.loads(LATTICE_PANELS[name])
     start = start_of(given, next(iter(given.runs.values())))
     t0 = 0.5 if given.time else None
