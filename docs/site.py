@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from mkdocs.structure.pages import Page
 from phigen import resources
 from phigen import spec as specs
 from phigen.compiler import compile_spec
-from phigen.report.panel import panel_page
+from phigen.report.panel import NoPanelError, panel_page
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -59,8 +60,8 @@ def panels() -> dict[str, str]:
     for name, path in resources.bundled().items():
         if CHOSEN is None or name in CHOSEN.split():
             spec = specs.load(path)
-            html = panel_page(compile_spec(spec), max(spec.runs.values(), key=lambda run: run.steps))
-            found |= {name: html} if html else {}
+            with suppress(NoPanelError):
+                found[name] = panel_page(compile_spec(spec), max(spec.runs.values(), key=lambda run: run.steps))
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,6 +15,9 @@ from phigen.cli.sources import load_one
 from phigen.errors import CheckError
 from phigen.writing import write
 
+if TYPE_CHECKING:
+    from phigen.spec.model import Spec
+
 
 @click.command("report")
 @one_spec
@@ -23,6 +27,7 @@ from phigen.writing import write
 @scheme_option
 @click.option("--lyapunov", is_flag=True, help="Also compute Lyapunov exponents of the run.")
 @click.option("--quick", is_flag=True, help="Use fewer steps and fewer repetitions.")
+@click.option("--panel", is_flag=True, help="Write the live panel alone, for an <iframe> in a page of yours.")
 @verbosity
 @pass_console
 def command(
@@ -34,6 +39,7 @@ def command(
     scheme: str | None,
     lyapunov: bool,
     quick: bool,
+    panel: bool,
 ) -> None:
     """Write one self-contained HTML page about a spec, to be read by anyone.
 
@@ -50,6 +56,9 @@ def command(
     from phigen.report.lattice import lattice_document
 
     spec = load_one(spec_file)
+    if panel:
+        write_panel(spec.overridden(order=order, scheme=scheme), name, output, lyapunov or quick, console)
+        return
     target = output if output and output != "-" else f"{spec.name}.html"
     if output != "-":
         expect_writable(Path(target), "--output")
@@ -77,6 +86,24 @@ def command(
     write_page(page, figures, output, target, console)
     if failures:
         raise failures[0]
+
+
+def write_panel(spec: Spec, name: str | None, output: str | None, measuring: bool, console: Console) -> None:
+    """Write the page of the live panel of a run, or print it. Raises `NoPanelError`."""
+    from phigen.compiler import compile_proved
+    from phigen.report.panel import panel_page
+
+    if measuring:
+        raise click.UsageError("--panel measures nothing: leave out --lyapunov and --quick")
+    target = output if output and output != "-" else f"{spec.name}-panel.html"
+    if output != "-":
+        expect_writable(Path(target), "--output")
+    html = panel_page(compile_proved(spec), run_of(spec, name))
+    if output == "-":
+        out_document(html)
+        return
+    write(Path(target), html)
+    console.note(f"wrote {target} ({len(html) // 1000} kB)")
 
 
 def command_of(

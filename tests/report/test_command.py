@@ -104,3 +104,20 @@ def test_without_compiler_times_are_those_of_python(phigen, without_compiler):
     page = Path("a.html").read_text(encoding="utf-8")
     assert "There was no C compiler" in page
     assert "generated for NumPy" in page
+
+
+def test_panel_alone_is_a_page_for_a_frame(phigen):
+    done = phigen(write(), "--panel")
+    assert done.exit_code == 0, done.stderr
+    text = Path("a-panel.html").read_text(encoding="utf-8")
+    assert "wrote a-panel.html" in done.stderr
+    assert 'id="live-panel"' in text
+    assert phigen("a.yaml", "--panel", "--quick").exit_code == 2
+    assert phigen("a.yaml", "--panel", "-o", "-").stdout == text
+
+
+def test_system_with_noise_has_no_panel_and_the_reason_is_said(phigen):
+    done = phigen("thermal_spin", "--panel")
+    assert done.exit_code == 5
+    assert "thermal_spin has no live panel: RK4, which it has beside the solver, takes no noise" in done.stderr
+    assert list(Path().glob("*.html")) == []
