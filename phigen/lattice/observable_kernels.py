@@ -6,10 +6,9 @@ reach beyond an open end a sum takes none, as H does; an extreme leaves out the 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from fractions import Fraction
-
-import numpy as np
 
 from phigen.lattice.cell import PAIRS, Cell
 from phigen.lattice.graphs import field_with_sums
@@ -74,7 +73,7 @@ def _density(cell: Cell, name: str, *, single: bool) -> Expression:
     there = _present(cell, value)
     if there == ONE:
         return value
-    largest = Fraction(float(np.finfo(np.float32 if single else np.float64).max))
+    largest = (2 - Fraction(1, 2**23)) * 2**127 if single else Fraction(sys.float_info.max)
     return call("choose", there, value, number(-largest if reduction.kind == "max" else largest))
 
 

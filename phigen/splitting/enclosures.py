@@ -8,7 +8,7 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 from numpy.typing import NDArray
 
-from phigen.splitting.matrices import MatrixExponential, exponential_less_one
+from phigen.splitting.matrices import MAX_PADE_NORM, PADE, MatrixExponential
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement
 
@@ -32,6 +32,24 @@ def enclosed(name: str, exponential: MatrixExponential, values: Mapping[str, flo
     errors = [_error(rates * (t / (norm or 1.0))) / (exponential.size + t) for t in TIMES]
     worst = max(errors) / np.finfo(float).eps
     return Statement(name, CHECKED if worst <= UNITS else REFUTED, f"‖tA‖ up to {TIMES[-1]:g}, by ball arithmetic")
+
+
+def exponential_less_one(a: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return exp(a) − 1 as the generated code computes it."""
+    n, norm = len(a), float(np.abs(a).sum(axis=1).max())
+    if not np.isfinite(norm):
+        return np.full_like(a, np.nan)
+    squarings = 0
+    while norm > MAX_PADE_NORM:
+        norm, squarings = norm / 2, squarings + 1
+    c, a, one = [float(v) for v in PADE], a * 0.5**squarings, np.eye(n)
+    b = a @ a
+    even = ((c[6] * b + c[4] * one) @ b + c[2] * one) @ b + one
+    odd = a @ ((c[5] * b + c[3] * one) @ b + c[1] * one)
+    f = np.linalg.solve(even - odd, 2 * odd)
+    for _ in range(squarings):
+        f = 2 * f + f @ f
+    return np.asarray(f)
 
 
 def _error(a: NDArray[np.float64]) -> float:

@@ -16,9 +16,6 @@ from fractions import Fraction
 from functools import cached_property
 from hashlib import blake2b
 
-import numpy as np
-from numpy.typing import NDArray
-
 from phigen.splitting.closure import LinearMotion
 from phigen.splitting.ring import TIME, Monomial, Ring
 from phigen.symbolic.expression import Expression, symbol, total
@@ -130,21 +127,3 @@ def _static_rows(ring: Ring, motion: LinearMotion) -> dict[Monomial, dict[Monomi
 
 def _times(a: Monomial, b: Monomial) -> Monomial:
     return tuple(x + y for x, y in zip(a, b, strict=True))
-
-
-def exponential_less_one(a: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return exp(a) − 1 as the generated code computes it."""
-    n, norm = len(a), float(np.abs(a).sum(axis=1).max())
-    if not np.isfinite(norm):
-        return np.full_like(a, np.nan)
-    squarings = 0
-    while norm > MAX_PADE_NORM:
-        norm, squarings = norm / 2, squarings + 1
-    c, a, one = [float(v) for v in PADE], a * 0.5**squarings, np.eye(n)
-    b = a @ a
-    even = ((c[6] * b + c[4] * one) @ b + c[2] * one) @ b + one
-    odd = a @ ((c[5] * b + c[3] * one) @ b + c[1] * one)
-    f = np.linalg.solve(even - odd, 2 * odd)
-    for _ in range(squarings):
-        f = 2 * f + f @ f
-    return np.asarray(f)

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from phigen.geometry.system import System, hamiltonian_vector_field
-from phigen.splitting.enclosures import enclosed
 from phigen.splitting.flow import Flow, composed
 from phigen.splitting.kepler import KeplerMotion, identities
 from phigen.splitting.parts import Splitting
@@ -63,6 +62,8 @@ def _exponential_statements(system: System, splitting: Splitting) -> Iterator[St
     values = {p.name: float(p.value) for p in system.parameters}
     for k, flow in enumerate(splitting.flows, 1):
         for exponential in flow.exponentials:
+            from phigen.splitting.enclosures import enclosed  # imports NumPy, only where it is needed
+
             name = f"exp(tA) of {flow.letter}_{k} to round-off, A with {exponential.size} rows"
             yield enclosed(name, exponential, values)
 

@@ -36,6 +36,17 @@ finally:
     assert "heavy: []" in done.stderr
 
 
+@pytest.mark.parametrize("name", ["pendulum", "toda3", "fput"])
+def test_build_imports_no_numerical_library(name, tmp_path):
+    """NumPy takes as long to import as a small system takes to compile."""
+    code = "import sys; from phigen.cli import main; main()"
+    command = [sys.executable, "-X", "importtime", "-c", code, "build", name, "-t", "c", "-q", "-o", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+    assert "phigen.compiler" in imported
+    assert imported & {"numpy", "sympy", "mpmath", "matplotlib"} == set()
+
+
 def test_every_command_has_help_quiet_and_verbose(phigen):
     listing = phigen("--help").output
     for name, (_, line) in COMMANDS.items():

@@ -11,7 +11,8 @@ from phigen.errors import SpecError
 from phigen.geometry.system import hamiltonian_vector_field
 from phigen.notation import flows, latex
 from phigen.splitting import enclosures
-from phigen.splitting.matrices import MatrixExponential, exponential_less_one
+from phigen.splitting.enclosures import exponential_less_one
+from phigen.splitting.matrices import MatrixExponential
 from phigen.splitting.statements import check
 from phigen.study import measures
 from phigen.study.methods import of_solver
