@@ -51,7 +51,7 @@ class StageMap:
     moved: tuple[int, ...]
     starts: tuple[int, ...]  # the first unknown of each group
     change: tuple[Expression, ...] = field(default=())
-    pace: Expression = ONE  # what ∇H + ζ is multiplied by, where a monitor and forces act
+    pace: Expression = ONE  # the factor of ∇H + ζ: g with a monitor and forces
 
     @property
     def start(self) -> tuple[str, ...]:

@@ -68,7 +68,7 @@ def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> 
     four, last = field.number(4), len(places) * count
 
     def unknowns(i: int, j: int, of: int, sign: Scalar) -> Iterator[tuple[int, dict[int, Scalar]]]:
-        """sign·4·β(e_i, e_j)(e_of) by components, in the unknown coefficients of the maps."""
+        """Yield the components of sign·4·β(e_i, e_j)(e_of) in the unknown coefficients of the maps."""
         place = places[max(i, j), min(i, j)]
         for number, phi in enumerate(maps):
             for (row, column), v in phi.items():

@@ -54,7 +54,7 @@ class Storage(Enum):
     COTANGENT = "bar"  # of the state, then of parameters at bonds
     START_COTANGENT = "start_bar"
     SUM_COTANGENT = "gathered_bar"
-    SEED = "seed"  # cotangents of what a kernel computes
+    SEED = "seed"  # cotangents of the outputs of a kernel
 
 
 @dataclass(frozen=True)

@@ -244,8 +244,10 @@ def _called_in_forms(step: Sweeps) -> set[str]:
 
 
 def _stages(program: Program, step: Gauss) -> Stages:
-    """The vector field of a Gauss method at all stages, with its transposes; what lies where a step starts is the same
-    for all of them."""
+    """Return the vector field of a Gauss method at all stages, with its transposes.
+
+    Values at the start of the step are shared by all lanes.
+    """
     kernels = [LaneKernel(step.slope, ("coef", "x"))]
     kernels += [LaneKernel(step.frame, ("coef", "z"))] if step.frame else []
     others = [*step.stage_transposes, *(k.kernel for k in _elapsed(program))]

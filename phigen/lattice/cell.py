@@ -69,7 +69,7 @@ class Cell:
 
     @property
     def times(self) -> tuple[str, ...]:
-        """The symbol of the time, or nothing."""
+        """The symbol of the time; empty without a time."""
         return (self.time,) if self.time else ()
 
     @cached_property

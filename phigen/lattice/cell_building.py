@@ -151,7 +151,7 @@ def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression
 def _not_along_bonds(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
     """Yield an error for forces and noise that a spec with brackets along bonds cannot have.
 
-    π at a site would need sums over bonds of covectors at other sites.
+    With such brackets π of a covector field at a site is a sum over bonds, which these features do not compute.
     """
     declared = {("damping",): spec.forces.damping is not None, ("forces", "covector"): bool(spec.forces.covector)}
     for path, is_declared in {**declared, ("noise",): bool(spec.noise)}.items():

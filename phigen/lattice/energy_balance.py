@@ -97,8 +97,9 @@ def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: 
 def integral(values: Floats, h: float, places: Floats | None = None) -> tuple[Floats, float]:
     """Return the integrals of P from the first time to each, and an estimate of their error.
 
-    ``values`` (steps + 1,) are taken at times ``h`` apart; so are the integrals, or they end at ``places``, numbers of
-    steps with a fraction (rows,). Beyond the last value, the polynomial through the values before it is integrated.
+    ``values`` (steps + 1,) are taken at times ``h`` apart. The integrals end at these times or, with ``places``
+    (rows,), after these numbers of steps, which may have a fraction. Beyond the last value, the polynomial through
+    the values before it is integrated.
     """
     fine, coarse = (_integrals_to(values, count, h, places) for count in (FINE_NODES, COARSE_NODES))
     return fine, float(np.abs(fine - coarse).max())

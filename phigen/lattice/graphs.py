@@ -54,7 +54,7 @@ class GraphSearch(PartSearch):
         if bonds and self._along_bonds:
             raise NoPartError(bonds[0].expression, "brackets run along bonds, so no energies may")
 
-    # --- what commutes
+    # --- commuting terms
 
     def _classes(self, term: Summand) -> list[tuple[Summand, int]]:
         for kind in (WHOLE, self._end_of(term)):

@@ -1,4 +1,4 @@
-"""Kernels of what is observed of a lattice: energy, Casimirs, vector field, and the observables of the spec.
+"""Kernels of observables of a lattice: energy, Casimirs, vector field, and the observables of the spec.
 
 An observable that is one number has a density at sites, which targets add up, or take the extremes of. Of terms that
 reach beyond an open end a sum takes none, as H does; an extreme leaves out the sites where any term does.

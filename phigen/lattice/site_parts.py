@@ -267,7 +267,7 @@ class PartSearch:
             self._couples.setdefault(f, []).append(self.cell.place(other))
 
     def splitting(self) -> CellSplitting:
-        """Return all parts."""
+        """Return H as a sum of parts with this colouring. Raises `NoPartError` if some term fits none."""
         site_terms: list[Summand] = []
         classes: list[tuple[Summand, int]] = []
         for term in summands_of(self.cell):
@@ -291,7 +291,7 @@ class PartSearch:
         ]
         return CellSplitting((*flows, *self._site_flows(site_terms)), self.colouring)
 
-    # --- what commutes
+    # --- commuting terms
 
     def _support(self, term: tuple[Summand, int]) -> list[Coordinate]:
         summand, colour = term

@@ -189,9 +189,9 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
 
 
 def _with_seams(choice: Choice, colouring: Colouring) -> Choice:
-    """Return the choice with the flows of terms on seams added.
+    """Return the choice with the flows of terms on boundary seams added.
 
-    They follow the flow of the other terms of their part; in the last part they precede it.
+    These flows follow the flow of the other terms of their part; in the last part they precede it.
     """
     flows = choice.splitting.flows
     last, all_flows = len(flows) - 1, list[Flow]()
@@ -203,7 +203,7 @@ def _with_seams(choice: Choice, colouring: Colouring) -> Choice:
 
 
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
-    """The flows of the terms of a part that begin on seams, for each of these."""
+    """Yield the flows of the terms of a part that begin on seams, one for each set of seams."""
     colours = {colour for _, listed in flow.summands for colour in listed}
     if colours and colours.isdisjoint(colouring.on_seams()):
         return
@@ -265,7 +265,8 @@ def _seamed(
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
     """Return the parts that can be V.
 
-    Where there is a time, beside T + e: then T must not depend on it, and V and ∂V/∂t commute.
+    If H depends on the time, T + e takes the place of T: T must not depend on the time, and V must commute with
+    ∂V/∂t.
     """
     return [k for k in cell_kicks(cell, parts) if not (cell.time and is_dated(parts.flows[1 - k.part], cell.time))]
 

@@ -110,7 +110,7 @@ def flow_attitude(
 
 
 def _carrier(group: Group) -> tuple[Symbol, ...]:
-    """Return the symbols of the element, less 1, of the flows of a step so far."""
+    """Return the symbols of the product, less 1, of the elements of the flows of a step so far."""
     return tuple(Symbol("element", i) for i in range(group.size))
 
 

@@ -1,9 +1,9 @@
 """Choice of the composition of a splitting: by the order, the brackets of its parts, and the cost of its flows.
 
 If {V, {V, {V, T}}} = 0 for one of two parts as V, the methods of `phigen.scheme.nystrom` apply, with modified kicks
-if V + κ{V, {V, T}} has a flow. Among the methods that apply, the choice has the least product of the cost of a step
-and error^{1/order}, to which the cost of a given accuracy is proportional. Other splittings get the recommended
-alternation.
+if V + κ{V, {V, T}} has a flow. The cost of reaching an accuracy is proportional to the cost of a step times
+error^{1/order}; of the methods that apply, the one with the least such product is chosen. Other splittings get the
+recommended alternation.
 """
 
 from __future__ import annotations

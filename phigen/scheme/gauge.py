@@ -88,7 +88,7 @@ class Gauge:
         return self.monitor * (hamiltonian + symbol(LEVEL)) if self.monitor else hamiltonian
 
     def pace(self, system: System) -> Expression:
-        """What multiplies ∇H + ζ of the system that is discretised: g where there is no K."""
+        """Return the factor of ∇H + ζ in the discretised system: g if a monitor acts together with forces, else 1."""
         return self.monitor if self.monitor and system.forces else ONE
 
     def applied(self, system: System) -> System:

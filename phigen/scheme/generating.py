@@ -108,7 +108,7 @@ def collected_form(
 def graph_form(
     series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str], inputs: Sequence[str] = ()
 ) -> GeneratingFunction:
-    """Return the gradient by reverse, the Hessian by repeated reverse differentiation of the shared graph.
+    """Return the gradient by one reverse sweep over the shared graph, and the Hessian by one sweep for each row.
 
     ``inputs`` are those of a step, such as the time. Raises `OverflowError` as soon as the derivatives so far exceed
     the budget of one kernel.

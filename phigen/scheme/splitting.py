@@ -203,7 +203,7 @@ def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic |
 
 
 def _expect_correctable(system: System, spec: Spec, method: Corrected) -> None:
-    """`SpecError` for what does not go with a corrector: values that belong to a step between those of a run."""
+    """Raise `SpecError` for features that need the state at single steps, which a corrector does not have."""
     refused = {
         "time": (bool(system.time), "the corrector would need its own times"),
         "noise": (bool(system.noise), "the corrector would undo random increments"),

@@ -93,7 +93,7 @@ def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
 
 
 def recomputing_transpose(program: Program, step: Sweeps, sweep: Sweep, transpose: Kernel) -> Kernel:
-    """Return the transpose of a sweep that reads the updated fields after the sweep and recomputes them, `UNDONE`."""
+    """Return the transpose of a sweep that reads the fields after the sweep and recomputes those before, `UNDONE`."""
     updated = [program.coordinates[f] for f in sweep.moved]
     changes = _changes(program, sweep, of_coefficients(step))
     values = iter(before(transpose.roots, changes))

@@ -276,9 +276,9 @@ def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
 
 
 def _as_written(ring: Ring, g: Expression, solution: Solved) -> list[Expression]:
-    """Return the increments, with t π∇g as written for shifted coordinates where this takes fewer operations.
+    """Return t π∇g with g as written as the increments of shifted coordinates, if this takes fewer operations.
 
-    (x − y)⁴ is an example.
+    An example is g = (x − y)⁴.
     """
     slope = gradient(symbol(TIME) * g, ring.coordinates)
     written = hamiltonian_vector_field(ring.brackets, slope)

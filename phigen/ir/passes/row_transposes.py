@@ -38,7 +38,7 @@ BEGIN, END, APART, WHOLE, LANES, LANE, INDEX_TO = (
 #: Number of partial sums of a sum over sites, which the runtime adds at the end.
 BATCH, SUMS = ir.fixed("ADDED"), ir.fixed("sums")
 
-#: Sites in a batch of a sum over pairs: so many additions are independent that their latency is hidden.
+#: Sites in a batch of a sum over pairs: their additions are independent, which hides the latency.
 PAIR_BATCH = 32
 
 

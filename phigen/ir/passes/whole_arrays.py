@@ -76,7 +76,7 @@ class WholeArrays:
         return replace(function, parameters=("parameters", "x", "sites"), body=(*body, ir.Return(OUT)))
 
     def sums(self, functions: Sequence[ir.Function]) -> ir.Function:
-        """Return one function that sums over the bonds or pairs that several functions loop over."""
+        """Return one function for the sums over bonds or pairs of several functions, such as those for both ends."""
         body: list[ir.Statement] = []
         for function in functions:
             loop = _loop(function)
@@ -174,7 +174,7 @@ class WholeArrays:
                 return ir.Called("_apart", (value, SITES))
         return ir.Called("filled", (value,), SITES)
 
-    # ---- what is read
+    # ---- reads
 
     def _sums(self, function: ir.Function) -> Iterator[ir.Statement]:
         """Yield the statement that computes the sums over bonds or pairs that a function reads."""
