@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 4e913bef4bf0bc734061c8085103c9a20edcef6e811388b20e242bb29c6579de
+ * body-sha256: 267560c5c40b9127330e4cc6dbdf7facf095510e2409aed48e1b8771ce7dca01
  */
 #include "food_web.h"
 #include <float.h>
@@ -84,6 +84,23 @@ typedef struct {
 #else
 #define food_web_EACH_SITE
 #endif
+
+/* Doubles from the beginning of a row of so many sites to that of the next. */
+static size_t food_web_width(size_t length)
+{
+    const size_t wide = (length + 7) / 8 * 8;
+    /* rows a multiple of a page apart would share lines of the cache */
+    return wide % 512 == 0 ? wide + 8 : wide;
+}
+
+/* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
+static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
+{
+    const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
+    if (sizes == NULL || sizes[0] < food_web_least[0] || sizes[0] > most / 2) return 0;
+    *width = (ptrdiff_t)food_web_width(sizes[0]);
+    return 1;
+}
 
 /* The whole row. */
 static inline food_web_row food_web_row_of(const food_web_solver *s)
@@ -240,9 +257,10 @@ static size_t food_web_graph_size(size_t sites, size_t bonds)
     return food_web_BOND_ARRAYS * 2 * bonds * sizeof(double) + integers * sizeof(int);
 }
 
-/* Whether all bonds run between two different sites. */
+/* Whether bonds can be numbered and all run between two different sites. */
 static int food_web_connected(const food_web_bonds *bonds, size_t sites)
 {
+    if (!food_web_few(sites, bonds != NULL ? bonds->count : 0)) return 0;
     if (bonds == NULL || bonds->ends == NULL) return bonds == NULL || bonds->count == 0;
     for (size_t k = 0; k < bonds->count; ++k) {
         const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
@@ -305,19 +323,7 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
 /* ---- The lattice ---- */
 #define food_web_PROBE_STEP 1e-100 /* so short that coefficients are finite */
 
-enum { food_web_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { food_web_BUFFER = 256 }; /* densities that are added in one go */
-
-/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
-static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
-{
-    const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
-    if (sizes == NULL || sizes[0] < food_web_least[0] || sizes[0] > most / 2) return 0;
-    size_t wide = (sizes[0] + 7) / 8 * 8;
-    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    *width = (ptrdiff_t)wide;
-    return 1;
-}
 
 /* Doubles from one array to the next. */
 static size_t food_web_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
@@ -327,15 +333,23 @@ size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
     ptrdiff_t width;
     const size_t rows = food_web_shape(sizes, &width);
     if (rows == 0 || !food_web_few(sizes[0], bonds)) return 0;
-    size_t doubles = food_web_RESERVED * food_web_block(rows, width);
+    const size_t doubles = food_web_RESERVED * food_web_block(rows, width);
     return doubles * sizeof(double) + food_web_graph_size(sizes[0], bonds) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void food_web_put(const food_web_solver *s, double *rows, const double *values)
 {
-    memset(rows, 0, (size_t)s->width * sizeof *rows);
-    memcpy(rows, values, (size_t)s->length * sizeof *rows);
+    double *row = rows;
+    memset(row, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+}
+
+/* The sites of fields, without what is beside their rows. */
+static void food_web_take(const food_web_solver *s, double *const *fields, double *x)
+{
+    for (size_t k = 0; k < food_web_DIM; ++k)
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 /* The values of a parameter at sites, or one value for all. */
@@ -362,6 +376,14 @@ s->params.A = NULL;
 }
 
 /* ---- The solver ---- */
+/* Where all arrays are, in blocks of memory. */
+static void food_web_place_arrays(food_web_solver *s, double *memory, size_t block)
+{
+    for (size_t k = 0; k < food_web_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < food_web_DIM; ++k, memory += block) s->before[k] = memory;
+    for (size_t k = 0; k < food_web_GATHERED; ++k, memory += block) s->gathered[k] = memory;
+}
+
 static void food_web_prepare_step(const food_web_params *params, double h, double *coef)
 {
     for (int k = 0; k < food_web_ROWS_OF_FLOWS; ++k)
@@ -382,11 +404,10 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return food_web_BAD_ARGUMENT;
     const food_web_params own = params != NULL ? *params : food_web_default_params;
     const size_t rows = food_web_shape(sizes, &width), length = sizes[0], sites = rows * length;
-    const size_t count = bonds != NULL ? bonds->count : 0;
-    if (rows == 0 || !food_web_few(sites, count) || !food_web_connected(bonds, sites) || !food_web_finite(x0,
-        food_web_DIM * sites) || !food_web_allowed(&own, sites, count))
+    if (rows == 0 || !food_web_connected(bonds, sites) || !food_web_finite(x0, food_web_DIM * sites)
+        || !food_web_allowed(&own, sites, bonds != NULL ? bonds->count : 0))
         return food_web_BAD_ARGUMENT;
-    double coef[food_web_COEFFICIENTS];
+    double coef[food_web_COEFFICIENTS] = { 0.0 };
     food_web_prepare_step(&own, food_web_PROBE_STEP, coef);
     if (!food_web_finite(coef, food_web_COEFFICIENTS)) return food_web_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -399,9 +420,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = food_web_block(rows, width);
     food_web_connect(s, bonds, memory + food_web_RESERVED * block);
-    for (size_t k = 0; k < food_web_ARRAYS; ++k, memory += block) s->x[k] = memory;
-    for (size_t k = 0; k < food_web_DIM; ++k, memory += block) s->before[k] = memory;
-    for (size_t k = 0; k < food_web_GATHERED; ++k, memory += block) s->gathered[k] = memory;
+    food_web_place_arrays(s, memory, block);
     for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->x[k], x0 + k * sites);
     food_web_put_parameters(s, &own);
     food_web_put_at_bonds(s, &own);
@@ -438,6 +457,8 @@ static void food_web_copy(double *const *to, double *const *from, const food_web
 }
 
 /* ---- The flows ---- */
+enum { food_web_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
+
 /* The first flow, those between it and the last, the last, or those between, backwards. */
 static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef)
 {
@@ -504,20 +525,14 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 
 food_web_status food_web_step(food_web_solver *s, double h) { return food_web_integrate(s, h, 1); }
 
-/* The sites of fields, without what is beside their rows. */
-static void food_web_take(const food_web_solver *s, double *const *fields, double *x)
-{
-    for (size_t k = 0; k < food_web_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
-}
-
 void food_web_state(const food_web_solver *s, double *x) { food_web_take(s, s->x, x); }
 
 int food_web_saved(const food_web_solver *s, double *x, size_t *far)
 {
-    if (s->open) food_web_take(s, s->before, x);
     *far = s->far;
-    return s->open;
+    if (!s->open) return 0;
+    food_web_take(s, s->before, x);
+    return 1;
 }
 
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t far)

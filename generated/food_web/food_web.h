@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 592baa84e34570631c1b5855da18855269f9f89d57cac3b4a73275e081a45549
+ * body-sha256: 3fd8c9cf19aef0b09316d17d2132896870ddb9764a0de5b15f3f93ebf6362db3
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -32,14 +32,16 @@ typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food
     food_web_BAD_ARGUMENT } food_web_status;
 
 /* A solver and the trajectory that it computes. Initialise it by food_web_init. Its arrays lie in memory of
-   the caller, so a copy of the struct is not an independent solver. A field is stored as one row of all
-   sites. Read all fields of the struct at any time, write to none of them. */
+   the caller, so a copy of the struct is not an independent solver. A field is stored in rows, which are all
+   sites along the last axis. Where steps read other sites, a row has a halo: copies of the sites of the other
+   end beside each end. Read all fields of the struct at any time, write to none of them. */
 typedef struct {
     size_t sizes[food_web_AXES]; /* number of sites along each axis */
     size_t sites, rows;          /* number of all sites, and of rows */
     ptrdiff_t length, width;     /* sites of a row; doubles from the start of a row to that of the next */
     /* the state: first site of each field, then of each parameter at sites, in rows */
     double *x[food_web_ARRAYS];
+    double *before[food_web_DIM]; /* the fields at the start of the present steps, restored if a step fails */
     double *gathered[food_web_GATHERED]; /* for each site, sums over other sites */
     /* for each site, index in other of its first bond that starts there, and that ends there */
     int *bonds, *middle;
@@ -47,12 +49,8 @@ typedef struct {
     double *at_bonds[food_web_BOND_ARRAYS]; /* for each of these, the values of the parameters at bonds */
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
-    /* the fields at the start of the present steps, restored if a step fails */
-    double *before[food_web_DIM];
-    /* 1 if before lacks the last flow of the last step, which x includes between calls */
-    int open;
-    /* steps that use functions for arguments of any size in place of faster ones for small */
-    size_t far;
+    int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
+    size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
     size_t steps; /* number of successful steps since food_web_init */
     double t; /* time since food_web_init */
     double h; /* size of the last step */
@@ -84,8 +82,8 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
    step, and s->steps counts the successful ones. The last flow of a step is merged with the first of the
-   next, also of the next call. With OpenMP, rows are updated in parallel, with the same bits for any number
-   of threads. */
+   next, also of the next call, where steps consist of flows. With OpenMP, rows are updated in parallel, with
+   the same bits for any number of threads. */
 food_web_status food_web_step(food_web_solver *s, double h);
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 
@@ -94,7 +92,7 @@ void food_web_state(const food_web_solver *s, double *x);
 
 /* Save and restore a run with the same bits. food_web_saved writes x[field][site] and far. To restore, call
    food_web_init with the state, then food_web_resume with far, and with x if food_web_saved returned 1, else
-   NULL. */
+   NULL. With compensated steps x has room for two states: all fields, then the compensation term of each. */
 int food_web_saved(const food_web_solver *s, double *x, size_t *far);
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t far);
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: beff6f92e149813bc78c45c7868515a9b96f4cef1a9d6d01ca7faeb0002d65cb
+ * body-sha256: 9cf9de244be0ef154506e2fa22600b7e78742b61162db7d9fe454028aa63b07e
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -97,6 +97,31 @@ static inline void heisenberg_ends(double *row, ptrdiff_t length, ptrdiff_t from
         for (ptrdiff_t k = 1; k <= heisenberg_HALO; ++k) row[-k] = row[length - k];
 }
 
+/* Doubles from the beginning of a row of so many sites to that of the next. */
+static size_t heisenberg_width(size_t length)
+{
+    const size_t wide = heisenberg_LEAD + ((length + 7) / 8 * 8 + heisenberg_HALO + 7) / 8 * 8;
+    /* rows a multiple of a page apart would share lines of the cache */
+    return wide % 512 == 0 ? wide + 8 : wide;
+}
+
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
+static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *width)
+{
+    const size_t most = SIZE_MAX / 64 / heisenberg_RESERVED;
+    size_t rows = 1;
+    if (sizes == NULL) return 0;
+    for (int a = 0; a < heisenberg_AXES; ++a)
+        if (sizes[a] < heisenberg_least[a] || sizes[a] > most / 2) return 0;
+    for (int a = 0; a < heisenberg_AXES - 1; ++a) {
+        if (rows > most / sizes[a]) return 0;
+        rows *= sizes[a];
+    }
+    const size_t wide = heisenberg_width(sizes[heisenberg_AXES - 1]);
+    *width = (ptrdiff_t)wide;
+    return rows > most / wide ? 0 : rows;
+}
+
 /* The position of a row along all axes but the last. */
 static inline void heisenberg_place(const heisenberg_solver *s, size_t index,
     ptrdiff_t place[heisenberg_AXES])
@@ -106,6 +131,35 @@ static inline void heisenberg_place(const heisenberg_solver *s, size_t index,
         place[a] = (ptrdiff_t)(index % s->sizes[a]);
         index /= s->sizes[a];
     }
+}
+
+/* Where a row is, and those beside it. */
+static void heisenberg_find_lines(const heisenberg_solver *s, size_t index, ptrdiff_t at[heisenberg_LINES])
+{
+    ptrdiff_t place[heisenberg_AXES];
+    heisenberg_place(s, index, place);
+    for (int k = 0; k < heisenberg_LINES; ++k) {
+        ptrdiff_t line = 0;
+        for (int a = 0; a < heisenberg_AXES - 1; ++a) {
+            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
+            ptrdiff_t p = place[a] + heisenberg_lines[k][a];
+            if (heisenberg_open[a]) { /* mirrored, as in heisenberg_ends */
+                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
+                p = p < 0 ? 0 : p < size ? p : size - 1;
+            } else {
+                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
+            }
+            line = line * size + p;
+        }
+        at[k] = line * s->width;
+    }
+}
+
+/* The same of all rows, into memory. */
+static void heisenberg_find_all_lines(heisenberg_solver *s, double *memory)
+{
+    s->lines = (ptrdiff_t *)(void *)memory;
+    for (size_t r = 0; r < s->rows; ++r) heisenberg_find_lines(s, r, s->lines + r * heisenberg_LINES);
 }
 
 /* The row of that number, which is worked at in one go. */
@@ -506,27 +560,7 @@ static void heisenberg_wait(void)
 #endif
 }
 
-enum { heisenberg_STRETCH = 32 };   /* steps between looks at the state: what is not finite stays so */
-enum { heisenberg_FAR_STEPS = 64 }; /* steps by functions for large arguments, after one that needed them */
-enum { heisenberg_BUFFER = 256 };   /* densities that are added in one go */
-
-/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
-static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *width)
-{
-    const size_t most = SIZE_MAX / 64 / heisenberg_RESERVED;
-    size_t rows = 1;
-    if (sizes == NULL) return 0;
-    for (int a = 0; a < heisenberg_AXES; ++a)
-        if (sizes[a] < heisenberg_least[a] || sizes[a] > most / 2) return 0;
-    for (int a = 0; a < heisenberg_AXES - 1; ++a) {
-        if (rows > most / sizes[a]) return 0;
-        rows *= sizes[a];
-    }
-    size_t wide = heisenberg_LEAD + ((sizes[heisenberg_AXES - 1] + 7) / 8 * 8 + heisenberg_HALO + 7) / 8 * 8;
-    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    *width = (ptrdiff_t)wide;
-    return rows > most / wide ? 0 : rows;
-}
+enum { heisenberg_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
    what is being written at the same place of another page. */
@@ -541,7 +575,7 @@ size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES])
     ptrdiff_t width;
     const size_t rows = heisenberg_shape(sizes, &width);
     if (rows == 0) return 0;
-    size_t doubles = heisenberg_RESERVED * heisenberg_block(rows, width);
+    const size_t doubles = heisenberg_RESERVED * heisenberg_block(rows, width);
     return doubles * sizeof(double) + rows * heisenberg_LINES * sizeof(ptrdiff_t) + 64;
 }
 
@@ -554,6 +588,15 @@ static void heisenberg_put(const heisenberg_solver *s, double *rows, const doubl
         memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
         heisenberg_ends(row, s->length, 0, s->length);
     }
+}
+
+/* The sites of fields, without what is beside their rows. */
+static void heisenberg_take(const heisenberg_solver *s, double *const *fields, double *x)
+{
+    for (size_t k = 0; k < heisenberg_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
+                (size_t)s->length * sizeof *x);
 }
 
 /* The values of a parameter at sites, or one value for all. */
@@ -572,29 +615,14 @@ static void heisenberg_put_parameters(heisenberg_solver *s, const heisenberg_par
 s->params.B = NULL;
 }
 
-/* Where a row is, and those beside it. */
-static void heisenberg_find_lines(const heisenberg_solver *s, size_t index, ptrdiff_t at[heisenberg_LINES])
+/* ---- The solver ---- */
+/* Where all arrays are, in blocks of memory. */
+static void heisenberg_place_arrays(heisenberg_solver *s, double *memory, size_t block)
 {
-    ptrdiff_t place[heisenberg_AXES];
-    heisenberg_place(s, index, place);
-    for (int k = 0; k < heisenberg_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < heisenberg_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + heisenberg_lines[k][a];
-            if (heisenberg_open[a]) { /* mirrored, as in heisenberg_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
+    for (size_t k = 0; k < heisenberg_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < heisenberg_DIM; ++k, memory += block) s->before[k] = memory;
 }
 
-/* ---- The solver ---- */
 static void heisenberg_prepare_step(const heisenberg_params *params, double h, double *coef)
 {
     for (int k = 0; k < heisenberg_ROWS_OF_FLOWS; ++k)
@@ -618,7 +646,7 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
         sites = rows * length;
     if (rows == 0 || !heisenberg_finite(x0, heisenberg_DIM * sites) || !heisenberg_allowed(&own, sites))
         return heisenberg_BAD_ARGUMENT;
-    double coef[heisenberg_COEFFICIENTS];
+    double coef[heisenberg_COEFFICIENTS] = { 0.0 };
     heisenberg_prepare_step(&own, heisenberg_PROBE_STEP, coef);
     if (!heisenberg_finite(coef, heisenberg_COEFFICIENTS)) return heisenberg_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -630,10 +658,8 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     s->params = own;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + heisenberg_LEAD;
     const size_t block = heisenberg_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(memory - heisenberg_LEAD + heisenberg_RESERVED * block);
-    for (size_t r = 0; r < rows; ++r) heisenberg_find_lines(s, r, s->lines + r * heisenberg_LINES);
-    for (size_t k = 0; k < heisenberg_ARRAYS; ++k, memory += block) s->x[k] = memory;
-    for (size_t k = 0; k < heisenberg_DIM; ++k, memory += block) s->before[k] = memory;
+    heisenberg_find_all_lines(s, memory - heisenberg_LEAD + heisenberg_RESERVED * block);
+    heisenberg_place_arrays(s, memory, block);
     for (size_t k = 0; k < heisenberg_DIM; ++k) heisenberg_put(s, s->x[k], x0 + k * sites);
     heisenberg_put_parameters(s, &own);
     return heisenberg_OK;
@@ -671,6 +697,9 @@ static void heisenberg_copy(double *const *to, double *const *from, const heisen
 }
 
 /* ---- The flows ---- */
+enum { heisenberg_STRETCH = 32 };   /* steps between looks at the state: what is not finite stays so */
+enum { heisenberg_FAR_STEPS = 64 }; /* steps by functions for large arguments, after one that needed them */
+
 /* One part of H. */
 static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const double *coef, int far)
 {
@@ -837,15 +866,6 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
 
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h) { return heisenberg_integrate(s, h, 1); }
 
-/* The sites of fields, without what is beside their rows. */
-static void heisenberg_take(const heisenberg_solver *s, double *const *fields, double *x)
-{
-    for (size_t k = 0; k < heisenberg_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
-}
-
 void heisenberg_state(const heisenberg_solver *s, double *x) { heisenberg_take(s, s->x, x); }
 
 /* To x and so many times what is there. */
@@ -878,9 +898,10 @@ heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change)
 
 int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far)
 {
-    if (s->open) heisenberg_take(s, s->before, x);
     *far = s->far;
-    return s->open;
+    if (!s->open) return 0;
+    heisenberg_take(s, s->before, x);
+    return 1;
 }
 
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far)

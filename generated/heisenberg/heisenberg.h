@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cc8e183e41f1d5b1c9764d39035f13913fa068c2116e6b912eff2f9ef28298e6
+ * body-sha256: 4eae8c1a87d657c0d9fcaca4152c81c358734da8593605e85dacc2ea3a6b38ef
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -30,22 +30,20 @@ typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR
     heisenberg_BAD_ARGUMENT } heisenberg_status;
 
 /* A solver and the trajectory that it computes. Initialise it by heisenberg_init. Its arrays lie in memory of
-   the caller, so a copy of the struct is not an independent solver. A field is stored in rows. A row is all
-   sites along the last axis, with a halo: copies of the sites of the other end beside each end. Read all
-   fields of the struct at any time, write to none of them. */
+   the caller, so a copy of the struct is not an independent solver. A field is stored in rows, which are all
+   sites along the last axis. Where steps read other sites, a row has a halo: copies of the sites of the other
+   end beside each end. Read all fields of the struct at any time, write to none of them. */
 typedef struct {
     size_t sizes[heisenberg_AXES]; /* number of sites along each axis */
     size_t sites, rows;            /* number of all sites, and of rows */
     ptrdiff_t length, width;       /* sites of a row; doubles from the start of a row to that of the next */
     /* the state: first site of each field, then of each parameter at sites, in rows */
     double *x[heisenberg_ARRAYS];
-    ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     /* the fields at the start of the present steps, restored if a step fails */
     double *before[heisenberg_DIM];
-    /* 1 if before lacks the last flow of the last step, which x includes between calls */
-    int open;
-    /* steps that use functions for arguments of any size in place of faster ones for small */
-    size_t far;
+    ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
+    int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
+    size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
     size_t steps; /* number of successful steps since heisenberg_init */
     double t; /* time since heisenberg_init */
     double h; /* size of the last step */
@@ -69,8 +67,8 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
    step, and s->steps counts the successful ones. The last flow of a step is merged with the first of the
-   next, also of the next call. With OpenMP, rows are updated in parallel, with the same bits for any number
-   of threads. */
+   next, also of the next call, where steps consist of flows. With OpenMP, rows are updated in parallel, with
+   the same bits for any number of threads. */
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps);
 
@@ -84,7 +82,8 @@ heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 
 /* Save and restore a run with the same bits. heisenberg_saved writes x[field][site] and far. To restore, call
    heisenberg_init with the state, then heisenberg_resume with far, and with x if heisenberg_saved returned 1,
-   else NULL. */
+   else NULL. With compensated steps x has room for two states: all fields, then the compensation term of
+   each. */
 int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far);
 

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 623018430a9e9339ebdac38eed430c8897cf4d8421136be58abf164bc8c36f0c
+ * body-sha256: 089cb33d2924900be6d52e3dc5b7ab3d3e3f4eec0159c45eb1d9e6da5e868c2b
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -75,6 +75,23 @@ typedef struct {
 #else
 #define point_vortices_EACH_SITE
 #endif
+
+/* Doubles from the beginning of a row of so many sites to that of the next. */
+static size_t point_vortices_width(size_t length)
+{
+    const size_t wide = (length + 7) / 8 * 8;
+    /* rows a multiple of a page apart would share lines of the cache */
+    return wide % 512 == 0 ? wide + 8 : wide;
+}
+
+/* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
+static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
+{
+    const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
+    if (sizes == NULL || sizes[0] < point_vortices_least[0] || sizes[0] > most / 2) return 0;
+    *width = (ptrdiff_t)point_vortices_width(sizes[0]);
+    return 1;
+}
 
 /* The whole row. */
 static inline point_vortices_row point_vortices_row_of(const point_vortices_solver *s)
@@ -289,17 +306,6 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 
 enum { point_vortices_BUFFER = 256 }; /* densities that are added in one go */
 
-/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
-static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
-{
-    const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
-    if (sizes == NULL || sizes[0] < point_vortices_least[0] || sizes[0] > most / 2) return 0;
-    size_t wide = (sizes[0] + 7) / 8 * 8;
-    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    *width = (ptrdiff_t)wide;
-    return 1;
-}
-
 /* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
    what is being written at the same place of another page. */
 static size_t point_vortices_block(size_t rows, ptrdiff_t width)
@@ -313,15 +319,23 @@ size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
     ptrdiff_t width;
     const size_t rows = point_vortices_shape(sizes, &width);
     if (rows == 0) return 0;
-    size_t doubles = point_vortices_RESERVED * point_vortices_block(rows, width);
+    const size_t doubles = point_vortices_RESERVED * point_vortices_block(rows, width);
     return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void point_vortices_put(const point_vortices_solver *s, double *rows, const double *values)
 {
-    memset(rows, 0, (size_t)s->width * sizeof *rows);
-    memcpy(rows, values, (size_t)s->length * sizeof *rows);
+    double *row = rows;
+    memset(row, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+}
+
+/* The sites of fields, without what is beside their rows. */
+static void point_vortices_take(const point_vortices_solver *s, double *const *fields, double *x)
+{
+    for (size_t k = 0; k < point_vortices_DIM; ++k)
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 /* The values of a parameter at sites, or one value for all. */
@@ -340,9 +354,12 @@ s->params.G = NULL;
 }
 
 /* ---- The solver ---- */
-/* Where y and what guesses need are, in blocks of memory. */
-static void point_vortices_place_middle(point_vortices_solver *s, double *memory, size_t block)
+/* Where all arrays are, in blocks of memory. */
+static void point_vortices_place_arrays(point_vortices_solver *s, double *memory, size_t block)
 {
+    for (size_t k = 0; k < point_vortices_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < point_vortices_DIM; ++k, memory += block) s->before[k] = memory;
+    for (size_t k = 0; k < point_vortices_GATHERED; ++k, memory += block) s->gathered[k] = memory;
     for (int k = 0; k < point_vortices_ARRAYS; ++k)
         for (int side = 0; side < point_vortices_SIDES; ++side)
             s->y[side][k] = k < point_vortices_DIM ? memory + (size_t)(point_vortices_SIDES * k + side)
@@ -378,8 +395,9 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     const point_vortices_params own = params != NULL ? *params : point_vortices_default_params;
     const size_t rows = point_vortices_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !point_vortices_finite(x0, point_vortices_DIM * sites) || !point_vortices_allowed(&own,
-        sites)) return point_vortices_BAD_ARGUMENT;
-    double coef[point_vortices_COEFFICIENTS];
+        sites))
+        return point_vortices_BAD_ARGUMENT;
+    double coef[point_vortices_COEFFICIENTS] = { 0.0 };
     point_vortices_prepare_step(&own, point_vortices_PROBE_STEP, coef);
     if (!point_vortices_finite(coef, point_vortices_COEFFICIENTS)) return point_vortices_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -391,10 +409,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     s->params = own;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = point_vortices_block(rows, width);
-    for (size_t k = 0; k < point_vortices_ARRAYS; ++k, memory += block) s->x[k] = memory;
-    for (size_t k = 0; k < point_vortices_DIM; ++k, memory += block) s->before[k] = memory;
-    for (size_t k = 0; k < point_vortices_GATHERED; ++k, memory += block) s->gathered[k] = memory;
-    point_vortices_place_middle(s, memory, block);
+    point_vortices_place_arrays(s, memory, block);
     for (size_t k = 0; k < point_vortices_DIM; ++k) point_vortices_put(s, s->x[k], x0 + k * sites);
     point_vortices_put_parameters(s, &own);
     return point_vortices_OK;
@@ -771,11 +786,7 @@ point_vortices_status point_vortices_step(point_vortices_solver *s, double h)
     return point_vortices_integrate(s, h, 1);
 }
 
-void point_vortices_state(const point_vortices_solver *s, double *x)
-{
-    for (size_t k = 0; k < point_vortices_DIM; ++k)
-        memcpy(x + k * s->sites, s->x[k], (size_t)s->length * sizeof *x);
-}
+void point_vortices_state(const point_vortices_solver *s, double *x) { point_vortices_take(s, s->x, x); }
 
 /* To x and so many times what is there. */
 static point_vortices_status point_vortices_move(point_vortices_solver *s, const double *x, double kept)

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ad19eae6f08339341401e62c5fbce2638dc54fbaeda6e9077b44d4261109f5c4
+ * body-sha256: 0e63f3d8ffdc35f863a49df67f11ae3c9e3f24a96080ce08c5e7199db92e4217
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -40,17 +40,19 @@ typedef struct {
 } point_vortices_guess;
 
 /* A solver and the trajectory that it computes. Initialise it by point_vortices_init. Its arrays lie in
-   memory of the caller, so a copy of the struct is not an independent solver. A field is stored as one row of
-   all sites. Read all fields of the struct at any time, write to none of them. */
+   memory of the caller, so a copy of the struct is not an independent solver. A field is stored in rows,
+   which are all sites along the last axis. Where steps read other sites, a row has a halo: copies of the
+   sites of the other end beside each end. Read all fields of the struct at any time, write to none of
+   them. */
 typedef struct {
     size_t sizes[point_vortices_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
     /* the state: first site of each field, then of each parameter at sites, in rows */
     double *x[point_vortices_ARRAYS];
-    double *gathered[point_vortices_GATHERED]; /* for each site, sums over other sites */
     /* the fields at the start of the present steps, restored if a step fails */
     double *before[point_vortices_DIM];
+    double *gathered[point_vortices_GATHERED]; /* for each site, sums over other sites */
     /* solution of a stage before and after a sweep, with the parameters at sites */
     double *y[2][point_vortices_ARRAYS];
     point_vortices_guess guess[point_vortices_STAGES]; /* predictor of each stage */
@@ -82,8 +84,9 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     const size_t sizes[point_vortices_AXES], const double *x0, void *work);
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
-   step, and s->steps counts the successful ones. Predictors are extrapolated from earlier steps of the same
-   call. With OpenMP, rows are updated in parallel, with the same bits for any number of threads. */
+   step, and s->steps counts the successful ones. The last flow of a step is merged with the first of the
+   next, also of the next call, where steps consist of flows. With OpenMP, rows are updated in parallel, with
+   the same bits for any number of threads. */
 point_vortices_status point_vortices_step(point_vortices_solver *s, double h);
 point_vortices_status point_vortices_integrate(point_vortices_solver *s, double h, size_t steps);
 

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 65c4474c4ef60b1f98d14858e638b9b9a34f8407f351d726844102d83f27a16b
+ * body-sha256: 2f6a755703c35e4f689be331447bd24d186e688acb18d157e5550187672f02f6
  */
 #include "toda.h"
 #include <float.h>
@@ -84,6 +84,23 @@ static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 0; k < toda_HALO; ++k) row[length + k] = row[k];
     if (to == length)
         for (ptrdiff_t k = 1; k <= toda_HALO; ++k) row[-k] = row[length - k];
+}
+
+/* Doubles from the beginning of a row of so many sites to that of the next. */
+static size_t toda_width(size_t length)
+{
+    const size_t wide = toda_LEAD + ((length + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
+    /* rows a multiple of a page apart would share lines of the cache */
+    return wide % 512 == 0 ? wide + 8 : wide;
+}
+
+/* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
+static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
+{
+    const size_t most = SIZE_MAX / 64 / toda_RESERVED;
+    if (sizes == NULL || sizes[0] < toda_least[0] || sizes[0] > most / 2) return 0;
+    *width = (ptrdiff_t)toda_width(sizes[0]);
+    return 1;
 }
 
 /* The whole row. */
@@ -232,19 +249,7 @@ static void toda_vector_field_row(const toda_row *row, double *restrict out)
 /* ---- The lattice ---- */
 #define toda_PROBE_STEP 1e-100 /* so short that coefficients are finite */
 
-enum { toda_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { toda_BUFFER = 256 }; /* densities that are added in one go */
-
-/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
-static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
-{
-    const size_t most = SIZE_MAX / 64 / toda_RESERVED;
-    if (sizes == NULL || sizes[0] < toda_least[0] || sizes[0] > most / 2) return 0;
-    size_t wide = toda_LEAD + ((sizes[0] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
-    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    *width = (ptrdiff_t)wide;
-    return 1;
-}
 
 /* Doubles from one array to the next. */
 static size_t toda_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
@@ -254,7 +259,7 @@ size_t toda_work_size(const size_t sizes[toda_AXES])
     ptrdiff_t width;
     const size_t rows = toda_shape(sizes, &width);
     if (rows == 0) return 0;
-    size_t doubles = toda_RESERVED * toda_block(rows, width);
+    const size_t doubles = toda_RESERVED * toda_block(rows, width);
     return doubles * sizeof(double) + 64;
 }
 
@@ -267,7 +272,21 @@ static void toda_put(const toda_solver *s, double *rows, const double *values)
     toda_ends(row, s->length, 0, s->length);
 }
 
+/* The sites of fields, without what is beside their rows. */
+static void toda_take(const toda_solver *s, double *const *fields, double *x)
+{
+    for (size_t k = 0; k < toda_DIM; ++k)
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
+}
+
 /* ---- The solver ---- */
+/* Where all arrays are, in blocks of memory. */
+static void toda_place_arrays(toda_solver *s, double *memory, size_t block)
+{
+    for (size_t k = 0; k < toda_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < toda_DIM; ++k, memory += block) s->before[k] = memory;
+}
+
 static void toda_prepare_step(const toda_params *params, double h, double *coef)
 {
     for (int k = 0; k < toda_ROWS_OF_FLOWS; ++k) toda_prepare(params, toda_times[k] * h, coef + k * toda_ROW);
@@ -289,7 +308,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     const size_t rows = toda_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !toda_finite(x0, toda_DIM * sites) || !toda_allowed(&own, sites))
         return toda_BAD_ARGUMENT;
-    double coef[toda_COEFFICIENTS];
+    double coef[toda_COEFFICIENTS] = { 0.0 };
     toda_prepare_step(&own, toda_PROBE_STEP, coef);
     if (!toda_finite(coef, toda_COEFFICIENTS)) return toda_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -301,8 +320,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     s->params = own;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
     const size_t block = toda_block(rows, width);
-    for (size_t k = 0; k < toda_ARRAYS; ++k, memory += block) s->x[k] = memory;
-    for (size_t k = 0; k < toda_DIM; ++k, memory += block) s->before[k] = memory;
+    toda_place_arrays(s, memory, block);
     for (size_t k = 0; k < toda_DIM; ++k) toda_put(s, s->x[k], x0 + k * sites);
     return toda_OK;
 }
@@ -337,6 +355,8 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 }
 
 /* ---- The flows ---- */
+enum { toda_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
+
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void toda_make_flow(const toda_solver *s, size_t steps, int number)
 {
@@ -394,20 +414,14 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 
 toda_status toda_step(toda_solver *s, double h) { return toda_integrate(s, h, 1); }
 
-/* The sites of fields, without what is beside their rows. */
-static void toda_take(const toda_solver *s, double *const *fields, double *x)
-{
-    for (size_t k = 0; k < toda_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
-}
-
 void toda_state(const toda_solver *s, double *x) { toda_take(s, s->x, x); }
 
 int toda_saved(const toda_solver *s, double *x, size_t *far)
 {
-    if (s->open) toda_take(s, s->before, x);
     *far = s->far;
-    return s->open;
+    if (!s->open) return 0;
+    toda_take(s, s->before, x);
+    return 1;
 }
 
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far)

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c3f839245801bee15eec76ee9abdd8539e48a02ef183bad90850fe7c2fdb8484
+ * body-sha256: 7423e0f549a8683edae5b8cb292f5a630fa0e22b6c1d5fe4b130d9d8eab5081a
  */
 #ifndef TODA_H
 #define TODA_H
@@ -29,9 +29,9 @@ typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
     toda_BAD_ARGUMENT } toda_status;
 
 /* A solver and the trajectory that it computes. Initialise it by toda_init. Its arrays lie in memory of the
-   caller, so a copy of the struct is not an independent solver. A field is stored as one row of all sites,
-   with a halo: copies of the sites of the other end beside each end. Read all fields of the struct at any
-   time, write to none of them. */
+   caller, so a copy of the struct is not an independent solver. A field is stored in rows, which are all
+   sites along the last axis. Where steps read other sites, a row has a halo: copies of the sites of the other
+   end beside each end. Read all fields of the struct at any time, write to none of them. */
 typedef struct {
     size_t sizes[toda_AXES]; /* number of sites along each axis */
     size_t sites, rows;      /* number of all sites, and of rows */
@@ -39,10 +39,8 @@ typedef struct {
     /* the state: first site of each field, then of each parameter at sites, in rows */
     double *x[toda_ARRAYS];
     double *before[toda_DIM]; /* the fields at the start of the present steps, restored if a step fails */
-    /* 1 if before lacks the last flow of the last step, which x includes between calls */
-    int open;
-    /* steps that use functions for arguments of any size in place of faster ones for small */
-    size_t far;
+    int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
+    size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
     size_t steps; /* number of successful steps since toda_init */
     double t; /* time since toda_init */
     double h; /* size of the last step */
@@ -66,8 +64,8 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
    step, and s->steps counts the successful ones. The last flow of a step is merged with the first of the
-   next, also of the next call. With OpenMP, rows are updated in parallel, with the same bits for any number
-   of threads. */
+   next, also of the next call, where steps consist of flows. With OpenMP, rows are updated in parallel, with
+   the same bits for any number of threads. */
 toda_status toda_step(toda_solver *s, double h);
 toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 
@@ -75,7 +73,8 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 void toda_state(const toda_solver *s, double *x);
 
 /* Save and restore a run with the same bits. toda_saved writes x[field][site] and far. To restore, call
-   toda_init with the state, then toda_resume with far, and with x if toda_saved returned 1, else NULL. */
+   toda_init with the state, then toda_resume with far, and with x if toda_saved returned 1, else NULL. With
+   compensated steps x has room for two states: all fields, then the compensation term of each. */
 int toda_saved(const toda_solver *s, double *x, size_t *far);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far);
 

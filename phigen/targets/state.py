@@ -7,7 +7,7 @@ another step size; in JavaScript, what a copy of a solver takes over.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from phigen.targets.c.files import holds
@@ -199,38 +199,12 @@ STATE = (
     ),
 )
 
-Lines = Callable[[StateBlock], Iterator[str]]
-
-#: What the runtime in C includes, by file: how deep it is indented there, and the lines of a block.
-PARTS: dict[str, tuple[int, Lines]] = {
-    "state_members.h": (4, lambda block: iter(block.members)),
-    "state_saved.h": (4, StateBlock.save),
-    "state_restored.h": (8, StateBlock.restore),
-    "state_reset.h": (8, lambda block: iter(block.reset)),
-}
-
-
-def part(file: str, switches: Mapping[str, bool]) -> list[str]:
-    """The lines of one of `PARTS` for a solver."""
-    indent, lines = PARTS[file]
-    return [" " * indent + line for block in STATE if _belongs(block, switches) for line in lines(block)]
-
-
-def header(file: str) -> str:
-    """The same for all solvers, with conditions, for a compiler that reads the runtime as it lies there."""
-    indent, lines = PARTS[file]
-    found = []
-    for block in STATE:
-        text = [" " * indent + line for line in lines(block)]
-        condition = " ".join(f"PHI_{w}" if w.isupper() else w for w in block.when.replace("!", "! ").split())
-        found += [f"#if {condition}", *text, "#endif"] if text and condition else text
-    return "\n".join(found)
-
 
 def copied(switches: Mapping[str, bool]) -> list[str]:
     """The statements in JavaScript by which a copy of a solver takes over its state."""
-    return [line for block in STATE if block.copied and _belongs(block, switches) for line in block.copied]
+    return [line for block in STATE if block.copied and belongs(block, switches) for line in block.copied]
 
 
-def _belongs(block: StateBlock, switches: Mapping[str, bool]) -> bool:
+def belongs(block: StateBlock, switches: Mapping[str, bool]) -> bool:
+    """Whether a solver has the block."""
     return not block.when or holds(block.when, switches)

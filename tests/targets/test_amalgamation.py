@@ -9,11 +9,11 @@ from support import run, spec_of, tool, write
 
 from phigen import resources
 from phigen.compiler import compile_spec
-from phigen.targets import state
-from phigen.targets.c import phrases
+from phigen.targets.c import phrases, states
 from phigen.targets.c.emitter import runtime_of
-from phigen.targets.c.files import CONDITIONS, guard
+from phigen.targets.c.files import CALLS, CONDITIONS, calls_left_out, guard
 from phigen.targets.c.macros import Macros
+from phigen.targets.c.unused import without_unused
 
 RUNTIME = resources.templates() / "c/runtime"
 
@@ -97,7 +97,7 @@ def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, pro
     own = {str(f.relative_to(RUNTIME)): f.read_text(encoding="utf-8") for f in RUNTIME.rglob("*.[ch]")}
     (tmp_path / "none").mkdir()
     write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{made.name}_", text) for f, text in own.items()})
-    printed = {"phrases.h": phrases.header(), **{file: state.header(file) for file in state.PARTS}}
+    printed = {"phrases.h": phrases.header(), **{file: states.header(file) for file in states.PARTS}}
     write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{made.name}_", text) for f, text in printed.items()})
     write(tmp_path, {f: f"#ifndef {f[:-2]}_h\n#define {f[:-2]}_h\n{text}\n#endif" for f, text in made.printed.items()})
     made_text = made.text(code)
@@ -105,9 +105,13 @@ def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, pro
     write(tmp_path / "none", dict.fromkeys(re.findall("#include <(.*)>", "".join(own.values())), ""))
     switches = [f"-D{made.name}_{switch}={int(on)}" for switch, on in made.switches.items()]
     switches += [f"-D{guard.replace('PHI_', made.name + '_')}" for guard in made.left_out.values()]
+    left_out = calls_left_out(made.switches)
+    switches += [f"-D{function.replace('phi_', made.name + '_')}(...)=" for function in left_out]
 
     def tokens(file):
-        text = run([tool("gcc"), "-E", "-P", "-nostdinc", "-I", "none", *switches, file], tmp_path)
+        lines = run([tool("gcc"), "-E", "-P", "-nostdinc", "-I", "none", *switches, file], tmp_path).split("\n")
+        lines = [line for line in lines if line.strip() != ";"]  # of statements that are left out
+        text = "\n".join(without_unused(lines, f"{made.name}_"))
         return re.findall(r"\w+|[^\w\s{}]", re.sub("^#.*$", "", text, flags=re.MULTILINE))
 
     found = tokens("made.c")
@@ -115,6 +119,60 @@ def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, pro
     assert made.switches["COMPOSED"] or not {"stage", f"{made.name}_STAGES"} & set(found)
     assert made.switches.get("HALO", True) or f"{made.name}_LEAD" not in found
     assert not made.switches.get("ONE_ROW") or "r < s->rows" not in made_text
+
+
+USED = """\
+/* A table. */
+enum { n_SIZE = 2 }; /* of it */
+static int n_never(void) { return n_seldom(); }
+
+/* See n_never. */
+static int n_seldom(void)
+{
+    return n_never();
+}
+
+/* Called below. */
+static int n_called(void)
+{
+    return 1;
+}
+
+/* Two of one subject. */
+int n_defined(void);
+int n_elsewhere(void);
+
+/* Of which there is none. */
+int n_nowhere(void);
+
+static int n_ahead(void);
+int foreign(void);
+int n_defined(void) { return n_called(); }"""
+
+
+def test_functions_without_use_are_left_out_with_what_is_said_of_them():
+    """Comments call nothing, and what calls one another is not called by that."""
+    assert [line for line in without_unused(USED.split("\n"), "n_") if line] == [
+        "/* A table. */",
+        "enum { n_SIZE = 2 }; /* of it */",
+        "/* Called below. */",
+        "static int n_called(void)",
+        "{",
+        "    return 1;",
+        "}",
+        "/* Two of one subject. */",
+        "int n_defined(void);",
+        "int foreign(void);",
+        "int n_defined(void) { return n_called(); }",
+    ]
+
+
+def test_functions_that_statements_may_not_call_are_of_the_runtime():
+    text = "".join(file.read_text(encoding="utf-8") for file in RUNTIME.glob("*.[ch]"))
+    printed = {"phi_put_parameters", "phi_put_at_bonds"}
+    for function in CALLS.keys() - printed:
+        assert re.search(rf"^static [^\n]*\b{function}\(", text, re.M), function
+        assert re.search(rf"^ +{function}\([^\n]*\);$", text, re.M), function
 
 
 def test_every_phrase_is_used_by_the_runtime():

@@ -9,9 +9,8 @@ from support import run, tool, write
 
 from phigen import resources
 from phigen.scheme.policies import POLICIES
-from phigen.targets import state
-from phigen.targets.c import phrases
-from phigen.targets.c.files import CONDITIONS, guard
+from phigen.targets.c import phrases, states
+from phigen.targets.c.files import CALLS, CONDITIONS, guard
 from phigen.targets.c.layout import WIDTH, fitted
 from phigen.targets.policies import C
 
@@ -54,7 +53,10 @@ def printed(tmp_path):
     for file, condition in CONDITIONS.items():
         negated = re.sub(r"\b([A-Z])", r"PHI_\1", condition)
         lines.append(f"#if !({negated}) && !defined({guard(file)})\n#define {guard(file)}\n#endif")
-    write(tmp_path, {file: state.header(file) + "\n" for file in state.PARTS})
+    for function, condition in CALLS.items():
+        negated = re.sub(r"\b([A-Z])", r"PHI_\1", condition)
+        lines.append(f"#if !({negated})\n#define {function}(...) ((void)0)\n#endif")
+    write(tmp_path, {file: states.header(file) + "\n" for file in states.PARTS})
     texts |= {"left_out": "\n".join(lines), "phrases": phrases.header()}
     write(
         tmp_path, {f"{name}.h": f"#ifndef {name}_H\n#define {name}_H\n{text}\n#endif\n" for name, text in texts.items()}
@@ -139,6 +141,7 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
     kinds = {"packs.c": "SPLITTING", "adjoint_segments.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH"}
     kinds |= dict.fromkeys(("path_lanes.c", "expansion_lanes.c", "adjoint_lanes.c"), "PATH")
     kinds |= dict.fromkeys(("gauss.c", "adjoint_gauss.c"), "GAUSS")
+    kinds |= {f"tangent_{kind.lower()}.c": kind for kind in ("EXPLICIT", "GAUSS", "PATH", "SPLITTING")}
     own = {
         "gauge.c": ["GAUGE"],
         "level.c": ["GAUGE"],

@@ -3,7 +3,8 @@
 The files of ``templates/c/runtime`` are C99 as they lie there, with the prefix ``phi_`` and with switches and sizes
 (``PHI_BLOCKS``, ``PHI_DIM``) that a model defines. What a reader of the output should not see is resolved here, as a
 preprocessor would: ``#include "…"`` of these files, ``#if`` on switches, guards, and phrases
-(`phigen.targets.c.phrases`). All other directives stay.
+(`phigen.targets.c.phrases`); so are static functions that nothing calls (`phigen.targets.c.unused`). All other
+directives stay.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from phigen import resources
-from phigen.targets import state
-from phigen.targets.c import phrases
-from phigen.targets.c.files import holds, left_out
+from phigen.targets.c import phrases, states
+from phigen.targets.c.files import calls_left_out, holds, left_out
 from phigen.targets.c.macros import Macros
+from phigen.targets.c.unused import without_unused
 
 
 @dataclass
@@ -32,6 +33,7 @@ class Amalgam:
 
     def __post_init__(self) -> None:
         self._defined |= set(self.left_out.values())
+        self._not_called = re.compile(rf" +({'|'.join(calls_left_out(self.switches))})\(.*\);$")
         for definition in phrases.definitions(self.switches):
             self._macros.define(definition)
 
@@ -42,8 +44,14 @@ class Amalgam:
 
     def text(self, file: str) -> str:
         """The file with all that it includes and that was not included before."""
-        text = re.sub(r"\n{3,}", "\n\n", "\n".join(self._expanded(file)))
-        return re.sub(r"( ---- \*/\n)\n", r"\1", text).strip("\n") + "\n"
+        return _spaced(without_unused(self._expanded(file), f"{self.name}_"))
+
+    def texts(self, header: str, code: str) -> tuple[str, str]:
+        """The same of a header and the code behind it."""
+        lines = [*self._expanded(header), _BEHIND, *self._expanded(code)]
+        used = without_unused(lines, f"{self.name}_")
+        border = used.index(_BEHIND)
+        return _spaced(used[:border]), _spaced(used[border + 1 :])
 
     def _expanded(self, file: str) -> list[str]:
         if file in self.printed:
@@ -56,7 +64,7 @@ class Amalgam:
             if line == '#include "phrases.h"':
                 continue
             if line.startswith('#include "state_'):
-                own += state.part(line.split('"')[1], self.switches)
+                own += states.part(line.split('"')[1], self.switches)
                 continue
             if line.startswith('#include "'):
                 lines += [*self._own(own), *self._expanded(line.split('"')[1])]
@@ -103,4 +111,15 @@ class Amalgam:
 
     def _own(self, lines: Sequence[str]) -> list[str]:
         """Lines of the runtime with what macros stand for, and with the prefix of the solver."""
+        lines = [line for line in lines if not self._not_called.match(line)]
         return [re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line) for line in self._macros.expanded(lines)]
+
+
+#: What is between a header and code while both are looked at together.
+_BEHIND = "/* */"
+
+
+def _spaced(lines: Sequence[str]) -> str:
+    """The lines with one blank line at most between two, and none behind the name of a chapter."""
+    text = re.sub(r"\n{3,}", "\n\n", "\n".join(lines))
+    return re.sub(r"( ---- \*/\n)\n", r"\1", text).strip("\n") + "\n"

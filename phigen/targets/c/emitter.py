@@ -44,8 +44,9 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
     name, lines = program.name, header_lines(program, command)
     amalgam, header, code = runtime_of(program)
     written = single if program.single else str
-    declared = written(amalgam.text(header)) + "\n#ifdef __cplusplus\n}\n#endif\n"
-    defined = _unrestricted(program, written(amalgam.text(code)))
+    declarations, definitions = amalgam.texts(header, code)
+    declared = written(declarations) + "\n#ifdef __cplusplus\n}\n#endif\n"
+    defined = _unrestricted(program, written(definitions))
     headers = "\n".join(sorted(amalgam.headers))
     if single_file:
         body = fitted(f"{headers}\n{declared}\n{defined}")

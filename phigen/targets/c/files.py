@@ -1,11 +1,12 @@
 """The files of the runtime in C that only some solvers have, each with the condition for it.
 
-Other files include these without a condition: of a file that is left out, the include guard counts as defined.
+Other files include these without a condition: of a file that is left out, the include guard counts as defined. They
+call functions of `CALLS` without one too: where these are left out, so are the statements that call them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 #: Conditions on switches (`phigen.targets.c.features`) by files.
 CONDITIONS = {
@@ -22,9 +23,10 @@ CONDITIONS = {
     "ensemble.c": "ENSEMBLE",
     "expansion_lanes.c": "PATH",
     "explicit.c": "EXPLICIT || SPLITTING",
-    "gauge_formula.c": "GAUGE && !MONITOR && !GAUGE_SEARCH",
     "gauge.c": "GAUGE_SEARCH && !MONITOR",
+    "gauge_formula.c": "GAUGE && !MONITOR && !GAUGE_SEARCH",
     "gauss.c": "GAUSS",
+    "graph.c": "GRAPH",
     "groups.c": "GROUPS",
     "implicit.c": "IMPLICIT",
     "lane_functions_double.c": "!SINGLE",
@@ -35,12 +37,29 @@ CONDITIONS = {
     "lattice_back.c": "ADJOINT",
     "lattice_band.c": "BANDED",
     "lattice_by_hand.c": "BY_HAND",
+    "lattice_by_hand.h": "BY_HAND",
+    "lattice_carry.c": "COMPENSATED",
     "lattice_flows.c": "!SERIES",
+    "lattice_graph.h": "GRAPH",
+    "lattice_grid.h": "!GRAPH",
+    "lattice_guess.h": "GUESSES",
     "lattice_keeping.c": "!UNDONE",
+    "lattice_kicks.c": "KICKED",
     "lattice_krylov.c": "KRYLOV",
+    "lattice_matrix.c": "BANDED",
     "lattice_noise.c": "NOISE",
+    "lattice_observed.c": "OBSERVED",
+    "lattice_observed_fields.c": "OBSERVED_FIELDS",
+    "lattice_passed.c": "TIMED || NOISE",
+    "lattice_pieces.c": "SERIES",
+    "lattice_renewed.c": "RENEWED && !SERIES",
+    "lattice_saved.c": "!SERIES && !NOISE",
+    "lattice_saved_noise.c": "!SERIES && NEAR && NOISE",
+    "lattice_seams.c": "SEAMS",
+    "lattice_share.c": "SHARED",
     "lattice_stages.c": "SERIES",
     "lattice_tangent.c": "TANGENT",
+    "lattice_time.c": "TIMED",
     "lattice_undoing.c": "UNDONE",
     "lattice_waves.c": "WAVES",
     "level.c": "MONITOR",
@@ -51,7 +70,32 @@ CONDITIONS = {
     "path.c": "PATH",
     "placing.c": "KICKED",
     "recurrence.c": "RECURRENCES",
+    "rows_many.c": "!ONE_ROW",
+    "rows_single.c": "ONE_ROW",
     "tangent.c": "TANGENT",
+    "tangent_explicit.c": "TANGENT && EXPLICIT",
+    "tangent_gauss.c": "TANGENT && GAUSS",
+    "tangent_implicit.c": "TANGENT && IMPLICIT",
+    "tangent_newton.c": "TANGENT && NEWTON",
+    "tangent_path.c": "TANGENT && PATH",
+    "tangent_product.c": "TANGENT",
+    "tangent_splitting.c": "TANGENT && SPLITTING",
+}
+
+#: Functions that others call in statements of their own, each with the condition for the statement.
+CALLS = {
+    "phi_clear_carry": "COMPENSATED",
+    "phi_connect": "GRAPH",
+    "phi_copy_carry": "COMPENSATED",
+    "phi_find_all_lines": "!ONE_ROW",
+    "phi_find_seams": "SEAMS",
+    "phi_place": "!ONE_ROW",
+    "phi_place_matrix": "BANDED",
+    "phi_put_at_bonds": "GRAPH && BOND_PARAMETERS",
+    "phi_put_carry": "COMPENSATED",
+    "phi_put_kinds": "SEAMS",
+    "phi_put_parameters": "SITE_PARAMETERS",
+    "phi_take_carry": "COMPENSATED",
 }
 
 
@@ -65,13 +109,23 @@ def holds(condition: str, switches: Mapping[str, bool]) -> bool:
 
 def guard(file: str) -> str:
     """The include guard of a file of the runtime."""
-    return f"PHI_FILE_{file.split('.')[0].upper()}"
+    return f"PHI_FILE_{file.removesuffix('.c').replace('.', '_').upper()}"
 
 
 def left_out(switches: Mapping[str, bool]) -> dict[str, str]:
     """The files that a solver lacks, with their include guards."""
-    known = dict.fromkeys(_SWITCHES, False) | dict(switches)
-    return {file: guard(file) for file, condition in CONDITIONS.items() if not holds(condition, known)}
+    return {file: guard(file) for file in _lacking(CONDITIONS, switches)}
 
 
-_SWITCHES = {s.removeprefix("!") for c in CONDITIONS.values() for part in c.split(" || ") for s in part.split(" && ")}
+def calls_left_out(switches: Mapping[str, bool]) -> list[str]:
+    """The functions that the statements of a solver do not call."""
+    return _lacking(CALLS, switches)
+
+
+def _lacking(conditions: Mapping[str, str], switches: Mapping[str, bool]) -> list[str]:
+    known = dict.fromkeys(_switches(conditions.values()), False) | dict(switches)
+    return [name for name, condition in conditions.items() if not holds(condition, known)]
+
+
+def _switches(conditions: Iterable[str]) -> set[str]:
+    return {s.removeprefix("!") for c in conditions for part in c.split(" || ") for s in part.split(" && ")}

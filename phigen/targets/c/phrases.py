@@ -67,6 +67,18 @@ STAGES = Choice(
     },
 )
 
+VALUES = Choice(
+    "The value of the unknown of a stage in the step that was made last.",
+    ("RECURRENCES", "GUESSED"),
+    {
+        "LAST_VALUE": (
+            "PHI_OF(s->history, stage).past[PHI_OF(s->history, stage).count - 1]",
+            "PHI_OF(s->history, stage).difference[0]",
+            "at->x",
+        )
+    },
+)
+
 TIME = Choice(
     "H depends on the time, which functions of the model and starts of runs then receive.",
     ("TIMED",),
@@ -76,6 +88,9 @@ TIME = Choice(
         "OR_NO_T0": ("|| !isfinite(t0)", ""),
         "INIT_AT(s, params, x, t)": ("phi_init_at(s, params, x, t)", "phi_init(s, params, x)"),
         "ENSEMBLE_AT": ("phi_ensemble_at", "phi_ensemble"),
+        "INIT": ("phi_init_at", "phi_init"),
+        "TAKE_T0": ("s->t = s->now = t0;", ""),
+        "SET_TIME(s)": ("s->t = s->now =", "s->t ="),
     },
 )
 
@@ -186,6 +201,58 @@ HALO = Choice(
     },
 )
 
+WIDTH = Choice(
+    "The doubles of a row, of which those of the sites are a multiple of 8.",
+    ("HALO",),
+    {"WIDE(sites)": ("PHI_LEAD + (sites + PHI_HALO + 7) / 8 * 8", "sites")},
+)
+
+COLOURS = Choice(
+    "Sizes of lattices that are multiples of the periods of their colours.",
+    ("PERIODIC_COLOURS",),
+    {"OR_MISFIT(a)": ("|| sizes[a] % phi_periods[a] != 0", "")},
+)
+
+GRAPHS = Choice(
+    "The sites of a graph are connected by bonds.",
+    ("GRAPH",),
+    {
+        "SIZES": ("const size_t sizes[PHI_AXES], const phi_bonds *bonds", "const size_t sizes[PHI_AXES]"),
+        "SIZES_OF_WORK": ("const size_t sizes[PHI_AXES], size_t bonds", "const size_t sizes[PHI_AXES]"),
+        "AND_GRAPH": (", bonds", ""),
+        "AND_BONDS": (", bonds != NULL ? bonds->count : 0", ""),
+        "OR_TOO_MANY(sites)": ("|| !phi_few(sites, bonds)", ""),
+        "OR_UNCONNECTED(sites)": ("|| !phi_connected(bonds, sites)", ""),
+    },
+)
+
+TABLES = Choice(
+    "The bytes of tables beside the fields: of bonds, or of the rows beside each row.",
+    ("GRAPH", "!ONE_ROW"),
+    {"AND_TABLES": ("+ phi_graph_size(sizes[0], bonds)", "+ rows * PHI_LINES * sizeof(ptrdiff_t)", "")},
+)
+
+MATRIX = Choice(
+    "The equation of a stage is solved by elimination, in a matrix.",
+    ("BANDED",),
+    {
+        "AND_MATRIX(sites)": ("+ phi_matrix_size(sites)", ""),
+        "DOUBLES_OF_SITE": ("(PHI_RESERVED + 8 * PHI_BAND * PHI_DIM)", "PHI_RESERVED"),
+    },
+)
+
+JOINED = Choice(
+    "Steps of flows are joined: what is behind the last flow of a step may stay open.",
+    ("SERIES",),
+    {"NOT_OPEN(s)": ("", "s->open = 0;")},
+)
+
+CARRY = Choice(
+    "What rounding has left out of the fields of a lattice goes with them.",
+    ("COMPENSATED",),
+    {"SAVED_FIELDS": ("2 * PHI_DIM", "PHI_DIM")},
+)
+
 FAR = Choice(
     "Whether arguments of functions may be large, where functions have another form for them.",
     ("NEAR",),
@@ -202,7 +269,29 @@ PREDICTORS = Choice(
     {"AND_GUESS": ("PHI_AND_STAGE", "")},
 )
 
-ALL = (STAGES, TIME, GAUGE, LEVEL, OWN, NOISE, ATTITUDE, POSITION, SIDES, ROWS, HALO, FAR, PREDICTORS)
+ALL = (
+    STAGES,
+    VALUES,
+    TIME,
+    GAUGE,
+    LEVEL,
+    OWN,
+    NOISE,
+    ATTITUDE,
+    POSITION,
+    SIDES,
+    ROWS,
+    HALO,
+    WIDTH,
+    COLOURS,
+    GRAPHS,
+    TABLES,
+    MATRIX,
+    JOINED,
+    CARRY,
+    FAR,
+    PREDICTORS,
+)
 
 
 def definitions(switches: Mapping[str, bool]) -> Iterator[str]:

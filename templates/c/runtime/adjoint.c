@@ -203,7 +203,6 @@ static phi_status phi_leave_trail(phi_solver *s, size_t steps, size_t stride, do
     return status;
 }
 
-#if PHI_PARAMETERS || PHI_MONITOR
 /* Add the cotangents of parameters that follow from those of coefficients. */
 static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, phi_params *params_bar PHI_AND_DOUBLE(e_bar))
 {
@@ -244,7 +243,6 @@ static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, ph
 #endif
 }
 
-#endif
 #if PHI_MONITOR
 void phi_level_bar(const phi_params *params, const double x0[PHI_DIM], double e_bar, double x0_bar[PHI_DIM],
     phi_params *params_bar)

@@ -20,7 +20,6 @@ static int phi_finite(const double *values, int count)
     return count == 0;
 }
 
-#if PHI_ADVANCE
 /* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the change,
    corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
 static int phi_advance(phi_solver *s, const double *change, const double *small)
@@ -38,7 +37,6 @@ static int phi_advance(phi_solver *s, const double *change, const double *small)
     return 1;
 }
 
-#endif
 #if PHI_MONITOR
 /* The time that has passed gains that of a stage. */
 static void phi_pass(phi_solver *s, double elapsed)
@@ -50,7 +48,6 @@ static void phi_pass(phi_solver *s, double elapsed)
 }
 
 #endif
-#if PHI_SPLITTING
 /* In a step from start, moved holds the sum of the changes so far, and the carry; x is start + moved, rounded. */
 static inline void phi_add(double x[PHI_DIM], double moved[PHI_DIM], const double start[PHI_DIM], int i, double change)
 {
@@ -68,7 +65,6 @@ static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double mo
     }
 }
 
-#endif
 #if PHI_IMPLICIT
 #if PHI_UNROLLED || PHI_BLOCKS || PHI_TRACED
 #define PHI_LARGEST_RECIPROCAL 1e3 /* Newton matrices are I + O(h): a pivot with a larger one is far from 1 */

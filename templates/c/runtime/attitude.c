@@ -20,7 +20,6 @@ static void phi_group_product(const double a[PHI_ELEMENT], const double b[PHI_EL
         }
 }
 
-#if PHI_NORMALISE
 /* Make a factor, given less 1, that brings a matrix which is nearly orthogonal nearer to that. */
 static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT])
 {
@@ -40,8 +39,6 @@ static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT
     for (int i = 0; i < PHI_ELEMENT; ++i) factor[i] -= excess[i] + change[i];
 }
 
-#endif
-#if PHI_EXPONENTIAL
 enum { PHI_SIZE = PHI_COVECTOR - 1 }; /* where a covector tells a bound for the square of its size */
 
 /* By how many halvings P becomes so small that its exponential is a short sum. */
@@ -77,8 +74,6 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
     }
 }
 
-#endif
-#if PHI_RATE_OF_GAUGE
 /* The element, less 1, of the motion with a constant rate, for some time. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
@@ -88,7 +83,6 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     phi_matrix_exponential(p, element);
 }
 
-#endif
 #else
 /* The product of two quaternions. */
 static inline void phi_group_product(const double a[4], const double b[4], double product[4])
@@ -99,7 +93,6 @@ static inline void phi_group_product(const double a[4], const double b[4], doubl
     product[3] = (a[0] * b[3] + a[3] * b[0]) + (a[1] * b[2] - a[2] * b[1]);
 }
 
-#if PHI_POSITION || PHI_RATE_OF_GAUGE
 /* What rotating a vector by a quaternion adds to it. */
 static void phi_rotation(const double q[4], const double v[3], double change[3])
 {
@@ -109,8 +102,6 @@ static void phi_rotation(const double q[4], const double v[3], double change[3])
     change[2] = 2.0 * (q[0] * z + (q[1] * y - q[2] * x));
 }
 
-#endif
-#if PHI_POSITION && PHI_SPATIAL || PHI_POSITION && PHI_RATE_OF_GAUGE
 /* What a factor from the left adds to an element. The quaternion of the factor is given less 1. */
 static inline void phi_added_left(const double element[PHI_ELEMENT], const double factor[PHI_ELEMENT],
     double change[PHI_ELEMENT])
@@ -121,8 +112,6 @@ static inline void phi_added_left(const double element[PHI_ELEMENT], const doubl
     for (int i = 4; i < 7; ++i) change[i] += factor[i];
 }
 
-#endif
-#if PHI_POSITION && !PHI_SPATIAL || PHI_POSITION && PHI_RATE_OF_GAUGE
 /* What a factor from the right adds to an element. The quaternion of the factor is given less 1. */
 static inline void phi_added_right(const double element[PHI_ELEMENT], const double factor[PHI_ELEMENT],
     double change[PHI_ELEMENT])
@@ -132,8 +121,6 @@ static inline void phi_added_right(const double element[PHI_ELEMENT], const doub
     for (int i = 4; i < 7; ++i) change[i] += factor[i];
 }
 
-#endif
-#if PHI_RATE_OF_GAUGE
 /* The element, less 1, of the motion with a constant rate, for some time. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
@@ -178,7 +165,6 @@ static void phi_carry_rate(const double element[PHI_ELEMENT], double rate[PHI_RA
 #endif
 }
 
-#endif
 /* By how much the square of the length of a quaternion is more than 1. What rounding leaves of that has no direction, and does
    not add up. */
 static inline double phi_excess(const double q[4])
@@ -238,7 +224,6 @@ static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT])
     }
 }
 
-#if PHI_RATE_OF_GAUGE
 /* What these Casimirs turn in one step, and in a block of steps. */
 static void phi_set_aside(phi_solver *s)
 {
@@ -248,8 +233,6 @@ static void phi_set_aside(phi_solver *s)
 #endif
 }
 
-#endif
-#if PHI_IMPLICIT
 /* The element, less 1, of a stage that was solved by y. */
 static inline void phi_factor(const phi_solver *s PHI_AND_INT_STAGE, const double y[PHI_DIM], double factor[PHI_ELEMENT])
 {
@@ -262,8 +245,6 @@ static inline void phi_factor(const phi_solver *s PHI_AND_INT_STAGE, const doubl
 #endif
 }
 
-#endif
-#if PHI_BLOCKS
 /* Two factors as one, in place of the first; all less 1. */
 static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_ELEMENT], double both[PHI_ELEMENT])
 {
@@ -290,7 +271,6 @@ static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int
 #endif
 }
 
-#endif
 /* The attitude proper. */
 static void phi_read_attitude(phi_solver *s)
 {
@@ -306,7 +286,6 @@ static void phi_read_attitude(phi_solver *s)
 #endif
 }
 
-#if PHI_RATE_OF_GAUGE
 /* Where x or the attitude has been set: the rate at which the Casimirs that are taken from H turn from here on. */
 static void phi_take_rate(phi_solver *s)
 {
@@ -317,7 +296,6 @@ static void phi_take_rate(phi_solver *s)
     phi_set_aside(s);
 }
 
-#endif
 /* Begin at an element, where x is now. */
 static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
 {

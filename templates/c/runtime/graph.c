@@ -1,10 +1,9 @@
 #ifndef PHI_FILE_GRAPH
 #define PHI_FILE_GRAPH
+#include <limits.h>
+
 #include "lattice.h"
 #include "model.h"
-
-#if PHI_GRAPH
-#include <limits.h>
 
 /* ---- Bonds ---- */
 /* Whether sites and bonds can be numbered. */
@@ -25,9 +24,10 @@ static size_t phi_graph_size(size_t sites, size_t bonds)
 #endif
 }
 
-/* Whether all bonds run between two different sites. */
+/* Whether bonds can be numbered and all run between two different sites. */
 static int phi_connected(const phi_bonds *bonds, size_t sites)
 {
+    if (!phi_few(sites, bonds != NULL ? bonds->count : 0)) return 0;
     if (bonds == NULL || bonds->ends == NULL) return bonds == NULL || bonds->count == 0;
     for (size_t k = 0; k < bonds->count; ++k) {
         const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
@@ -36,7 +36,6 @@ static int phi_connected(const phi_bonds *bonds, size_t sites)
     return 1;
 }
 
-#if PHI_BY_COLOUR
 /* Each site takes the first colour that none before it has at the other end of a bond. */
 static void phi_colour(phi_solver *s, int *taken)
 {
@@ -55,7 +54,6 @@ static void phi_colour(phi_solver *s, int *taken)
     for (int part = 0; part < PHI_PARTS; ++part) s->flows += phi_by_colour[part] ? s->colour_count : 1;
 }
 
-#endif
 /* The bonds of each site, in their order: first those that begin there. */
 static void phi_connect(phi_solver *s, const phi_bonds *bonds, double *memory)
 {
@@ -91,5 +89,4 @@ static void phi_connect(phi_solver *s, const phi_bonds *bonds, double *memory)
     phi_colour(s, s->colours + sites);
 #endif
 }
-#endif
 #endif

@@ -35,7 +35,6 @@ static inline double phi_total(double lanes[8])
     return lanes[0] + lanes[2] + (lanes[1] + lanes[3]);
 }
 
-#if PHI_APART
 enum { PHI_ADDED = 64 }; /* sites whose shares in a sum are kept apart before they are added */
 
 /* The sum of some values, in an order that lets loops vectorise. */
@@ -50,8 +49,6 @@ static inline double phi_added(const double *values, ptrdiff_t count)
 }
 
 #endif
-#endif
-#if !PHI_UNDONE
 /* Keep the values of some pieces of rows, with the copies beside rows, which another thread may be making of one row. Pairs read
    numbers beyond the last site too, but leave what they find of them. */
 static void phi_keep_units(const phi_solver *s, const double *from, double *to, size_t first, size_t end)
@@ -71,8 +68,6 @@ static void phi_keep_units(const phi_solver *s, const double *from, double *to, 
 #endif
 }
 
-#endif
-#if PHI_GIVERS
 /* The rows from which a row is handed what is its own; beyond open ends a row of zeros after all others. */
 static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
 {
@@ -87,8 +82,6 @@ static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_
     }
 }
 
-#endif
-#if PHI_SITE_PARAMETERS
 /* The derivatives along a parameter at sites, added to those of the caller, unless that wants none. */
 static void phi_add_at_sites(const phi_solver *s, const double *bar, double *to)
 {
@@ -99,7 +92,6 @@ static void phi_add_at_sites(const phi_solver *s, const double *bar, double *to)
     }
 }
 
-#endif
 #if PHI_BOND_PARAMETERS
 /* The derivatives along a parameter at bonds, added to those of the caller, unless that wants none. */
 static void phi_add_at_bonds(const phi_solver *s, const double *bar, double *to)

@@ -139,7 +139,6 @@ static void phi_solve(const phi_matrix *m)
         for (ptrdiff_t i = 0; i < inner; ++i) m->side[i] -= m->b[j * inner + i] * lower[j];
 }
 
-#if PHI_ADJOINT
 /* Solve with the transpose of what phi_decompose has made, in place. */
 static void phi_substitute_back(
     const double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, const double *pivots, double *x)
@@ -171,7 +170,6 @@ static void phi_solve_back(const phi_matrix *m)
     phi_substitute_back(m->a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m->pivots, m->side);
 }
 
-#endif
 /* s->y[now] with the correction by a sweep to the other, in place of what the sweep has made. */
 static void phi_eliminate(phi_solver *s, int now)
 {

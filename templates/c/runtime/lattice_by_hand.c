@@ -24,11 +24,9 @@ phi_status phi_describe(size_t number, phi_stage *about)
 
 phi_status phi_begin(phi_solver *s, double h) { return phi_set_step(s, h); }
 
-#if !PHI_ONE_ROW
 /* The rows of a plane. */
 static size_t phi_rows_of_plane(const phi_solver *s) { return s->rows / s->sizes[0]; }
 
-#endif
 phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t to)
 {
     if (s == NULL || !s->prepared || number >= PHI_NUMBERED || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;

@@ -6,6 +6,11 @@
 #include "sweeps.h"
 
 /* ---- The flows ---- */
+enum { PHI_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
+#if PHI_NEAR
+enum { PHI_FAR_STEPS = 64 }; /* steps by functions for large arguments, after one that needed them */
+#endif
+
 #if PHI_SHARED
 #if PHI_BY_COLOUR
 /* One part of H, of one colour. */
@@ -179,7 +184,6 @@ static int phi_try(phi_solver *s, size_t steps)
     return 0;
 }
 
-#if PHI_NEAR && !PHI_NOISE || PHI_NEAR && PHI_ADJOINT
 /* The last flow of a step, by functions for large arguments if need be; whether it leads to finite values. */
 static int phi_close(phi_solver *s)
 {
@@ -191,7 +195,6 @@ static int phi_close(phi_solver *s)
     return done;
 }
 
-#endif
 #if PHI_NEAR
 /* Functions for small arguments give no number for larger ones. The state is looked at after a stretch of steps only: where
    it is not finite, these are made again one by one, and that which fails by functions for arguments of any size. */

@@ -150,7 +150,6 @@ static void phi_forget(phi_solver *s)
 #endif
 #include "lattice_newton.c"
 
-#if PHI_ADJOINT
 /* Keep the y of a stage, and x where its transpose reads that; returns where the next are kept. */
 static double *phi_keep_stage(const phi_solver *s, int now, double *to)
 {
@@ -167,7 +166,6 @@ static double *phi_keep_stage(const phi_solver *s, int now, double *to)
     return to + PHI_KEPT * PHI_DIM * block;
 }
 
-#endif
 /* The stages of a step. */
 static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
 {

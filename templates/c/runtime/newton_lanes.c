@@ -105,7 +105,6 @@ static void phi_apply(phi_lanes matrix[restrict PHI_DIM * PHI_DIM], phi_lanes ve
     }
 }
 
-#if PHI_SWEPT || PHI_GROUPS
 /* What a residual takes from the increment. */
 static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes gained[restrict PHI_DIM])
 {
@@ -120,8 +119,6 @@ static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi
 #endif
 }
 
-#endif
-#if !PHI_SWEPT || PHI_GROUPS
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
@@ -130,7 +127,6 @@ static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_
     phi_take(model, delta, unit, size);
 }
 
-#endif
 #endif
 /* Corrections below the first go on with the matrices of the last pass. After the square of so small a correction as the
    second, there is rounding only, if the next is below the third. */

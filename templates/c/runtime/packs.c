@@ -37,7 +37,6 @@ typedef struct {
     size_t steps_left[PHI_GROUP]; /* that it has still to make */
 } phi_group;
 
-#if PHI_SPLITTING
 /* phi_add for one coordinate in all lanes. */
 static inline void phi_add_lanes(double x[restrict PHI_LANES], double moved[restrict PHI_LANES],
     const double start[restrict PHI_LANES], const double change[restrict PHI_LANES])
@@ -61,7 +60,6 @@ static inline void phi_settle_lanes(double x[restrict PHI_LANES], double carry[r
     }
 }
 
-#endif
 #include "model_lanes.h"
 
 #if PHI_EXPLICIT

@@ -2,7 +2,6 @@
 #define PHI_FILE_TAYLOR
 #include "model.h"
 
-#if PHI_TAYLOR_PRODUCT
 /* Coefficient k of the product of two Taylor series. */
 static double phi_taylor_product(const double *a, const double *b, int k)
 {
@@ -11,8 +10,6 @@ static double phi_taylor_product(const double *a, const double *b, int k)
     return sum;
 }
 
-#endif
-#if PHI_TAYLOR_CHAIN
 /* Coefficient k >= 1 of the Taylor series of f(a), where d is that of f'(a): f(a)' = f'(a) a'. */
 static double phi_taylor_chain(const double *a, const double *d, int k)
 {
@@ -21,8 +18,6 @@ static double phi_taylor_chain(const double *a, const double *d, int k)
     return sum / (double)k;
 }
 
-#endif
-#if PHI_TAYLOR_POWER
 /* Coefficient k >= 1 of the Taylor series of b = a^r, times a[0]: a b' = r a' b. */
 static double phi_taylor_power(const double *a, const double *b, double r, int k)
 {
@@ -30,5 +25,4 @@ static double phi_taylor_power(const double *a, const double *b, double r, int k
     for (int j = 1; j <= k; ++j) sum += ((r + 1.0) * (double)j - (double)k) * a[j] * b[k - j];
     return sum / (double)k;
 }
-#endif
 #endif

@@ -3,6 +3,7 @@
 #ifndef DECLARATIONS_H
 #define DECLARATIONS_H
 #include <stddef.h>
+#include <stdint.h>
 
 #define PHI_AXES 2
 #define PHI_DIM 2
@@ -24,7 +25,7 @@
 
 typedef struct {
     double g;
-} phi_params;
+} phi_params, phi_params_bar;
 
 extern const phi_params phi_default_params;
 

@@ -68,7 +68,23 @@ static void phi_stage_change_adjoint(const double *coef, const double x[2], cons
 }
 
 #endif
+#if PHI_TANGENT
+/* By rows, along x and along the unknowns z. */
+static void phi_stage_slope_jacobian(const double *coef, const double x[2], const double z[2], double out[8])
+{
+    const double slope = -coef[1] / coef[0] * cos(x[0] + z[0]);
+    const double rows[8] = { 0.0, 1.0, 0.0, 1.0, slope, 0.0, slope, 0.0 };
+    memcpy(out, rows, sizeof rows);
+}
 
+static void phi_stage_change_jacobian(const double *coef, const double x[2], const double z[2], double out[8])
+{
+    const double rows[8] = { 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0 };
+    (void)coef, (void)x, (void)z;
+    memcpy(out, rows, sizeof rows);
+}
+
+#endif
 #endif
 static int phi_allowed(const phi_params *params) { return isfinite(params->g) && params->g > 0.0; }
 

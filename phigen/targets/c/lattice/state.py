@@ -1,0 +1,343 @@
+"""The state of a lattice and a piece of its rows, block by block: members of structs in C, and what sets them up."""
+
+from __future__ import annotations
+
+from phigen.targets.state import StateBlock
+
+#: In the order of the members of the struct. What is ``reset`` takes its arrays from the memory of the solver.
+LATTICE = (
+    StateBlock(
+        "sizes",
+        members=(
+            "size_t sizes[PHI_AXES];   /* number of sites along each axis */",
+            "size_t sites, rows;       /* number of all sites, and of rows */",
+            "ptrdiff_t length, width;  /* sites of a row; doubles from the start of a row to that of the next */",
+        ),
+    ),
+    StateBlock(
+        "seams",
+        "SEAMS",
+        (
+            "ptrdiff_t seams[PHI_AXES];"
+            " /* first site along each axis whose colour breaks the period; the size if there is none */",
+            "ptrdiff_t inside[2];     "
+            " /* in a row, the first site away from the seam, and the site behind the last of them */",
+        ),
+    ),
+    StateBlock(
+        "x",
+        members=(
+            "double *x[PHI_ARRAYS];   "
+            " /* the state: first site of each field, then of each parameter at sites, in rows */",
+        ),
+        reset=("for (size_t k = 0; k < PHI_ARRAYS; ++k, memory += block) s->x[k] = memory;",),
+    ),
+    StateBlock(
+        "before",
+        members=(
+            "double *before[PHI_DIM]; /* the fields at the start of the present steps, restored if a step fails */",
+        ),
+        reset=("for (size_t k = 0; k < PHI_DIM; ++k, memory += block) s->before[k] = memory;",),
+    ),
+    StateBlock(
+        "lines",
+        "!ONE_ROW",
+        ("ptrdiff_t *lines;         /* for each row: its offset, and the offsets of the rows beside it */",),
+    ),
+    StateBlock(
+        "gathered",
+        "GATHER",
+        ("double *gathered[PHI_GATHERED]; /* for each site, sums over other sites */",),
+        reset=("for (size_t k = 0; k < PHI_GATHERED; ++k, memory += block) s->gathered[k] = memory;",),
+    ),
+    StateBlock(
+        "bonds",
+        "GRAPH",
+        (
+            "int *bonds, *middle;     "
+            " /* for each site, index in other of its first bond that starts there, and that ends there */",
+            "int *other, *number; /* for each of these, the site at the other end, and the number of the bond */",
+        ),
+    ),
+    StateBlock(
+        "at_bonds",
+        "GRAPH && BOND_PARAMETERS",
+        ("double *at_bonds[PHI_BOND_ARRAYS]; /* for each of these, the values of the parameters at bonds */",),
+    ),
+    StateBlock(
+        "colours",
+        "GRAPH && BY_COLOUR",
+        (
+            "int *colours;             /* colour of each site; no bond connects two sites of the same colour */",
+            "int colour_count, flows;  /* number of colours, and of flows in a stage */",
+        ),
+    ),
+    StateBlock(
+        "carry",
+        "!SERIES && COMPENSATED",
+        ("double *carry[2 * PHI_DIM]; /* compensation terms of the fields, then of before */",),
+        reset=("for (size_t k = 0; k < 2 * PHI_DIM; ++k, memory += block) s->carry[k] = memory;",),
+    ),
+    StateBlock(
+        "open",
+        "!SERIES",
+        (
+            "int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */",
+            "size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */",
+        ),
+    ),
+    StateBlock(
+        "swept",
+        "!SERIES && BY_HAND && ONE_ROW",
+        ("ptrdiff_t from, to;       /* the sites of the present sweep */",),
+        reset=("s->to = s->length;",),
+    ),
+    StateBlock(
+        "middle",
+        "SERIES",
+        reset=(
+            "for (int k = 0; k < PHI_ARRAYS; ++k)",
+            "    for (int side = 0; side < PHI_SIDES; ++side)",
+            "        s->y[side][k] = k < PHI_DIM ? memory + (size_t)(PHI_SIDES * k + side) * block : s->x[k];",
+            "memory += PHI_SIDES * PHI_DIM * block;",
+        ),
+    ),
+    StateBlock(
+        "y",
+        "SERIES && ADJOINT",
+        (
+            "double *y[3][PHI_ARRAYS];"
+            " /* solution of a stage before and after a sweep, and in the reverse pass; parameters at sites */",
+            "double *const *side; /* right-hand side while the equation of the cotangents is solved, else NULL */",
+            "double *const *handed, *shares;"
+            " /* cotangents for neighbouring sites; for each row segment, its terms of sums */",
+            "int wide;                 /* 1 if the cotangents use functions for arguments of any size */",
+        ),
+        reset=("memcpy(s->y[2], s->x, sizeof s->x);",),
+    ),
+    StateBlock(
+        "y",
+        "SERIES && SLOPES && !ADJOINT",
+        ("double *y[2][PHI_ARRAYS]; /* solution of a stage before and after a sweep, with the parameters at sites */",),
+    ),
+    StateBlock(
+        "y",
+        "SERIES && !SLOPES && !ADJOINT",
+        (
+            "double *y[3][PHI_ARRAYS];"
+            " /* solution of a stage before and after a sweep, and perturbed; with the parameters at sites */",
+        ),
+    ),
+    StateBlock(
+        "guess",
+        "SERIES && GUESSES",
+        ("phi_guess PHI_OF(guess, PHI_STAGES); /* predictor of each stage */",),
+        reset=(
+            "PHI_EACH_STAGE",
+            "    for (int d = 0; d < PHI_DIFFERENCES; ++d)",
+            "        for (int k = 0; k < PHI_DIM; ++k, memory += block)"
+            " PHI_OF(s->guess, stage).difference[d][k] = memory;",
+        ),
+    ),
+    StateBlock(
+        "sweeps",
+        "SERIES",
+        (
+            "size_t sweeps;            /* number of sweeps of all stages since phi_init */",
+            "int stiff;                /* 1 if fixed-point sweeps have failed, so that Newton's method is used */",
+            "double usual[PHI_DIM];    /* magnitudes of the fields of y */",
+        ),
+    ),
+    StateBlock(
+        "matrix",
+        "SERIES && BANDED",
+        (
+            "const double *factored;   /* the coefficients of the factorised matrix, or NULL */",
+            "double *v[PHI_DIM];       /* a direction of Newton's method */",
+            "double *matrix;           /* the factorised band matrix, see phi_factorise */",
+        ),
+        reset=("for (int k = 0; k < PHI_DIM; ++k, memory += block) s->v[k] = memory;",),
+    ),
+    StateBlock(
+        "block",
+        "SERIES && KRYLOV && SITE_BLOCKS",
+        (
+            "double *block[PHI_DIM * PHI_DIM], *solved[PHI_DIM];"
+            " /* preconditioner: inverses of the diagonal blocks; their products */",
+        ),
+        reset=(
+            "for (int k = 0; k < PHI_DIM * PHI_DIM; ++k, memory += block) s->block[k] = memory;",
+            "for (int k = 0; k < PHI_DIM; ++k, memory += block) s->solved[k] = memory;",
+        ),
+    ),
+    StateBlock(
+        "space",
+        "SERIES && KRYLOV",
+        (
+            "double *space[PHI_DIRECTIONS + 1][PHI_DIM], *sums;"
+            " /* basis of the Krylov space, sums over row segments: see phi_krylov */",
+        ),
+        reset=(
+            "for (int d = 0; d <= PHI_DIRECTIONS; ++d)",
+            "    for (int k = 0; k < PHI_DIM; ++k, memory += block) s->space[d][k] = memory;",
+            "s->sums = memory;",
+        ),
+    ),
+    StateBlock(
+        "kinds",
+        "SEAMS",
+        (("double *kinds; /* for each site, in rows: its colour, and the seams that it is on, as one number */"),),
+        reset=("s->kinds = memory;",),
+    ),
+    StateBlock("steps", members=("size_t steps;             /* number of successful steps since phi_init */",)),
+    StateBlock(
+        "t",
+        "TIMED",
+        (
+            "double t;                 /* the time of the state */",
+            "double now;               /* the time of the present stage, at which H is evaluated */",
+        ),
+    ),
+    StateBlock("t", "!TIMED", ("double t;                 /* time since phi_init */",)),
+    StateBlock("h", members=("double h;                 /* size of the last step */",)),
+    StateBlock(
+        "noise",
+        "NOISE",
+        (
+            "uint64_t seed, first_step;"
+            " /* seed of the noise, and number of the first step after phi_init: see phi_set_noise */",
+            "uint32_t member;",
+        ),
+    ),
+    StateBlock(
+        "planes",
+        "NOISE && BY_HAND",
+        (
+            "uint64_t first_plane, planes;"
+            " /* number of the first plane in the whole lattice, and its number of planes, or 0 */",
+        ),
+    ),
+    StateBlock("stop", "ADJOINT", ("int (*stop)(void);        /* see phi_ask */",)),
+    StateBlock(
+        "kept",
+        "ADJOINT && SERIES",
+        ("double *kept;             /* tape to which a step writes the solutions of its stages, or NULL */",),
+    ),
+    StateBlock(
+        "kept",
+        "ADJOINT && !SERIES && !UNDONE",
+        (("double *kept; /* tape to which steps write the values that their sweeps overwrite, or NULL */"),),
+    ),
+    StateBlock(
+        "tangents",
+        "TANGENT",
+        (
+            "size_t vectors;           /* number of tangent vectors that flows act on */",
+            "double *tangents;         /* the fields of the first vector, in rows, then those of the others */",
+        ),
+    ),
+    StateBlock(
+        "coef",
+        members=(
+            "phi_params params;        /* the parameters, set by phi_init */",
+            "double coef[PHI_COEFFICIENTS]; /* functions of params and h */",
+            "int prepared;             /* 1 if coef has been computed */",
+        ),
+    ),
+    StateBlock(
+        "before_h",
+        members=(
+            "size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */",
+            "double t_before_h;",
+        ),
+    ),
+)
+
+#: What loops over the sites of a piece of a row are told. What is ``reset`` is so for the row of a solver s.
+ROW = (
+    StateBlock(
+        "x",
+        members=("const phi_solver *s;", "double *const *x;             /* see phi_solver */"),
+        reset=("row.s = s;", "row.x = s->x;"),
+    ),
+    StateBlock(
+        "at",
+        "!ONE_ROW",
+        ("const ptrdiff_t *at;          /* the row itself and those beside it, from the first row on */",),
+        reset=("row.at = s->lines + index * PHI_LINES;",),
+    ),
+    StateBlock(
+        "sites",
+        members=("ptrdiff_t from, to;           /* its sites, to not among them */",),
+        reset=("row.from = 0;", "row.to = s->length;"),
+    ),
+    StateBlock(
+        "stage",
+        "SERIES",
+        (
+            "double *const *start, *const *out;"
+            " /* where a stage starts, and where what is computed goes; x is y there */",
+        ),
+        reset=("row.start = row.out = s->x;",),
+    ),
+    StateBlock(
+        "varied",
+        "SERIES && SLOPES || TANGENT",
+        ("double *const *varied;        /* a variation of x */",),
+    ),
+    StateBlock(
+        "bar",
+        "ADJOINT",
+        ("double *const *bar, *const *handed; /* see phi_transpose */",),
+        reset=("row.bar = row.handed = NULL;",),
+    ),
+    StateBlock(
+        "given",
+        "ADJOINT && TAKES",
+        ("double *const *given;         /* what sites beside have handed before */",),
+        reset=("row.given = NULL;",),
+    ),
+    StateBlock(
+        "givers",
+        "GIVERS",
+        ("ptrdiff_t givers[PHI_LINES];  /* the rows that hand something to this one, where they have been found */",),
+    ),
+    StateBlock(
+        "chosen",
+        "BY_COLOUR",
+        ("int chosen;                   /* the colour that a part of H belongs to */",),
+        reset=("row.chosen = 0;",),
+    ),
+    StateBlock(
+        "present",
+        "OPEN && !ONE_ROW",
+        ("double present[PHI_WEIGHTS];  /* 1 for terms of H that are there as far as the other axes say, else 0 */",),
+    ),
+    StateBlock("whole", "OPEN && BESIDE && !ONE_ROW", ("int whole;                    /* whether all of them are */",)),
+    StateBlock(
+        "window",
+        "SEAMS",
+        (
+            "double window;               "
+            " /* the first kind, see phi_solver, of those that terms begin on which move sites near seams */",
+        ),
+        reset=("row.window = 0.0;",),
+    ),
+    StateBlock(
+        "near",
+        "SEAMS && !ONE_ROW",
+        ("int near;                     /* the other axes along which it is near a seam, as bits */",),
+    ),
+    StateBlock(
+        "colour",
+        "COLOURS && !ONE_ROW",
+        ("int colour;                   /* of the first site */",),
+        reset=("row.colour = 0;",),
+    ),
+    StateBlock(
+        "swept_colour",
+        "COLOURS && SWEPT",
+        ("int swept;                    /* that of the sites which are swept */",),
+        reset=("row.swept = 0;",),
+    ),
+)

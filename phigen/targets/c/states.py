@@ -1,0 +1,55 @@
+"""The blocks of state (`phigen.targets.state`) as the runtime in C includes them: members, copies, rollback, reset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from phigen.targets.c.lattice.state import LATTICE, ROW
+from phigen.targets.state import STATE, StateBlock, belongs
+
+
+@dataclass(frozen=True)
+class Part:
+    """A file that the runtime includes: some ``lines`` of each of the ``blocks``, and how deep they are indented."""
+
+    blocks: Sequence[StateBlock]
+    indent: int
+    lines: Callable[[StateBlock], Iterator[str]]
+
+
+def _members(block: StateBlock) -> Iterator[str]:
+    return iter(block.members)
+
+
+def _reset(block: StateBlock) -> Iterator[str]:
+    return iter(block.reset)
+
+
+PARTS = {
+    "state_members.h": Part(STATE, 4, _members),
+    "state_saved.h": Part(STATE, 4, StateBlock.save),
+    "state_restored.h": Part(STATE, 8, StateBlock.restore),
+    "state_reset.h": Part(STATE, 8, _reset),
+    "state_of_lattice.h": Part(LATTICE, 4, _members),
+    "state_placed.h": Part(LATTICE, 4, _reset),
+    "state_of_row.h": Part(ROW, 4, _members),
+    "state_row_begun.h": Part(ROW, 4, _reset),
+}
+
+
+def part(file: str, switches: Mapping[str, bool]) -> list[str]:
+    """The lines of one of `PARTS` for a solver."""
+    made = PARTS[file]
+    return [" " * made.indent + line for b in made.blocks if belongs(b, switches) for line in made.lines(b)]
+
+
+def header(file: str) -> str:
+    """The same for all solvers, with conditions, for a compiler that reads the runtime as it lies there."""
+    made = PARTS[file]
+    found = []
+    for block in made.blocks:
+        text = [" " * made.indent + line for line in made.lines(block)]
+        condition = " ".join(f"PHI_{w}" if w.isupper() else w for w in block.when.replace("!", "! ").split())
+        found += [f"#if {condition}", *text, "#endif"] if text and condition else text
+    return "\n".join(found)

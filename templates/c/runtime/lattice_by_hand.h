@@ -1,0 +1,27 @@
+#ifndef PHI_FILE_LATTICE_BY_HAND_H
+#define PHI_FILE_LATTICE_BY_HAND_H
+/* Caller-driven stepping, for lattices distributed over several memories. A plane is all sites with the same index of the
+   first axis. A step consists of the stages 0 ... phi_stages() - 1; each is a sweep over all planes. Without noise, stage
+   number phi_stages() is the last stage of a step merged with the first of the next, as in phi_integrate. A stage may be
+   made in parts, in any order, with the same bits as phi_step. Before a part is swept, all planes that it reads must have
+   completed the stages before. */
+typedef struct {
+    size_t behind, ahead;        /* number of planes read before the first swept one, and after the last */
+    unsigned long read, changed; /* fields that are read there, and fields that are changed; bit k is field k */
+} phi_stage;
+
+size_t phi_stages(void);
+phi_status phi_describe(size_t number, phi_stage *about);
+
+/* phi_begin computes the coefficients for a step size; call it before the first stage. phi_sweep makes a stage for the
+   planes from ... to - 1. With far = 1 it uses functions for arguments of any size; with far = 0 faster ones, which give
+   NaN if an argument is too large. */
+phi_status phi_begin(phi_solver *s, double h);
+phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t to);
+
+/* Read or write the values x[plane][site] of a field, counted from 0, on the planes from ... to - 1. phi_holds returns 1 if
+   all fields are finite on these planes. */
+phi_status phi_planes(const phi_solver *s, size_t field, size_t from, size_t to, double *x);
+phi_status phi_put_planes(phi_solver *s, size_t field, size_t from, size_t to, const double *x);
+int phi_holds(const phi_solver *s, size_t from, size_t to);
+#endif

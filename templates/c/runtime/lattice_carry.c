@@ -1,0 +1,28 @@
+#ifndef PHI_FILE_LATTICE_CARRY
+#define PHI_FILE_LATTICE_CARRY
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+
+/* Go on as if rounding had left out nothing. */
+static void phi_clear_carry(phi_solver *s)
+{
+    for (size_t k = 0; k < PHI_DIM; ++k) memset(PHI_MEMORY_OF(s->carry[k]), 0, PHI_DOUBLES * sizeof *s->carry[k]);
+}
+
+/* What rounding has left out goes with the fields, of which some are x and the others those before. */
+static void phi_copy_carry(const phi_solver *s, double *const *to)
+{
+    const size_t block = PHI_DOUBLES * sizeof **to, into = to == s->before ? PHI_DIM : 0;
+    for (size_t k = 0; k < PHI_DIM; ++k)
+        memcpy(PHI_MEMORY_OF(s->carry[into + k]), PHI_MEMORY_OF(s->carry[PHI_DIM - into + k]), block);
+}
+
+/* What rounding has left out of the fields before, at sites, and back. */
+static void phi_take_carry(const phi_solver *s, double *x) { phi_take(s, s->carry + PHI_DIM, x); }
+
+static void phi_put_carry(const phi_solver *s, const double *x)
+{
+    for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->carry[PHI_DIM + k], x + k * s->sites);
+}
+#endif

@@ -1,0 +1,29 @@
+#ifndef PHI_FILE_LATTICE_KICKS
+#define PHI_FILE_LATTICE_KICKS
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+
+/* To x and so many times what is there. */
+static phi_status phi_move(phi_solver *s, const double *x, double kept)
+{
+    if (s == NULL || x == NULL) return PHI_BAD_ARGUMENT;
+    for (int moving = 0; moving < 2; ++moving) /* nothing, unless all of it can be */
+        for (size_t r = 0; r < PHI_DIM * s->rows; ++r) {
+            double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
+            for (ptrdiff_t i = 0; i < s->length; ++i) {
+                const double moved = kept * row[i] + x[(ptrdiff_t)r * s->length + i];
+                if (!isfinite(moved)) return PHI_BAD_ARGUMENT;
+                row[i] = moving ? moved : row[i];
+            }
+            PHI_COPY_ENDS(row, s->length, 0, s->length)
+        }
+    PHI_NOT_OPEN(s)
+    phi_clear_carry(s);
+    return PHI_OK;
+}
+
+phi_status phi_set_state(phi_solver *s, const double *x) { return phi_move(s, x, 0.0); }
+
+phi_status phi_kick(phi_solver *s, const double *change) { return phi_move(s, change, 1.0); }
+#endif

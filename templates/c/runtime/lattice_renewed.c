@@ -1,0 +1,12 @@
+#ifndef PHI_FILE_LATTICE_RENEWED
+#define PHI_FILE_LATTICE_RENEWED
+#include "lattice.h"
+#include "model.h"
+
+/* A row of coefficients in the step after so many others. */
+static void phi_renew(const phi_solver *s, int row, size_t steps, double coef[PHI_ROW])
+{
+    memcpy(coef, s->coef + row * PHI_ROW, PHI_PREPARED * sizeof *coef);
+    phi_refresh(coef, phi_time_after(s, steps) + phi_moments[row] * s->h, coef + PHI_PREPARED);
+}
+#endif

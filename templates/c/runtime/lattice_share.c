@@ -1,0 +1,42 @@
+#ifndef PHI_FILE_LATTICE_SHARE
+#define PHI_FILE_LATTICE_SHARE
+#ifdef _OPENMP
+#ifdef __cplusplus
+extern "C" {
+#endif
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#ifdef __cplusplus
+}
+#endif
+#if PHI_PAIRS
+#define PHI_PARALLEL _Pragma("omp parallel if (s->sites > 512)")
+#else
+#define PHI_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#endif
+#define PHI_THREADS (size_t)omp_get_num_threads()
+#define PHI_THREAD (size_t)omp_get_thread_num()
+#else
+#define PHI_PARALLEL
+#define PHI_THREADS (size_t)1
+#define PHI_THREAD (size_t)0
+#endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t phi_share(size_t units, size_t *first)
+{
+    const size_t threads = PHI_THREADS, own = PHI_THREAD, each = units / threads, more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void phi_wait(void)
+{
+#ifdef _OPENMP
+    if (PHI_THREADS > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
+#pragma omp barrier
+    }
+#endif
+}
+#endif

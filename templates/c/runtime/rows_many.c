@@ -1,0 +1,100 @@
+#ifndef PHI_FILE_ROWS_MANY
+#define PHI_FILE_ROWS_MANY
+#include "lattice.h"
+#include "model.h"
+
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
+static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
+{
+    const size_t most = SIZE_MAX / 64 / PHI_DOUBLES_OF_SITE;
+    size_t rows = 1;
+    if (sizes == NULL) return 0;
+    for (int a = 0; a < PHI_AXES; ++a)
+        if (sizes[a] < phi_least[a] PHI_OR_MISFIT(a) || sizes[a] > most / 2) return 0;
+    for (int a = 0; a < PHI_AXES - 1; ++a) {
+        if (rows > most / sizes[a]) return 0;
+        rows *= sizes[a];
+    }
+    const size_t wide = phi_width(sizes[PHI_LAST_AXIS]);
+    *width = (ptrdiff_t)wide;
+    return rows > most / wide ? 0 : rows;
+}
+
+/* The position of a row along all axes but the last. */
+static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[PHI_AXES])
+{
+    place[PHI_AXES - 1] = 0;
+    for (int a = PHI_AXES - 2; a >= 0; --a) {
+        place[a] = (ptrdiff_t)(index % s->sizes[a]);
+        index /= s->sizes[a];
+    }
+}
+
+/* Where a row is, and those beside it. */
+static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
+{
+    ptrdiff_t place[PHI_AXES];
+    phi_place(s, index, place);
+    for (int k = 0; k < PHI_LINES; ++k) {
+        ptrdiff_t line = 0;
+        for (int a = 0; a < PHI_AXES - 1; ++a) {
+            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
+            ptrdiff_t p = place[a] + phi_lines[k][a];
+            if (phi_open[a]) { /* mirrored, as in phi_ends */
+                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
+                p = p < 0 ? 0 : p < size ? p : size - 1;
+            } else {
+                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
+            }
+            line = line * size + p;
+        }
+        at[k] = line * s->width;
+    }
+}
+
+/* The same of all rows, into memory. */
+static void phi_find_all_lines(phi_solver *s, double *memory)
+{
+    s->lines = (ptrdiff_t *)(void *)memory;
+    for (size_t r = 0; r < s->rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
+}
+
+/* The row of that number, which is worked at in one go. */
+static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
+{
+    phi_row row;
+#include "state_row_begun.h"
+#if PHI_OPEN || PHI_COLOURS
+    ptrdiff_t place[PHI_AXES];
+    phi_place(s, index, place);
+#endif
+#if PHI_OPEN
+#if PHI_BESIDE
+    row.whole = 1;
+#endif
+    for (int k = 0; k < PHI_WEIGHTS; ++k) {
+        int there = 1;
+        for (int a = 0; a < PHI_AXES - 1; ++a)
+            there = there && place[a] + phi_weights[k][a][0] >= 0 &&
+                place[a] + phi_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
+        row.present[k] = there ? 1.0 : 0.0;
+#if PHI_BESIDE
+        row.whole = row.whole && there;
+#endif
+    }
+#endif
+#if PHI_COLOURS
+    for (int a = 0; a < PHI_AXES - 1; ++a) row.colour = (int)((row.colour + place[a] * phi_colours[a]) % PHI_COLOUR_COUNT);
+#endif
+#if PHI_SEAMS
+    row.near = 0;
+    for (int a = 0; a < PHI_AXES - 1; ++a) {
+        const ptrdiff_t near = s->seams[a] < (ptrdiff_t)s->sizes[a] ? phi_seams[a][2] : 0;
+        if (place[a] < near || place[a] >= s->seams[a] - near) row.near |= 1 << a;
+    }
+#endif
+    return row;
+}
+
+static size_t phi_units(const phi_solver *s) { return s->rows; } /* what is worked at in one go */
+#endif

@@ -1,0 +1,47 @@
+#ifndef PHI_FILE_ROWS_SINGLE
+#define PHI_FILE_ROWS_SINGLE
+#include "lattice.h"
+#include "model.h"
+
+/* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
+static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
+{
+    const size_t most = SIZE_MAX / 64 / PHI_DOUBLES_OF_SITE;
+    if (sizes == NULL || sizes[0] < phi_least[0] PHI_OR_MISFIT(0) || sizes[0] > most / 2) return 0;
+    *width = (ptrdiff_t)phi_width(sizes[0]);
+    return 1;
+}
+
+/* The whole row. */
+static inline phi_row phi_row_of(const phi_solver *s)
+{
+    phi_row row;
+#include "state_row_begun.h"
+    return row;
+}
+
+#if PHI_GATHER
+enum { PHI_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
+#else
+enum { PHI_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
+#endif
+
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t phi_units(const phi_solver *s)
+{
+    return s->length < 2 * PHI_PIECE ? 1 : (size_t)s->length / PHI_PIECE;
+}
+
+/* The piece of that number. */
+static inline phi_row phi_piece_of(const phi_solver *s, size_t unit)
+{
+    phi_row row = phi_row_of(s);
+    row.from = (ptrdiff_t)unit * PHI_PIECE;
+    if (unit + 1 < phi_units(s)) row.to = row.from + PHI_PIECE;
+#if PHI_BY_HAND
+    if (row.from < s->from) row.from = s->from;
+    if (row.to > s->to) row.to = s->to;
+#endif
+    return row;
+}
+#endif

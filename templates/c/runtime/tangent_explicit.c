@@ -1,0 +1,17 @@
+#ifndef PHI_FILE_TANGENT_EXPLICIT
+#define PHI_FILE_TANGENT_EXPLICIT
+#include "model.h"
+#include "solver.h"
+
+/* The derivative of one explicit stage, 1 + increment', and its step from x + carry. The remembered value is unused. */
+static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
+    const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
+{
+    (void)carry;
+    (void)value;
+    phi_explicit(coef, x, change);
+    phi_explicit_tangent(coef, x, derivative);
+    for (int i = 0; i < PHI_DIM; ++i) derivative[i * PHI_DIM + i] += 1.0;
+    return PHI_OK;
+}
+#endif
