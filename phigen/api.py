@@ -193,6 +193,7 @@ def interface_of(program: Program) -> Interface:
         order=program.order,
         parameters={p.name: float(p.value) for p in program.parameters},
         positive=frozenset(p.name for p in program.parameters if p.positive),
+        nonnegative=frozenset(p.name for p in program.parameters if p.nonnegative),
         casimirs=program.casimirs,
         time=program.time,
         moving=frozenset(["energy", *program.pushed] if program.time or program.forced else ()),

@@ -210,7 +210,10 @@ name: chain
 lattice: {axes: [i], boundary: open}
 coordinates: [q, p]
 time: t
-parameters: {B: {value: {random: normal, seed: 1, scale: 0.1, mean: 1}, at: sites}, k: {value: 1, at: sites}, g: 0.1}
+parameters:
+  B: {value: {random: normal, seed: 1, scale: 0.1, mean: 1}, at: sites}
+  k: {value: 1, at: sites}
+  g: {value: 0.1, nonnegative: true}
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: p**2/2 + k*(q[i+1] - q)**2/2 + B*q**2 + g*q*sin(t)
 casimirs: {}

@@ -198,11 +198,11 @@ def with_seed(spec: Spec, run: Run, seed: int | None) -> Run:
 
 
 def expect_positive(spec: Spec, parameters: Mapping[str, Any]) -> None:
-    """Refuse numbers for parameters that the spec says are positive; arrays are looked at elsewhere."""
+    """Refuse numbers beyond the bounds of parameters; arrays are checked elsewhere."""
     for p in spec.parameters:
         value = parameters.get(p.name)
-        if p.positive and isinstance(value, float | Fraction) and value <= 0:
-            raise click.BadParameter(f"parameter {p.name} must be positive", param_hint="--set")
+        if isinstance(value, float | Fraction) and p.refuses(value):
+            raise click.BadParameter(f"parameter {p.name} must be {p.bound}", param_hint="--set")
 
 
 def setting_of(setting: str) -> tuple[str, float]:

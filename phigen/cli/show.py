@@ -111,7 +111,7 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
     corrected = _modified(compilation, modified, most)
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     if system.parameters:
-        listed = ", ".join(f"{p.name} = {float(p.value):.9g}" + (" > 0" * p.positive) for p in system.parameters)
+        listed = ", ".join(f"{p.name} = {float(p.value):.9g}{p.inequality}" for p in system.parameters)
         section("Parameters", [listed])
     section(f"Poisson tensor: {system.shape}", assignments(brackets(compilation)))
     section("Hamiltonian", assignments([("H", readable_one(system.hamiltonian, most))]))

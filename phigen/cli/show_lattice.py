@@ -29,7 +29,7 @@ def print_cell(spec: Spec, cell: Cell, most: int | None) -> None:
 def _parameter(p: Parameter) -> str:
     where = {"all": "", "sites": " at every site", "bonds": " at every bond"}[p.at]
     value = "" if p.values else f" = {float(p.value):.9g}"
-    return f"{p.name}{value}{' > 0' * p.positive}{where}"
+    return f"{p.name}{value}{p.inequality}{where}"
 
 
 def described_cell(spec: Spec, cell: Cell) -> dict[str, object]:

@@ -114,7 +114,7 @@ def _parameters(spec: Spec, run: Run) -> Iterator[Variable]:
     values = spec.parameters_of(run)
     for p in spec.parameters:
         causality, variability = ("input", "continuous") if p.name in spec.inputs else ("parameter", "tunable")
-        yield Variable(p.name, causality, variability, values[p.name], p.description, p.unit, p.positive)
+        yield Variable(p.name, causality, variability, values[p.name], p.description, p.unit, bool(p.bound))
 
 
 def _solver(program: Program, run: Run) -> Iterator[Variable]:

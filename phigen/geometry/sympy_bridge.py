@@ -198,7 +198,7 @@ def symbols_in_sympy(system: Described) -> dict[str, Any]:
 
 
 def _assumed(parameter: Parameter) -> dict[str, bool]:
-    return {"positive": True} if parameter.positive else {"real": True}
+    return {parameter.bound or "real": True}
 
 
 def free_symbols(names: Iterable[str], used_names: Iterable[str]) -> list[Any]:

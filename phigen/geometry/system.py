@@ -95,8 +95,8 @@ class System:
 
     @property
     def positive(self) -> tuple[str, ...]:
-        """Names of the parameters that are positive."""
-        return tuple(p.name for p in self.parameters if p.positive)
+        """Names of the parameters that are positive, or nonnegative: what holds for all positive values holds at 0."""
+        return tuple(p.name for p in self.parameters if p.bound)
 
     @property
     def lie_algebra(self) -> LieAlgebra | None:

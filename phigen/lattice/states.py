@@ -88,8 +88,8 @@ class _Reader:
                     values = values or p.values
                     default = np.full(shape, float(p.value))
                     parameters[p.name] = default if values is None else self.arrays.read(values, shape, p.name)
-                if p.positive and np.any(np.asarray(parameters[p.name]) <= 0):
-                    message = f"the parameter {p.name!r} is positive by declaration, but not all its values are"
+                if p.refuses(float(np.min(parameters[p.name], initial=1.0))):
+                    message = f"the parameter {p.name!r} is {p.bound} by declaration, but not all its values are"
                     raise self._error("parameters", message)
         return Start(sizes, self._state(sizes), parameters, bonds, bool(self.lattice.graph))
 

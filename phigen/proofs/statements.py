@@ -54,7 +54,8 @@ def monitor(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
     """g of dt = g dτ is positive; no statement without a monitor."""
     if spec.monitor is None or isinstance(spec.monitor, str):
         return {}
-    return {MONITOR: (positivity("g > 0", spec.monitor, system.positive, _starts(system, spec)),)}
+    positive = [p.name for p in spec.parameters if p.positive]  # a factor that may be 0 is not
+    return {MONITOR: (positivity("g > 0", spec.monitor, positive, _starts(system, spec)),)}
 
 
 def damping(spec: Spec, starts: Sequence[Mapping[str, float]]) -> dict[str, tuple[Statement, ...]]:
@@ -62,7 +63,7 @@ def damping(spec: Spec, starts: Sequence[Mapping[str, float]]) -> dict[str, tupl
     rate = spec.forces.damping
     if rate is None:
         return {}
-    positive = [p.name for p in spec.parameters if p.positive]
+    positive = [p.name for p in spec.parameters if p.bound]
     stated = not_negative("λ ≥ 0, so that damping takes energy: dH/dt ≤ 0", rate, positive, starts)
     return {DAMPING: (stated,)} if stated else {}
 

@@ -157,7 +157,8 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
         "order": compilation.order.order,
         "orders": list(live.solvers),
         "parameters": [
-            {"name": p.name, "value": parameters[p.name], "positive": p.positive} for p in system.parameters
+            {"name": p.name, "value": parameters[p.name], "positive": p.positive, "nonnegative": p.nonnegative}
+            for p in system.parameters
         ],
         "groups": [
             {"axes": [system.coordinates.index(n) for n in group], "leaf": leaf}

@@ -96,7 +96,13 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
         "bonds": start.bonds.reshape(-1).tolist(),
         **({} if places is None else {"places": np.round(places, 4).reshape(-1).tolist()}),
         "parameters": [
-            {"name": p.name, "value": _values(spec, run, start, p.name), "positive": p.positive} for p in moved
+            {
+                "name": p.name,
+                "value": _values(spec, run, start, p.name),
+                "positive": p.positive,
+                "nonnegative": p.nonnegative,
+            }
+            for p in moved
         ],
         "arrays": {p.name: _array(spec, run, start, p) for p in spec.parameters if p not in moved},
         "initial": {name: _given(v, start, name, spec) for name, v in _initial(spec, run).items()},

@@ -53,6 +53,6 @@ def _kinds(system: System) -> Markup:
 def _parameters(system: System) -> Markup:
     rows = []
     for p in system.parameters:
-        about = f"{p.description} (positive)".strip() if p.positive else p.description
+        about = f"{p.description} ({p.bound})".strip() if p.bound else p.description
         rows.append((Markup(mathml.math(mathml.name(p.name))), [("number", f"{float(p.value):.9g}"), ("", about)]))
     return page.table("Parameters", [("", "name"), ("number", "default"), ("", "meaning")], rows)

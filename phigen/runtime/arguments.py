@@ -174,6 +174,14 @@ def together(mapped: Mapping[str, Any] | None, more: Mapping[str, Any]) -> dict[
     return {**(mapped or {}), **more}
 
 
+def broken_bound(name: str, value: ArrayLike, interface: Interface) -> str:
+    """Return the bound that a parameter has, ``positive`` or ``nonnegative``, if a value breaks it; otherwise empty."""
+    least = float(np.min(np.asarray(value), initial=np.inf))
+    if name in interface.positive and not least > 0:
+        return "positive"
+    return "nonnegative" if name in interface.nonnegative and not least >= 0 else ""
+
+
 def parameters(interface: Interface, mapped: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
     """Return the values of all parameters: those passed in a mapping and, as ``more``, by keyword, else defaults.
 
@@ -184,8 +192,8 @@ def parameters(interface: Interface, mapped: Mapping[str, float] | None, more: M
     expect_known(asked, interface.parameters)
     for name, value in asked.items():
         values[name] = number(value, f"parameter {name!r}")
-        if name in interface.positive and values[name] <= 0:
-            raise ValueError(f"parameter {name!r} must be positive, not {_shown(value)}")
+        if bound := broken_bound(name, values[name], interface):
+            raise ValueError(f"parameter {name!r} must be {bound}, not {_shown(value)}")
     return values
 
 
@@ -236,9 +244,9 @@ def ensemble(
     values = {name: np.asarray(value) for name, value in parameters(interface, *plain).items()}
     for name in per_member.keys() & values.keys():
         values[name] = array(per_member[name], f"parameter {name!r}", shape)
-        if name in interface.positive and not (values[name] > 0).all():
-            m = int(np.argmin(values[name] > 0))
-            raise ValueError(f"parameter {name!r} must be positive, not {float(values[name][m])}, as of member {m}")
+        if bound := broken_bound(name, values[name], interface):
+            m = int(np.argmin(values[name] >= 0 if bound == "nonnegative" else values[name] > 0))
+            raise ValueError(f"parameter {name!r} must be {bound}, not {float(values[name][m])}, as of member {m}")
     if alone is not t0 and interface.time:
         begin = array(t0, "the times t0", shape)  # type: ignore[arg-type]
     size = array(h, "the step size h", shape) if np.ndim(h) > 0 else np.asarray(step_size(h))  # type: ignore[arg-type]

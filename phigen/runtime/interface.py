@@ -47,6 +47,7 @@ class Interface:
     order: int
     parameters: Mapping[str, float]  # defaults
     positive: frozenset[str] = frozenset()  # the parameters that must be positive
+    nonnegative: frozenset[str] = frozenset()  # those that must be 0 or positive
     casimirs: tuple[str, ...] = ()
     time: str = ""  # the name of the time, "" if the Hamiltonian does not depend on it
     moving: frozenset[str] = frozenset()  # those of energy and Casimirs that time or forces change

@@ -911,8 +911,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             where = "sites" if name in about.at_sites else "bonds"
             if not np.isfinite(array).all():
                 raise ValueError(f"parameter {name!r} must be finite at all {where}")
-            if name in about.positive and not (array > 0).all():
-                raise ValueError(f"parameter {name!r} must be positive at all {where}")
+            if bound := arguments.broken_bound(name, array, about):
+                raise ValueError(f"parameter {name!r} must be {bound} at all {where}")
             values[name] = array
         return values | bonds
 

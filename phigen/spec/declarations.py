@@ -315,15 +315,20 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
             )
         else:
             number = declared.number(entry, numbers)
-        positive = options.get("positive", False)
-        if number is not None and positive and number <= 0:
-            message = f"the parameter {name!r} is positive by declaration, but its value is {options['value'].text}"
-            declared.reader.error(options["value"], message)
+        positive, nonnegative = options.get("positive", False), options.get("nonnegative", False)
+        if positive and nonnegative:
+            declared.reader.error(
+                key, f"the parameter {name!r} is positive, so it is nonnegative too", "give one of them"
+            )
+        bounded = Parameter(name, Fraction(1), positive, nonnegative=nonnegative)
+        if number is not None and bounded.refuses(number):
+            said = f"is {bounded.bound} by declaration, but its value is {options['value'].text}"
+            declared.reader.error(options["value"], f"the parameter {name!r} {said}")
         # A value with an error is reported; the name stays declared, so that its uses are not reported too.
         value = Fraction(1) if number is None else number
         description, unit = options.get("description", ""), options.get("unit", "")
         small = options.get("small", False)
-        declared.parameters[name] = Parameter(name, value, positive, description, at, array, unit, small)
+        declared.parameters[name] = Parameter(name, value, positive, description, at, array, unit, small, nonnegative)
 
 
 def _expect_place(name: str, at: str, declared: Declarations) -> None:

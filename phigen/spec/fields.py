@@ -66,6 +66,7 @@ PARAMETER = Record(
             default="all",
         ),
         Field("positive", Boolean(), "the value is always greater than 0; simplifications may use it", default=False),
+        Field("nonnegative", Boolean(), "the value is never less than 0", default=False),
         Field("small", Boolean(), "splittings: the terms with this factor are a small part of H", default=False),
         Field("description", PROSE, "the meaning of the parameter"),
         Field("unit", INLINE, "its unit, such as kg.m2; documentation only, nothing is converted"),

@@ -48,7 +48,7 @@ class Values:
 class Parameter:
     """A run-time argument of the generated code, with its default.
 
-    ``small`` says that what it multiplies is a small part of H.
+    ``small`` says that what it multiplies is a small part of H, ``nonnegative`` that it is 0 or positive.
     ``at`` says of a lattice whether it is one number (``all``), or an array with a value at each of the ``sites`` or
     ``bonds``; ``values`` are its defaults where they are not all ``value``. ``unit`` is text for readers: nothing is
     converted.
@@ -62,6 +62,21 @@ class Parameter:
     values: Values | None = None
     unit: str = ""
     small: bool = False
+    nonnegative: bool = False
+
+    @property
+    def bound(self) -> str:
+        """``positive``, ``nonnegative``, or "" if every number is allowed."""
+        return "positive" if self.positive else "nonnegative" if self.nonnegative else ""
+
+    @property
+    def inequality(self) -> str:
+        """The bound as it is shown: `` > 0``, `` ≥ 0`` or nothing."""
+        return {"positive": " > 0", "nonnegative": " ≥ 0"}.get(self.bound, "")
+
+    def refuses(self, value: float | Fraction) -> bool:
+        """Whether a number is beyond the bound."""
+        return bool(self.bound and (value < 0 or (self.positive and value == 0)))
 
 
 @dataclass(frozen=True)

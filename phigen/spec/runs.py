@@ -242,8 +242,8 @@ def _overrides(
             hint = did_you_mean(name, declared.parameters)
             declared.reader.error(key, f"{shown(name)} is not a parameter", hint)
         elif value is not None and node is not None:
-            if parameter.positive and value <= 0:
-                message = f"the parameter {name!r} is positive by declaration, but its value is {node.text}"
+            if parameter.refuses(value):
+                message = f"the parameter {name!r} is {parameter.bound} by declaration, but its value is {node.text}"
                 declared.reader.error(node, message)
             values[name] = value
     return values, arrays

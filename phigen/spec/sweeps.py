@@ -134,8 +134,9 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
     if axis.scale == "log" and lowest <= 0:
         declared.reader.error(key, f"over: {name} on a logarithmic scale reaches {lowest:g}")
     parameter = declared.parameters.get(name)
-    if parameter is not None and parameter.positive and lowest <= 0:
-        declared.reader.error(key, f"over: the parameter {name!r} is positive by declaration, but reaches {lowest:g}")
+    if parameter is not None and parameter.refuses(lowest):
+        said = f"is {parameter.bound} by declaration, but reaches {lowest:g}"
+        declared.reader.error(key, f"over: the parameter {name!r} {said}")
     return [axis]
 
 

@@ -160,7 +160,7 @@ def _sum(terms: Sequence[str]) -> str:
 
 def _parameter(p: Parameter) -> str:
     value = _values(p.values) if p.values else _number(p.value)
-    more = ", positive: true" * p.positive + ", small: true" * p.small + (f", at: {p.at}" if p.at != "all" else "")
+    more = f", {p.bound}: true" * bool(p.bound) + ", small: true" * p.small + (f", at: {p.at}" if p.at != "all" else "")
     more += f", unit: {_quoted(p.unit)}" if p.unit else ""
     return f"{{value: {value}{more}}}" if more else value
 

@@ -127,8 +127,8 @@ def _parameters(spec: Spec, parameters: Mapping[str, float]) -> dict[str, Fracti
     arguments.expect_known(parameters, {p.name: 0.0 for p in spec.parameters})
     values = {name: arguments.number(value, f"parameter {name!r}") for name, value in parameters.items()}
     for p in spec.parameters:
-        if p.positive and values.get(p.name, 1.0) <= 0:
-            raise ValueError(f"parameter {p.name!r} must be positive, not {values[p.name]}")
+        if p.refuses(values.get(p.name, 1.0)):
+            raise ValueError(f"parameter {p.name!r} must be {p.bound}, not {values[p.name]}")
     return {name: Fraction(value) for name, value in values.items()}
 
 

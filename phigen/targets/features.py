@@ -40,6 +40,7 @@ FEATURES = (
     Feature("KICKS", lambda p: p.step.multiples),
     Feature("TIMED", lambda p: p.time),
     Feature("NOISE", lambda p: p.noise),
+    Feature("NONNEGATIVE", lambda p: any(q.nonnegative for q in p.parameters)),
     Feature("OBSERVED", lambda p: p.observed),
     Feature("OBSERVED_FIELDS", lambda p: p.observables.fields),
     Feature("RENEWED", lambda p: p.step.refresh),

@@ -63,7 +63,7 @@ def right_hand_side(program: Program) -> str:
 
 def facts(program: Program, listed: Callable[[Sequence[object]], str], key: Callable[[str], str]) -> dict[str, object]:
     """What a module states of its system: ``listed`` writes a sequence, ``key`` the name of a parameter."""
-    noise = program.noise
+    noise, nonnegative = program.noise, [p.name for p in program.parameters if p.nonnegative]
     return {
         "name": program.name,
         "n": program.dimension,
@@ -76,6 +76,7 @@ def facts(program: Program, listed: Callable[[Sequence[object]], str], key: Call
         "observed_fields": listed(program.observables.fields) if program.observables.fields else "",
         "defaults": [f"{key(p.name)}: {float(p.value)!r}" for p in program.parameters],
         "positive": listed([p.name for p in program.parameters if p.positive]),
+        "nonnegative": listed(nonnegative) if nonnegative else "",
         "right_hand_side": right_hand_side(program),
         "noise": noise is not None,
         "sources": listed(noise.sources) if noise else "",

@@ -85,8 +85,9 @@ if (document.getElementById("live-panel")) {
     number("order", (v) => data.orders.includes(v), (v) => { found.order = v; });
     number("group", (v) => v in data.groups, (v) => { found.group = v; });
     number("sites", (v) => lists.sites.includes(v), (v) => { found.sites = v; });
-    for (const { name, positive: only } of data.parameters) {
-      number(`p.${name}`, only ? positive : () => true, (v) => { found.params[name] = v; });
+    for (const { name, positive: only, nonnegative } of data.parameters) {
+      const allowed = only ? positive : nonnegative ? (v) => v >= 0 : () => true;
+      number(`p.${name}`, allowed, (v) => { found.params[name] = v; });
     }
     // A link shows what its sender saw, whatever this browser would measure.
     number("rk4", (v) => v >= 1 && v <= MOST_PARTS && Number.isInteger(v), (v) => { measured[alike(found)] = v; });

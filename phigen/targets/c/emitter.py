@@ -301,7 +301,8 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     text = "\n".join(body)
     member = members(program)
     asked = [
-        f"isfinite(params->{member[p.name]})" + f" && params->{member[p.name]} > 0.0" * p.positive
+        f"isfinite(params->{member[p.name]})"
+        + (f" && params->{member[p.name]} {'>' if p.positive else '>='} 0.0" if p.bound else "")
         for p in program.parameters
     ]
     schedule, solve = step.flow_schedule, step.inner_solve

@@ -114,6 +114,11 @@ export class Sites {
       if (!values.every((v) => Number.isFinite(v) && (v > 0 || !POSITIVE.includes(name)))) {
         throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
       }
+      // #if NONNEGATIVE
+      if (NONNEGATIVE.includes(name) && values.some((v) => v < 0)) {
+        throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+      }
+      // #endif
       params[name] = listed ? values : length === undefined ? value : new Float64Array(length).fill(value);
     }
     return Object.freeze(params);

@@ -65,6 +65,9 @@ function admitted(given) {
   for (const [name, value] of Object.entries(params)) {
     const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+    // #if NONNEGATIVE
+    if (value < 0 && NONNEGATIVE.includes(name)) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+    // #endif
   }
   const [table] = emptyTables();
   // #if GAUGE

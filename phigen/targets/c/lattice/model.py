@@ -234,17 +234,19 @@ def _moments(step: Sweeps) -> list[float]:
 def _allowed(program: Program, *, graph: bool) -> Iterator[str]:
     """The statements that return whether parameters are allowed."""
     named = members(program)
-    numbers = [(f"params->{named[p.name]}", p.positive) for p in program.parameters if p.at == "all"]
-    asked = [f"isfinite({number})" + f" && {number} > 0.0" * positive for number, positive in numbers]
-    arrays = [(named[p.name], p.positive, p.values is not None, p.at) for p in program.parameters if p.at != "all"]
+    inside, outside = ({"positive": o, "nonnegative": e} for o, e in ((">", ">="), ("<=", "<")))
+    numbers = [(f"params->{named[p.name]}", p.bound) for p in program.parameters if p.at == "all"]
+    asked = [f"isfinite({n})" + (f" && {n} {inside[bound]} 0.0" if bound else "") for n, bound in numbers]
+    arrays = [(named[p.name], p.bound, p.values is not None, p.at) for p in program.parameters if p.at != "all"]
     counts = ["sites", *["bonds"] * graph]
     unused = ["params"] * (not asked and not arrays) + [c for c in counts if all(at != c for *_, at in arrays)]
     if unused:
         yield ", ".join(f"(void){u}" for u in unused) + ";"
-    for member, positive, required, at in arrays:
+    for member, bound, required, at in arrays:
         if required:
             yield f"if (params->{member} == NULL) return 0;"
-        wrong = f"!isfinite(params->{member}[k])" + f" || params->{member}[k] <= 0.0" * positive
+        beyond = f" || params->{member}[k] {outside[bound]} 0.0" if bound else ""
+        wrong = f"!isfinite(params->{member}[k])" + beyond
         yield f"for (size_t k = 0; params->{member} != NULL && k < {at}; ++k)"
         yield f"    if ({wrong}) return 0;"
     yield f"return {' && '.join(asked) or '1'};"
