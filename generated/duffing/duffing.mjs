@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9471c0ca048d3338820501fbab2f02d0b64aa3ac798f8b57cc29ab1f01b0a150
+ * body-sha256: ca48fe33565d1673a1f1af7e69fd79176da2cfa59b82893477a74ae96af4046e
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -37,10 +37,10 @@ const DEFAULT_PARAMETERS = Object.freeze({
   omega: 1.2,
 });
 
-/** Parameters that have to be positive. */
+/** Parameters that must be positive. */
 const POSITIVE = ["omega"];
 
-/** A step of size h is the composition of one stage of each of these fractions of it. */
+/** A step of size h is the composition of stages of these fractions of h. */
 const FRACTIONS = [1.0];
 
 /** Where the middle of each of them lies, as a fraction of the step: there the time is taken. */
@@ -52,7 +52,7 @@ const PREPARED = 22;
 /** Coefficients. */
 const COEFFICIENTS = 33;
 
-/** Most iterations of the inner solve. */
+/** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
 /** The error that may remain, relative to y. */
@@ -238,13 +238,13 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 
 const number = new Float64Array(1);
 
-/** A table of coefficients for each stage. */
+/** Return a table of coefficients for each stage. */
 function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
 /**
- * All parameters: those given, and defaults. StepError unless they are known and finite, positive where
+ * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
  * they have to be, and give finite coefficients for a step so short that it has no part in it.
  */
 function admitted(given) {
@@ -263,7 +263,7 @@ function admitted(given) {
   return Object.freeze(params);
 }
 
-/** A trajectory, and what makes its steps. */
+/** A solver and the trajectory that it computes. */
 export class Solver {
   static NAME = NAME;
   static VERSION = VERSION;
@@ -274,34 +274,34 @@ export class Solver {
   static CASIMIRS = CASIMIRS;
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state; read it freely, and change it by setState and kick only. */
+  /** The state; change it by setState and kick only. */
   x;
-  /** What rounding took from x: the state proper is x + carry. */
+  /** Rounding error of x (compensated summation): x + carry is more accurate. */
   carry = new Float64Array(DIM);
   /** The time of x. */
   t;
-  /** Good steps since the start. */
+  /** Number of successful steps since the start. */
   steps = 0;
-  /** Evaluations of the generating function, for statistics. */
+  /** Number of evaluations of the generating function, for statistics. */
   evaluations = 0;
-  /** The last step size. */
+  /** Size of the last step. */
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** What depends on parameters and step size only, then on the time of the step too, for each stage. */
+  /** Coefficients of each stage: functions of parameters and step size, then of the time too. */
   coef = emptyTables();
-  /** For starting guesses, for each stage. */
+  /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time when h was set: time is counted from there, so that no error adds up. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
   /**
-   * Start at x0. Throws StepError for arguments that are not allowed.
+   * Start at x0. Throws StepError for arguments that are not admissible.
    *
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
-   * @param {Partial<Parameters>} [options.params] the defaults for those that are left out
+   * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
    * @param {number} [options.t0] the time of x0, 0 by default
    */
   constructor(options) {
@@ -310,7 +310,7 @@ export class Solver {
     [this.t] = finite([options.t0 ?? 0], 1, "t0");
   }
 
-  /** What depends on the step size; nothing where that is as before. */
+  /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
@@ -323,7 +323,7 @@ export class Solver {
     this.#stepsBefore = this.steps;
   }
 
-  /** What depends on the time of the next step. */
+  /** Compute the coefficients that depend on the time of the next step. */
   #renew() {
     this.coef.forEach((coef, stage) => {
       refresh(coef, this.t + MIDDLES[stage] * this.h, coef.subarray(PREPARED));
@@ -331,7 +331,7 @@ export class Solver {
   }
 
   /**
-   * One step of size h, of either sign. Throws StepError; then the state is as before.
+   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
    *
    * @param {number} h
    * @returns {this}
@@ -350,7 +350,7 @@ export class Solver {
   }
 
   /**
-   * Many steps. Throws StepError; then x is the last good state, and steps counts the good ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
    *
    * @param {number} h
    * @param {number} count
@@ -362,7 +362,7 @@ export class Solver {
   }
 
   /**
-   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   * Return an independent solver with the same state. Its predictors start anew.
    *
    * @returns {Solver}
    */
@@ -386,7 +386,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: move the state by a change, as an impulse does; else as setState.
+   * Between steps: add a change to the state, as an impulse does; else as setState.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -404,7 +404,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Stand at x + carry from now on. */
+  /** Replace the state by x + carry. */
   #place(x, carry) {
     for (const history of this.history) history.move(this.x, x);
     this.x.set(x);
@@ -419,8 +419,8 @@ export class Solver {
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: object, t0?: number | ArrayLike<number>}} [options] as of the constructor
-   * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
+   * @param {{params?: object, t0?: number | ArrayLike<number>}} [options] as in the constructor
+   * @returns {{x: Float64Array[], status: string[]}} the last state of each member, and "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
     const ends = Array.from(members, (x0, m) => {

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 24f1a41df6984182589277cc1855aaa6057e7c3e43a52f086595be0bb3ccfdbd
+# body-sha256: 51b640e8b87b0046d281798ae895c4acae8db63d932a228d51223abf3efe0189
 import numpy as np
 
 VERSION = "0.1.0"
@@ -20,18 +20,18 @@ DEFAULT_PARAMETERS = {
     "omega": 1.2,
 }
 
-# Parameters that have to be positive.
+# Parameters that must be positive.
 POSITIVE = ("omega",)
 
-# Casimirs whose multiples the solver subtracts from the Hamiltonian before discretising: see gauge().
+# Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
 GAUGE = ()
 
-# A step of size h is the composition of steps of these fractions of it.
+# A step of size h is the composition of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
 class StepError(ArithmeticError):
-    """A step could not be made; the state before it stands.
+    """A step failed.
 
     step: number of the failing step, from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of
     the members that failed; states: the rows computed so far, the last good state included.
@@ -46,25 +46,25 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """The coefficients of some members; where these have nothing of their own, all share them."""
+    """Return the coefficients of some members; a single column belongs to all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """What some members have of a stage."""
+    """Return a stage for some of its members."""
     coef, parameters, *times = stage
     own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
-    """Rows of numbers, or of one for each member, as an array (rows, members), or (rows, 1)."""
+    """Return rows as an array (rows, members), or (rows, 1) if all rows are numbers."""
     zeros = np.zeros(max((np.size(row) for row in rows), default=1))
     return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
-    """Values, arrays or numbers, side by side along a new last axis of the shape of `like` without its own."""
+    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -72,7 +72,7 @@ def _filled(like, values):
 
 
 def _sum(x, carry, change):
-    """x + carry + change in compensated arithmetic: the rounded sum and what rounding took from it."""
+    """Return x + carry + change by compensated summation: the rounded sum and its rounding error."""
     change = change + carry
     total = x + change
     added = total - x
@@ -83,7 +83,7 @@ PROBE_STEP = 1e-100  # so short that coefficients are finite
 
 
 def _numbers(values):
-    """An array of numbers; ValueError where one is too large."""
+    """Return an array of numbers. Raises ValueError if one is too large."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -91,7 +91,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """All parameters, as numbers of NumPy: dividing by zero, they give infinity."""
+    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -99,7 +99,7 @@ def _values(parameters):
 
 
 def _admissible(values):
-    """Whether steps can be made with these parameters.
+    """Return whether steps can be made with these parameters.
 
     They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
     it has no part in it.
@@ -200,7 +200,7 @@ def _linearise(coef, y):
 
 
 def _solve(matrix, side):
-    """Solutions of linear systems, NaN where the matrix is singular."""
+    """Return the solutions of linear systems, NaN if the matrix is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -243,7 +243,7 @@ SHRINKING = 0.25  # ... if one is more than this part of the one before
 
 
 def _size(y, delta):
-    """Size of a correction relative to each component of y, but no finer than FLOOR of the largest."""
+    """Return the size of a correction relative to each component of y, or to FLOOR times the largest if that is more."""
     scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
 
@@ -284,29 +284,29 @@ def _attempt(coef, x, carry, y):
 
 
 def _advance(stage, x, carry, memory):
-    """One stage of all members; `memory` holds the offsets y - x of the last two steps, for the starting guess."""
+    """One stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
     guess = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, guess)
     guessed = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & guessed)
     if len(failed):
-        # A guess from earlier steps may mislead: once more from y = x.
+        # A prediction from earlier steps may be bad: repeat from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
     return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
 
 
 def _choose_gauge(parameters, x):
-    """This solver has no Casimir gauge to choose."""
+    """Return None: this solver has no gauge."""
     return np.zeros((len(x), 0))
 
 
-# Where the middle of each stage lies, as a fraction of the step: there the time is taken.
+# The midpoint of each stage, as a fraction of the step; H is evaluated at that time.
 MIDDLES = (0.5,)
 
 
 def _coefficients(parameters, x, h, gauge):
-    """What depends on neither state nor time, for each stage: coefficients, parameters, its step and its middle.
+    """Return what depends on neither state nor time, for each stage: coefficients, parameters, step size, midpoint.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -318,7 +318,7 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def _renewed(stage, t, h):
-    """A stage of the step of size h from the time t on: with the coefficients that depend on its time, and that time."""
+    """Return a stage of the step of size h from the time t on, with its time and the coefficients that depend on it."""
     coef, parameters, step, middle = stage
     t = t + middle * h
     coef = _table([*coef, *_refresh(coef, t)])
@@ -326,24 +326,24 @@ def _renewed(stage, t, h):
 
 
 def gauge(x, **parameters):
-    """The multiples of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
+    """Return the factors of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, t0=0.0, gauge=None, **parameters):
-    """The state after one step of size h, of either sign, from the time t0. x: (..., DIM); raises StepError."""
+    """Return the state after one step of size h, of either sign, from the time t0. x: (..., DIM); raises StepError."""
     return integrate(x, h, 1, t0=t0, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """A number, or one for each member. Raises ValueError where these are not as many as the states x."""
+    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """The arguments of integrate() as arrays and values. Raises ValueError for those that are not allowed."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -358,12 +358,12 @@ def _checked(x0, h, steps, stride, parameters):
 
 
 def integrate(x0, h, steps, stride=1, t0=0.0, gauge=None, **parameters):
-    """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
     x0 has shape (..., DIM): leading axes are members, each integrated by itself. h, t0 and parameters may be
     arrays with one number for each of them. Raises ValueError for arguments that
     are not allowed, and StepError as soon as a step of a member fails. t0 is the time of x0. gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge.
+    overrides the choice of the solver: the step is a Poisson map for each fixed gauge.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
     if not np.isfinite(t0).all():
@@ -419,18 +419,18 @@ def _vector_field(parameters, t, x):
 
 
 def hamiltonian(x, t, **parameters):
-    """The Hamiltonian at x at the time t, a number or as many as there are states: (..., DIM) -> (...)."""
+    """Return the Hamiltonian at x at the time t, a number or an array with one for each state: (..., DIM) -> (...)."""
     with np.errstate(all="ignore"):
         return _energy(_values(parameters), np.asarray(t, dtype=float), np.asarray(x, dtype=float))[..., 0]
 
 
 def casimirs(x, **parameters):
-    """The Casimirs at x, in the order of CASIMIRS: (..., DIM) -> (..., number of Casimirs)."""
+    """Return the Casimirs at x, in the order of CASIMIRS: (..., DIM) -> (..., number of Casimirs)."""
     with np.errstate(all="ignore"):
         return _casimirs(_values(parameters), np.asarray(x, dtype=float))
 
 
 def vector_field(x, t, **parameters):
-    """The right-hand side pi(x) grad H(t, x), t as in hamiltonian: (..., DIM) -> (..., DIM)."""
+    """Return the right-hand side pi(x) grad H(t, x), t as in hamiltonian: (..., DIM) -> (..., DIM)."""
     with np.errstate(all="ignore"):
         return _vector_field(_values(parameters), np.asarray(t, dtype=float), np.asarray(x, dtype=float))

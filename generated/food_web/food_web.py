@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 54e33aa6e40e107c7d26db1fa4cd14a77703ec144e97be4344750c22bb1e6bb1
+# body-sha256: 8f43d66e54c190bb49b8c68140d325ccf9d334c10478ead877fb54404179c063
 import numpy as np
 
 VERSION = "0.1.0"
@@ -38,7 +38,7 @@ SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 
 
 
 class StepError(ArithmeticError):
-    """A step could not be made; the state before it stands.
+    """A step failed.
 
     step: number of the failing step, from 0; status: NO_CONVERGENCE, NOT_FINITE; states: the frames so far.
     """
@@ -207,7 +207,7 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """States at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
 
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """

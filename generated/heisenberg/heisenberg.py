@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: cd8128d9f668cd265a63e9f94dc7a4ed5b29e3b376ac6fdd352aea3421675bfe
+# body-sha256: e546df8a2fd4b2bf7cd06497b7c523289899b68e1437e1efb68de0459db932c3
 import numpy as np
 
 VERSION = "0.1.0"
@@ -38,7 +38,7 @@ SCHEDULE = ((0, 0), (1, 1), (2, 2), (1, 3), (0, 4))
 
 
 class StepError(ArithmeticError):
-    """A step could not be made; the state before it stands.
+    """A step failed.
 
     step: number of the failing step, from 0; status: NO_CONVERGENCE, NOT_FINITE; states: the frames so far.
     """
@@ -141,7 +141,7 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """States at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
 
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """

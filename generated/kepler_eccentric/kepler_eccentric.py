@@ -7,7 +7,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 86e2a5b108d6f2d3330363543f1befab3c29750cd1e74189f70c59c83c33f05f
+# body-sha256: 43f2a88fb2cb98f9a95c67fbe0690f5b4a1dcc9bcd0bea2c2a12d83f30e5c32c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -20,18 +20,18 @@ DEFAULT_PARAMETERS = {
     "oblateness": 1e-06,
 }
 
-# Parameters that have to be positive.
+# Parameters that must be positive.
 POSITIVE = ()
 
-# What a trajectory holds fixed: e = -H(x0), see gauge().
+# Constant of a trajectory: the energy level e = -H(x0), see gauge().
 GAUGE = ("e",)
 
-# A step of size h is the composition of steps of these fractions of it.
+# A step of size h is the composition of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
 class StepError(ArithmeticError):
-    """A step could not be made; the state before it stands.
+    """A step failed.
 
     step: number of the failing step, from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of
     the members that failed; states: the rows computed so far, the last good state included.
@@ -46,25 +46,25 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """The coefficients of some members; where these have nothing of their own, all share them."""
+    """Return the coefficients of some members; a single column belongs to all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """What some members have of a stage."""
+    """Return a stage for some of its members."""
     coef, parameters, *times = stage
     own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
-    """Rows of numbers, or of one for each member, as an array (rows, members), or (rows, 1)."""
+    """Return rows as an array (rows, members), or (rows, 1) if all rows are numbers."""
     zeros = np.zeros(max((np.size(row) for row in rows), default=1))
     return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
-    """Values, arrays or numbers, side by side along a new last axis of the shape of `like` without its own."""
+    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -72,7 +72,7 @@ def _filled(like, values):
 
 
 def _sum(x, carry, change):
-    """x + carry + change in compensated arithmetic: the rounded sum and what rounding took from it."""
+    """Return x + carry + change by compensated summation: the rounded sum and its rounding error."""
     change = change + carry
     total = x + change
     added = total - x
@@ -83,7 +83,7 @@ PROBE_STEP = 1e-100  # so short that coefficients are finite
 
 
 def _numbers(values):
-    """An array of numbers; ValueError where one is too large."""
+    """Return an array of numbers. Raises ValueError if one is too large."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -91,7 +91,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """All parameters, as numbers of NumPy: dividing by zero, they give infinity."""
+    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -99,7 +99,7 @@ def _values(parameters):
 
 
 def _admissible(values):
-    """Whether steps can be made with these parameters.
+    """Return whether steps can be made with these parameters.
 
     They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
     it has no part in it.
@@ -152,7 +152,7 @@ def _flow2(coef, state):
         ])
 
 
-# The times of the flows of one step, as fractions of it, each with a row of coefficients; and the flows in order: the
+# The times of the flows of one step, as fractions of h, each with a row of coefficients; and the flows in order: the
 # part of H, and its row.
 TIMES = (0.06510124154444503, 0.13020248308889007, 0.3456827324319992, 0.5611629817751084, 0.08584400956513055, -0.38947496264484727, -0.11531652804484584, 0.1588419065551556, -0.11853099378904099, -0.39590389413323757, -0.10568212657746093, 0.1845396409783157, 0.22145701433231887, 0.25837438768632204, 0.27669305564781616, 0.2950117236093103, -0.15524840511036214, -0.6055085338300346, -0.15524840511036214, 0.2950117236093103, 0.27669305564781616, 0.25837438768632204, 0.22145701433231887, 0.1845396409783157, -0.10568212657746093, -0.39590389413323757, -0.11853099378904099, 0.1588419065551556, -0.11531652804484584, -0.38947496264484727, 0.08584400956513055, 0.5611629817751084, 0.3456827324319992, 0.13020248308889007, 0.06510124154444503,)
 ROW = 4
@@ -161,7 +161,7 @@ FLOWS = (_flow1, _flow2,)
 
 
 def _advance(stage, x, carry, memory):
-    """One step of all members: the flows of the parts of K, one after the other; the memory becomes the time it took.
+    """Make one step of all members: the flows of the parts of K, one after another; the memory becomes its time.
 
     No number for it means that one of the logarithms of K was left by its argument.
     """
@@ -180,7 +180,7 @@ def _prepare(parameters, gauge, h):
 
 
 def _choose_gauge(parameters, x):
-    """e = -H of the starts, (members, 1): K = g (H + e) is zero along the trajectory."""
+    """Return the energy level e = -H of the starts, (members, 1): K = g (H + e) is zero along the trajectory."""
     return -_energy(parameters, x)
 
 
@@ -196,20 +196,20 @@ def _monitor(parameters, x):
 
 
 def _refused(parameters, x):
-    """The members (indices) whose monitor is not positive, or without an energy."""
+    """Return the indices of members whose monitor is not positive, or whose energy is not finite."""
     with np.errstate(all="ignore"):
         rate = _monitor(parameters, x)[:, 0]
         return np.flatnonzero(~((rate > 0) & np.isfinite(rate + _energy(parameters, x)[:, 0])))
 
 
 def _time_of(stage, x, value):
-    """The time (members,) that a stage took, by its start and what it solved for; NaN unless it has the sign of the step."""
+    """Return the time (members,) that a stage took, from its start and solution; NaN unless it has the sign of the step."""
     elapsed = value
     return np.where(elapsed * np.sign(stage[2]) > 0, elapsed, np.nan)
 
 
 def _coefficients(parameters, x, h, gauge):
-    """What does not depend on the state, for each stage: coefficients, parameters and the step of the stage.
+    """Return what does not depend on the state, for each stage: coefficients, parameters and its step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -221,24 +221,24 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """e = -H(x), which integrate() holds fixed for trajectories from x: (..., 1)."""
+    """Return the energy level e = -H(x) that integrate() holds fixed for trajectories from x: (..., 1)."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """The state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
+    """Return the state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """A number, or one for each member. Raises ValueError where these are not as many as the states x."""
+    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """The arguments of integrate() as arrays and values. Raises ValueError for those that are not allowed."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -253,14 +253,14 @@ def _checked(x0, h, steps, stride, parameters):
 
 
 def integrate(x0, h, steps, stride=1, gauge=None, times=False, **parameters):
-    """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
     The steps are of size h in tau; with times the result is a pair of the states and their times t: (rows, ...).
 
     x0 has shape (..., DIM): leading axes are members, each integrated by itself. h and parameters may be
     arrays with one number for each of them. Raises ValueError for arguments that
     are not allowed, and StepError as soon as a step of a member fails. gauge overrides e = -H(x0): the step
-    is an exact Poisson map for each fixed e.
+    is a Poisson map for each fixed e.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
     shape = x.shape
@@ -335,18 +335,18 @@ def _vector_field(parameters, x):
 
 
 def hamiltonian(x, **parameters):
-    """The Hamiltonian at x: (..., DIM) -> (...)."""
+    """Return the Hamiltonian at x: (..., DIM) -> (...)."""
     with np.errstate(all="ignore"):
         return _energy(_values(parameters), np.asarray(x, dtype=float))[..., 0]
 
 
 def casimirs(x, **parameters):
-    """The Casimirs at x, in the order of CASIMIRS: (..., DIM) -> (..., number of Casimirs)."""
+    """Return the Casimirs at x, in the order of CASIMIRS: (..., DIM) -> (..., number of Casimirs)."""
     with np.errstate(all="ignore"):
         return _casimirs(_values(parameters), np.asarray(x, dtype=float))
 
 
 def vector_field(x, **parameters):
-    """The right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
+    """Return the right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
     with np.errstate(all="ignore"):
         return _vector_field(_values(parameters), np.asarray(x, dtype=float))

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 740ba57a3a54c456489aa75ec7726ff3f57b9be63e21cae0d82cd4cda77ff988
+ * body-sha256: 6b73809d4d806e8994f763fbc573013090a4c1c1ab62b2de2df2fd777d2e9cf2
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -34,10 +34,10 @@ const DEFAULT_PARAMETERS = Object.freeze({
   g: 1.0,
 });
 
-/** Parameters that have to be positive. */
+/** Parameters that must be positive. */
 const POSITIVE = ["g"];
 
-/** A step of size h is the composition of one stage of each of these fractions of it. */
+/** A step of size h is the composition of stages of these fractions of h. */
 const FRACTIONS = [1.0];
 
 /** Values that depend on parameters and step size only. */
@@ -127,13 +127,13 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 
 const number = new Float64Array(1);
 
-/** A table of coefficients for each stage. */
+/** Return a table of coefficients for each stage. */
 function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
 /**
- * All parameters: those given, and defaults. StepError unless they are known and finite, positive where
+ * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
  * they have to be, and give finite coefficients for a step so short that it has no part in it.
  */
 function admitted(given) {
@@ -152,7 +152,7 @@ function admitted(given) {
   return Object.freeze(params);
 }
 
-/** A trajectory, and what makes its steps. */
+/** A solver and the trajectory that it computes. */
 export class Solver {
   static NAME = NAME;
   static VERSION = VERSION;
@@ -163,39 +163,39 @@ export class Solver {
   static CASIMIRS = CASIMIRS;
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state; read it freely, and change it by setState and kick only. */
+  /** The state; change it by setState and kick only. */
   x;
-  /** What rounding took from x: the state proper is x + carry. */
+  /** Rounding error of x (compensated summation): x + carry is more accurate. */
   carry = new Float64Array(DIM);
   /** Time since the start. */
   t = 0;
-  /** Good steps since the start. */
+  /** Number of successful steps since the start. */
   steps = 0;
-  /** Evaluations of the generating function, for statistics. */
+  /** Number of evaluations of the generating function, for statistics. */
   evaluations = 0;
-  /** The last step size. */
+  /** Size of the last step. */
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** All that depends on parameters and step size only, for each stage. */
+  /** Coefficients of each stage: functions of parameters and step size. */
   coef = emptyTables();
-  /** Steps and time when h was set: time is counted from there, so that no error adds up. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
   /**
-   * Start at x0. Throws StepError for arguments that are not allowed.
+   * Start at x0. Throws StepError for arguments that are not admissible.
    *
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
-   * @param {Partial<Parameters>} [options.params] the defaults for those that are left out
+   * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
    */
   constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
   }
 
-  /** What depends on the step size; nothing where that is as before. */
+  /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
@@ -208,7 +208,7 @@ export class Solver {
   }
 
   /**
-   * One step of size h, of either sign. Throws StepError; then the state is as before.
+   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
    *
    * @param {number} h
    * @returns {this}
@@ -226,7 +226,7 @@ export class Solver {
   }
 
   /**
-   * Many steps. Throws StepError; then x is the last good state, and steps counts the good ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
    *
    * @param {number} h
    * @param {number} count
@@ -238,7 +238,7 @@ export class Solver {
   }
 
   /**
-   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   * Return an independent solver with the same state. Its predictors start anew.
    *
    * @returns {Solver}
    */
@@ -262,7 +262,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: move the state by a change, as an impulse does; else as setState.
+   * Between steps: add a change to the state, as an impulse does; else as setState.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -280,7 +280,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Stand at x + carry from now on. */
+  /** Replace the state by x + carry. */
   #place(x, carry) {
     this.x.set(x);
     this.carry.set(carry);
@@ -294,8 +294,8 @@ export class Solver {
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: object}} [options] as of the constructor
-   * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
+   * @param {{params?: object}} [options] as in the constructor
+   * @returns {{x: Float64Array[], status: string[]}} the last state of each member, and "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
     const ends = Array.from(members, (x0, m) => {

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 10 multiplications, 2 divisions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 48e306ccafe09e9902046704c24bb6018a7bf8ab248b2a2ad6182d85ab96bdc7
+# body-sha256: bea0d909a3407b707f26954c6f02796b0e534516ded4144ac74912804036daff
 import numpy as np
 
 VERSION = "0.1.0"
@@ -39,7 +39,7 @@ SCHEDULE = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4))
 
 
 class StepError(ArithmeticError):
-    """A step could not be made; the state before it stands.
+    """A step failed.
 
     step: number of the failing step, from 0; status: NO_CONVERGENCE, NOT_FINITE; states: the frames so far.
     """
@@ -265,7 +265,7 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """States at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
 
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 2d8c39f1b05c527c646c2f7884d092978e668d6787a160bd0e69d40df0a121f2
+# body-sha256: d545c1db76d00e5906ed8c7eda862b12b9d3a84e2c8c726be67b2a97e69fa2d5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -24,18 +24,18 @@ DEFAULT_PARAMETERS = {
     "spring": 0.5,
 }
 
-# Parameters that have to be positive.
+# Parameters that must be positive.
 POSITIVE = ("I1", "I2", "I3",)
 
-# Casimirs whose multiples the solver subtracts from the Hamiltonian before discretising: see gauge().
+# Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
 GAUGE = ("length",)
 
-# A step of size h is the composition of steps of these fractions of it.
+# A step of size h is the composition of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
 class StepError(ArithmeticError):
-    """A step could not be made; the state before it stands.
+    """A step failed.
 
     step: number of the failing step, from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of
     the members that failed; states: the rows computed so far, the last good state included.
@@ -50,25 +50,25 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """The coefficients of some members; where these have nothing of their own, all share them."""
+    """Return the coefficients of some members; a single column belongs to all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """What some members have of a stage."""
+    """Return a stage for some of its members."""
     coef, parameters, *times = stage
     own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
-    """Rows of numbers, or of one for each member, as an array (rows, members), or (rows, 1)."""
+    """Return rows as an array (rows, members), or (rows, 1) if all rows are numbers."""
     zeros = np.zeros(max((np.size(row) for row in rows), default=1))
     return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
-    """Values, arrays or numbers, side by side along a new last axis of the shape of `like` without its own."""
+    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -76,7 +76,7 @@ def _filled(like, values):
 
 
 def _sum(x, carry, change):
-    """x + carry + change in compensated arithmetic: the rounded sum and what rounding took from it."""
+    """Return x + carry + change by compensated summation: the rounded sum and its rounding error."""
     change = change + carry
     total = x + change
     added = total - x
@@ -87,7 +87,7 @@ PROBE_STEP = 1e-100  # so short that coefficients are finite
 
 
 def _numbers(values):
-    """An array of numbers; ValueError where one is too large."""
+    """Return an array of numbers. Raises ValueError if one is too large."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -95,7 +95,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """All parameters, as numbers of NumPy: dividing by zero, they give infinity."""
+    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -103,7 +103,7 @@ def _values(parameters):
 
 
 def _admissible(values):
-    """Whether steps can be made with these parameters.
+    """Return whether steps can be made with these parameters.
 
     They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
     it has no part in it.
@@ -799,7 +799,7 @@ def _differences(coef, x, p, residual):
 
 
 def _solve(matrix, side):
-    """Solutions of linear systems, NaN where the matrix is singular."""
+    """Return the solutions of linear systems, NaN if the matrix is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -890,7 +890,7 @@ def _advance(stage, x, carry, memory):
 
 
 def _choose_gauge(parameters, x):
-    """For each Casimir C the lambda by which grad H - lambda grad C is smallest at x: (members, number of them).
+    """Return for each Casimir C the lambda that minimises |grad H - lambda grad C| at x: (members, number of them).
 
     Zero where that gives nothing finite.
     """
@@ -931,7 +931,7 @@ def _products(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """What does not depend on the state, for each stage: coefficients, parameters and the step of the stage.
+    """Return what does not depend on the state, for each stage: coefficients, parameters and its step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -943,24 +943,24 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """The multiples of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
+    """Return the factors of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """The state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
+    """Return the state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """A number, or one for each member. Raises ValueError where these are not as many as the states x."""
+    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """The arguments of integrate() as arrays and values. Raises ValueError for those that are not allowed."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -975,12 +975,12 @@ def _checked(x0, h, steps, stride, parameters):
 
 
 def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
-    """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
     x0 has shape (..., DIM): leading axes are members, each integrated by itself. h and parameters may be
     arrays with one number for each of them. Raises ValueError for arguments that
     are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge.
+    overrides the choice of the solver: the step is a Poisson map for each fixed gauge.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
     shape = x.shape
@@ -1069,18 +1069,18 @@ def _vector_field(parameters, x):
 
 
 def hamiltonian(x, **parameters):
-    """The Hamiltonian at x: (..., DIM) -> (...)."""
+    """Return the Hamiltonian at x: (..., DIM) -> (...)."""
     with np.errstate(all="ignore"):
         return _energy(_values(parameters), np.asarray(x, dtype=float))[..., 0]
 
 
 def casimirs(x, **parameters):
-    """The Casimirs at x, in the order of CASIMIRS: (..., DIM) -> (..., number of Casimirs)."""
+    """Return the Casimirs at x, in the order of CASIMIRS: (..., DIM) -> (..., number of Casimirs)."""
     with np.errstate(all="ignore"):
         return _casimirs(_values(parameters), np.asarray(x, dtype=float))
 
 
 def vector_field(x, **parameters):
-    """The right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
+    """Return the right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
     with np.errstate(all="ignore"):
         return _vector_field(_values(parameters), np.asarray(x, dtype=float))

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 40c37c37a43ead83cb05c7df5737e7cf993b1d76d6ff254d63ccc37c02af5941
+ * body-sha256: e2f47e5f23f6804ca0110ba4ef76955e0d8752ecdecd70017dee4fbf8954ef91
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -40,19 +40,19 @@ const DEFAULT_PARAMETERS = Object.freeze({
   I3: 0.6666666666666666,
 });
 
-/** Parameters that have to be positive. */
+/** Parameters that must be positive. */
 const POSITIVE = ["I1", "I2", "I3"];
 
-/** Casimirs whose multiples the solver takes from H before it discretises. */
+/** Casimirs of which the solver subtracts multiples from H. */
 const GAUGE = Object.freeze(["C"]);
 
-/** A step of size h is the composition of one stage of each of these fractions of it. */
+/** A step of size h is the composition of stages of these fractions of h. */
 const FRACTIONS = [1.0];
 
 /** Values that depend on parameters and step size only. */
 const COEFFICIENTS = 35;
 
-/** Most iterations of the inner solve. */
+/** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
 /** The error that may remain, relative to y. */
@@ -539,13 +539,13 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 
 const number = new Float64Array(1);
 
-/** A table of coefficients for each stage. */
+/** Return a table of coefficients for each stage. */
 function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
 /**
- * All parameters: those given, and defaults. StepError unless they are known and finite, positive where
+ * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
  * they have to be, and give finite coefficients for a step so short that it has no part in it.
  */
 function admitted(given) {
@@ -564,7 +564,7 @@ function admitted(given) {
   return Object.freeze(params);
 }
 
-/** A trajectory, and what makes its steps. */
+/** A solver and the trajectory that it computes. */
 export class Solver {
   static NAME = NAME;
   static VERSION = VERSION;
@@ -575,36 +575,36 @@ export class Solver {
   static CASIMIRS = CASIMIRS;
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state; read it freely, and change it by setState and kick only. */
+  /** The state; change it by setState and kick only. */
   x;
-  /** What rounding took from x: the state proper is x + carry. */
+  /** Rounding error of x (compensated summation): x + carry is more accurate. */
   carry = new Float64Array(DIM);
   /** Time since the start. */
   t = 0;
-  /** Good steps since the start. */
+  /** Number of successful steps since the start. */
   steps = 0;
-  /** Evaluations of the generating function, for statistics. */
+  /** Number of evaluations of the generating function, for statistics. */
   evaluations = 0;
-  /** The last step size. */
+  /** Size of the last step. */
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Multiples of the Casimirs in GAUGE that are taken from H. */
+  /** Factors of the Casimirs in GAUGE that are subtracted from H. */
   gauge;
-  /** All that depends on parameters and step size only, for each stage. */
+  /** Coefficients of each stage: functions of parameters and step size. */
   coef = emptyTables();
-  /** For starting guesses, for each stage. */
+  /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time when h was set: time is counted from there, so that no error adds up. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
   /**
-   * Start at x0. Throws StepError for arguments that are not allowed.
+   * Start at x0. Throws StepError for arguments that are not admissible.
    *
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
-   * @param {Partial<Parameters>} [options.params] the defaults for those that are left out
+   * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
    * @param {ArrayLike<number>} [options.gauge] multiples of one's own: the step is an exact Poisson map
    *   for each
    */
@@ -615,7 +615,7 @@ export class Solver {
     this.gauge = gauge ? finite(gauge, GAUGE.length, "gauge") : chooseGauge(this.params, this.x);
   }
 
-  /** What depends on the step size; nothing where that is as before. */
+  /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
@@ -629,7 +629,7 @@ export class Solver {
   }
 
   /**
-   * One step of size h, of either sign. Throws StepError; then the state is as before.
+   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
    *
    * @param {number} h
    * @returns {this}
@@ -647,7 +647,7 @@ export class Solver {
   }
 
   /**
-   * Many steps. Throws StepError; then x is the last good state, and steps counts the good ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
    *
    * @param {number} h
    * @param {number} count
@@ -659,7 +659,7 @@ export class Solver {
   }
 
   /**
-   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   * Return an independent solver with the same state. Its predictors start anew.
    *
    * @returns {Solver}
    */
@@ -683,7 +683,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: move the state by a change, as an impulse does; else as setState.
+   * Between steps: add a change to the state, as an impulse does; else as setState.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -701,7 +701,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Stand at x + carry from now on. */
+  /** Replace the state by x + carry. */
   #place(x, carry) {
     for (const history of this.history) history.move(this.x, x);
     this.x.set(x);
@@ -716,8 +716,8 @@ export class Solver {
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: object}} [options] as of the constructor
-   * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
+   * @param {{params?: object}} [options] as in the constructor
+   * @returns {{x: Float64Array[], status: string[]}} the last state of each member, and "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
     const ends = Array.from(members, (x0, m) => {

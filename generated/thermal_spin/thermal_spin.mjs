@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ffe9b2bf317f6fd1ea65e0bf86db025b9db61d14ea5e2a7a579e09749ef021d0
+ * body-sha256: 544a0b92c8068858fa369eb4e62c0c90571d0f921549fdff29f3c762453fd0e5
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -45,16 +45,16 @@ const DEFAULT_PARAMETERS = Object.freeze({
   damping_rate: 0.1,
 });
 
-/** Parameters that have to be positive. */
+/** Parameters that must be positive. */
 const POSITIVE = ["T", "damping_rate"];
 
-/** Sources of noise, the increments of each in a step, all of them, and where normal variates are cut off. */
+/** Sources of noise, increments of each in a step, increments of all, and the bound of normal variates. */
 const SOURCES = Object.freeze(["bath_x", "bath_y", "bath_z"]);
 const PARTS = 1;
 const DRAWS = 3;
 const BOUND = 6.0;
 
-/** A step of size h is the composition of one stage of each of these fractions of it. */
+/** A step of size h is the composition of stages of these fractions of h. */
 const FRACTIONS = [1.0];
 
 /** Where the middle of each of them lies, as a fraction of the step: there the time is taken. */
@@ -66,7 +66,7 @@ const PREPARED = 7;
 /** Coefficients. */
 const COEFFICIENTS = 13;
 
-/** Most iterations of the inner solve. */
+/** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
 /** The error that may remain, relative to y. */
@@ -333,13 +333,13 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 
 const number = new Float64Array(1);
 
-/** A table of coefficients for each stage. */
+/** Return a table of coefficients for each stage. */
 function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
 /**
- * All parameters: those given, and defaults. StepError unless they are known and finite, positive where
+ * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
  * they have to be, and give finite coefficients for a step so short that it has no part in it.
  */
 function admitted(given) {
@@ -358,7 +358,7 @@ function admitted(given) {
   return Object.freeze(params);
 }
 
-/** A trajectory, and what makes its steps. */
+/** A solver and the trajectory that it computes. */
 export class Solver {
   static NAME = NAME;
   static VERSION = VERSION;
@@ -369,43 +369,43 @@ export class Solver {
   static CASIMIRS = CASIMIRS;
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state; read it freely, and change it by setState and kick only. */
+  /** The state; change it by setState and kick only. */
   x;
-  /** What rounding took from x: the state proper is x + carry. */
+  /** Rounding error of x (compensated summation): x + carry is more accurate. */
   carry = new Float64Array(DIM);
   /** Time since the start. */
   t = 0;
-  /** The random numbers of a step are a function of these, and of how many steps were made before. */
+  /** The random numbers of a step are a function of these three and of the number of steps made before. */
   seed = 0;
   member = 0;
   step0 = 0;
   /** The increments of the noise in the last step. */
   dw = new Float64Array(DRAWS);
-  /** Good steps since the start. */
+  /** Number of successful steps since the start. */
   steps = 0;
-  /** Evaluations of the generating function, for statistics. */
+  /** Number of evaluations of the generating function, for statistics. */
   evaluations = 0;
-  /** The last step size. */
+  /** Size of the last step. */
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** What depends on parameters and step size only, then on the time of the step too, for each stage. */
+  /** Coefficients of each stage: functions of parameters and step size, then of the time too. */
   coef = emptyTables();
-  /** For starting guesses, for each stage. */
+  /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time when h was set: time is counted from there, so that no error adds up. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
   /**
-   * Start at x0. Throws StepError for arguments that are not allowed.
+   * Start at x0. Throws StepError for arguments that are not admissible.
    *
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
-   * @param {Partial<Parameters>} [options.params] the defaults for those that are left out
-   * @param {number | bigint} [options.seed] which random numbers are taken, of 64 bits, 0 by default
-   * @param {number} [options.member] the same, of 32 bits, 0 by default
-   * @param {number} [options.step0] how many steps were made before x0, 0 by default
+   * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
+   * @param {number | bigint} [options.seed] seed of the random numbers, 64 bits, 0 by default
+   * @param {number} [options.member] member of an ensemble, 32 bits, 0 by default
+   * @param {number} [options.step0] number of steps made before x0, 0 by default
    */
   constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
@@ -413,7 +413,7 @@ export class Solver {
     Object.assign(this, drawsOf(options));
   }
 
-  /** What depends on the step size; nothing where that is as before. */
+  /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
@@ -426,7 +426,7 @@ export class Solver {
     this.#stepsBefore = this.steps;
   }
 
-  /** What depends on the increments of the next step. */
+  /** Compute the coefficients that depend on the increments of the next step. */
   #renew() {
     this.coef.forEach((coef, stage) => {
       refresh(coef, this.dw, coef.subarray(PREPARED));
@@ -434,10 +434,10 @@ export class Solver {
   }
 
   /**
-   * One step of size h, of either sign. Throws StepError; then the state is as before.
+   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
    *
    * @param {number} h
-   * @param {ArrayLike<number>} [dw] increments of the noise, in place of random ones
+   * @param {ArrayLike<number>} [dw] increments of the noise; random ones by default
    * @returns {this}
    */
   step(h) {
@@ -456,7 +456,7 @@ export class Solver {
   }
 
   /**
-   * Many steps. Throws StepError; then x is the last good state, and steps counts the good ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
    *
    * @param {number} h
    * @param {number} count
@@ -468,7 +468,7 @@ export class Solver {
   }
 
   /**
-   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   * Return an independent solver with the same state. Its predictors start anew.
    *
    * @returns {Solver}
    */
@@ -493,7 +493,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: move the state by a change, as an impulse does; else as setState.
+   * Between steps: add a change to the state, as an impulse does; else as setState.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -511,7 +511,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Stand at x + carry from now on. */
+  /** Replace the state by x + carry. */
   #place(x, carry) {
     for (const history of this.history) history.move(this.x, x);
     this.x.set(x);
@@ -526,9 +526,9 @@ export class Solver {
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: object}} [options] as of the constructor
-   * also seed, step0, and member, that of the first of the members
-   * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
+   * @param {{params?: object}} [options] as in the constructor
+   * also seed, step0, and member, that of the first member
+   * @returns {{x: Float64Array[], status: string[]}} the last state of each member, and "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
     const ends = Array.from(members, (x0, m) => {

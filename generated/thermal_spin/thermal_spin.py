@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e0bfca6969011e5e2adc11faa8597417869f0a0b5deb8ce29932427f5004d1c6
+# body-sha256: b92151304a7ffcbce15fe78825ff9ad6c63cf69f5e8303a43a89b76079bc4c71
 import numpy as np
 
 VERSION = "0.1.0"
@@ -27,18 +27,18 @@ DEFAULT_PARAMETERS = {
     "damping_rate": 0.1,
 }
 
-# Parameters that have to be positive.
+# Parameters that must be positive.
 POSITIVE = ("T", "damping_rate",)
 
-# Casimirs whose multiples the solver subtracts from the Hamiltonian before discretising: see gauge().
+# Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
 GAUGE = ()
 
-# A step of size h is the composition of steps of these fractions of it.
+# A step of size h is the composition of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
 class StepError(ArithmeticError):
-    """A step could not be made; the state before it stands.
+    """A step failed.
 
     step: number of the failing step, from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of
     the members that failed; states: the rows computed so far, the last good state included.
@@ -53,25 +53,25 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """The coefficients of some members; where these have nothing of their own, all share them."""
+    """Return the coefficients of some members; a single column belongs to all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """What some members have of a stage."""
+    """Return a stage for some of its members."""
     coef, parameters, *times = stage
     own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
-    """Rows of numbers, or of one for each member, as an array (rows, members), or (rows, 1)."""
+    """Return rows as an array (rows, members), or (rows, 1) if all rows are numbers."""
     zeros = np.zeros(max((np.size(row) for row in rows), default=1))
     return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
-    """Values, arrays or numbers, side by side along a new last axis of the shape of `like` without its own."""
+    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -79,7 +79,7 @@ def _filled(like, values):
 
 
 def _sum(x, carry, change):
-    """x + carry + change in compensated arithmetic: the rounded sum and what rounding took from it."""
+    """Return x + carry + change by compensated summation: the rounded sum and its rounding error."""
     change = change + carry
     total = x + change
     added = total - x
@@ -90,7 +90,7 @@ PROBE_STEP = 1e-100  # so short that coefficients are finite
 
 
 def _numbers(values):
-    """An array of numbers; ValueError where one is too large."""
+    """Return an array of numbers. Raises ValueError if one is too large."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -98,7 +98,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """All parameters, as numbers of NumPy: dividing by zero, they give infinity."""
+    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -106,7 +106,7 @@ def _values(parameters):
 
 
 def _admissible(values):
-    """Whether steps can be made with these parameters.
+    """Return whether steps can be made with these parameters.
 
     They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
     it has no part in it.
@@ -288,7 +288,7 @@ def _linearise(coef, y):
 
 
 def _solve(matrix, side):
-    """Solutions of linear systems, NaN where the matrix is singular."""
+    """Return the solutions of linear systems, NaN if the matrix is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -333,7 +333,7 @@ SHRINKING = 0.25  # ... if one is more than this part of the one before
 
 
 def _size(y, delta):
-    """Size of a correction relative to each component of y, but no finer than FLOOR of the largest."""
+    """Return the size of a correction relative to each component of y, or to FLOOR times the largest if that is more."""
     scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
 
@@ -374,13 +374,13 @@ def _attempt(coef, x, carry, y):
 
 
 def _advance(stage, x, carry, memory):
-    """One stage of all members; noise cannot be guessed from earlier steps, and `memory` holds the last offset only."""
+    """Make one stage of all members. `memory` holds the last offset only, since noise cannot be predicted."""
     following, rest, y, status = _solved(stage, x, carry, x)
     return following, rest, (y - x, y - x), status
 
 
 def _choose_gauge(parameters, x):
-    """This solver has no Casimir gauge to choose."""
+    """Return None: this solver has no gauge."""
     return np.zeros((len(x), 0))
 
 
@@ -427,26 +427,26 @@ def _normals(seed, members, step):
 
 
 def _drawing(h, count, seed=0, member=0, step0=0, increments=None):
-    """The increments of the steps of so many members, as a function of the steps done: (increments, members).
+    """Return the increments of the noise as a function of the number of steps done: (increments, members).
 
     They are a function of seed, member (that of the first, or an array of all) and the number of the step, step0 + done,
     and of nothing else; or `increments` (steps, increments) for all members, or (steps, members, increments).
     """
     members = np.arange(count) + member if np.ndim(member) == 0 else np.asarray(member)
     if increments is None:
-        size = np.sign(h) * np.sqrt(abs(h) / PARTS)  # so that a step of -h undoes one of h
+        size = np.sign(h) * np.sqrt(abs(h) / PARTS)  # so that a step of -h is the inverse of one of h
         return lambda done: size * _normals(int(seed), members, int(step0) + done)
     draws = PARTS * len(SOURCES)
     return lambda done: np.broadcast_to(np.asarray(increments[done], dtype=float), (count, draws)).T
 
 
 def _coefficients(parameters, x, h, gauge):
-    """What depends on parameters and step only: coefficients (coefficients, members or 1), parameters and the step."""
+    """Return what depends on parameters and step only: coefficients (coefficients, members or 1), parameters, step."""
     return [(_table(_prepare(parameters, h)), parameters, h)]
 
 
 def _renewed(stage, t, h, dw):
-    """A stage of the step of size h from the time t on with the increments dw (increments, members).
+    """Return a stage of the step of size h from the time t on with the increments dw (increments, members).
 
     Its coefficients are arrays (coefficients, members).
     """
@@ -455,24 +455,24 @@ def _renewed(stage, t, h, dw):
 
 
 def gauge(x, **parameters):
-    """The multiples of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
+    """Return the factors of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, seed=0, member=0, step0=0, increments=None, gauge=None, **parameters):
-    """The state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
+    """Return the state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
     return integrate(x, h, 1, seed=seed, member=member, step0=step0, increments=increments, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """A number, or one for each member. Raises ValueError where these are not as many as the states x."""
+    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """The arguments of integrate() as arrays and values. Raises ValueError for those that are not allowed."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -487,14 +487,14 @@ def _checked(x0, h, steps, stride, parameters):
 
 
 def integrate(x0, h, steps, stride=1, seed=0, member=0, step0=0, increments=None, gauge=None, **parameters):
-    """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
     x0 has shape (..., DIM): leading axes are members, each integrated by itself. h and parameters may be
     arrays with one number for each of them. Raises ValueError for arguments that
     are not allowed, and StepError as soon as a step of a member fails. The random
-    numbers are a function of seed, member (that of the first, or one for each) and the number of the step, from step0
-    on; increments (steps, increments) for all members, or (steps, members, increments), take their place. gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge.
+    numbers are a function of seed, member (that of the first member, or an array) and the number of the step, from
+    step0 on. Prescribed increments (steps, increments) or (steps, members, increments) replace them. gauge (one value for each Casimir in GAUGE)
+    overrides the choice of the solver: the step is a Poisson map for each fixed gauge.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
     shape = x.shape
@@ -567,25 +567,25 @@ def _noise_fields(parameters, x):
 
 
 def hamiltonian(x, **parameters):
-    """The Hamiltonian at x: (..., DIM) -> (...)."""
+    """Return the Hamiltonian at x: (..., DIM) -> (...)."""
     with np.errstate(all="ignore"):
         return _energy(_values(parameters), np.asarray(x, dtype=float))[..., 0]
 
 
 def casimirs(x, **parameters):
-    """The Casimirs at x, in the order of CASIMIRS: (..., DIM) -> (..., number of Casimirs)."""
+    """Return the Casimirs at x, in the order of CASIMIRS: (..., DIM) -> (..., number of Casimirs)."""
     with np.errstate(all="ignore"):
         return _casimirs(_values(parameters), np.asarray(x, dtype=float))
 
 
 def noise_fields(x, **parameters):
-    """sigma pi(x) grad g(x) of each source of noise: (..., DIM) -> (..., len(SOURCES), DIM)."""
+    """Return sigma pi(x) grad g(x) of each source of noise: (..., DIM) -> (..., len(SOURCES), DIM)."""
     x, values = np.asarray(x, dtype=float), _values(parameters)
     with np.errstate(all="ignore"):
         return _noise_fields(values, x).reshape(x.shape[:-1] + (len(SOURCES), DIM))
 
 
 def vector_field(x, **parameters):
-    """The right-hand side pi(x) (grad H(x) + zeta(x)) + f(x): (..., DIM) -> (..., DIM)."""
+    """Return the right-hand side pi(x) (grad H(x) + zeta(x)) + f(x): (..., DIM) -> (..., DIM)."""
     with np.errstate(all="ignore"):
         return _vector_field(_values(parameters), np.asarray(x, dtype=float))

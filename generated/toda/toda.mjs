@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c53ebbe8186f1b76beb65a708b551ed0cbb0ea6d96ed49236d11ab4e80c40552
+ * body-sha256: 391aac686a423b0a09e358a307eab46c430b69e37f52660bb12b1e4903e75210
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -28,7 +28,7 @@ const AXES = Object.freeze(["i"]);
 const COORDINATES = Object.freeze(["a", "b"]);
 const CASIMIRS = Object.freeze(["momentum", "length"]);
 
-/** What is constant of each Casimir: its value at each of the "sites", their "sum", or their "product". */
+/** Kind of each Casimir: its value at each of the "sites", or their "sum" or "product". */
 const CASIMIR_KINDS = Object.freeze(["sum", "product"]);
 
 /**
@@ -37,7 +37,7 @@ const CASIMIR_KINDS = Object.freeze(["sum", "product"]);
 const DEFAULT_PARAMETERS = Object.freeze({
 });
 
-/** Parameters that have to be positive, and those that are arrays with a value at each site, or bond. */
+/** Parameters that must be positive, and those with a value at each site, or bond. */
 const POSITIVE = [];
 const AT_SITES = [];
 
@@ -203,7 +203,7 @@ function prepareStep(params, h, rows) {
   return rows;
 }
 
-/** A lattice on its way, and what makes its steps. */
+/** A solver of a lattice and the trajectory that it computes. */
 export class Solver {
   static NAME = NAME;
   static VERSION = VERSION;
@@ -216,33 +216,33 @@ export class Solver {
   static CASIMIR_KINDS = CASIMIR_KINDS;
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state, one field after the other, in each the sites, the last axis fastest; to be read only. */
+  /** The state, one field after the other, each with the last axis fastest; read only. */
   x;
   /** Time since the start. */
   t = 0;
-  /** Good steps since the start. */
+  /** Number of successful steps since the start. */
   steps = 0;
-  /** The last step size. */
+  /** Size of the last step. */
   h = NaN;
-  /** Sizes, parameters, and which sites are neighbours. */
+  /** Sizes, parameters, and tables of neighbours. */
   sites;
-  /** What depends on parameters and step size only, a row for each time. */
+  /** Coefficients, functions of parameters and step size: a row for each flow or stage. */
   rows = TIMES.map(() => new Float64Array(COEFFICIENTS));
   /** The state before a step. */
   before;
-  /** What the steps of one size learn, for those after them. */
+  /** Predictors and other results of steps of one size, for later steps. */
   past = {};
-  /** Steps and time when h was set: time is counted from there, so that no error adds up. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
   /**
-   * Start at x0. Throws StepError for arguments that are not allowed.
+   * Start at x0. Throws StepError for arguments that are not admissible.
    *
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES
    * @param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default
-   * @param {object} [options.params] those at sites and at bonds are arrays, or one number for all
+   * @param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number for all
    */
   constructor(options) {
     const { x0 } = options;
@@ -256,7 +256,7 @@ export class Solver {
     }
   }
 
-  /** All parameters, those at sites and at bonds as arrays. */
+  /** All parameters; those at sites and at bonds are arrays. */
   get params() {
     return this.sites.params;
   }
@@ -273,7 +273,7 @@ export class Solver {
     return this.x.subarray(k * this.sites.count, (k + 1) * this.sites.count);
   }
 
-  /** What depends on the step size; nothing where that is as before. */
+  /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
@@ -285,7 +285,7 @@ export class Solver {
   }
 
   /**
-   * One step of size h, of either sign. Throws StepError; then the state is as before.
+   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
    *
    * @param {number} h
    * @returns {this}
@@ -304,7 +304,7 @@ export class Solver {
   }
 
   /**
-   * Many steps. Throws StepError; then x is the last good state, and steps counts the good ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
    *
    * @param {number} h
    * @param {number} count
@@ -328,8 +328,8 @@ export class Solver {
   }
 
   /**
-   * The Casimirs at each site, one after the other in the order of CASIMIRS. CASIMIR_KINDS says what is
-   * constant: each value ("sites"), their sum, or their product.
+   * The Casimirs at each site, one after the other in the order of CASIMIRS. By CASIMIR_KINDS, a Casimir is
+   * each value ("sites"), their sum, or their product.
    */
   casimirs(x = this.x) {
     const out = new Float64Array(CASIMIRS.length * this.sites.count);

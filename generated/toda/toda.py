@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 5d47932f54fad1d5f407afe380595cc0ef7e031750b6ee937be2af49e26b9fc5
+# body-sha256: c02754ff65b6429ab1fa6e3e78947512e848a2bb562310a3d3daddbc61dcb706
 import numpy as np
 
 VERSION = "0.1.0"
@@ -36,7 +36,7 @@ SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 
 
 
 class StepError(ArithmeticError):
-    """A step could not be made; the state before it stands.
+    """A step failed.
 
     step: number of the failing step, from 0; status: NO_CONVERGENCE, NOT_FINITE; states: the frames so far.
     """
@@ -139,7 +139,7 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """States at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
 
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """

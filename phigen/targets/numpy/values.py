@@ -11,14 +11,14 @@ from phigen.targets.path import TERMS
 from phigen.targets.policies import PYTHON, policies_of
 
 _NOISE_ARGUMENTS = """ The random
-    numbers are a function of seed, member (that of the first, or one for each) and the number of the step, from step0
-    on; increments (steps, increments) for all members, or (steps, members, increments), take their place."""
+    numbers are a function of seed, member (that of the first member, or an array) and the number of the step, from
+    step0 on. Prescribed increments (steps, increments) or (steps, members, increments) replace them."""
 
-#: What is said of what a trajectory holds fixed, and of steps in tau.
+#: Sentences of docstrings on the gauge, the energy level and steps in tau.
 _OF_GAUGE = """gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge."""
+    overrides the choice of the solver: the step is a Poisson map for each fixed gauge."""
 _OF_LEVEL = """gauge overrides e = -H(x0): the step
-    is an exact Poisson map for each fixed e."""
+    is a Poisson map for each fixed e."""
 _OF_TAU = """
 
     The steps are of size h in tau; with times the result is a pair of the states and their times t: (rows, ...)."""

@@ -45,7 +45,7 @@ function prepareStep(params, h, rows) {
   return rows;
 }
 
-/** A lattice on its way, and what makes its steps. */
+/** A solver of a lattice and the trajectory that it computes. */
 export class Solver {
   static NAME = NAME;
   static VERSION = VERSION;
@@ -64,7 +64,7 @@ export class Solver {
   // #endif
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state, one field after the other, in each the sites, the last axis fastest; to be read only. */
+  /** The state, one field after the other, each with the last axis fastest; read only. */
   x;
   // #if TIMED
   /** The time of x. */
@@ -74,45 +74,45 @@ export class Solver {
   t = 0;
   // #endif
   // #if NOISE
-  /** The random numbers of a step are a function of these, of the steps made before, and of the site. */
+  /** The random numbers of a site are a function of these three, the number of steps made before, and the site. */
   seed = 0;
   member = 0;
   step0 = 0;
   // #endif
   // #if TANGENT
-  /** The tangent vectors that a step carries along. */
+  /** The tangent vectors that a step multiplies by its derivative. */
   vectors = [];
   // #endif
-  /** Good steps since the start. */
+  /** Number of successful steps since the start. */
   steps = 0;
-  /** The last step size. */
+  /** Size of the last step. */
   h = NaN;
-  /** Sizes, parameters, and which sites are neighbours. */
+  /** Sizes, parameters, and tables of neighbours. */
   sites;
-  /** What depends on parameters and step size only, a row for each time. */
+  /** Coefficients, functions of parameters and step size: a row for each flow or stage. */
   rows = TIMES.map(() => new Float64Array(COEFFICIENTS));
   /** The state before a step. */
   before;
-  /** What the steps of one size learn, for those after them. */
+  /** Predictors and other results of steps of one size, for later steps. */
   past = {};
-  /** Steps and time when h was set: time is counted from there, so that no error adds up. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
   /**
-   * Start at x0. Throws StepError for arguments that are not allowed.
+   * Start at x0. Throws StepError for arguments that are not admissible.
    *
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES
    * @param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default
-   * @param {object} [options.params] those at sites and at bonds are arrays, or one number for all
+   * @param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number for all
    * #if TIMED
    * @param {number} [options.t0] the time of x0, 0 by default
    * #endif
    * #if NOISE
-   * @param {number | bigint} [options.seed] which random numbers are taken, of 64 bits, 0 by default
-   * @param {number} [options.member] the same, of 32 bits, 0 by default
-   * @param {number} [options.step0] how many steps were made before x0, below 2^48, 0 by default
+   * @param {number | bigint} [options.seed] seed of the random numbers, 64 bits, 0 by default
+   * @param {number} [options.member] member of an ensemble, 32 bits, 0 by default
+   * @param {number} [options.step0] number of steps made before x0, below 2^48, 0 by default
    * #endif
    * #if GRAPH
    * @param {ArrayLike<number>} options.bonds the ends of all bonds, counted from 0: a, b of the first, …
@@ -137,7 +137,7 @@ export class Solver {
     }
   }
 
-  /** All parameters, those at sites and at bonds as arrays. */
+  /** All parameters; those at sites and at bonds are arrays. */
   get params() {
     return this.sites.params;
   }
@@ -154,7 +154,7 @@ export class Solver {
     return this.x.subarray(k * this.sites.count, (k + 1) * this.sites.count);
   }
 
-  /** What depends on the step size; nothing where that is as before. */
+  /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
@@ -166,7 +166,7 @@ export class Solver {
   }
 
   /**
-   * One step of size h, of either sign. Throws StepError; then the state is as before.
+   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
    *
    * @param {number} h
    * @returns {this}
@@ -192,7 +192,7 @@ export class Solver {
 
   // #if TANGENT
   /**
-   * One step as `step` makes it, and where its derivative carries vectors, to round-off. Throws StepError;
+   * Make one step as `step` does, and multiply vectors by its derivative, exact to round-off. Throws StepError;
    * then the state is as before.
    *
    * @param {number} h
@@ -211,7 +211,7 @@ export class Solver {
 
   // #endif
   /**
-   * Many steps. Throws StepError; then x is the last good state, and steps counts the good ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
    *
    * @param {number} h
    * @param {number} count
@@ -245,8 +245,8 @@ export class Solver {
   }
 
   /**
-   * The Casimirs at each site, one after the other in the order of CASIMIRS. CASIMIR_KINDS says what is
-   * constant: each value ("sites"), their sum, or their product.
+   * The Casimirs at each site, one after the other in the order of CASIMIRS. By CASIMIR_KINDS, a Casimir is
+   * each value ("sites"), their sum, or their product.
    */
   casimirs(x = this.x) {
     const out = new Float64Array(CASIMIRS.length * this.sites.count);

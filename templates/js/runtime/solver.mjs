@@ -45,7 +45,7 @@ import { tangentOf } from "./tangent.mjs";
 
 const number = new Float64Array(1);
 
-/** A table of coefficients for each stage. */
+/** Return a table of coefficients for each stage. */
 function emptyTables() {
   // #if SPLITTING
   return [TIMES.map(() => new Float64Array(COEFFICIENTS))];
@@ -55,7 +55,7 @@ function emptyTables() {
 }
 
 /**
- * All parameters: those given, and defaults. StepError unless they are known and finite, positive where
+ * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
  * they have to be, and give finite coefficients for a step so short that it has no part in it.
  */
 function admitted(given) {
@@ -81,7 +81,7 @@ function admitted(given) {
   return Object.freeze(params);
 }
 
-/** A trajectory, and what makes its steps. */
+/** A solver and the trajectory that it computes. */
 export class Solver {
   static NAME = NAME;
   static VERSION = VERSION;
@@ -95,12 +95,12 @@ export class Solver {
   // #endif
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state; read it freely, and change it by setState and kick only. */
+  /** The state; change it by setState and kick only. */
   x;
-  /** What rounding took from x: the state proper is x + carry. */
+  /** Rounding error of x (compensated summation): x + carry is more accurate. */
   carry = new Float64Array(DIM);
   // #if MONITOR
-  /** What rounding took from t, the physical time: steps are equal in tau, not in it. */
+  /** Rounding error of t, the physical time since the start. Steps are equal in tau, not in t. */
   tCarry = 0;
   // #endif
   // #if TIMED
@@ -111,73 +111,73 @@ export class Solver {
   t = 0;
   // #endif
   // #if NOISE
-  /** The random numbers of a step are a function of these, and of how many steps were made before. */
+  /** The random numbers of a step are a function of these three and of the number of steps made before. */
   seed = 0;
   member = 0;
   step0 = 0;
   /** The increments of the noise in the last step. */
   dw = new Float64Array(DRAWS);
   // #endif
-  /** Good steps since the start. */
+  /** Number of successful steps since the start. */
   steps = 0;
-  /** Evaluations of the generating function, for statistics. */
+  /** Number of evaluations of the generating function, for statistics. */
   evaluations = 0;
-  /** The last step size. */
+  /** Size of the last step. */
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
   // #if MONITOR
-  /** e = -H(x0): K = monitor (H + e) is 0 along the trajectory. */
+  /** Energy level e = -H(x0); K = monitor (H + e) is 0 along the trajectory. */
   gauge;
   // #else
   // #if GAUGE
-  /** Multiples of the Casimirs in GAUGE that are taken from H. */
+  /** Factors of the Casimirs in GAUGE that are subtracted from H. */
   gauge;
   // #endif
   // #endif
   // #if RENEWED
-  /** What depends on parameters and step size only, then on the time of the step too, for each stage. */
+  /** Coefficients of each stage: functions of parameters and step size, then of the time too. */
   // #else
-  /** All that depends on parameters and step size only, for each stage. */
+  /** Coefficients of each stage: functions of parameters and step size. */
   // #endif
   coef = emptyTables();
   // #if HISTORY
-  /** For starting guesses, for each stage. */
+  /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
   // #endif
   // #if ATTITUDE
-  /** Where the attitude began; the product of what steps turned it by since; what rounding took of that. */
+  /** The attitude that was set; the product of the rotations of all steps since then; its rounding error. */
   firstElement;
   turned;
   turnedCarry;
   // #if RATE_OF_GAUGE
-  /** The gradient of the Casimirs that are taken from H, by which the body turns too, and since when. */
+  /** Gradient of the Casimirs subtracted from H, at which the body rotates too; the time when it was set. */
   turningRate;
   attitudeFrom;
   // #endif
   // #endif
   // #if !MONITOR
-  /** Steps and time when h was set: time is counted from there, so that no error adds up. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
   #stepsBefore = 0;
   #timeBefore = 0;
   // #endif
 
   /**
-   * Start at x0. Throws StepError for arguments that are not allowed.
+   * Start at x0. Throws StepError for arguments that are not admissible.
    *
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
-   * @param {Partial<Parameters>} [options.params] the defaults for those that are left out
+   * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
    * #if NOISE
-   * @param {number | bigint} [options.seed] which random numbers are taken, of 64 bits, 0 by default
-   * @param {number} [options.member] the same, of 32 bits, 0 by default
-   * @param {number} [options.step0] how many steps were made before x0, 0 by default
+   * @param {number | bigint} [options.seed] seed of the random numbers, 64 bits, 0 by default
+   * @param {number} [options.member] member of an ensemble, 32 bits, 0 by default
+   * @param {number} [options.step0] number of steps made before x0, 0 by default
    * #endif
    * #if TIMED
    * @param {number} [options.t0] the time of x0, 0 by default
    * #endif
    * #if MONITOR
-   * @param {ArrayLike<number>} [options.gauge] an e of one's own: the step is an exact Poisson map for each
+   * @param {ArrayLike<number>} [options.gauge] energy level e: the step is a Poisson map for each e
    * #else
    * #if GAUGE
    * @param {ArrayLike<number>} [options.gauge] multiples of one's own: the step is an exact Poisson map
@@ -217,20 +217,20 @@ export class Solver {
   }
 
   // #if ATTITUDE
-  /** A quaternion (w, x, y, z) that turns body into space, or a matrix, row by row; see setAttitude. */
+  /** The attitude: a quaternion (w, x, y, z) that rotates body into space coordinates, or a matrix by rows. */
   get attitude() {
     return currentElement(this).slice(0, ATTITUDE);
   }
 
   // #if POSITION
-  /** Where the body is, in space. */
+  /** The position of the body in space. */
   get position() {
     return currentElement(this).slice(ATTITUDE);
   }
 
   // #endif
   /**
-   * The attitude from now on. Throws StepError for what is not allowed; then all is as before.
+   * Set the attitude. Throws StepError for values that are not admissible; then nothing changes.
    *
    * @param {ArrayLike<number>} attitude
    * #if POSITION
@@ -244,7 +244,7 @@ export class Solver {
   }
   // #endif
 
-  /** What depends on the step size; nothing where that is as before. */
+  /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
@@ -267,9 +267,9 @@ export class Solver {
 
   // #if RENEWED
   // #if NOISE
-  /** What depends on the increments of the next step. */
+  /** Compute the coefficients that depend on the increments of the next step. */
   // #else
-  /** What depends on the time of the next step. */
+  /** Compute the coefficients that depend on the time of the next step. */
   // #endif
   #renew() {
     // #if SPLITTING
@@ -303,11 +303,11 @@ export class Solver {
 
   // #endif
   /**
-   * One step of size h, of either sign. Throws StepError; then the state is as before.
+   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
    *
    * @param {number} h
    * #if NOISE
-   * @param {ArrayLike<number>} [dw] increments of the noise, in place of random ones
+   * @param {ArrayLike<number>} [dw] increments of the noise; random ones by default
    * #endif
    * @returns {this}
    */
@@ -361,7 +361,7 @@ export class Solver {
   }
 
   /**
-   * Many steps. Throws StepError; then x is the last good state, and steps counts the good ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
    *
    * @param {number} h
    * @param {number} count
@@ -398,7 +398,7 @@ export class Solver {
 
   // #endif
   /**
-   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   * Return an independent solver with the same state. Its predictors start anew.
    *
    * @returns {Solver}
    */
@@ -423,7 +423,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: move the state by a change, as an impulse does; else as setState.
+   * Between steps: add a change to the state, as an impulse does; else as setState.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -441,7 +441,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Stand at x + carry from now on. */
+  /** Replace the state by x + carry. */
   #place(x, carry) {
     // #if MONITOR
     const [rate, level] = [rateAt(this.params, x), chooseGauge(this.params, x)];
@@ -517,14 +517,14 @@ export class Solver {
    * @param {number | ArrayLike<number>} h
    * @param {number} count
    * #if TIMED
-   * @param {{params?: object, t0?: number | ArrayLike<number>}} [options] as of the constructor
+   * @param {{params?: object, t0?: number | ArrayLike<number>}} [options] as in the constructor
    * #else
-   * @param {{params?: object}} [options] as of the constructor
+   * @param {{params?: object}} [options] as in the constructor
    * #endif
    * #if NOISE
-   * also seed, step0, and member, that of the first of the members
+   * also seed, step0, and member, that of the first member
    * #endif
-   * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
+   * @returns {{x: Float64Array[], status: string[]}} the last state of each member, and "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
     const ends = Array.from(members, (x0, m) => {
