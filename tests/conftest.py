@@ -3,6 +3,8 @@ import gc
 import os
 import re
 import signal
+import zlib
+from collections import defaultdict
 
 import pytest
 from hypothesis import settings
@@ -44,6 +46,9 @@ def pytest_configure(config):
     config.addinivalue_line(
         "markers", "corpus: of the corpus, systems beside `systems.QUICK` are slow, and those like others need --corpus"
     )
+    config.addinivalue_line(
+        "markers", "thin(n): of its quick cases one in n is, drawn by their names, and the others slow"
+    )
     config.addinivalue_line("markers", "few(*cases, of): of the cases `of`, those beside the named ones are slow")
 
 
@@ -51,9 +56,27 @@ def pytest_collection_modifyitems(config, items):
     named = any("::" in argument for argument in config.args)
     if named or config.option.corpus:
         return
-    left_out = _is_alike if config.option.all or config.option.markexpr else _is_slow
-    config.hook.pytest_deselected(items=[item for item in items if left_out(item)])
-    items[:] = [item for item in items if not left_out(item)]
+    everything = config.option.all or config.option.markexpr
+    remaining = [item for item in items if not (_is_alike if everything else _is_slow)(item)]
+    if not everything:
+        remaining = _thinned(remaining)
+    selected = {*remaining}
+    config.hook.pytest_deselected(items=[item for item in items if item not in selected])
+    items[:] = remaining
+
+
+def _thinned(items):
+    """The items without most cases of tests with the mark `thin`; by chance, so that all of two parameters are seen."""
+    cases = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("thin"):
+            cases[item.nodeid.partition("[")[0]].append(item)
+    slow = set()
+    for several in cases.values():
+        one_in = several[0].get_closest_marker("thin").args[0]
+        several.sort(key=lambda item: zlib.crc32(item.name.encode()))
+        slow.update(several[-(-len(several) // one_in) :])
+    return [item for item in items if item not in slow]
 
 
 def _is_alike(item):

@@ -39,6 +39,7 @@ def test_page_shows_all_figures_and_they_are_small():
     assert [path for path in shown if (DOCS / path).stat().st_size >= 150_000] == []
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", QUICK)
 def test_numbers_are_current(name):
     today, before = gallery.facts(name), KNOWN[name]

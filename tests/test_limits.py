@@ -276,6 +276,7 @@ def test_a_step_that_is_too_large_is_refused_before_anything_is_proved(monkeypat
         compile_proved(loads(log_canonical(10)))
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     ("text", "said", "most"),
     [

@@ -30,6 +30,7 @@ def made(name: str) -> Plate:
     return rigid_body.errors_plate(rigid_body.EARLY) if name == "rigid_body" else PLATES[name]()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["poisson_not_hamiltonian"], PLATES))
 def test_numbers_are_current(name):
     stored = {f["quantity"]: f for f in STORED[name]["findings"]}

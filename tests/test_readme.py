@@ -48,6 +48,7 @@ def workshop(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_c_example_prints_what_the_readme_says(workshop):
     commands = block("The commands").strip().splitlines()
     assert commands[-1] == "./main"

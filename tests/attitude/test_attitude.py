@@ -257,6 +257,7 @@ def errors(case, order, counts, gauge=None):
 COUNTS = {2: (20, 40), 4: (12, 24), 6: (8, 16), 8: (6, 12), 10: (5, 10), 12: (4, 6)}
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("order", "gauge"),
     [
@@ -280,6 +281,7 @@ def test_the_attitude_is_that_of_the_closed_form_to_round_off(case):
     assert errors(case, 12, [60])[0] < 1e-13
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("case", ["body by Cayley", "body along paths", "body, split"])
 def test_other_elements_have_the_order_too(case):
     few, many = errors(case, 4, [24, 48], 0.0 if "split" not in case else None)
@@ -357,6 +359,7 @@ def conserved(case, x, g):
     return turned @ momentum @ g if group.spatial else g @ momentum @ turned
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("case", ["so(4)", "so(4), momenta in space, by Cayley", "so(4), split", "so(3) by matrices"])
 def test_matrices_keep_the_other_momentum_and_stay_orthogonal(case, target):
@@ -421,6 +424,7 @@ def momenta_in_space(found):
     return np.einsum("rij,rj->ri", rotation(found.attitude), found.x)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("case", ["body", "body, split"])
 def test_spatial_momentum_is_constant_to_round_off_for_many_steps(case):
     start = np.array([0.3, 1.0, 0.2])
@@ -452,6 +456,7 @@ def test_after_a_kick_a_body_turns_as_one_that_starts_there(case, target):
 ALL = ["body", "body by Cayley", "body along paths", "body, split", "momenta in space", "top", "so(4)", "sl(2)"]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("case", [*ALL, "heisenberg(1)", "su(2) along paths", "motions, momenta in space"])
 def test_targets_agree_to_round_off_for_strides_and_starts_and_backward(case):
     rng, n = np.random.default_rng(7), made(case).system.dimension
@@ -510,6 +515,7 @@ def small_top() -> Solver:
     return solver_of(compile_spec(spec_of(TOP), order=2, profile="small"), "c")
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy", "small"])
 def test_members_of_ensembles_have_attitudes_and_positions(target):
     """Each begins with its own and has the bits of a run of it alone, in rows and without, in any number of threads."""
@@ -622,6 +628,7 @@ JAVASCRIPT = """(() => {
 })()"""
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("case", CASES)
 def test_javascript_has_the_attitude_of_numpy_after_kicks_too(case):
     x0, expected = np.linspace(0.4, 1.0, made(case).system.dimension), interface_of(made(case).program)

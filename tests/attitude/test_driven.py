@@ -92,6 +92,7 @@ def final(case, n, order=2, target="numpy"):
     return np.array([*found.x[-1], *found.attitude[-1]]), found.t[-1]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("case", "order"), [(c, k) for c in CASES for k in (2, 4) if k == 2 or c in HIGHER])
 def test_momentum_and_attitude_have_the_order(case, order):
     """With hζ in the element, or without it in the momentum, a body that is damped turns wrongly at order 0."""
@@ -102,6 +103,7 @@ def test_momentum_and_attitude_have_the_order(case, order):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.35)
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("case", CASES)
 def test_c_and_javascript_agree_with_numpy(case):
     expected = final(case, 16)[0]

@@ -43,11 +43,13 @@ def observed_order(method: Method) -> float:
     return math.log2(errors[0] / errors[1])
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("method", STEPPED, ids=lambda m: m.name)
 def test_a_peer_has_its_order_on_the_rigid_body(method):
     assert observed_order(method) > method.order - 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", slow_but(PROBLEMS[:1], PROBLEMS), ids=lambda p: p.name)
 def test_all_peers_solve_the_same_system(problem):
     h = problem.typical / 20
@@ -81,6 +83,7 @@ def test_kernels_of_lattices_by_hand_make_the_steps_of_the_generated_ones():
         lattices.expect_same(lattices.ours(sites.solver(2)), by_hand, sites.start(size))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("sites", [lattices.XXZ, lattices.FPUT, lattices.DNLS], ids=lambda s: s.name)
 def test_peers_of_lattices_have_their_orders(sites):
     x, kernel = sites.start(16), lattices.Kernel(sites, 16, False)
@@ -205,6 +208,7 @@ def test_dop853_in_vectors_makes_the_steps_of_dop853():
 # an eccentric orbit --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_all_rows_of_the_eccentric_orbit_cover_the_same_physical_time():
     """Steps of monitors are equal in another time, of which a period takes more or less: rows once ended half way."""
     periods = 3

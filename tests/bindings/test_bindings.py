@@ -63,6 +63,7 @@ def expected(folder):
     return run([sys.executable, "-c", code], folder / "generated/tumbler")
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("language", "file", "compiler"), [("cpp", "main.cpp", "g++"), ("fortran", "main.f90", "gfortran")]
 )

@@ -47,6 +47,7 @@ def test_second_build_leaves_files_alone(phigen, write):
     assert [p.stat().st_mtime_ns for p in Path("generated/a").iterdir()] == before
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("options", [[], ["--order", "4"], ["-t", "c"], ["--single-file"], ["-o", "out put"]])
 def test_check_accepts_what_build_wrote(phigen, write, options):
     write("specs/a.yaml")
@@ -123,6 +124,7 @@ DAMAGES = [damage_edit, damage_header, damage_missing, damage_orphan, damage_sta
 QUICK = [*product(["generated"], DAMAGES), ("else where", damage_edit), ("else where", damage_orphan)]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("folder", "damage"), slow_but(QUICK, product(["generated", "else where"], DAMAGES)))
 def test_check_notices_and_names_the_command_that_mends(phigen, write, damage, folder, monkeypatch):
     write("specs/a.yaml")

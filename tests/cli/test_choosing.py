@@ -55,6 +55,7 @@ def test_proposed_settings_reach_their_accuracy_and_hardly_more(row):
     assert 0.2 < energy_error(name, kind, order, step) / float(accuracy) <= 1
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     "row",
     [

@@ -178,6 +178,7 @@ def test_latex_is_balanced_and_complete(phigen, name):
     assert ":" not in latex
 
 
+@pytest.mark.slow
 def test_latex_defines_what_it_uses(phigen):
     """λ of a gauge, φ of the exponential, and the modified Hamiltonian that was asked for."""
     latex = phigen("show", SPECS / "rigid_body.yaml", "--latex", "--modified", "2").stdout
@@ -232,6 +233,7 @@ def summary(phigen, *args):
     return json.loads(done.stdout, parse_constant=no_json)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_run_stores_what_it_integrates(phigen, write, target):
     path = write("a.yaml")
@@ -281,6 +283,7 @@ def test_run_falls_back_to_numpy_and_says_so(phigen, write, without_compiler):
     assert "target numpy" in done.stdout
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("named", ["/there/is/none", 'gcc "', "true"])
 def test_a_compiler_that_is_named_is_used_or_refused(phigen, write, monkeypatch, named):
     monkeypatch.setenv("CC", named)
@@ -309,6 +312,7 @@ def test_output_of_unknown_kind_is_refused_before_the_work(phigen, write):
 # -- new, schema, list, demo
 
 
+@pytest.mark.slow
 def test_new_writes_a_spec_that_checks_builds_and_runs(phigen, in_tmp):
     assert phigen("new", "mysystem").exit_code == 0
     assert spec.load("mysystem.yaml").name == "mysystem"

@@ -99,6 +99,7 @@ def test_states_at_given_times(phigen, swing):
         assert rows[:, 1] == pytest.approx(np.cos(rows[:, 0]), abs=1e-11)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("text", "suffix"), [(SWING, "csv"), (SWING, "npz"), (BODY, "npz"), (TURNING, "csv")],
     ids=["csv", "npz", "monitor", "attitude"],
@@ -133,6 +134,7 @@ def test_an_extension_holds_the_e_of_the_start(phigen, write):
     assert table("b.csv") == pytest.approx(table("a.csv"), abs=1e-13)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("how", ["--extend", "--from"])
 @pytest.mark.parametrize("level", ["0.46", "0.1", "0.02", "0.5"])  # the first three with a rounding before the zero
 def test_a_run_that_goes_on_from_a_stop_ends_at_the_next_one(phigen, write, how, level):
@@ -189,6 +191,7 @@ def test_exponents_do_not_depend_on_which_rows_are_stored(phigen, swing):
     assert "lyapunov" not in short  # which has no whole step
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     "rows", [("--until", 2.03), ("--until", 2.03, "--every", 0.5), ("--until", 0.05), ("--steps", 7)]
 )
@@ -205,6 +208,7 @@ def test_methods_beside_it_have_the_same_times(phigen, write, text, rows):
 NOISY = SWING.replace("order: 8", "order: 2\nnoise: {kick: {hamiltonian: q, amplitude: 0.1}}").split("  until:")[0]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("scheme", ["series", "splitting"])
 def test_means_are_of_members_that_made_the_steps_of_the_run(phigen, write, scheme):
     """Of two members the run is the first: it is as far from the mean as the error says."""
@@ -227,6 +231,7 @@ def test_means_are_of_members_that_made_the_steps_of_the_run(phigen, write, sche
     assert (refused.exit_code, "ends with a shorter step" in refused.stderr) == (2, True)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("members", [1, 2])
 def test_another_seed_is_that_of_a_spec_with_it(phigen, write, members):
     spec = write("spec.yaml", NOISY.replace("steps: 60}", f"steps: 60, members: {members}}}"))
@@ -291,6 +296,7 @@ def test_a_duration_stays_with_another_step_and_steps_do_too(phigen, write):
     assert (refused.exit_code, "the duration 5 is 71.4285714 steps of 0.07" in refused.stderr) == (2, True)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "steps"), [("until", 60), ("stopped", 10), ("back", 31), ("never", 20)])
 def test_verify_makes_the_whole_steps_of_the_run(phigen, swing, name, steps):
     (told,) = json.loads(phigen("verify", swing, "--run", name, "--quick", "--json", "-q").stdout)
@@ -336,6 +342,7 @@ def test_verify_says_that_steps_are_in_tau(phigen, write):
     assert "132 steps of 0.05 in τ" in done.stdout
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("text", "name", "horizon", "clock"),
     [(SWING, "until", 6.05, "t"), (SWING, "stopped", np.pi / 3, "t"), (BODY, "tumbling", 6.6319085, "τ")],
@@ -359,6 +366,7 @@ def test_tune_finds_an_orbit_in_tau_and_tells_lines_for_the_run(phigen, write):
     assert "up to τ = 6.6319" in phigen("tune", spec, "--budget", 2, "-q", "--accuracy", 1e-3).stdout
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("text", "name", "said"),
     [

@@ -21,6 +21,7 @@ HEAVY = ("sympy", "numpy", "flint", "ruamel", "jinja2", "mpmath")
 PHIGEN = [sys.executable, "-c", "from phigen.cli import main; main()"]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("args", [["--help"], ["--version"], ["build", "--help"], ["demo", "--help"], ["lst"]])
 def test_help_imports_nothing_heavy(args):
     code = f"""
@@ -211,6 +212,7 @@ def test_no_colour_in_pipes_and_under_no_color(phigen, write):
         assert "\x1b" not in done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_colour_on_a_terminal_unless_no_color(write):
     pty = pytest.importorskip("pty")
     write("a.yaml", "phigen: 1\n")
@@ -264,6 +266,7 @@ runpy.run_module("phigen", run_name="__main__")
 """
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     "moment",
     [

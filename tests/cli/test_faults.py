@@ -32,6 +32,7 @@ def test_files_of_a_solver_appear_together_or_not_at_all(phigen, write, command)
     assert not Path("out/nothing").exists()
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     "command",
     [
@@ -85,6 +86,7 @@ def test_a_folder_that_takes_no_files_is_told_before_the_work(phigen, write, mon
     assert (done.exit_code, "nothing can be written to the folder '.'" in done.stderr) == (2, True)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("redirected", [">/dev/full", ">&-"])
 @pytest.mark.parametrize("command", ["list --path kepler", "schema", "new b -o -"])
 def test_data_that_cannot_be_printed_is_an_error_of_stdout(command, redirected):
@@ -94,6 +96,7 @@ def test_data_that_cannot_be_printed_is_an_error_of_stdout(command, redirected):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("command", "code"), [("build --nonsense", 2), ("check none.yaml", 1), ("list", 0)])
 def test_messages_that_cannot_be_printed_do_not_change_the_exit_code(command, code):
     assert shell(f"{command} 2>/dev/full").returncode == code

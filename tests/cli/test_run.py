@@ -40,6 +40,7 @@ def files(*names):
     return [Path(name).read_bytes() for name in names]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     ("name", "target", "suffix"),
     [("rigid_body", "c", "csv"), ("pendulum_euler", "numpy", "csv"),

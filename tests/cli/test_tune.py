@@ -41,6 +41,7 @@ def test_pasted_lines_reach_the_accuracy_at_the_proposed_step(phigen, in_tmp):
     assert "up to t = 500" in Path("w.svg").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_table_names_the_proposal_and_the_lines(phigen):
     done = phigen("tune", SPECS / "harmonic_oscillator.yaml", "--measure", "orbit", "--budget", "3", "-q")
     assert done.exit_code == 0, done.stderr

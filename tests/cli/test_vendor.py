@@ -136,6 +136,7 @@ DAMAGES = {
 }
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_check_names_the_file_what_is_wrong_and_the_command_that_mends(phigen, vendored, damage):
     what, remedy = DAMAGES[damage]

@@ -40,6 +40,7 @@ def spiral(rows=50, names=("x1", "x2", "x3"), broken=None):
     return Trajectory(t, x, 1 + error, {"C": 1 + 0 * error}, rows - 1, t[1], {}, tuple(names))
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("dimension", [1, 2, 3, 4, 12, 30])
 def test_trajectories_of_every_dimension_are_drawn(dimension):
     figure = trajectory_figure(spiral(names=[f"x{i + 1}" for i in range(dimension)]), CASIMIR)

@@ -74,6 +74,7 @@ NASTY = body_spec("nasty", title='a "title" <b>&amp; ]]> ?>')
 MORE = ["satellite", "seasonal_predator_prey", "kepler_eccentric", "thermal_spin", "so4_manakov", "lagrange_top"]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("source", [FREE, NASTY, *(pytest.param(s, marks=pytest.mark.slow) for s in MORE)])
 def test_descriptions_and_declarations_are_those_of_the_standard(source, tmp_path):
     """The schema and rules of fmpy; the C compiles without warnings, after the headers of the standard too."""
@@ -118,6 +119,7 @@ def states_of_c(steps, folder):
     return [printed[k : k + 3] for k in range(0, len(printed), 3)]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("version", [2, 3])
 def test_bits_are_those_of_the_c(free, version, tmp_path):
     """For whole steps; and for a part of a step behind them, which is a step of that size."""

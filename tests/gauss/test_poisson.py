@@ -64,6 +64,7 @@ def poisson_of(spec):
     return lambda x: np.array(f(x), dtype=float)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but(("rigid_body", "so4_manakov", "toda3", "maxwell_bloch"), EXACT))
 def test_step_of_any_size_is_a_poisson_map(name):
     spec = spec_of(name)
@@ -74,6 +75,7 @@ def test_step_of_any_size_is_a_poisson_map(name):
         assert defect(of(spec, order), x, h, poisson_of(spec)) <= 2e-13
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", STARTS)
 def test_written_systems_step_by_poisson_maps(name):
     text, start = STARTS[name]
@@ -127,6 +129,7 @@ def test_direct_step_keeps_quadratic_casimirs():
     assert np.ptp(run.casimirs["C"]) <= 5e-15
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["numpy", "c"])
 def test_casimirs_do_not_drift(target):
     """Over many steps that are not small Casimirs wander by rounding only."""
@@ -138,6 +141,7 @@ def test_casimirs_do_not_drift(target):
         assert np.ptp(values) <= 2e-15 * np.sqrt(steps) * np.abs(values).max()
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("order", [2, 4, 6, 8])
 def test_order_is_that_of_the_method(order):
     """Errors on a nonlinear problem shrink by the power 2s, measured where they are far from rounding."""

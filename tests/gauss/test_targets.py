@@ -41,6 +41,7 @@ def ends(compilation, x0, h, **more):
     return found
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     ("name", "order"), [("rigid_body", 6), ("so4_manakov", 16), ("toda3", 2), ("henon_heiles", 10)]
 )
@@ -63,6 +64,7 @@ def test_time_and_forces_enter_at_the_stages():
         assert state == pytest.approx(found["numpy"], abs=1e-13)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", ["so4_manakov", "henon_heiles"])
 def test_tangents_are_equal_and_those_of_the_step(name):
     compilation = compile_spec(spec_of(name).overridden(order=8, scheme="gauss", tangent=True))

@@ -103,6 +103,7 @@ def given(made):
     return {name: 1.07 * value for name, value in made.interface.parameters.items()}
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_pullback_is_the_gradient_of_the_run(kind):
     """All rows have a cotangent; what is held fixed by a gauge is held fixed here too, e of a monitor follows."""
@@ -186,6 +187,7 @@ def exact_gradient(kind, parameters, x, bar, steps):
     return [slope(f) for f in moved], by
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("kind", ["newton", "path"])
 def test_gradient_agrees_with_many_digits(kind):
     x, steps = start(kind), 3 if kind == "newton" else 1
@@ -216,6 +218,7 @@ def test_sparse_newton_matrices_are_gone_back_through_in_lanes():
     assert members.x0_bar == pytest.approx(np.tile(ours.x0_bar, (3, 1)), rel=1e-13)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
     made = solver(compilation("newton"), target)
@@ -331,6 +334,7 @@ FURTHER = {
 }
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("kind", FAR)
 def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
     """As each is alone: with rows, and numbers of its own, splittings in segments; one that lanes cannot do to the last

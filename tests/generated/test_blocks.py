@@ -44,18 +44,21 @@ def test_large_derivatives_of_paths_and_explicit_steps_have_no_blocks():
     assert not [name for name in WITHOUT_BLOCKS if isinstance(in_lanes(compiled(name).program), Blocks)]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.corpus
 @pytest.mark.parametrize("name", slow_but(QUICK, WITH_BLOCKS))
 def test_blocks_and_groups_equal_single_steps(name, tmp_path):
     exercise(compiled(name), "-O0", tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "volterra5", "toda3", "kowalevski_top"]))
 def test_vectorised_blocks_and_groups_equal_single_steps(name, tmp_path):
     """-O0 leaves the loops over lanes as they are, -O3 makes vector instructions of them."""
     exercise(compiled(name), "-O3", tmp_path)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but(["rigid_body", "pendulum"], ["rigid_body", "pendulum", "volterra5"]))
 def test_blocks_of_several_stages_equal_single_steps(name, tmp_path):
     """Of the pendulum y is the mean of the ends of a stage."""

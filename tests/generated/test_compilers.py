@@ -103,6 +103,7 @@ def test_splittings_with_derivatives_are_cpp_as_well(tmp_path):
     run([tool("g++"), "-x", "c++", "-std=c++20", *WARNINGS, "-fsyntax-only", "rigid_body.c"], tmp_path)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but(BACK, sorted(resources.bundled())))
 def test_fast_code_with_derivatives_is_cpp_as_well(name, tmp_path):
     """By one standard of each compiler, `test_all_c_is_cpp_as_well` has both of both. clang alone says which inline
@@ -175,6 +176,7 @@ FURTHER_SYSTEMS = ["guiding_centre", "lagrange_top", "lotka_volterra", "pendulum
 ALL = [*FEW, *product(["clang"], FURTHER_SYSTEMS), ("gcc", "lotka_volterra"), ("gcc", "nambu_pendulum")]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(("compiler", "name"), slow_but(FEW, ALL))
 def test_whole_interface_is_clean_under_sanitizers(compiler, name, sources):
     check_with_sanitizers(compiler, compiled(name), sources, *([] if name in QUICK else [_OF_POINTERS]))
@@ -210,6 +212,7 @@ def test_whole_interface_is_clean_under_valgrind(name, sources):
     run([valgrind, "--error-exitcode=9", "--quiet", "--track-origins=yes", program], sources)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", ["food_web", "kdv", "heisenberg"])  # a graph, a chain, rows
 def test_compilers_see_that_all_is_initialised(name, tmp_path):
     """With -O1 it looks into functions, but not as far as with more; clang asks whether all ways to a use assign."""

@@ -41,6 +41,7 @@ def trajectory(name, run, request):
     return solver(compilation, "c").integrate(at.x, at.h, steps, stride=stride, parameters=at.parameters)
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(("name", "run"), RUNS)
 def test_what_is_conserved_stays_where_it_was(name, run, trajectory):
     check_casimirs(name, run, trajectory)
@@ -133,6 +134,7 @@ KINDS = ("birealisation: canonical-euler\norder: 1\n", "order: 2\n", "birealisat
          "scheme: splitting\norder: 2\n")  # fmt: skip
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("target", [*TARGETS, "generated module"])
 @pytest.mark.parametrize("kind", KINDS, ids=["explicit", "newton", "path", "splitting"])
 def test_rounding_errors_of_sums_are_carried_along(kind, target):

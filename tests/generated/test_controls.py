@@ -149,6 +149,7 @@ def observed_order(compilation, x0):
     return np.log2(errors[0] / errors[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("build", "right", "wrong", "x0"),
     [
@@ -186,6 +187,7 @@ def midpoint(compilation):
     )
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("name", "keeps_casimirs"),
     [("volterra5", False), ("lagrange_top", True)],
@@ -215,6 +217,7 @@ def test_midpoint_rule_on_a_constant_bracket_is_a_poisson_map():
 # -- classical methods
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "volterra5", "lagrange_top", "so4_manakov"]))
 def test_runge_kutta_fails_every_check(name):
     """Casimirs and energy drift, the bracket is not preserved, and there is no way back."""

@@ -50,6 +50,7 @@ def bits(x):
     return np.ascontiguousarray(x).tobytes()
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("status", FAILURES)
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_step_that_cannot_be_made_says_why(status, target):
@@ -231,6 +232,7 @@ def kind(name):
 REFUSED = ({"m": 0.0}, {"m": np.nan}, {"k": np.inf}, {"k": 0.0}, {"k": -1.0})
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", KINDS)
 def test_parameters_that_give_no_steps_are_refused_from_the_start(name):
     """What was there before stands; the next start is as if nothing had happened."""
@@ -355,6 +357,7 @@ def test_members_of_an_ensemble_are_trajectories(name, target):
         np.testing.assert_allclose(end, alone, rtol=0, atol=2e-15 * np.max(np.abs(alone)))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_failing_members_keep_their_last_good_state(target):
     """One species system runs into its singularity, the others go on."""

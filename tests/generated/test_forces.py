@@ -103,12 +103,14 @@ def reference(kind):
 ORDERS = [(kind, order) for kind in SYSTEMS for order in (2, 4)]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("kind", "order"), slow_but([o for o in ORDERS if o != ("path", 4)], ORDERS))
 def test_the_order_is_reached(kind, order):
     coarse, fine = (np.max(np.abs(final(kind, n, order) - reference(kind))) for n in (20, 40))
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.3)
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_targets_agree_to_roundoff(kind):
     expected = final(kind, 20, 4)
@@ -117,6 +119,7 @@ def test_targets_agree_to_roundoff(kind):
     assert x == pytest.approx(expected, abs=1e-13)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("kind", ["damped", "covector", "path", "split damping", "split on leaves"])
 def test_covectors_keep_casimirs(kind):
     """A force put beside the leaves, such as f for πζ, changes them at the order of the step."""

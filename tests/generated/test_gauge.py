@@ -123,6 +123,7 @@ def test_short_code_takes_the_gauge_by_which_the_gradient_is_smallest_at_the_sta
     assert np.array_equal(short.gauge(np.zeros(3)), [0.0])
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "profile"), slow_but(IN_BOTH, dict.fromkeys([*IN_BOTH, *product(GAUGED, ["fast"])])))
 def test_both_targets_choose_the_same_gauge(name, profile):
     compilation = gauged(name, profile)
@@ -139,6 +140,7 @@ def test_casimirs_stay_at_roundoff(name):
         assert np.max(np.abs(values - values[0])) <= 1e-13 * max(1.0, abs(values[0]))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("order", [2, 4, 6])
 def test_order_is_kept_and_the_error_is_smaller(order):
     """On the free rigid body, against the flow by another method."""

@@ -17,6 +17,7 @@ def body():
     return api.compile(resources.bundled_specs() / "rigid_body.yaml", order=10)
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("stride", [1, 8, 20000])
 def test_guesses_near_a_saddle_lead_nowhere_else(body, stride):
     """Recurrences fitted to the long rest near the middle axis may guess 1e8, where the step has a solution as well."""
@@ -32,6 +33,7 @@ def test_guesses_near_a_saddle_lead_members_of_ensembles_nowhere_else(body):
     np.testing.assert_allclose(energies[1], energies[0], rtol=1e-8)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("stride", [1, 8, 40])
 def test_steps_that_are_too_large_lead_nowhere_else(stride):
     """The equation of a reversal has a solution far away too, of a hundred times the energy."""

@@ -50,6 +50,7 @@ def expect_clean(name, folder, compilers, **options):
         run([tool(compiler), *language, *WARNINGS, "-fsyntax-only", "t.c"], folder)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "without", "profile"), FEW)
 def test_gradients_compile_whatever_is_left_out(name, without, profile, tmp_path):
     expect_clean(name, tmp_path, ("gcc", "clang"), adjoint=True, without=without, profile=profile)

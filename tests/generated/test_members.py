@@ -23,6 +23,7 @@ def own(compilation, count):
     return np.outer(1 + 0.002 * k, at.x), at.h * (1 - 0.01 * k), given
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("target", "name"), slow_but(product(TARGETS, KINDS), product(TARGETS, DISTINCT)))
 def test_members_with_numbers_of_their_own_are_trajectories(name, target):
     """To round-off; eleven are a full group of eight and one that is not. Frames are on the same ways."""
@@ -36,6 +37,7 @@ def test_members_with_numbers_of_their_own_are_trajectories(name, target):
         np.testing.assert_allclose(frames[:, m], alone, rtol=0, atol=1e-15 * np.max(np.abs(alone)))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "scheme"), [("rigid_body", None), ("lagrange_top", "splitting")])
 def test_numbers_of_all_are_those_of_each_and_neighbours_do_not_matter(name, scheme):
     """Bit by bit where steps are explicit; implicit ones are iterated until the slowest of a group is solved."""
@@ -74,6 +76,7 @@ def test_parts_of_ensembles_end_where_groups_do(monkeypatch):
 FAST = [*product(TARGETS, ["fast"])]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(("target", "profile"), slow_but(FAST, [*FAST, ("c", "small")]))
 @pytest.mark.parametrize("scheme", ["series", "splitting"])
 def test_a_member_that_fails_has_no_frames_from_then_on(target, profile, scheme):

@@ -42,6 +42,7 @@ def test_constant_to_higher_order(name, count):
     assert math.log2(spreads[0] / spreads[1]) > expected - 0.4
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_targets_agree(name):
     compilation = compile_with(SYSTEMS[name], 2)

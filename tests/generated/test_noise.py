@@ -172,6 +172,7 @@ def test_the_numbers_are_normal_and_bounded():
 # --- steps
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_targets_agree_to_roundoff(kind):
     c, numpy = (
@@ -182,6 +183,7 @@ def test_targets_agree_to_roundoff(kind):
     assert x == pytest.approx(c.x[-1], abs=1e-13)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("scheme", ["series", "splitting"])
 def test_noise_along_a_casimir_moves_nothing(scheme, target):
@@ -260,6 +262,7 @@ def test_results_do_not_depend_on_threads(tmp_path):
 # --- orders
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("kind", slow_but(["thermal", "path"], SYSTEMS))
 def test_the_strong_order_is_reached(kind):
     _, start, stated = SYSTEMS[kind]
@@ -352,6 +355,7 @@ def test_the_weak_order_is_reached(text, order):
 # --- equilibria
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("scheme", "h"), [("series", 0.1), ("splitting", 0.5)])
 def test_a_spin_in_a_bath_has_the_magnetisation_of_langevin(scheme, h):
     """⟨m⟩ = coth(B/T) − T/B; half of the variance of the noise is told from that. Splittings are of weak order 2."""
@@ -413,6 +417,7 @@ def test_a_source_without_a_flow_in_closed_form_is_named():
         compile_text(text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", slow_but(["dated"], ["dated", "thermal", "split"]))
 def test_verification_asks_for_what_is_promised(kind):
     solvers = {target: solver(made(kind), target) for target in ("c", "numpy")}

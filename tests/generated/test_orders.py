@@ -50,6 +50,7 @@ SYMMETRIC = {
 QUICK_SYMMETRIC = [*zip(2 * list(SYMMETRIC), [2, 4, 6, 8, 10, 12], strict=True)][:-1]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "order"), slow_but(QUICK_SYMMETRIC, product(SYMMETRIC, [2, 4, 6, 8, 10, 12])))
 def test_symmetric_methods_have_even_orders(name, order):
     text, x0, time = SYMMETRIC[name]
@@ -62,6 +63,7 @@ ONE_SIDED = {"separable": ROD, "not separable": BEAD}
 QUICK_ONE_SIDED = [("separable", "q", 1), ("separable", "p", 2), ("not separable", "q", 4), ("not separable", "p", 3)]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("kind", "side", "order"), slow_but(QUICK_ONE_SIDED, product(ONE_SIDED, "qp", [1, 2, 3, 4])))
 def test_one_sided_methods_have_every_order(kind, side, order):
     text = ONE_SIDED[kind]
@@ -70,6 +72,7 @@ def test_one_sided_methods_have_every_order(kind, side, order):
     assert order_of(compilation, [0.5, 0.8], 1.0) == pytest.approx(order, abs=0.25)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("order", slow_but([1, 4], [1, 2, 3, 4]))
 def test_a_custom_realisation_that_is_not_symmetric_has_every_order(order):
     compilation = compile_text(f"{GRAZING}order: {order}\n")
@@ -77,6 +80,7 @@ def test_a_custom_realisation_that_is_not_symmetric_has_every_order(order):
     assert order_of(compilation, [1.5, 0.8], 1.0) == pytest.approx(order, abs=0.25)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("text", [BODY, SPECIES], ids=["rigid body", "Lotka–Volterra"])
 def test_one_term_of_a_symmetric_method_is_the_second_order_already(text):
     """PHI-1 of the paper is its PHI-2: both have order 2."""

@@ -54,6 +54,7 @@ def exercise(compilation, folder, optimisation, ulps, far):
 SAME = {*FAR} - {"kepler"}  # whose anomaly is found by other iterations in packs
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but(SAME - {"ablowitz_ladik3", "spin_chain5", "volterra5"}, sorted(SAME)))
 def test_members_of_splittings_equal_single_trajectories_bit_for_bit(name, tmp_path):
     """Where arguments are small and products are not fused; else to round-off."""
@@ -82,6 +83,7 @@ def test_members_of_explicit_steps_equal_single_trajectories(kind, tmp_path):
     exercise(compilation, tmp_path, "-O0", ulps, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["toda3_quadratic"], ["kepler", "toda3_quadratic"]))
 @pytest.mark.parametrize("compiler", slow_but(["clang"], ["gcc", "clang"]))
 def test_packs_compile_without_a_warning_where_loops_cannot_be_vectorised(name, compiler, tmp_path):
@@ -150,6 +152,7 @@ def test_functions_without_a_version_for_lanes_leave_members_by_themselves():
     assert "t_pack" not in emit(compilation.program, "c", COMMAND)["t.c"]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", ["kepler", "lagrange_top", "pendulum_euler"])
 def test_threads_change_no_bit(name, tmp_path):
     """100 members are four groups, the last of which is not full."""
@@ -181,6 +184,7 @@ def test_what_lanes_cannot_compute_is_not_taken_for_infinite(scheme):
 VECTORS = list(product(["gcc", "clang"], ["henon_heiles", "spin_chain5", "volterra5"]))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("compiler", "name"), slow_but([v for v in VECTORS if v[1] == "henon_heiles"], VECTORS))
 def test_steps_of_packs_become_vector_instructions(name, compiler, tmp_path):
     """All of their arithmetic, by both compilers, with no more than -O2 and the instructions of 2013; coefficients that

@@ -97,6 +97,7 @@ def test_generated_steps_are_those_of_the_scheme_to_round_off(name, run):
         assert error <= bound + 1e-18 * size + 4e-324, f"after {steps} steps"
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("order", slow_but([2, 8], [2, 6, 8]))
 def test_generated_steps_of_high_order_are_those_of_the_scheme(order):
     compilation = compile_text(BODY + f"order: {order}\n")
@@ -110,6 +111,7 @@ def test_generated_steps_of_high_order_are_those_of_the_scheme(order):
         assert error <= 1e-16
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_c_and_numpy_agree(name):
     """To 1e-13 over 100 steps; paths, which take their time in NumPy, over 20."""
@@ -188,6 +190,7 @@ IN_NUMPY = [("numpy", name) for name in QUICK if name in REFERENCES and name in 
 IN_C = [("c", name) for name in REFERENCES]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(("target", "name"), [*IN_C, *IN_NUMPY])
 def test_reference_state_is_reached(name, target):
     compilation, expected = compiled(name), REFERENCES[name]

@@ -20,6 +20,7 @@ KINDS = {
 }
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "scheme"), KINDS)
 def test_small_code_makes_the_steps_of_fast_code(name, scheme):
     fast = compiled(name, 4 if scheme else None, scheme)
@@ -77,6 +78,7 @@ def described(name, profile, without=()):
     return compile_spec(given, order=4, profile=profile, without=without)
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("part", WORDS)
 def test_a_part_can_be_left_out_of_fast_code(part):
     """The steps are those of NumPy, which leaves it out too where it has it."""

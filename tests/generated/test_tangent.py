@@ -77,6 +77,7 @@ def differences(step, x, width=1e-3):
 FEW = [("c", name) for name in QUICK if name not in KINDS] + [("numpy", "lotka_volterra")]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.corpus
 @pytest.mark.parametrize(("target", "name"), slow_but(FEW, product(TARGETS, NAMES)))
 def test_step_is_a_poisson_map(name, target):
@@ -91,6 +92,7 @@ def test_step_is_a_poisson_map(name, target):
         x = image
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", [n for n in KINDS if n != "pendulum_euler"])
 def test_tangent_agrees_with_many_digits(name, target):
@@ -107,6 +109,7 @@ def test_tangent_agrees_with_many_digits(name, target):
     assert np.max(np.abs(image - np.array(expected_image, dtype=float))) <= 1e-15 * len(at.x) * np.max(np.abs(image))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", ["pendulum_euler", "ablowitz_ladik3", "rigid_body"])
 def test_tangent_agrees_with_differences(name, target):
@@ -120,6 +123,7 @@ def test_tangent_agrees_with_differences(name, target):
     assert np.max(np.abs(tangent - differences(step, np.array(at.x)))) <= 1e-10
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_stages_of_a_composition_are_multiplied(target):
     compilation = text_with_tangent(COMPOSED)
@@ -134,6 +138,7 @@ def test_stages_of_a_composition_are_multiplied(target):
         assert np.max(np.abs(made.backend.module.step_tangent(x, 0.2)[1] - tangent)) <= 1e-15
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_gauge_is_held_fixed(target):
     compilation = text_with_tangent(f"{BODY}casimirs: {{C: x1**2 + x2**2 + x3**2}}\norder: 4\ngauge: auto\n")
@@ -202,6 +207,7 @@ def test_a_step_that_fails_raises(target):
         made.step_tangent([1e3, 2e3, -1e3], 50.0)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_plain_code_has_none_and_says_how_to_get_it(target):
     plain = compiled("rigid_body")
@@ -218,6 +224,7 @@ def test_code_without_extras_is_the_same_whatever_was_compiled_before():
     assert asked.program.step.linearise == again.program.step.linearise
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("compiler", slow_but(["clang"], ["gcc", "clang"]))
 @pytest.mark.parametrize("name", [*KINDS, "toda3_quadratic", "ablowitz_ladik3"])
 def test_generated_c_has_no_warnings(name, compiler, tmp_path):

@@ -164,6 +164,7 @@ def errors(solve, field, x0, span, counts):
     return np.array([np.max(np.abs(solve(x0, span / n, n) - reference)) for n in counts])
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_order_is_that_of_autonomous_systems(kind):
     compilation = compilation_of(kind)
@@ -196,6 +197,7 @@ def test_the_time_at_an_end_of_the_step_gives_order_one_only(shift):
 IN_C = [*product(KINDS, ["small"]), *product(QUICKLY, ["fast"])]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(("kind", "profile"), slow_but(IN_C, product(KINDS, ["small", "fast"])))
 def test_c_agrees_with_numpy_to_roundoff(kind, profile):
     compilation, x0 = compilation_of(kind), start_of(kind)
@@ -209,6 +211,7 @@ def test_c_agrees_with_numpy_to_roundoff(kind, profile):
     assert solver(found, "c").vector_field(c.x[-1], c.t[-1]) == pytest.approx(field, abs=1e-13)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_javascript_agrees_with_numpy_to_roundoff(kind):
     compilation, x0 = compilation_of(kind), start_of(kind)
@@ -399,6 +402,7 @@ def test_every_flow_sees_the_time_of_its_place():
         with_clock(schedule(STRANG, 5), 2, 5)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("kind", ["newton, non-linear π", "newton, composed", "path"])
 def test_blocks_of_steps_see_the_time_of_each_step(kind):
     compilation = compilation_of(kind)

@@ -69,6 +69,7 @@ def test_products_of_casimirs_are_not_new_ones():
     assert texts(family("gl", 2).casimirs.values()) == ["x1 + x4", "x1*x4 - x2*x3"]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("name", "size", "number"),
     [("so", 4, 2), ("so", 5, 2), ("so", 6, 3), ("sl", 3, 2), ("gl", 3, 3), ("su", 3, 2), ("sp", 4, 2), ("se", 3, 2),

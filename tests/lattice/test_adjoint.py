@@ -216,6 +216,7 @@ def numbers(solver, given):
     return {name: np.asarray(given.get(name, value)) for name, value in solver.interface.parameters.items()}
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", LATTICES)
 def test_pullback_is_the_gradient_of_the_run(name):
     """Along random directions of the state, and of each parameter, with a cotangent of every frame."""
@@ -334,6 +335,7 @@ def weighed_tangents(solver, x, bar, stride, parameters):
     return found, along
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in IN_C])
 def test_c_pulls_back_what_numpy_does_and_tangent_vectors_say(name):
     solver, numpy, random = made(name, "c"), made(name), np.random.default_rng(5)
@@ -404,6 +406,7 @@ hamiltonian: {sites: p**2/2 - k*q**2/2, bonds: "(q[a] - q[b])**2/8"}
 """
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("text", "given"), [(UNSTABLE, {}), (UNSTABLE_GRAPH, RING)], ids=["grid", "graph"])
 def test_sweeps_are_undone_over_single_steps_where_fields_grow_fast(text, given):
     """Over 40 steps by a factor of 1e15: of where they began nothing is left in the end, to its last digit."""
@@ -436,6 +439,7 @@ DAMPED_GRAPH = (
 )
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("text", "given"), [(DAMPED, {}), (DAMPED_GRAPH, RING)], ids=["grid", "graph"])
 def test_flows_of_a_step_are_made_anew_where_velocities_are_damped_away(text, given):
     spec, random = phigen.spec.loads(text), np.random.default_rng(8)
@@ -509,6 +513,7 @@ LARGE |= {"driven_graph": 2000, "paired fast": 513}
 LARGE |= {"heisenberg_plane fast": (80, 76), "heisenberg fast": (40, 40, 40)}
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", LARGE)
 def test_c_has_the_same_bits_for_any_threads(name):
     solver, random = made(name, "c"), np.random.default_rng(8)

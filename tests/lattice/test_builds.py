@@ -48,6 +48,7 @@ def expect_clean(compilation, folder, *compilers):
         run([tool(compiler), *language, *WARNINGS, "-fsyntax-only", "t.c"], folder)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("lattice", LATTICES)
 def test_lattices_with_parts_that_have_no_use_compile(lattice, tmp_path):
     made = compile_spec(spec.loads(text_of(lattice)), adjoint=True, profile="fast")

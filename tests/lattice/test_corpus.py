@@ -38,6 +38,7 @@ def test_the_corpus_has_every_relation_of_sites() -> None:
     assert any(not c.is_local and c.relation == "grid" for c in cells)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_a_lattice_is_documented_proved_and_starts(path: Path) -> None:
     spec = load(path)
@@ -51,6 +52,7 @@ def test_a_lattice_is_documented_proved_and_starts(path: Path) -> None:
         assert np.all(np.isfinite(start.state))
 
 
+@pytest.mark.slow
 def test_short_code_is_short_for_any_number_of_sites() -> None:
     found = {path.stem: emit(compile_spec(load(path), profile="small").program, "c", "phigen") for path in FILES}
     lines = {name: sum(len(text.splitlines()) for text in files.values()) for name, files in found.items()}

@@ -169,6 +169,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     return Answers(tmp_path_factory.mktemp("javascript"))
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("case", CASES)
 def test_steps_and_what_is_seen_are_those_of_numpy_to_roundoff(case: str, answers: dict[str, dict[str, Any]]) -> None:
     compilation, found = compiled(case), answers[case]

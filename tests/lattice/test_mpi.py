@@ -52,6 +52,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_any_number_of_processes_makes_the_bits_of_one(given: Path, processes: int) -> None:
     assert MPIRUN, "mpi4py is there, but no mpirun"

@@ -136,6 +136,7 @@ CASES = {
 }
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("case", "target", "profile"),
     [

@@ -61,6 +61,7 @@ def cases():
     return [pytest.param(*case, marks=[pytest.mark.slow] * (case[1] > 0)) for case in each]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("kind", "seed", "profile"), cases())
 def test_gradients_of_lattices_of_one_part_are_differences(kind, seed, profile):
     text, given = drawn(kind, seed)

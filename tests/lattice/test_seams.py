@@ -79,6 +79,7 @@ def start(name: str, sizes: tuple[int, ...]) -> np.ndarray:
     return np.exp(0.4 * np.random.default_rng(1).normal(size=(fields, *sizes)))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "sizes"), [*CASES[:-1], pytest.param(*CASES[-1], marks=pytest.mark.slow)])
 def test_steps_are_poisson_maps(name: str, sizes: tuple[int, ...]) -> None:
     x, found = start(name, sizes), solver(name, odd(name))
@@ -89,6 +90,7 @@ def test_steps_are_poisson_maps(name: str, sizes: tuple[int, ...]) -> None:
     np.testing.assert_allclose(moved, poisson_at(whole, after, {}), rtol=0, atol=2e-14)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "sizes"), CASES)
 def test_steps_follow_h_with_their_order(name: str, sizes: tuple[int, ...]) -> None:
     x, found = start(name, sizes), solver(name, odd(name))

@@ -96,6 +96,7 @@ def start(name: str, sizes: tuple[int, ...]) -> np.ndarray:
     return 0.1 * np.random.default_rng(3).normal(size=(len(compiled(name).spec.coordinates), *sizes))
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(("name", "sizes"), CASES)
 def test_steps_that_sweeps_cannot_make_are_those_of_the_ordinary_system(name: str, sizes: tuple[int, ...]) -> None:
     x, compilation, more = start(name, sizes), compiled(name), bonds(name, sizes[0])
@@ -117,6 +118,7 @@ def test_steps_that_sweeps_cannot_make_are_those_of_the_ordinary_system(name: st
         np.testing.assert_allclose(found, reference, rtol=0, atol=1e-12)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "sizes"), CASES)
 def test_cotangents_go_back_through_such_steps(name: str, sizes: tuple[int, ...]) -> None:
     """By elimination with the transpose of the matrix, or by Krylov spaces: as tangent vectors go forward."""
@@ -129,6 +131,7 @@ def test_cotangents_go_back_through_such_steps(name: str, sizes: tuple[int, ...]
     )
 
 
+@pytest.mark.slow
 def test_short_code_follows_sweeps_by_differences_and_solves_stages_to_round_off_too() -> None:
     x, compilation = start("sheet", (9, 8)), compiled("sheet")
     short = lattice_solver_of(compile_spec(compilation.spec, profile="small"), "c")
@@ -136,6 +139,7 @@ def test_short_code_follows_sweeps_by_differences_and_solves_stages_to_round_off
     np.testing.assert_allclose(short.integrate(x, 0.2, 5, 5).x[-1], reference, rtol=0, atol=1e-13)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["numpy", "c"])
 @pytest.mark.parametrize("profile", ["fast", "small"])
 def test_equations_without_a_solution_are_told(target: str, profile: str) -> None:
@@ -146,6 +150,7 @@ def test_equations_without_a_solution_are_told(target: str, profile: str) -> Non
     assert np.array_equal(failure.value.trajectory.x[-1], x)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("profile", "axes", "h", "left"), [("fast", "i", 0.2, 1e-13), ("small", "i", 0.05, 1e-5), ("fast", "ij", 0.1, 1e-5)]
 )
@@ -183,6 +188,7 @@ def test_short_code_has_no_functions_of_derivatives_that_are_differences(graph: 
     assert re.findall(r"^static inline double (\w+)_lane\(", code, re.M) == ["ripple_sin"] * (not graph)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ring", "net"])
 def test_short_code_makes_the_same_steps(name: str) -> None:
     x, more = start(name, (30,)), bonds(name, 30)

@@ -163,6 +163,7 @@ def poisson_at(whole: Expansion, x: np.ndarray, parameters: dict[str, Any]) -> n
     return matrix
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", TEXTS)
 @pytest.mark.parametrize("target", ["numpy", "c"])
 def test_field_and_energy_are_those_of_the_ordinary_system(name: str, target: str) -> None:
@@ -181,6 +182,7 @@ def test_field_and_energy_are_those_of_the_ordinary_system(name: str, target: st
     assert found.hamiltonian(x, **parameters) == pytest.approx(float(energy), rel=1e-13, abs=1e-13)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", TEXTS)
 def test_c_makes_the_steps_of_numpy(name: str) -> None:
     x = start(name)
@@ -200,6 +202,7 @@ def test_steps_are_those_of_the_ordinary_splitting_with_the_same_parts(name: str
     np.testing.assert_allclose(lattice.x.reshape(len(lattice), -1), ordinary.x, rtol=0, atol=1e-13)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", sorted({*SERIES} - {"stretched"}))  # whose π ordinary systems follow paths for
 def test_steps_of_the_series_are_those_of_the_ordinary_system(name: str) -> None:
     x = start(name, FEW.get(name, (5,)))
@@ -215,6 +218,7 @@ def test_steps_of_the_series_are_those_of_the_ordinary_system(name: str) -> None
     np.testing.assert_allclose(lattice.x.reshape(len(lattice), -1), ordinary.x, rtol=0, atol=1e-13)
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     ("name", "order"),
     [
@@ -277,11 +281,13 @@ def poisson_defect(name: str, module: Any) -> float:
     return float(np.abs(moved - poisson_at(whole, after, parameters)).max())
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_step_is_a_poisson_map(name: str) -> None:
     assert poisson_defect(name, module_of(name)) < (1e-9 if name in REAL_ONLY else 1e-12)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", ["volterra", "sheet", "web", "magnet"])
 def test_neighbours_moved_at_once_where_brackets_couple_them_are_noticed(name: str) -> None:
     module = module_of(name)
@@ -376,6 +382,7 @@ def test_parts_that_differ_in_the_order_of_fields_have_one_loop_in_short_code() 
     np.testing.assert_allclose(mine, solver("magnet", 2).integrate(x, 0.05, 2, 2, **ring).x[-1], rtol=0, atol=3e-14)
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", ["sheet", "magnet", "dragged"])
 def test_threads_make_the_same_bits(name: str) -> None:
     found, x = solver(name, 2, "c"), start(name, (70, 90) if name != "magnet" else (6300,))

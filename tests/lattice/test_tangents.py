@@ -57,6 +57,7 @@ IN_C = ("xxz_open", "sheet", "charges", "magnet", "volterra", "dragged", "tangle
 pytestmark = pytest.mark.few("fput", "sheet", "charges", "magnet", of=TEXTS)
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", [*IN_C, "fput", "ablowitz_ladik", "toda", "web", "network", "pond"])
 def test_tangent_vectors_are_carried_by_the_derivative_of_a_step(name: str) -> None:
     x = start(name, FEW.get(name))
@@ -193,6 +194,7 @@ order: 2
 NOISY = "noise: {kicks: {hamiltonian: x, amplitude: 0.3}, turns: {hamiltonian: z, amplitude: 0.2}}\n"
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     ("kind", "text", "short"),
     [

@@ -114,6 +114,7 @@ def test_steps_have_their_order(name: str, order: int) -> None:
     assert np.log2(errors[0] / errors[1]) > order - 0.3
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", ["driven", "melting", "coloured"])
 def test_c_makes_the_steps_of_numpy_and_goes_on_with_the_same_bits(name: str, tmp_path: Path) -> None:
     x, values = given(name)

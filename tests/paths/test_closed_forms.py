@@ -27,6 +27,7 @@ BOTH = {
 }
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     ("name", "order"), slow_but([("so(3)", 4), ("log-canonical", 4), ("constant", 2)], product(BOTH, [2, 4]))
 )
@@ -58,6 +59,7 @@ def test_both_keep_the_casimir_to_roundoff(name):
 LINEAR = ["rigid_body", "engel_geodesics", "maxwell_bloch", "lagrange_top", "gaussian_moments"]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", slow_but(["rigid_body", "engel_geodesics", "maxwell_bloch"], LINEAR))
 def test_paths_of_a_linear_bracket_are_the_exponential(name):
     given = spec_of(name)
@@ -76,6 +78,7 @@ def test_paths_of_a_linear_bracket_are_the_exponential(name):
 LINEAR_HAMILTONIANS = ["toda3_quadratic", "sir_final_size", "lotka_volterra"]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", LINEAR_HAMILTONIANS)
 def test_paths_of_a_linear_hamiltonian_are_the_exact_flow(name):
     compilation = by_paths(name, 2)

@@ -103,6 +103,7 @@ def test_parameters_of_the_bracket_reach_the_path():
         assert np.max(np.abs(np.array(ends) - image)) < 8 * EPS * max(np.abs(image))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("power", slow_but([4, 9], [4, 6, 8, 9]))
 def test_expansion_with_a_gap_is_not_taken_for_a_finished_one(power, target):
@@ -117,6 +118,7 @@ hamiltonian: 4*x + y**2/2 + 2*z
     assert max(abs(a - b) for a, b in zip(found, image, strict=True)) <= 2 * EPS
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_path_across_a_kink_is_refused(target):
     text = """coordinates: [x, y]

@@ -44,6 +44,7 @@ def alone(compilation, start, h, steps):
     return raw.x.copy(), int(raw.counters[0]), status
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_steps_and_failures_of_blocks_are_those_of_single_steps(name):
     _, start, h, steps, apart = SYSTEMS[name]

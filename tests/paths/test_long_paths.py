@@ -26,6 +26,7 @@ hamiltonian: {hamiltonian}
 """
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("target", slow_but(["c"], TARGETS))
 @pytest.mark.parametrize(("coordinates", "form", "hamiltonian", "start", "h"), slow_but(LONG[1:4], LONG))
 def test_long_path_is_followed_in_pieces(coordinates, form, hamiltonian, start, h, target):
@@ -39,6 +40,7 @@ def test_long_path_is_followed_in_pieces(coordinates, form, hamiltonian, start, 
     assert np.max(np.abs(solve.step(end, h=-h) - start)) < 2000 * EPS * max(1, *np.abs(end))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", slow_but(["c"], TARGETS))
 def test_mean_of_a_path_in_pieces_enters_the_equation(target):
     text = LONG_TEXT.format(hamiltonian="3*x - y + 2*z + (x**2 + y*z)/40")
@@ -88,6 +90,7 @@ def test_path_to_infinity_is_reported_and_the_state_kept():
             solver(compilation, target).step(start, h=3.0)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_path_out_of_the_domain_is_reported(target):
     compilation = compile_paths("coordinates: [x, y]\npoisson: {brackets: {x: {y: log(x)}}}\nhamiltonian: y - x*y\n", 2)

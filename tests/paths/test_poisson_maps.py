@@ -40,6 +40,7 @@ def steady(name):
 FEW = ("charged_particle", "engel_geodesics", "maxwell_bloch", "nambu_pendulum", "sir_epidemic", "toda3_quadratic")
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but(FEW, NAMES))
 def test_step_is_a_poisson_map_and_the_generated_one(name):
     # Order 2, one stage, where order 4 is a composition.
@@ -143,6 +144,7 @@ ORDERS = [
 ]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(("name", "order"), slow_but([o for o in ORDERS if o[0] in FEW], ORDERS))
 def test_observed_order_is_the_stated_one(name, order):
     compilation, at = by_paths(name, order), steady(name)
@@ -168,6 +170,7 @@ def test_fractions_of_a_composition_satisfy_the_order_conditions_to_roundoff(com
 COMPOSED = [("suzuki", 4), ("triple-jump", 4), ("kahan-li", 6), ("yoshida", 6), ("kahan-li", 8), ("yoshida", 8)]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("composition", "order"), slow_but([COMPOSED[0], COMPOSED[2]], COMPOSED))
 def test_symmetric_composition_of_paths_has_its_order(composition, order):
     text = """coordinates: [x, y, z]

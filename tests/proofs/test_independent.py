@@ -68,6 +68,7 @@ def expect_equal(compilation, terms):
     assert bool(others & {"α", "axioms"}) != compilation.realisation.path
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     "name", slow_but(["lotka_volterra", "nambu_pendulum", "pendulum", "pendulum_euler", "rigid_body"])
 )
@@ -104,6 +105,7 @@ SYSTEMS = {
 LONG = {"natural spray", "truncated spray", "group map", "not smooth"}
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but({*SYSTEMS} - LONG, SYSTEMS))
 def test_other_bi_realisations_are_what_sympy_derives(name):
     expect_equal(compile_text(SYSTEMS[name]), 4)
@@ -186,6 +188,7 @@ def test_exchanged_ends_of_paths_are_refuted():
     assert [k for k, verdict in verdicts(wrong, 3).items() if verdict == REFUTED] == ["α"]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("text", "form"),
     [

@@ -90,6 +90,7 @@ def test_constant_displacement_and_increment():
     assert found.covector == (momentum("q"), momentum("p"))
 
 
+@pytest.mark.slow
 def test_nothing_depends_on_the_hash_seed():
     code = (
         "from phigen.spec import load\nfrom phigen.resources import bundled_specs\n"

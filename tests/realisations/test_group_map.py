@@ -34,6 +34,7 @@ def of_text(algebra, tau, coordinates="x, y, z"):
     return s, realise(s, spec.birealisation)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "size"), [("so", 3), ("sl", 2), ("se", 2), ("se", 3), ("aff", 1), ("heisenberg", 1)])
 def test_the_cayley_transform_is_the_kind_cayley(name, size):
     s = family(name, size, -1)

@@ -279,6 +279,7 @@ def test_axioms_of_a_truncation_hold_up_to_its_degree(coordinates, poisson, degr
     assert f"approximate, Poisson up to degree {degree}" in found.explanation
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("coordinates", "poisson"), SYSTEMS)
 def test_axioms_of_a_truncation_fail_beyond_its_degree(coordinates, poisson):
     s = system(coordinates, poisson)
@@ -318,6 +319,7 @@ def test_exchanged_maps_and_a_wrong_coefficient_are_refuted():
     assert verdicts(check(s, wrong))[1] == REFUTED
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("coordinates", "poisson"), SYSTEMS)
 def test_flat_spray_is_karasevs_construction(coordinates, poisson):
     # ∫ Φˢ*ω ds = Σ d(mean_i) ∧ dp_i and p·(mean − x) = 0, so that Moser's ψ₀ keeps p.

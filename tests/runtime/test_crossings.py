@@ -21,6 +21,7 @@ def oscillator(target):
     return solver(compiled("harmonic_oscillator", 8), target)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_crossings_of_the_oscillator_are_at_the_exact_times(target):
     # q = cos t rises through 0 at t = 3π/2 + 2πk.
@@ -49,6 +50,7 @@ SECTIONS = [*product(["henon_heiles", "rigid_body", "pendulum_euler", "predator_
 SECTIONS.append(("nambu_pendulum", "c"))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "target"), slow_but(SECTIONS, [*SECTIONS, *product(["guiding_centre"], TARGETS)]))
 def test_crossings_lie_on_the_section_and_on_the_leaf(name, target):
     """g is an inclined plane through the mean of the first steps: nothing about it is special."""
@@ -92,6 +94,7 @@ KINDS = {
 }
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(("kind", "target"), slow_but(product(KINDS, ["numpy"]), product(KINDS, TARGETS)))
 def test_every_kind_of_step_is_cut_and_ends_where_a_function_vanishes(kind, target):
     """Within the step in which its sign changes, to round-off; and a terminal event is the first of the section, as the

@@ -39,6 +39,7 @@ ending.terminal = True
 ending.direction = -1
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("name", "span"), [("pendulum", (1.0, 7.0)), ("duffing", (0.5, 12.0)), ("pendulum", (7.0, -3.0))]
 )

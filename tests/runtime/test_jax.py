@@ -67,6 +67,7 @@ def test_gradient_is_that_of_the_pull_back(solver):
     assert close(by_i2, found["I2"])
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("axes", [(0, None), (None, 0)])
 def test_vmap_is_a_loop(solver, axes):
     made = cubes(propagator(solver))
@@ -80,6 +81,7 @@ def test_vmap_is_a_loop(solver, axes):
         assert close(slopes[1][m], by_i2)
 
 
+@pytest.mark.slow
 def test_members_share_a_parameter_in_any_way(solver):
     """As leading axes, by vmap inside the derivative, by vmap outside, and with an axis of vmap before their own."""
     made = propagator(solver)
@@ -117,6 +119,7 @@ def test_a_gradient_takes_one_run_back_and_a_jvp_the_tangent_map(solver, monkeyp
     assert close(rows[0, 1], found.x0_bar)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("forward", [False, True])
 def test_second_derivatives_are_refused(solver, forward):
     with pytest.raises(TypeError, match="second derivatives of runs are not offered"):
@@ -158,6 +161,7 @@ def test_members_may_be_none_and_states_lists(solver):
     assert (by_x.shape, float(by_i2)) == ((0, 3), 0)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("stride", [None, 3])
 def test_lattices_have_gradients_along_disorder(stride):
     """Members by `vmap`, each with fields of its own at the sites; J is shared."""

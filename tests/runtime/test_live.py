@@ -18,6 +18,7 @@ def session_of(name, target):
     return solver(compiled(name), target).session(at.x, parameters=at.parameters), at
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_kicked_sessions_of_c_and_numpy_are_one_trajectory(name):
     found = []
@@ -33,6 +34,7 @@ def test_kicked_sessions_of_c_and_numpy_are_one_trajectory(name):
     assert np.allclose(found[0], found[1], rtol=1e-11, atol=1e-12)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", SYSTEMS[:2])
 def test_a_kick_moves_to_another_leaf_and_energy_which_are_kept_from_then_on(name, target):
@@ -98,6 +100,7 @@ def test_sessions_make_the_steps_of_integrate_and_branch_and_are_stored(target):
         assert (other.t, other.steps) == (whole.t[-1], 30)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_time_is_counted_through_changes_of_the_step(target):
     session, at = session_of("duffing", target)

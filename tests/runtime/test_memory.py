@@ -97,6 +97,7 @@ TAKING = [
 ]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("words", "target", "refused", "allowed", "call"), TAKING)
 def test_vectors_members_and_ways_back_are_refused_where_they_do_not_fit(
     chain, words, target, refused, allowed, call, monkeypatch

@@ -61,6 +61,7 @@ def by_numpy(x, t, A=0.5):
     }
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("profile", ["fast", "small"])
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_observables_are_those_of_the_formulas(target, profile):

@@ -49,6 +49,7 @@ def hasty(monkeypatch):
     monkeypatch.setattr(toolchain, "_TRIAL_TIMEOUT", 0.4)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("kind", BROKEN)
 def test_a_compiler_that_is_named_and_does_not_work_is_refused_with_the_reason(kind, compiler, monkeypatch):
     body, reason = BROKEN[kind]

@@ -82,6 +82,7 @@ def test_all_targets_make_the_same_steps_and_take_the_same_time(kepler):
     np.testing.assert_allclose(js, [*numpy.x[-1], numpy.t[-1]], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extra", slow_but([""], ["", "birealisation: karasev", "composition: suzuki"]))
 def test_verification_finds_the_order_in_tau_and_of_the_time_and_no_poisson_defect(extra):
     compilation = compiled_text(f"{BODY}order: 4\n{extra}\n")
@@ -151,6 +152,7 @@ def test_states_at_times_are_on_the_orbit_and_until_ends_there():
     np.testing.assert_allclose(back.x[-1], BODY_START, rtol=0, atol=1e-12)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_until_and_at_without_a_monitor(target):
     made = solver_of(compiled_text(BODY.replace("monitor: 1/(1 + x1**2)\n", ""), 4), target)
@@ -203,6 +205,7 @@ def test_where_the_monitor_vanishes_the_motion_stops_and_beyond_it_none_begins(t
         made.integrate([-1, 0], 0.1, 1)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("order", [2, 4])
 def test_in_single_precision_until_and_at_are_right_to_its_rounding(order):
     single = solver_of(compiled_text(BODY + "real: float\n", order), "c")
@@ -251,6 +254,7 @@ def test_what_is_not_offered_is_an_error_of_the_spec(monitor, said):
         compile_spec(spec.loads(text))
 
 
+@pytest.mark.slow
 def test_the_hint_for_a_monitor_with_a_time_is_a_spec_that_is_right():
     driven = KEPLER.replace("- 1/sqrt(q1**2 + q2**2)", "- 1/sqrt(q1**2 + q2**2) + q1*sin(t)/9").replace(
         "invariants", "#"

@@ -221,6 +221,7 @@ IN_BOTH_CHARTS = [*product(["one-sided"], HAMILTONIANS), *product(["midpoint"], 
 QUICK = [(chart, text) for chart, text in IN_BOTH_CHARTS[:-4] if "asin" not in text]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(("chart", "text"), slow_but(QUICK, IN_BOTH_CHARTS))
 def test_series_of_other_functions_agrees_with_sympy(text, chart):
     one_sided = chart == "one-sided"

@@ -76,6 +76,7 @@ def test_first_correction_is_minus_the_first_term_left_out(text, terms):
     assert all(t == 0 for t in found.terms[1:power])
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     ("name", "order"),
     [

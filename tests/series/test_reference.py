@@ -104,6 +104,7 @@ def test_paths_of_linear_tensors_are_bernoulli_polynomials():
         assert sympy.expand(vector(*part) - expected) == sympy.zeros(3, 1)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     "tensor",
     [so3(x), log_canonical(x), pytest.param((1 + x[0]) * so3(x), marks=pytest.mark.slow), exp(x[1]) * so3(x)],

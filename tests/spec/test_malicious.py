@@ -63,6 +63,7 @@ OVER_LIMITS = {
 }
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("title", OVER_LIMITS)
 def test_limit_is_an_error_of_its_own(title: str, tmp_path: Path) -> None:
     error = refused(OVER_LIMITS[title], tmp_path)

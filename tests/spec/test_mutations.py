@@ -57,6 +57,7 @@ def test_a_base_is_written_as_it_is_read(base: str) -> None:
     assert meaning(document(tree_of(BASES[base]))) == meaning(BASES[base])
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("base", "seed"), SAMPLES)
 def test_a_mutant_is_read_as_what_it_says_or_refused_at_its_place(base: str, seed: int) -> None:
     sample = mutants(base, random.Random(f"{base} {seed}"), MANY if seed else FEW)

@@ -108,6 +108,7 @@ def test_the_derivative_of_the_flow_is_exact_and_symplectic(eccentricity):
     np.testing.assert_allclose(tangent, slopes, atol=1e-7 * np.abs(slopes).max())
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_gradients_along_state_mass_and_strength_are_differences(target):
     made = solver(orbit("adjoint: true\n"), target)

@@ -33,6 +33,7 @@ def kepler():
     return compilation, {target: solver_of(compilation, target) for target in ("c", "numpy")}
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("order", [2, 4, 8])
 def test_the_orbit_of_a_kepler_motion_is_exact_however_eccentric(order):
     found = solver_of(compiled_text(KEPLER, order), "c").integrate(START, 0.05, 4000)

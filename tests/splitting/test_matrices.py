@@ -68,6 +68,7 @@ def test_the_flow_is_one_part_and_proved_to_round_off(name):
     assert [s.verdict for s in check(found.system, found.splitting)] == [PROVED, PROVED, CHECKED]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", LINEAR)
 def test_steps_of_any_size_are_the_exponential(name, target):
@@ -117,6 +118,7 @@ NONLINEAR = {
 }
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", NONLINEAR)
 def test_composed_with_other_parts_they_have_the_order_of_the_method(name):
     text, moved = NONLINEAR[name]
@@ -141,6 +143,7 @@ CONSTANT = {
 }
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("parameters", CONSTANT)
 def test_exponentials_that_no_parameter_enters_are_not_transposed(parameters):
     found = compilation(CONSTANT[parameters])

@@ -55,6 +55,7 @@ def worst_energy(name, order, eps, h):
 FIRST = {"saba-4-2": (2, 4, 1e-7, 1.2), "aba-8-4": (4, 8, 1e-7, 1.2), "aba-10-6-4": (4, 10, 1e-5, 1.8)}
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", FIRST)
 def test_the_error_in_the_first_power_of_epsilon_has_its_order(name):
     order, power, eps, h = FIRST[name]

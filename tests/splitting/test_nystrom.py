@@ -41,6 +41,7 @@ def named(method):
 METHODS = pytest.mark.parametrize("method", nystrom.METHODS, ids=named)
 
 
+@pytest.mark.thin(2)
 @METHODS
 def test_order_conditions_hold_to_thirty_digits_up_to_the_order_and_not_beyond(method):
     found = algebra.defects(method, method.order + 1)
@@ -155,6 +156,7 @@ def reference(name):
 SPANS = {"kowalevski_top": 6, "henon_heiles": 8, "nambu_pendulum": 4}
 
 
+@pytest.mark.thin(3)
 @METHODS
 @pytest.mark.parametrize("name", slow_but(["kowalevski_top"], SPANS))
 def test_observed_order_is_the_stated_one(name, method):
@@ -172,6 +174,7 @@ def test_observed_order_is_the_stated_one(name, method):
     assert max(slopes) > method.order - 0.4
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("method", slow_but(nystrom.METHODS[::3], nystrom.METHODS), ids=named)
 def test_step_is_a_reversible_poisson_map_in_both_targets(method):
     found = forced("kowalevski_top", method)

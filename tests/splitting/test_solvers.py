@@ -52,6 +52,7 @@ def short(name, order):
 SPANS = {"rigid_body": 6, "kowalevski_top": 6, "predator_prey": 12, "toda3": 6, "charged_particle": 2}
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but({*SPANS} - {"rigid_body", "toda3"}, SPANS))
 @pytest.mark.parametrize("order", slow_but([2, 6], [2, 4, 6, 8]))
 def test_observed_order_is_the_stated_one(name, order):
@@ -73,6 +74,7 @@ def test_observed_order_is_the_stated_one(name, order):
     assert max(slopes) > order - 0.3
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_step_is_a_reversible_poisson_map_that_keeps_casimirs_in_both_targets(name):
     found = splitting_of(name, 4)
@@ -122,6 +124,7 @@ def test_exact_flow_is_followed_in_one_piece():
     assert x[:2] == pytest.approx([0.3, turned], abs=1e-15)
 
 
+@pytest.mark.slow
 def test_a_wrong_sign_in_one_flow_falls_short_of_the_order():
     found = compiled("kowalevski_top", 4, "splitting")
     at = setting(found)
@@ -153,6 +156,7 @@ def test_refuted_flows_are_not_compiled(monkeypatch):
         compile_proved(found.spec, scheme="splitting")
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_c_compiles_without_a_warning(name, compiler, tmp_path):

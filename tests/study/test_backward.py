@@ -27,6 +27,7 @@ def subject(name):
     return backward.modified(compilation, values, gauge), method, x, float(run.step)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", ["rigid_body", "predator_prey"])
 def test_each_correction_makes_the_modified_hamiltonian_two_orders_more_constant(name):
     found, method, x, h = subject(name)

@@ -67,6 +67,7 @@ def checks(compilation, solver, run):
     return list(verification.gradient_checks(subject, verification.gauge_at(compilation, x, values), list(states)))
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("more", ["", "monitor: 1/(1 + g*q**2)\n", "scheme: splitting\n"])
 @pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
 def test_right_gradients_pass(target, more):
@@ -85,6 +86,7 @@ def of_several(given, rows, x_bar, found):
     return rows, x_bar * (1 + 1e-9 * (len(x_bar) > 1)), found
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("change", "failed"),
     [(slightly, {TANGENTS}), (of_a_parameter, {DIFFERENCES}), (of_several, {MEMBERS})],

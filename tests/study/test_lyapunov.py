@@ -23,6 +23,7 @@ def solver(source, target="c", order=None):
     return api.compile(source, target, order, tangent=True)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_a_linear_saddle_has_its_eigenvalues(target):
     found = spectrum(solver(spec.loads(SADDLE), target), [0, 0, 0, 0, 1], 0.05, 2000)

@@ -60,6 +60,7 @@ def test_a_step_that_cannot_be_made_has_no_result(in_c):
     assert in_c.runners["rk4"](1e200, 3, 1) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", ["c", "python"])
 def test_orders_of_a_study_are_the_stated_ones(body, in_c, make, monkeypatch):
     monkeypatch.setattr(precision, "MOST_SECONDS", math.inf)  # a busy machine would measure larger steps only

@@ -29,6 +29,7 @@ def near_the_ground_state(sites: int, size: float) -> np.ndarray:
     return np.array([x, y, np.sqrt(1 - x**2 - y**2)])
 
 
+@pytest.mark.slow
 def test_spin_waves_have_the_dispersion_of_linear_theory():
     solver = phigen.compile(phigen.spec.loads(FERROMAGNET), target="numpy")
     run = solver.integrate(near_the_ground_state(16, 1e-3), 0.1, 2560, stride=5)

@@ -340,6 +340,7 @@ def test_a_system_without_a_time_has_no_start_to_vary(spec, tmp_path):
         phigen.sweep(tmp_path / "s.yaml", output=tmp_path / "s.zarr")
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(
     ("text", "why"),
     [
@@ -361,6 +362,7 @@ def test_a_file_of_members_that_cannot_be_read_is_refused_at_its_place(tmp_path,
     assert error.value.diagnostics[0].location.column == 32
 
 
+@pytest.mark.slow
 def test_two_sweeps_into_one_new_store_share_it(cluster, tmp_path, monkeypatch):
     setting = {"over": {"I2": [2.0, 2.5]}, "output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
     (tmp_path / "s.yaml").write_text(BODY)
@@ -423,6 +425,7 @@ sweeps:
 """
 
 
+@pytest.mark.slow
 def test_members_are_lattices_with_disorder_of_their_own(cluster, tmp_path, monkeypatch):
     """A draw moves the seeds of the run: of the state and of the parameter at sites."""
     from phigen.lattice.states import start_of

@@ -74,6 +74,7 @@ def with_derivatives(name, composition):
     return compile_spec(chosen, order=4, tangent=True, adjoint=True).program
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     ("name", "composition"),
     [

@@ -143,6 +143,7 @@ def size_of_operands(e, at):
     return max([abs(found), *(abs(v) for v in operands)]) if e.op in ("add", "sub") else abs(found)
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_everything_that_can_be_written_is_computed_right(everything, target):
     compilation, named = everything

@@ -155,6 +155,7 @@ def apart(found, expected):
     return float(np.max(np.abs(found - expected), initial=0.0) / (np.max(np.abs(expected), initial=0.0) or 1.0))
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
 def test_steps_are_those_of_numpy_to_roundoff(case, answers):
     at, found, numpy = setting(compilation_of(case)), answers[case], solver(compilation_of(case), "numpy")
@@ -180,6 +181,7 @@ def test_copies_go_on_by_themselves(case, answers):
     assert apart(found["ends"][1], found["ends"][0]) < 1e-14
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("case", slow_but(QUICK, [*NAMES, *VARIANTS, "duffing", "kepler_eccentric", "thruster_body"]))
 def test_parts_of_steps_find_events_where_sections_do(case, answers):
     """With time, a monitor, forces, attitude, and every kind of step."""
@@ -283,6 +285,7 @@ def test_code_that_was_not_asked_for_derivatives_has_none(answers):
     assert answers["gauge"]["tangent"] is None
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("case", NAMES)
 def test_an_ensemble_is_its_members_one_by_one(case, answers):
     found, at = answers[case]["many"], setting(compilation_of(case))

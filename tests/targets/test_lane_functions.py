@@ -39,6 +39,7 @@ FAST = "-O3 -march=native -ffp-contract=fast"
 COMPILED = [("double", FAST), ("double", "-O0"), ("float", FAST), ("float", "-O0")]
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize(("real", "flags"), slow_but([("double", FAST), ("float", "-O0")], COMPILED))
 @pytest.mark.parametrize("name", RANGES)
 def test_lane_functions_agree_with_the_library(real, name, flags, tmp_path):

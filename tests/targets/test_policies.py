@@ -35,6 +35,7 @@ CASES = {
 }
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("system", CASES)
 def test_a_number_is_changed_in_all_targets_by_its_record(system, monkeypatch):
     program = compile_spec(spec_of(system), profile="fast", tangent=True).program

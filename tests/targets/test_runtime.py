@@ -75,6 +75,7 @@ FEW += [("NEWTON", "GAUGE"), ("NEWTON", "FAST", "ADJOINT"), ("EXPLICIT",), ("EXP
 FEW += [("EXPLICIT", "ADJOINT"), ("SPLITTING", "FAST", "ADJOINT"), ("SPLITTING", "TANGENT"), ("GAUSS", "ADJOINT")]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     "switches",
     [pytest.param(s, marks=() if s in FEW else pytest.mark.slow, id=" ".join(s)) for s in [*IMPLICIT, *EXPLICIT]],

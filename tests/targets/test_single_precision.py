@@ -56,6 +56,7 @@ def in_single(name, **extras):
     return replace(found, program=program), found
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", [*SYSTEMS, *LATTICES])
 def test_there_is_no_double_in_it(name, tmp_path):
     """No promotion, no conversion back, no function of the library that takes doubles."""
@@ -72,6 +73,7 @@ def numbers(compilation):
     return setting(compilation), {**setting(compilation).parameters, **more}
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_steps_are_those_of_double_precision_to_its_digits(name):
     """Over a hundred steps, Casimirs by themselves; at most as near as numbers of 24 digits can be."""
@@ -84,6 +86,7 @@ def test_steps_are_those_of_double_precision_to_its_digits(name):
         assert np.ptp(values) <= COARSER * 1e-14 * max(1.0, np.abs(right.casimirs[name]).max())
 
 
+@pytest.mark.thin(2)
 @pytest.mark.parametrize("name", LATTICES)
 def test_lattices_move_as_in_double_precision(name):
     (made, other), run_ = in_single(name), first_run(in_single(name)[0])

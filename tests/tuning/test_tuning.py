@@ -353,6 +353,7 @@ CASES = [
 ]
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     ("name", "setting"), slow_but(CASES[::2], CASES), ids=[f"{n}-{s.described()}" for n, s in CASES]
 )
