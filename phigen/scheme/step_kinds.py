@@ -17,7 +17,8 @@ class StepKind:
     ``title`` names the method in a sentence, ``manner`` in the header; ``unit`` is the unit of operation counts.
     ``implicit`` steps solve an equation for one point by an inner solve; ``predicted`` ones start their iteration
     with a value extrapolated from earlier steps. Steps by ``flows`` have a schedule, and a row of coefficients for
-    each of its times; steps on ``sites`` are those of lattices.
+    each of its times; a step that ``collocates`` solves for all its stages at once; steps on ``sites`` are those of
+    lattices.
     """
 
     name: str

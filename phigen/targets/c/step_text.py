@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +11,8 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss, Newton, Path, PathAdjoint, Splitting
+from phigen.symbolic.expression import Expression, symbols_of
+from phigen.symbolic.symbols import COEFFICIENT, FIXED, MOMENTUM, kind_of
 from phigen.targets.c import gauss, paths, splitting
 from phigen.targets.c.kernels import function, printer
 from phigen.targets.c.lanes import packed_kernels, packed_step, printed_back
@@ -21,6 +22,9 @@ from phigen.targets.rendering import render
 #: Constants: names, values, and comments.
 Sizes = list[tuple[str, int, str]]
 Switches = Mapping[str, bool]
+
+#: The symbols that stand for entries of the arguments of functions on paths.
+_ENTRIES = {"coef": COEFFICIENT, "p": MOMENTUM, "f": FIXED}
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,9 @@ def _path(program: Program, path: Recurrences, kind: str) -> str:
     slope = "s[{i}][k + 1] = s[{slope}][k] / (double)(k + 1);"
     syntax = Syntax(printer, slope, sums=f"{program.name}_taylor_{{kind}}")
     found = statements(program, path, syntax)
-    begin, rules = [*found["fixed"], *found["first"]], [*found["rules"], *found["slopes"]]
+    derived = path.series[program.dimension :]
+    firsts, factors = [q.first for q in derived], [factor for q in derived for _, factor in q.linear]
+    defined = ("coef", "p") if path.fixed else ("coef", "p", "f")  # f is written where it has values
     return render(
         "c",
         "path.c",
@@ -114,16 +120,17 @@ def _path(program: Program, path: Recurrences, kind: str) -> str:
             "n": program.dimension,
             "series": len(path.series),
             "fixed_count": max(1, len(path.fixed)),
-            "unused_first": _unused(begin, ("coef", "p", "f")),
-            "unused_rules": _unused(rules, ("coef", "p", "f")),
-            "unused_field": _unused([*found["fixed"], *found["nodes"]], ("coef", "p")),
+            "unused_first": _unused([*path.fixed, *firsts], defined),
+            "unused_rules": _unused(factors, ("coef", "p", "f")),
+            "unused_field": _unused([*path.fixed, *firsts], ("coef", "p")),
         },
     )
 
 
-def _unused(lines: list[str], names: tuple[str, ...]) -> list[str]:
-    text = "\n".join(lines)
-    return [f"(void){name};" for name in names if not re.search(rf"\b{name}\[", text)]
+def _unused(expressions: Sequence[Expression], arrays: Sequence[str]) -> list[str]:
+    """The statements that name those arguments of a function that its expressions do not read."""
+    read = {kind_of(s) for s in symbols_of(*expressions)}
+    return [f"(void){array};" for array in arrays if _ENTRIES[array] not in read]
 
 
 def _gauss_texts(program: Program, step: Gauss, lanes: Lanes | None, has: Switches) -> dict[str, str]:
