@@ -143,7 +143,9 @@ static int n_called(void)
 int n_defined(void);
 int n_elsewhere(void);
 
-/* Of which there is none. */
+/* Of which there is none,
+   on two lines. */
+/* Nor more. */
 int n_nowhere(void);
 
 static int n_ahead(void);

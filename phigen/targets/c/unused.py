@@ -71,18 +71,16 @@ def _functions(lines: Sequence[str]) -> Iterator[Function]:
 
 
 def _without(lines: Sequence[str], functions: Iterable[Function]) -> list[str]:
-    """The lines without functions, and without comments above them that are above no other."""
+    """The lines without functions, and without comments right above them that are above no other."""
     gone = {k for f in functions for k in range(f.begin, f.end)}
     for begin in sorted({f.begin for f in functions}):
         first = begin - 1
         behind = next((k for k in range(begin, len(lines)) if k not in gone), len(lines))
-        if not _is_comment(lines, first):
-            continue
         if behind < len(lines) and lines[behind] and not lines[behind].startswith(("/*", "#")):
             continue
-        while not lines[first].startswith("/*"):
-            first -= 1
-        gone |= set(range(first, begin))
+        while _is_comment(lines, first):
+            first = _beginning(lines, first) - 1
+        gone |= set(range(first + 1, begin))
     return [line for k, line in enumerate(lines) if k not in gone]
 
 
@@ -90,8 +88,12 @@ def _is_comment(lines: Sequence[str], last: int) -> bool:
     """Whether a comment of lines of its own ends on this one, and is not the name of a chapter."""
     if not lines[last].endswith("*/") or lines[last].startswith("/* ---- "):
         return False
-    first = next(k for k in range(last, -1, -1) if "/*" in lines[k])
-    return lines[first].startswith("/*")
+    return lines[_beginning(lines, last)].startswith("/*")
+
+
+def _beginning(lines: Sequence[str], last: int) -> int:
+    """The line on which the comment begins that ends on this one."""
+    return next(k for k in range(last, -1, -1) if "/*" in lines[k])
 
 
 def _words(lines: Iterable[str]) -> set[str]:

@@ -5,76 +5,22 @@
 #include "status.h"
 const char *phi_status_string(phi_status status); /* what a status means */
 
-#if PHI_GAUSS
-/* Results of the last step, by which the next one predicts the starting values of its iteration. They affect the speed
-   only. */
-typedef struct {
-    int count;   /* 0 before the first step, else 1 */
-    int sweeps;  /* sweeps over the stages in the last step */
-    double rate; /* factor by which the changes of a sweep shrink from one sweep to the next */
-    double moves[PHI_UNKNOWNS][PHI_WIDTH]; /* stages of the last step, in the frame of its start */
-} phi_history;
+#include "history_gauss.h"
+#include "history_differences.h"
+#include "history_recurrences.h"
 
-#elif PHI_GUESSED && !PHI_RECURRENCES
-/* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
-typedef struct {
-    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
-    double difference[PHI_DIFFERENCES][PHI_DIM]; /* the solution, then differences */
-} phi_history;
+#include "blocks_learnt.h"
 
-#endif
-#if PHI_RECURRENCES
-enum { PHI_KEPT = 2 * PHI_REMEMBERED };
-
-/* Predictor: recent solutions of the implicit equation, from which the starting value of the next iteration follows by
-   extrapolation, or by a linear recurrence fitted to the last PHI_REMEMBERED solutions. It affects the speed only. */
-typedef struct {
-    int count;                       /* number of solutions in past */
-    int extrapolation_order;         /* number of solutions that the extrapolation uses */
-    int recurrence_terms;            /* number of solutions that the recurrence uses; 0 if none is fitted */
-    int use_recurrence;              /* 1 if the recurrence predicts better than the extrapolation */
-    int fits;                        /* number of fits so far */
-    int slow_steps;                  /* recent steps that took more than one iteration */
-    int slow_steps_allowed;          /* value of slow_steps at which the recurrence is fitted again */
-    double past[PHI_KEPT][PHI_DIM]; /* solutions, the latest last */
-    double weight[PHI_WINDOW][PHI_DIM][PHI_AHEAD]; /* factors of past solutions, the latest first, for the next ones */
-} phi_history;
-
-#endif
-#if PHI_BLOCKS
-/* Measurements that decide when several steps are solved together, as a block in SIMD registers, and when one by one. They
-   affect the speed only. */
-typedef struct {
-    double evaluations_per_stage;      /* number of evaluations in single steps */
-    int single_steps;                  /* single steps to make before the next block */
-    int last_single_steps;             /* single_steps after the last failure, halved by each successful block */
-    int use_recurrences;               /* 1 if recurrences predict blocks, 0 if Runge-Kutta steps do */
-    int passes_without_recurrences;    /* iterations of the last block predicted by Runge-Kutta steps */
-    size_t steps_without_recurrences;  /* steps to wait before recurrences are tried again */
-    size_t recurrences_from_step;      /* number of the step from which they are tried again */
-} phi_learnt;
-
-#endif
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {
 #include "state_members.h"
 } phi_solver;
 size_t phi_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t phi_solver_steps_done(const phi_solver *s);
-#if PHI_MONITOR
 double phi_solver_time(const phi_solver *s);
-#endif
-#if PHI_ATTITUDE && PHI_POSITION
-void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]); /* the attitude, then the position */
-#elif PHI_ATTITUDE
-void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]);
-#endif
-#if PHI_ADJOINT
+void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]); /* the attitude, then the position, if there is one */
 size_t phi_trail_size(void); /* PHI_TRAIL, in numbers */
-#if PHI_EACH
 size_t phi_trail_size_each(void); /* PHI_TRAIL_EACH, in numbers */
-#endif
-#endif
 
 /* Initialise *s with the state x0. params may be NULL for the defaults. PHI_BAD_ARGUMENT, with *s unchanged, if a value
    or a coefficient is not finite, or if a parameter that must be positive is not. */
@@ -83,19 +29,14 @@ size_t phi_trail_size_each(void); /* PHI_TRAIL_EACH, in numbers */
 #endif
 phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM]);
 
-#if PHI_TIMED
 /* The same at the time t0; phi_init starts at the time 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0);
 
-#endif
-#if PHI_NOISE
 /* Select the random numbers of the next steps. They are a function of the seed, the member and the number of the step
    only; phi_init sets all three to 0. Each increment of the noise is normal with variance |h|, truncated at
    PHI_BOUND sqrt(|h|). */
 phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step);
 
-#endif
-#if PHI_ATTITUDE
 /* Set the attitude of the present state. phi_init sets the identity. */
 #if PHI_MATRICES
 /* Returns PHI_BAD_ARGUMENT if an entry is not finite. */
@@ -107,17 +48,14 @@ phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t
 #endif
 phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE] PHI_AND_POSITION(const double position[3]));
 
-#endif
 #if PHI_MONITOR
 /* As phi_init, with the energy level e = gauge[0] in place of -H(x0). The step is a Poisson map for each fixed e. */
 #elif PHI_GAUGE
 /* As phi_init, with given factors of Casimirs. The step is a Poisson map for each fixed gauge. */
 #endif
-#if PHI_GAUGE
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
     const double gauge[PHI_GAUGES]);
 
-#endif
 #if PHI_MONITOR
 /* Make steps of size h in tau, of either sign; s->t increases by their physical time. If one fails, s->x is the state
    before it, after s->steps steps. */
@@ -127,7 +65,6 @@ phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double 
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
-#if PHI_KICKED
 /* Between steps: replace the state by x, or add change to it; this may change Casimirs. PHI_BAD_ARGUMENT, with *s
    unchanged, if the new state is not finite. */
 #if PHI_MONITOR
@@ -136,14 +73,10 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM]);
 phi_status phi_kick(phi_solver *s, const double change[PHI_DIM]);
 
-#endif
-#if PHI_NOISE
 /* As phi_integrate, with given increments of the noise: dw[k * PHI_DRAWS + i] is that of source i in step k. NULL for
    random ones. */
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw);
 
-#endif
-#if PHI_ENSEMBLE
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 #if PHI_GROUPS || PHI_PACKS
@@ -152,21 +85,16 @@ phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const doub
 phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status);
 
-#if PHI_NOISE
 /* The same with the random numbers of seed: member m takes those of first_member + m, from the step first_step on.
    phi_ensemble takes 0 for all three. With OpenMP, members are integrated in parallel; the results do not depend on the
    number of threads. */
 phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members PHI_AND_T0, double h, size_t steps,
     uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
 
-#endif
-#if PHI_TIMED
 /* The same from the time t0 on; phi_ensemble starts at the time 0. */
 phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
     unsigned char *status);
 
-#endif
-#if PHI_EACH
 #if PHI_TIMED
 /* The same for members with parameters params[m], initial time t0[m] and step size h[m]. params may be NULL for the
    defaults. */
@@ -181,19 +109,9 @@ phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, 
 #endif
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
    coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before. Arrays must not overlap. */
-#if PHI_TIMED
-phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, const double *t0, const double *h,
+phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, PHI_OWN_POINTER const double *h,
     size_t steps, size_t stride, double *frames, unsigned char *status);
-#elif PHI_GAUGE
-phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, const double *gauge,
-    const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
-#else
-phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, const double *h, size_t steps,
-    size_t stride, double *frames, unsigned char *status);
-#endif
 
-#endif
-#if PHI_ATTITUDES
 /* Integrate an ensemble with attitudes in place, each member with the same bits as by phi_integrate; with OpenMP, members
    in parallel. x[i * members + m] is coordinate i of member m, and attitude[i * members + m] is number i of its attitude,
    in the order of phi_attitude: first at the start, then at the end. Other arguments have a value for each member; params
@@ -205,21 +123,10 @@ phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *a
     PHI_RANDOM_NUMBERS
     size_t stride, double *frames, double *attitudes, unsigned char *status);
 
-#endif
-
-#endif
-#if PHI_TANGENT
-#if PHI_MONITOR
 /* Make one step as phi_step does, and compute its derivative: tangent[i * PHI_DIM + j] is the derivative of the new x_i
-   by the old x_j, exact to round-off, for a fixed energy level e. On failure *s and tangent are unchanged. */
-#else
-/* Make one step as phi_step does, and compute its derivative: tangent[i * PHI_DIM + j] is the derivative of the new x_i
-   by the old x_j, exact to round-off, for a fixed gauge if there is one. On failure *s and tangent are unchanged. */
-#endif
+   by the old x_j, exact to round-off, for a fixed gauge or energy level. On failure *s and tangent are unchanged. */
 phi_status phi_step_tangent(phi_solver *s, double h, double tangent[PHI_DIM * PHI_DIM]);
 
-#endif
-#if PHI_ADJOINT
 /* Make one step as phi_step does, and its reverse pass (vector-Jacobian product). For L = sum of x1_bar[i] * x[i] with the
    new x, x0_bar receives the derivatives of L by the old x, and the derivatives by the parameters are added to
    *params_bar, if not NULL. Derivatives are exact to round-off, for a fixed gauge or energy level. x0_bar may be x1_bar.
@@ -234,16 +141,12 @@ phi_status phi_step_adjoint(phi_solver *s, double h, const double x1_bar[PHI_DIM
 #if PHI_MONITOR
 /* The derivative of L by the energy level e is added to *e_bar, if not NULL. If phi_init has set e = -H(x0), call
    phi_level_bar with it: it adds the derivatives that act through e to x0_bar and *params_bar. */
+#endif
 phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
-    double x0_bar[PHI_DIM], phi_params *params_bar, double *e_bar, double *trail);
+    double x0_bar[PHI_DIM], phi_params *params_bar PHI_AND_DOUBLE(e_bar), double *trail);
 void phi_level_bar(const phi_params *params, const double x0[PHI_DIM], double e_bar, double x0_bar[PHI_DIM],
     phi_params *params_bar);
-#else
-phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
-    double x0_bar[PHI_DIM], phi_params *params_bar, double *trail);
-#endif
 
-#if PHI_EACH
 /* phi_pullback for an ensemble. Member m starts at x0 + m * PHI_DIM, with params[m] and h[m]; params may be NULL for the
    defaults. rows and rows_bar hold all rows of member 0, then those of member 1, and so on. x0_bar has the layout of x0;
    derivatives by the parameters of member m are added to params_bar[m]. trail is work space for PHI_TRAIL_EACH numbers
@@ -253,7 +156,4 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, PHI_OWN_POINTER const double *h,
     size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
     double *trail, unsigned char *status);
-
-#endif
-#endif
 #endif

@@ -3,6 +3,7 @@
 #ifndef DECLARATIONS_H
 #define DECLARATIONS_H
 #include <stddef.h>
+#include <stdint.h>
 
 #define PHI_DIM 2
 #define PHI_CASIMIRS 0
@@ -106,12 +107,10 @@ enum { PHI_STAGES = 3 };
 #endif
 enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2, PHI_TRAIL = (PHI_SPLITTING || PHI_COMPOSED ? 3 : PHI_GAUSS ? 2 : 1) * PHI_DIM };
 enum { PHI_TRAIL_EACH = PHI_TRAIL * (PHI_SPLITTING || !PHI_ABREAST ? 1 : PHI_EXPLICIT ? 32 : 8) };
-#if PHI_GAUGE
 enum { PHI_GAUGES = 2 };
-#endif
 #if PHI_MATRICES
 enum { PHI_ATTITUDE_SIZE = 9, PHI_ELEMENT = 9, PHI_COVECTOR = 4, PHI_RATE = 4, PHI_ROWS_OF_ATTITUDE = 3 };
-#elif PHI_ATTITUDE
+#else
 enum { PHI_ATTITUDE_SIZE = 4, PHI_ELEMENT = 7, PHI_RATE = 6 };
 #endif
 #if PHI_NOISE
