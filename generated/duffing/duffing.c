@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: b1a59e52f1200524e59c0b4a0b37edb0f36662c5683f09929c26638aac92a813
+ * body-sha256: e2a421015580edc694fac32b8df083480130526ada77cc93d69133d22df82666
  */
 #include "duffing.h"
 #include <float.h>
@@ -232,8 +232,8 @@ static void duffing_remember(duffing_history *history, const double value[duffin
     if (history->count < duffing_DIFFERENCES) ++history->count;
 }
 
-#define duffing_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
-#define duffing_LOST 0.5      /* part of the energy that one which leads farther must not lose */
+#define duffing_PLAUSIBLE 1.5         /* length of steps always accepted, in sizes of state and motion */
+#define duffing_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -252,7 +252,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
         for (int i = 0; i < duffing_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = duffing_hamiltonian(&s->params, s->t, point);
     }
-    return fabs(H[2] - H[0]) <= duffing_LOST * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
+    return fabs(H[2] - H[0]) <= duffing_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 
 /* ---- The implicit step, by Newton's method ---- */

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ca48fe33565d1673a1f1af7e69fd79176da2cfa59b82893477a74ae96af4046e
+ * body-sha256: ed4e2e6a74f6200cd442a9dd75dc1e20b6787608bea46b23b35683f2e63f4a95
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -181,10 +181,10 @@ const NEARLY_SOLVED = 1e-8;
 /** ... if one is more than this part of the one before */
 const SHRINKING = 0.25;
 
-/** How far any step may lead, in sizes of the state and of its motion */
+/** Length of steps always accepted, in sizes of state and motion */
 const PLAUSIBLE = 1.5;
-/** Part of the energy that one which leads farther must not lose */
-const LOST = 0.5;
+/** Relative change of energy in longer steps */
+const MAX_ENERGY_CHANGE = 0.5;
 
 /** How far from the last value a prediction may be, in sizes of that value */
 const REACH = 4.0;
@@ -635,7 +635,8 @@ function plausible(solver, stage, increment) {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
     return energyAt(params, solver.t, point);
   });
-  return Math.abs(after - before) <= LOST * (Math.abs(before) + Math.abs(middle) + Math.abs(after));
+  const energy = Math.abs(before) + Math.abs(middle) + Math.abs(after);
+  return Math.abs(after - before) <= MAX_ENERGY_CHANGE * energy;
 }
 
 const value = new Float64Array(1);

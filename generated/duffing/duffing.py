@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 51b640e8b87b0046d281798ae895c4acae8db63d932a228d51223abf3efe0189
+# body-sha256: 470fd55104398a4ab1795187f8c8decf84814fcd2ba04e5c71488e9b5b4ff163
 import numpy as np
 
 VERSION = "0.1.0"
@@ -209,8 +209,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # how far any step may lead, in sizes of the state and of its motion
-LOST = 0.5  # part of the energy that one which leads farther must not lose
+PLAUSIBLE = 1.5  # length of steps always accepted, in sizes of state and motion
+MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
@@ -226,8 +226,8 @@ def _plausible(stage, x, end):
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, t, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, t, at)[:, 0] for at in (x, 0.5 * (x + end), end))
-    kept = np.abs(after - before) <= LOST * (np.abs(before) + np.abs(middle) + np.abs(after))
-    return (moved <= PLAUSIBLE * size) | kept
+    energy = np.abs(before) + np.abs(middle) + np.abs(after)
+    return (moved <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
 
 
 def _solved(stage, x, carry, guess):

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: d3812d6618ff6437e80021e608ebd289203ecfec5e96f6beba5ad34e2a60e2ef
+ * body-sha256: 77a9c8080be11fd880bc29ee8f9d418f37e447c83c88df8aece89a234e46df11
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -214,8 +214,9 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
     if (history->count < guiding_centre_DIFFERENCES) ++history->count;
 }
 
-#define guiding_centre_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
-#define guiding_centre_LOST 0.5      /* part of the energy that one which leads farther must not lose */
+/* length of steps always accepted, in sizes of state and motion */
+#define guiding_centre_PLAUSIBLE 1.5
+#define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -236,7 +237,7 @@ static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
         for (int i = 0; i < guiding_centre_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = guiding_centre_hamiltonian(&s->params, point);
     }
-    return fabs(H[2] - H[0]) <= guiding_centre_LOST * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
+    return fabs(H[2] - H[0]) <= guiding_centre_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 
 /* Coefficient k of the product of two Taylor series. */

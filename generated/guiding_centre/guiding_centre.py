@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 510b1111a7bb9212ceab4c4dd6dc0188f8682705276a3b5c916c854e6e97330c
+# body-sha256: 0c2314949c9cd0542135f82be63bbe6f403360b0d752ca09969aa93fe82d4bf2
 import numpy as np
 
 VERSION = "0.1.0"
@@ -457,8 +457,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # how far any step may lead, in sizes of the state and of its motion
-LOST = 0.5  # part of the energy that one which leads farther must not lose
+PLAUSIBLE = 1.5  # length of steps always accepted, in sizes of state and motion
+MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
@@ -474,8 +474,8 @@ def _plausible(stage, x, end):
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
-    kept = np.abs(after - before) <= LOST * (np.abs(before) + np.abs(middle) + np.abs(after))
-    return (moved <= PLAUSIBLE * size) | kept
+    energy = np.abs(before) + np.abs(middle) + np.abs(after)
+    return (moved <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
 
 
 def _solved(stage, x, carry, guess):

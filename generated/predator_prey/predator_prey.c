@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: d7bee1394f59ca48d3c3681d7d77c0413662576e21452d279bfaef363cb3aa80
+ * body-sha256: 6a776038027afa6204cfe9cb43f05e83d133a9a56e7c4cf9af774c79e8def243
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -206,8 +206,9 @@ static void predator_prey_remember(predator_prey_history *history, const double 
     if (history->count < predator_prey_DIFFERENCES) ++history->count;
 }
 
-#define predator_prey_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
-#define predator_prey_LOST 0.5      /* part of the energy that one which leads farther must not lose */
+/* length of steps always accepted, in sizes of state and motion */
+#define predator_prey_PLAUSIBLE 1.5
+#define predator_prey_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -226,7 +227,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
         for (int i = 0; i < predator_prey_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = predator_prey_hamiltonian(&s->params, point);
     }
-    return fabs(H[2] - H[0]) <= predator_prey_LOST * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
+    return fabs(H[2] - H[0]) <= predator_prey_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 
 /* ---- The implicit step, by Newton's method ---- */

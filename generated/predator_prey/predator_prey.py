@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: f74321af05096d09ad087198b537cfcec456bbf894ba82b018b0fba969241765
+# body-sha256: d35bd44393f17711e8a5cea89362859624c1af656591b7a6563b8e3a69f1e37d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -203,8 +203,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # how far any step may lead, in sizes of the state and of its motion
-LOST = 0.5  # part of the energy that one which leads farther must not lose
+PLAUSIBLE = 1.5  # length of steps always accepted, in sizes of state and motion
+MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
@@ -220,8 +220,8 @@ def _plausible(stage, x, end):
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
-    kept = np.abs(after - before) <= LOST * (np.abs(before) + np.abs(middle) + np.abs(after))
-    return (moved <= PLAUSIBLE * size) | kept
+    energy = np.abs(before) + np.abs(middle) + np.abs(after)
+    return (moved <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
 
 
 def _solved(stage, x, carry, guess):

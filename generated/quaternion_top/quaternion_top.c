@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: b8532dad6f26cd74dc50c87cf595dd91e207034866f434390de701415da50d2c
+ * body-sha256: 164058b614f2bb88319535cac3e28b3ab9ab5f6dd068294885c41d3f1037b03a
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -379,8 +379,9 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
     if (history->count < quaternion_top_DIFFERENCES) ++history->count;
 }
 
-#define quaternion_top_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
-#define quaternion_top_LOST 0.5      /* part of the energy that one which leads farther must not lose */
+/* length of steps always accepted, in sizes of state and motion */
+#define quaternion_top_PLAUSIBLE 1.5
+#define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -400,7 +401,7 @@ static int quaternion_top_plausible(const quaternion_top_solver *s,
         for (int i = 0; i < quaternion_top_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = quaternion_top_hamiltonian(&s->params, point);
     }
-    return fabs(H[2] - H[0]) <= quaternion_top_LOST * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
+    return fabs(H[2] - H[0]) <= quaternion_top_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 
 /* The first coefficients of the series of a path, those of the coordinates given. */

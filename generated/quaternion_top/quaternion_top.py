@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d545c1db76d00e5906ed8c7eda862b12b9d3a84e2c8c726be67b2a97e69fa2d5
+# body-sha256: 4c17bc72419a7463bd10883683ac32b995e9edcccf53db69d93a035222754089
 import numpy as np
 
 VERSION = "0.1.0"
@@ -808,8 +808,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # how far any step may lead, in sizes of the state and of its motion
-LOST = 0.5  # part of the energy that one which leads farther must not lose
+PLAUSIBLE = 1.5  # length of steps always accepted, in sizes of state and motion
+MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
@@ -825,8 +825,8 @@ def _plausible(stage, x, end):
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
-    kept = np.abs(after - before) <= LOST * (np.abs(before) + np.abs(middle) + np.abs(after))
-    return (moved <= PLAUSIBLE * size) | kept
+    energy = np.abs(before) + np.abs(middle) + np.abs(after)
+    return (moved <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
 
 
 def _solved(stage, x, carry, guess):

@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 92472a7d47b530f4f7298979d06ac926e8d2b9c2525d98bfd671bb692d9eeed1
+ * body-sha256: 1c761fdc7c7ca6be8a1cb93f71232c4cf35f06e115ba6178afb56b54c3218403
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -631,8 +631,8 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
         rigid_body_fit(history);
 }
 
-#define rigid_body_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
-#define rigid_body_LOST 0.5      /* part of the energy that one which leads farther must not lose */
+#define rigid_body_PLAUSIBLE 1.5         /* length of steps always accepted, in sizes of state and motion */
+#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -651,7 +651,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
         for (int i = 0; i < rigid_body_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = rigid_body_hamiltonian(&s->params, point);
     }
-    return fabs(H[2] - H[0]) <= rigid_body_LOST * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
+    return fabs(H[2] - H[0]) <= rigid_body_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 
 /* ---- The implicit step, by Newton's method ---- */

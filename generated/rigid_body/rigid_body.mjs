@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e2f47e5f23f6804ca0110ba4ef76955e0d8752ecdecd70017dee4fbf8954ef91
+ * body-sha256: 4141bf7c43f0a509e7f36b6c68fc894ae8415ef1131ce85b16f2aaa8d8706a38
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -463,10 +463,10 @@ const NEARLY_SOLVED = 1e-8;
 /** ... if one is more than this part of the one before */
 const SHRINKING = 0.25;
 
-/** How far any step may lead, in sizes of the state and of its motion */
+/** Length of steps always accepted, in sizes of state and motion */
 const PLAUSIBLE = 1.5;
-/** Part of the energy that one which leads farther must not lose */
-const LOST = 0.5;
+/** Relative change of energy in longer steps */
+const MAX_ENERGY_CHANGE = 0.5;
 
 /** How far from the last value a prediction may be, in sizes of that value */
 const REACH = 4.0;
@@ -932,7 +932,8 @@ function plausible(solver, stage, increment) {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
     return energyAt(params, solver.t, point);
   });
-  return Math.abs(after - before) <= LOST * (Math.abs(before) + Math.abs(middle) + Math.abs(after));
+  const energy = Math.abs(before) + Math.abs(middle) + Math.abs(after);
+  return Math.abs(after - before) <= MAX_ENERGY_CHANGE * energy;
 }
 
 const value = new Float64Array(1);

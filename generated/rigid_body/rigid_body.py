@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 0e66f244d6f0f9c062a030368e5ea66d4d0b36f45acd4dcafe28af5c8d6ecba6
+# body-sha256: 58776aac1f699b42dc16f2d3ce7d43d779695ecaad1d6f5f959e09edbc9b6144
 import numpy as np
 
 VERSION = "0.1.0"
@@ -455,8 +455,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # how far any step may lead, in sizes of the state and of its motion
-LOST = 0.5  # part of the energy that one which leads farther must not lose
+PLAUSIBLE = 1.5  # length of steps always accepted, in sizes of state and motion
+MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
@@ -472,8 +472,8 @@ def _plausible(stage, x, end):
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
-    kept = np.abs(after - before) <= LOST * (np.abs(before) + np.abs(middle) + np.abs(after))
-    return (moved <= PLAUSIBLE * size) | kept
+    energy = np.abs(before) + np.abs(middle) + np.abs(after)
+    return (moved <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
 
 
 def _solved(stage, x, carry, guess):

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: a1d8819dbe7dc2d5593d8e1a11adef3e8308542c5da09be7b725e730d8bd5a05
+ * body-sha256: 0766d235e39cb10f8b5903ad80446eaf757380d26bc3f9815bfc3a2534ec9b83
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -259,8 +259,8 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
     return 1;
 }
 
-#define thermal_spin_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
-#define thermal_spin_LOST 0.5      /* part of the energy that one which leads farther must not lose */
+#define thermal_spin_PLAUSIBLE 1.5         /* length of steps always accepted, in sizes of state and motion */
+#define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -283,7 +283,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
         for (int i = 0; i < thermal_spin_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = thermal_spin_hamiltonian(&s->params, point);
     }
-    return fabs(H[2] - H[0]) <= thermal_spin_LOST * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
+    return fabs(H[2] - H[0]) <= thermal_spin_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 
 /* ---- The implicit step, by Newton's method ---- */

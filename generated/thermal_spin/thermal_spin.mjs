@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 544a0b92c8068858fa369eb4e62c0c90571d0f921549fdff29f3c762453fd0e5
+ * body-sha256: b2b4083d1e4c55b1b5acb8944b4c5504f46b016b42026a2e0844859336ec90b6
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -276,10 +276,10 @@ const NEARLY_SOLVED = 1e-8;
 /** ... if one is more than this part of the one before */
 const SHRINKING = 0.25;
 
-/** How far any step may lead, in sizes of the state and of its motion */
+/** Length of steps always accepted, in sizes of state and motion */
 const PLAUSIBLE = 1.5;
-/** Part of the energy that one which leads farther must not lose */
-const LOST = 0.5;
+/** Relative change of energy in longer steps */
+const MAX_ENERGY_CHANGE = 0.5;
 
 /** How far from the last value a prediction may be, in sizes of that value */
 const REACH = 4.0;
@@ -841,7 +841,8 @@ function plausible(solver, stage, increment) {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
     return energyAt(params, solver.t, point);
   });
-  return Math.abs(after - before) <= LOST * (Math.abs(before) + Math.abs(middle) + Math.abs(after));
+  const energy = Math.abs(before) + Math.abs(middle) + Math.abs(after);
+  return Math.abs(after - before) <= MAX_ENERGY_CHANGE * energy;
 }
 
 const value = new Float64Array(1);

@@ -105,8 +105,8 @@ class PredictorPolicy(Policy):
 class PlausibilityPolicy(Policy):
     """Criteria for solutions of an implicit step far from the motion: distant ones at another energy."""
 
-    plausible: float = number(1.5, "how far any step may lead, in sizes of the state and of its motion")
-    lost: float = number(0.5, "part of the energy that one which leads farther must not lose")
+    plausible: float = number(1.5, "length of steps always accepted, in sizes of state and motion")
+    max_energy_change: float = number(0.5, "relative change of energy in longer steps")
 
 
 @dataclass(frozen=True)

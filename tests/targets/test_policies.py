@@ -21,7 +21,7 @@ CASES = {
     "rigid_body": {
         "start_policy": "probe_step",
         "newton_policy": "shrinking",
-        "plausibility_policy": "lost",
+        "plausibility_policy": "max_energy_change",
         "gauge_search": "close_call",
         "tangent_policy": "tangent_solved",
     },

@@ -183,6 +183,6 @@ static int phi_plausible(const phi_solver *s PHI_AND_INT_STAGE, const double inc
         for (int i = 0; i < PHI_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = phi_hamiltonian(&s->params PHI_AND_T(s->t), point);
     }
-    return fabs(H[2] - H[0]) <= PHI_LOST * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
+    return fabs(H[2] - H[0]) <= PHI_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 #endif

@@ -1,4 +1,4 @@
-import { LOST, PLAUSIBLE } from "./plausibility_policy.mjs";
+import { MAX_ENERGY_CHANGE, PLAUSIBLE } from "./plausibility_policy.mjs";
 import { DIFFERENCES, REACH } from "./predictor_policy.mjs";
 import { DIM, FRACTIONS, energy, vectorField } from "./model.mjs";
 // #if NOISE
@@ -144,7 +144,8 @@ export function plausible(solver, stage, increment) {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
     return energyAt(params, solver.t, point);
   });
-  return Math.abs(after - before) <= LOST * (Math.abs(before) + Math.abs(middle) + Math.abs(after));
+  const energy = Math.abs(before) + Math.abs(middle) + Math.abs(after);
+  return Math.abs(after - before) <= MAX_ENERGY_CHANGE * energy;
 }
 
 const value = new Float64Array(1);
