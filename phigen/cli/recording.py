@@ -65,7 +65,7 @@ class Recorder:
         self.solver, self.experiment, self.files = solver, experiment, files
         run, parameters, names = experiment.run, experiment.parameters, solver.interface
         self.watch = Watch(self.label, compilation.system, run, parameters, experiment.rows)
-        self.sketch = Sketch(names.dimension, len(names.casimirs), experiment.rows)
+        self.sketch = Sketch(names.dimension, len(names.casimirs), experiment.rows, len(names.observables))
         self.averages = averages_of(run, len(names.observables))
         listed = [name for column in columns_of(names) for name in column.names]
         self._columns = recorded_columns(names, run.record)
@@ -172,7 +172,7 @@ class Recorder:
         self.averages.see(t, observed)
         rows = np.column_stack([*times, piece.x, energy, casimirs, piece.turned, observed])
         worked = self.watch.see(t, piece.x)
-        self.sketch.see(np.column_stack([t, piece.x, energy - worked, casimirs]))
+        self.sketch.see(np.column_stack([t, piece.x, energy - worked, casimirs, observed]))
         if "output" in self._tables:
             self._tables["output"].append(rows[:, self._places])
         self._cross(piece.crossings)
@@ -208,7 +208,8 @@ class Recorder:
         for start in range(0, len(rows), _ROWS):
             part = rows[start : start + _ROWS]
             worked = self.watch.see(part[:, 0], part[:, state])
-            samples = np.column_stack([part[:, 0], part[:, seen]])
+            observed = part[:, part.shape[1] - len(names.observables) :]
+            samples = np.column_stack([part[:, 0], part[:, seen], observed])
             samples[:, 1 + names.dimension] -= worked
             self.sketch.see(samples)
             if self.files.output and not self._goes_on(self.files.output):
@@ -284,7 +285,7 @@ class Recorder:
         """As many rows as a figure can show; ``broken`` marks the end of a run that failed."""
         names, about = self.solver.interface, self.experiment
         settings = about.h, self.steps, about.parameters
-        return self.sketch.trajectory(names.coordinates, names.casimirs, *settings, broken)
+        return self.sketch.trajectory(names.coordinates, names.casimirs, *settings, broken, names.observables)
 
     def _parts(self) -> dict[str, Any]:
         parts = {"watch": self.watch, "sketch": self.sketch, "points": self.points, "growth": self.growth}

@@ -18,6 +18,7 @@ from phigen.drawing import (
     phase_space,
     precision_curves,
     section_plane,
+    series_panels,
     tuning_curves,
 )
 from phigen.drawing.lettering import move_apart
@@ -131,7 +132,8 @@ def run_figure(
 ) -> Figure:
     """All figures of a run on one page.
 
-    The trajectory of the first method, the sections and the Lyapunov exponents if there are any, the errors of all.
+    The trajectory of the first method with its sections and observables, the errors of all methods, and the Lyapunov
+    exponents if there are any.
     """
     first = next(iter(methods.values()))
 
@@ -150,6 +152,9 @@ def run_figure(
     errors: Callable[[FigureBase], None] = partial(
         error_curves.draw_errors, methods=methods, units=units, balance=balance
     )
+    if first.observables:
+        draw_observables = partial(series_panels.draw_observables, t=first.t, observables=first.observables)
+        rows.append((series_panels.height(first.observables), [draw_observables]))
     rows.append((error_curves.height(methods), [errors]))
     if spectrum:
         rows.append((exponents.HEIGHT, [lambda part: exponents.draw_exponents(part.add_subplot(), spectrum)]))

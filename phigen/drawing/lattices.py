@@ -9,6 +9,7 @@ import numpy as np
 
 from phigen.drawing.exponents import draw_exponents
 from phigen.drawing.palette import SERIES, styled
+from phigen.drawing.series_panels import draw_series
 from phigen.drawing.shades import shades_of
 from phigen.drawing.spectra import draw_correlation, draw_spectrum
 from phigen.lattice.placing import placed
@@ -64,7 +65,7 @@ def lattice_figure(
         else:
             _draw_snapshots(part, name, run, values)
     for k, name in enumerate(observed):
-        _draw_series(parts[len(names) + k].add_subplot(), name, run.t, run.observed[:, k])
+        draw_series(parts[len(names) + k].add_subplot(), name, run.t, run.observed[:, k])
     _draw_errors(parts[len(names) + len(observed)].add_subplot(), run, errors)
     further = len(names) + len(observed) + 1
     if run.structure_factor is not None:
@@ -85,7 +86,7 @@ def series_figure(run: LatticeSeries, title: str) -> Figure:
     figure = Figure(figsize=(8.2, 1.6 * len(names) + 0.6), layout="constrained")
     figure.suptitle(title, fontsize=10)
     for axes, name in zip(np.atleast_1d(figure.subplots(len(names), 1, sharex=True)), names, strict=True):
-        _draw_series(axes, name, run.t, run.columns[name])
+        draw_series(axes, name, run.t, run.columns[name])
     return figure
 
 
@@ -191,13 +192,6 @@ def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats
         axes.set_xlabel(run.axes[-2])
     panels[0].set_ylabel(run.axes[-1])
     part.colorbar(shown, ax=list(panels), pad=0.02, label=name)
-
-
-def _draw_series(axes: Any, name: str, t: Floats, values: Floats) -> None:
-    """An observable against the time."""
-    axes.plot(t, values, color=SERIES[0], linewidth=1.0)
-    axes.set(xlabel="t", ylabel=name)
-    axes.grid(True)
 
 
 def _draw_errors(axes: Any, run: LatticeTrajectory, errors: Mapping[str, Floats]) -> None:

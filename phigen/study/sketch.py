@@ -56,13 +56,14 @@ class Thinned:
 class Sketch:
     """Rows of a run for its figures: rows at equal distances, and those with the largest errors of `WINDOWS` windows.
 
-    Rows are t, x, energy and Casimirs side by side, with their number before them. ``rows`` is how many there will be.
+    Rows are t, x, energy, Casimirs and observables side by side, with their number before them. ``rows`` is how many
+    there will be. Observables have no errors.
     """
 
-    def __init__(self, dimension: int, casimirs: int, rows: int) -> None:
+    def __init__(self, dimension: int, casimirs: int, rows: int, observables: int = 0) -> None:
         self._quantities = slice(2 + dimension, 3 + dimension + casimirs)
         self._dimension, self._of = dimension, rows
-        width = 3 + dimension + casimirs
+        width = 3 + dimension + casimirs + observables
         self._thinned = Thinned(width, ROWS)
         self._peaks: dict[str, Any] = {
             "first": np.full(width, np.nan),
@@ -82,7 +83,7 @@ class Sketch:
         self._peaks = {name: arrays[name] for name in self._peaks}
 
     def see(self, rows: Floats) -> None:
-        """Take in the next rows (rows, 2 + DIM + Casimirs): t, x, energy, Casimirs."""
+        """Take in the next rows (rows, 2 + DIM + Casimirs + observables): t, x, energy, Casimirs, observables."""
         if not len(rows):
             return
         numbered = np.column_stack([np.arange(self._thinned.seen, self._thinned.seen + len(rows)), rows])
@@ -110,6 +111,7 @@ class Sketch:
         steps: int,
         parameters: Mapping[str, float],
         broken: bool = False,
+        observables: tuple[str, ...] = (),
     ) -> Trajectory:
         """The rows that were kept, in their order; if the run is ``broken`` off, a row of NaN comes after them."""
         peaks = self._peaks["peaks"].reshape(-1, self._peaks["peaks"].shape[-1])
@@ -126,7 +128,8 @@ class Sketch:
             t=t,
             x=x,
             energy=rows[:, 1 + self._dimension],
-            casimirs=dict(zip(casimirs, values, strict=True)),
+            casimirs=dict(zip(casimirs, values[: len(casimirs)], strict=True)),
+            observables=dict(zip(observables, values[len(casimirs) :], strict=True)),
             steps=steps,
             h=h,
             parameters=parameters,

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from phigen.cli import group
 from phigen.drawing.error_curves import windowed_maxima
 from phigen.drawing.figures import (
     error_figure,
@@ -28,6 +30,16 @@ from phigen.study.lyapunov import Spectrum
 from phigen.symbolic.expression import power, symbol
 
 CASIMIR = {"C": power(symbol("x1"), 2) + power(symbol("x2"), 2) + power(symbol("x3"), 2)}
+
+SWING = """\
+phigen: 1
+name: swing
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - cos(q)
+observables: {T: p**2/2, side: sign(q)}
+runs: {a: {initial: [1, 0], step: 0.1, steps: 100}}
+"""
 
 
 def spiral(rows=50, names=("x1", "x2", "x3"), broken=None):
@@ -195,3 +207,25 @@ def test_files_of_other_kinds_are_refused(tmp_path):
 def test_section_of_an_orbit_that_closes_is_not_drawn_against_the_coordinate_of_the_section():
     points = np.array([1e-13, -1.02, 0.06]) * (1 + 1e-14 * np.arange(5)[:, None])
     assert plane_of(("m1", "m2", "m3"), points) == (1, 2)
+
+
+def test_observables_of_a_run_are_drawn_against_the_time_however_long_it_is(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("phigen.study.sketch.ROWS", 50)
+    Path("swing.yaml").write_text(SWING, encoding="utf-8")
+    drawn = []
+    monkeypatch.setattr("phigen.drawing.figures.save", lambda figure, path: drawn.append(figure))
+    for more in ([], ["--extend", "--steps", "50"]):
+        result = CliRunner().invoke(
+            group, ["run", "swing.yaml", "-t", "numpy", "-o", "a.csv", "--plot", "a.svg", *more]
+        )
+        assert result.exit_code == 0, result.output
+    rows = np.loadtxt("a.csv", delimiter=",", skiprows=1)
+    known = {t: values for t, *values in rows[:, [0, 4, 5]].tolist()}
+    panels = {axes.get_ylabel(): axes.lines[0] for axes in drawn[-1].axes if axes.get_ylabel() in ("T", "side")}
+    assert list(panels) == ["T", "side"]
+    for k, line in enumerate(panels.values()):
+        t, values = line.get_data()
+        assert len(t) >= 20
+        assert (t[0], t[-1]) == (0, pytest.approx(15.0))
+        assert values.tolist() == [known[time][k] for time in t.tolist()]
