@@ -33,6 +33,8 @@ CLEAN = (
     "study",
     "sweeping",
     "symbolic",
+    "targets/js",
+    "targets/numpy",
     "tuning",
 )
 #: Variables and arguments that name nothing. Fields of records are left to readers.

@@ -1,4 +1,4 @@
-"""A kernel as lines of assignments, with names chosen: what all printing shares."""
+"""Kernels as sequences of assignments, for the printers of all languages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from phigen.targets.names import Scope
 
 @dataclass(frozen=True)
 class Store:
-    """``array[index] = value``."""
+    """The statement ``array[index] = value``."""
 
     array: str
     index: int
@@ -24,7 +24,7 @@ class Store:
 
 @dataclass(frozen=True)
 class Code:
-    """A kernel lowered: assignments in order, then the stores of its outputs; ``used`` are its input symbols."""
+    """A lowered kernel: assignments in order, then stores of its outputs; ``used`` are the input symbols it reads."""
 
     assignments: tuple[Assignment, ...]
     stores: tuple[Store, ...]
@@ -33,13 +33,13 @@ class Code:
 
     @property
     def kept(self) -> list[int]:
-        """The entries of the workspace that it fills."""
+        """The indices of the entries of the workspace that the code assigns."""
         targets = [a.target for a in self.assignments]
         return [int(t.key[0]) for t in targets if isinstance(t, Symbol) and t.kind == WORK]
 
 
 def lower(kernel: Kernel) -> Code:
-    """The kernel as assignments and stores."""
+    """Return a kernel as assignments and stores."""
     roots = kernel.roots
     named = [e for _, e in kernel.named]
     expanded = expand_powers([*roots, *named])
@@ -60,10 +60,10 @@ def bound(
     *,
     named: bool,
 ) -> list[tuple[str, str]]:
-    """Call the inputs that are used what they are; the names of those that get one, with what they stand for.
+    """Bind the used inputs of a kernel in a scope; return the names of inputs that get a variable, and their values.
 
-    ``parameter`` is a parameter by its name, ``entry`` one of an array, or a number, by argument, place and symbol.
-    Entries that are symbols of phigen's own are read where they are, and parameters unless they are ``named``.
+    ``parameter`` prints a parameter by its name, ``entry`` an entry of an array, or a number, by argument, index and
+    symbol. Entries whose symbols are internal to phigen are printed in place; so are parameters unless ``named``.
     """
     names = []
     for argument, symbols in kernel.inputs.items():
@@ -71,20 +71,20 @@ def bound(
             if s not in code.used:
                 continue
             place = parameter(s) if argument == "params" else entry(argument, i, s)
-            own = named if argument == "params" else not (argument in SCALARS or isinstance(s, Symbol))
-            if own:
+            has_variable = named if argument == "params" else not (argument in SCALARS or isinstance(s, Symbol))
+            if has_variable:
                 names.append((scope[s], place))
             else:
                 scope.bind(s, place)
     return names
 
 
-#: Entries of an array that are zero whatever the arguments, from which on it is cleared first.
+#: Number of entries of an array that are always zero, from which on the array is cleared in one statement.
 MANY_ZEROS = 6
 
 
 def with_zeros_first(code: Code) -> Code:
-    """The same, where arrays with many zeros are cleared, and only what is not zero is stored."""
+    """Return code that clears arrays with many zeros first, and stores only their other entries."""
     zeros, sizes = Counter(s.array for s in code.stores if s.value.is_zero), Counter(s.array for s in code.stores)
     cleared = {array: sizes[array] for array, count in zeros.items() if count >= MANY_ZEROS}
     stores = tuple(s for s in code.stores if not (s.array in cleared and s.value.is_zero))
@@ -92,7 +92,7 @@ def with_zeros_first(code: Code) -> Code:
 
 
 def parts(code: Code, size: int) -> list[Code]:
-    """The code cut into pieces of at most ``size`` statements, each store as early as its value is known.
+    """Return the code in pieces of at most ``size`` statements, with each store as early as its value is known.
 
     Long functions compile in quadratic time. A temporary that a later piece reads becomes an entry of a workspace
     array, a symbol of the kind `WORK`.

@@ -1,4 +1,4 @@
-"""What a solver may have: the switches of the runtimes that lie in files, and what each asks for."""
+"""Features of solvers: the switches by which parts of the runtimes are included, with their conditions."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from phigen.targets.path import kinds, recurrences
 
 @dataclass(frozen=True)
 class Feature:
-    """A switch of a runtime: ``when`` a program has it, if it has also what it ``requires``; ``part`` is the name by
-    which users leave it out."""
+    """A switch of a runtime.
+
+    It is on if ``when`` holds for the program, if all switches that it ``requires`` are on, and if the user does not
+    leave out the part of the code named ``part``.
+    """
 
     name: str
     when: Callable[[Program], object] = lambda program: True
@@ -29,7 +32,7 @@ def _is_of(kind: StepKind) -> Callable[[Program], bool]:
     return lambda p: p.step.kind is kind
 
 
-#: What all languages know, each after what it requires.
+#: Switches of all languages; each comes after those that it requires.
 FEATURES = (
     *(Feature(kind.name.upper(), _is_of(kind)) for kind in STEP_KINDS.values() if not kind.sites),
     Feature("FRAMED", lambda p: p.step.frame),
@@ -65,9 +68,9 @@ FEATURES = (
 
 
 def switches(program: Program, further: Iterable[Feature] = ()) -> dict[str, bool]:
-    """Whether the program has each of the features, and of those that only one language knows."""
-    found: dict[str, bool] = {}
+    """Return the values of all switches for a program; ``further`` are those of one language only."""
+    values: dict[str, bool] = {}
     for feature in (*FEATURES, *further):
         asked = bool(feature.when(program)) and program.offers(feature.part)
-        found[feature.name] = asked and all(found[name] for name in feature.requires)
-    return found
+        values[feature.name] = asked and all(values[name] for name in feature.requires)
+    return values

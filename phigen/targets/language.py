@@ -1,4 +1,4 @@
-"""What printing takes of a language: formulas, and kernels that are functions of arrays, one number at a time."""
+"""Description of a language for printing: formulas, and kernels that read and write entries of arrays."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from phigen.targets.reserved import Reserved
 
 @dataclass(frozen=True)
 class Language:
-    """How a language writes the pieces of a kernel.
+    """Spelling of kernels in a language.
 
-    ``functions`` are the names of functions, or texts with ``{0}`` for the argument, those that a file defines itself
-    among them. ``declare`` and ``assign`` are statements, ``subscript`` an entry of an array whose first index is
-    ``base``, ``parameter`` a parameter of the system. ``point`` follows whole numbers. ``clear`` sets the
-    first entries of an array to zero, so many of them; without it each is stored by itself.
+    ``functions`` are the names of functions, or texts with ``{0}`` for the argument, including functions that the
+    generated file defines. ``declare`` and ``assign`` are statements, ``subscript`` is an entry of an array whose first
+    index is ``base``, ``parameter`` a parameter of the system. ``point`` follows integers. ``clear`` sets the first
+    ``{size}`` entries of an array to zero; if it is empty, each zero is stored by a statement.
     """
 
     reserved: Reserved
@@ -34,18 +34,18 @@ class Language:
     clear: str = ""
 
     def entry(self, array: str, index: int) -> str:
-        """An entry of an array, counted from 0 here."""
+        """Return the text of an entry of an array; ``index`` counts from 0."""
         return self.subscript.format(array=array, index=index + self.base)
 
     def printer(self, scope: Scope) -> Printer:
-        """Prints lowered trees with the names of a scope."""
+        """Return a printer of lowered trees with the names of a scope."""
         return Printer(lambda n: scope[n], self.functions, self.constants, self.functions["power"], self.point)
 
     def statements(self, kernel: Kernel, arrays: Mapping[str, str]) -> list[str]:
-        """The body of a kernel: its arguments are called as ``arrays`` says, entries are read and stored."""
+        """Return the statements of a kernel; ``arrays`` maps its arguments to their names in the output."""
         code = with_zeros_first(lower(kernel)) if self.clear else lower(kernel)
-        taken = [*arrays.values(), *self.functions.values()]
-        scope = Scope(self.reserved | taken)
+        used = [*arrays.values(), *self.functions.values()]
+        scope = Scope(self.reserved | used)
 
         def entry(argument: str, i: int, s: str) -> str:
             return arrays[argument] if argument in SCALARS else self.entry(arrays[argument], i)

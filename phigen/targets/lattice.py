@@ -1,4 +1,4 @@
-"""What code of lattices is told in every language."""
+"""Values of templates and switches of runtimes that lattices have in all languages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from phigen.scheme.steps import Sweeps
 
 
 def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], str]) -> dict[str, object]:
-    """What is stated of the sites and of the schedule, and what there is of it: ``listed`` writes a sequence."""
+    """Return the tables of sites, colours and flows for templates; ``listed`` prints a sequence."""
     sites, schedule = step.sites, step.schedule
     return {
         "axes": listed(sites.axes),
@@ -41,7 +41,7 @@ def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], 
 
 
 def switches(step: Sweeps) -> dict[str, bool]:
-    """The switches that all runtimes of lattices know."""
+    """Return the switches that the runtimes of lattices have in all languages."""
     return {
         "COLOURS": step.sites.colours > 1,
         "SEAMS": bool(step.sites.seams),

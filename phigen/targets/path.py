@@ -17,13 +17,13 @@ from phigen.targets.reserved import Reserved
 
 Text = Callable[[Expression], str]
 
-#: Most terms of the expansion of a path; a path that needs more is cut into pieces.
+#: Largest number of Taylor terms of a path; a path that needs more is divided into pieces.
 TERMS = 30
 
 
 @dataclass(frozen=True)
 class Syntax:
-    """How a target writes the pieces of a statement; those that say nothing, as C does."""
+    """Spelling of statements and sums in a target; the defaults are those of C."""
 
     printer: Callable[[Scope], Printer]
     slope: str  # the statement that sets coefficient k + 1 of coordinate i
@@ -36,9 +36,9 @@ class Syntax:
 
 
 def statements(program: Program, path: Recurrences, syntax: Syntax) -> dict[str, list[str]]:
-    """Statements by purpose: ``fixed`` values, ``first`` coefficients, ``rules`` for order k, ``slopes``.
+    """Return statements by purpose: ``fixed`` values, ``first`` coefficients, ``rules`` for order k, ``slopes``.
 
-    ``nodes`` set e[i], the values of the derived series at one point, and ``field`` that of ṁ; no semicolons.
+    ``nodes`` set e[i], the values of the derived series at one point, and ``field`` the value of ṁ, without semicolons.
     """
     show = syntax.printer(_scope(program, path, syntax, "s[{i}][0]"))
     show_node = syntax.printer(_scope(program, path, syntax, "e[{i}]"))
@@ -58,12 +58,12 @@ def statements(program: Program, path: Recurrences, syntax: Syntax) -> dict[str,
 
 
 def tangent_program(program: Program) -> Program:
-    """The program with the coordinates of its tangent path: the state, then its variation."""
+    """Return the program with the coordinates of its tangent path: the state, then its variation."""
     return replace(program, coordinates=(*program.coordinates, *map(variation, program.coordinates)))
 
 
 def adjoint_program(program: Program, path: PathAdjoint) -> Program:
-    """The program with the coordinates of the path that is traced back: the state, then all cotangents."""
+    """Return the program with the coordinates of the path of the reverse pass: the state, then all cotangents."""
     names = program.coordinates
     bars = [
         *map(cotangent, names),
@@ -74,14 +74,14 @@ def adjoint_program(program: Program, path: PathAdjoint) -> Program:
 
 
 def recurrences(program: Program) -> list[Recurrences]:
-    """Those of the path, of the path with its variation, and of the path traced back; none for other steps."""
+    """Return the recurrences of the path, of its tangent path and of its reverse pass, [] for steps without paths."""
     step = program.step
     back = step.back.recurrences if step.back else None
     return [path for path in (step.path, step.varied_path, back) if path]
 
 
 def kinds(path: Recurrences) -> list[str]:
-    """The kinds of sums over orders that the path needs, in a fixed order."""
+    """Return the kinds of sums over orders that the path needs, in a fixed order."""
     return [k for k in ("product", "chain", "power") if any(t.kind == k for q in path.series for t in q.terms)]
 
 

@@ -14,7 +14,10 @@ _LEAST_EXPONENT = -20
 
 
 def policies_of(program: Program) -> dict[str, Policy]:
-    """The policies by the names of their files; coordinates that keep their sign are measured each by itself."""
+    """Return the policies by the names of their files.
+
+    For coordinates that keep their sign, errors are relative to each coordinate.
+    """
     if program.step.inner_solve and program.step.inner_solve.relative:
         return {**POLICIES, "measure_policy": MeasurePolicy(floor=0.0)}
     return POLICIES
@@ -22,26 +25,26 @@ def policies_of(program: Program) -> dict[str, Policy]:
 
 @dataclass(frozen=True)
 class Spelling:
-    """How a language writes a power of two of a negative exponent, and the constants of a policy."""
+    """Spelling of constants in a language: powers of two with a negative exponent, and all constants of a policy."""
 
     power: str
     written: Callable[[list[tuple[PolicyConstant, str]]], str]
 
     def value(self, value: float) -> str:
-        """A number."""
+        """Return a number as text."""
         part, exponent = math.frexp(value)
         if part == 0.5 and exponent - 1 < _LEAST_EXPONENT:
             return self.power.format(exponent - 1)
         return repr(value).replace("e-0", "e-")
 
     def text(self, policy: Policy, omitted: Collection[str] = ()) -> str:
-        """The constants of a policy without those of the ``omitted`` names, which are declared elsewhere."""
+        """Return the declarations of the constants of a policy, without those of ``omitted`` names."""
         constants = [c for c in policy.constants() if c.name not in omitted]
         return self.written([(c, self.value(c.value)) for c in constants])
 
 
 def _c(constants: list[tuple[PolicyConstant, str]]) -> str:
-    """Real numbers as macros, so that `single` sees thresholds; whole numbers as enumerators, without a type."""
+    """Return declarations in C: macros for real numbers, which `single` adapts, and enumerators for integers."""
     whole = [(f"PHI_{c.name} = {value},", c.about) for c, value in constants if isinstance(c.value, int)]
     real = [(f"#define PHI_{c.name} {value}", c.about) for c, value in constants if isinstance(c.value, float)]
     lines = ["enum {", *(f"    {line}" for line in _aligned(whole)), "};"] if whole else []

@@ -1,7 +1,7 @@
-"""What identifiers of a language must not be: its keywords, and macros of its standard headers.
+"""Reserved identifiers of each language: its keywords, and macros of its standard headers.
 
-Macros of the headers that generated C includes break that C; those of other headers, programs that include them before
-the header of a solver. The tests take both from the compilers of the machine.
+Macros of the headers that generated C includes would break that C. Macros of other headers would break programs that
+include these before the header of a solver. The tests compare with the compilers of the machine.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Reserved:
-    """Names that a language keeps for itself: some words, and all that match a pattern. ``names | words`` has more."""
+    """Reserved names of a language: ``words``, and all names that match a ``pattern``. ``names | words`` adds words."""
 
     words: frozenset[str] = frozenset()
     pattern: re.Pattern[str] = re.compile(r"(?!)")

@@ -1,4 +1,4 @@
-"""What the templates of φ and its derivatives, and of entire functions, are filled with, in all languages."""
+"""Values of the templates of φ and its derivatives, and of entire functions, in all languages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values of the loop IR as text: what the printers of all languages share."""
+"""Values of the loop IR as text, for the printers of all languages."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ class Spelling:
 
     def __call__(self, value: ir.Value, strength: int = 0) -> str:
         """Return a value as text, in parentheses where it binds less than a strength."""
-        text, own = self._spelt(value)
-        return text if own >= strength else f"({text})"
+        text, binding = self._spelt(value)
+        return text if binding >= strength else f"({text})"
 
     def _spelt(self, value: ir.Value) -> tuple[str, int]:
         match value:
@@ -80,8 +80,8 @@ class Spelling:
             case ir.Entry(array, index):
                 return f"{self(array, _ATOM)}[{self(index)}]", _ATOM
             case ir.Binary(operator, left, right):
-                own, spelt = _STRENGTH[operator], self.dialect.operators.get(operator, operator)
-                return f"{self(left, own)} {spelt} {self(right, own + (operator != 'and'))}", own
+                level, spelt = _STRENGTH[operator], self.dialect.operators.get(operator, operator)
+                return f"{self(left, level)} {spelt} {self(right, level + (operator != 'and'))}", level
             case ir.Accumulated(start, terms):
                 return f"{self(start, 3)} + {self(terms)}", 3
             case ir.Cast(inner, kind):

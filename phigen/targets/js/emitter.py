@@ -23,7 +23,7 @@ from phigen.targets.rendering import render
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """The file name and its contents. Raises `SpecError` as `expect_offered` does."""
+    """Return the file name and its contents. Raises `SpecError` as `expect_offered` does."""
     expect_offered(program)
     body = _lattice(program, program.step.swept) if program.step.swept else _system_of_coordinates(program)
     return {f"{program.name}.mjs": sealed(header_lines(program, command), body)}
@@ -37,7 +37,7 @@ def expect_offered(program: Program) -> None:
 
 
 def _lattice(program: Program, step: Sweeps) -> str:
-    """The body of the module of a lattice."""
+    """Return the body of the module of a lattice."""
     from phigen.targets.js import lattice
 
     early = [_function(kernel) for kernel in (step.prepare, step.refresh) if kernel]
@@ -47,7 +47,7 @@ def _lattice(program: Program, step: Sweeps) -> str:
 
 
 def _system_of_coordinates(program: Program) -> str:
-    """The body of any other module."""
+    """Return the body of the module of an ordinary system."""
     step, features = program.step, switches(program)
     text, kind = STEP_MODULES[step.kind.name], step.kind.name
     modules = ["errors", "march", "solver", kind, *text.modules]
@@ -65,16 +65,16 @@ def _system_of_coordinates(program: Program) -> str:
 
 
 def _functions(program: Program) -> list[str]:
-    """Functions that the file defines itself."""
+    """Return definitions of the elementary functions that JavaScript lacks."""
     anomaly = special.calls_anomaly(program)
-    found = definitions(special.used(program), special.entire_used(program), LANGUAGE.printer, anomaly=anomaly)
+    functions = definitions(special.used(program), special.entire_used(program), LANGUAGE.printer, anomaly=anomaly)
     if special.largest_exponential(program):
-        found.append(render("js", "matrix_exponential.mjs", special.exponential_constants()).strip("\n"))
-    return found
+        functions.append(render("js", "matrix_exponential.mjs", special.exponential_constants()).strip("\n"))
+    return functions
 
 
 def _model(program: Program) -> str:
-    """What is printed of the system: constants and kernels."""
+    """Return the model: the constants and kernels of the system."""
     step = program.step
     text = STEP_MODULES[step.kind.name]
     pieces = [render("js", "system.mjs", _system(program))]
@@ -99,7 +99,7 @@ def _system(program: Program) -> Mapping[str, object]:
 
 
 def _sizes(attitude: Attitude) -> Mapping[str, int]:
-    """The numbers of arrays."""
+    """Return the sizes of the arrays of an attitude."""
     group, rate, rows = attitude.group, attitude.rate, attitude.group.rows
     covector = len(group.matrices) + 1 if attitude.exponential else 0
     return {
@@ -113,7 +113,7 @@ def _sizes(attitude: Attitude) -> Mapping[str, int]:
 
 
 def _table(program: Program) -> Mapping[str, object]:
-    """The sizes of the table of coefficients."""
+    """Return the sizes of the table of coefficients."""
     step, schedule = program.step, program.step.flow_schedule
     return {
         "middles": json.dumps(program.midpoints) if step.refresh else "",
@@ -126,7 +126,7 @@ def _table(program: Program) -> Mapping[str, object]:
 
 
 def _contents(program: Program) -> list[str]:
-    """The table of contents."""
+    """Return the lines of the comment at the head: an example of use, and the table of contents."""
     lines = [
         f"import {{ Solver, StepError }} from './{program.name}.mjs';",
         f"const solver = new Solver({{ x0: [...],{' t0,' * bool(program.time)} params: {{ ... }} }});",
@@ -138,7 +138,7 @@ def _contents(program: Program) -> list[str]:
 
 
 def _kernels(program: Program) -> list[Kernel]:
-    """The kernels that the runtime calls."""
+    """Return the kernels that the runtime calls."""
     step = program.step
     modified = [program.modified.kernel] if program.modified else []
     timed = [k for k in (program.monitor.elapsed, program.monitor.rate) if k] if program.monitor else []
@@ -150,7 +150,7 @@ def _kernels(program: Program) -> list[Kernel]:
 
 
 def _function(kernel: Kernel) -> str:
-    """A kernel as a function that fills arrays."""
+    """Return a kernel as a function that writes its outputs to arrays."""
     arrays = {argument: camel(argument) for argument in (*kernel.inputs, *(o.name for o in kernel.outputs))}
     head = f"function {camel(kernel.name)}({', '.join(arrays.values())}) {{"
     lines = [part for line in LANGUAGE.statements(kernel, arrays) for part in wrapped(line)]

@@ -1,4 +1,4 @@
-"""Functions of phigen's own in JavaScript: polynomials where these suffice, else those of Math."""
+"""Definitions of functions that JavaScript lacks: polynomials for small arguments, else formulas with Math."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from phigen.targets.rendering import render
 def definitions(
     phis: Sequence[str], entire: Sequence[str], printer: Callable[[Scope], Printer], *, anomaly: bool = False
 ) -> list[str]:
-    """The definitions of functions of `SPECIAL` and of `ENTIRE`, and of the universal anomaly of Kepler motions."""
-    found = [render("js", "phi.mjs", _phi(f)) for f in phis] + [
+    """Return the definitions of functions of `SPECIAL` and `ENTIRE`, and of the universal anomaly of Kepler motions."""
+    texts = [render("js", "phi.mjs", _phi(f)) for f in phis] + [
         render("js", "entire.mjs", _entire(f, printer)) for f in entire
     ]
-    found += [_anomaly()] if anomaly else []
-    polynomial = [render("js", "polynomial.mjs", {})] if found else []
-    return [text.strip("\n") for text in (*polynomial, *found)]
+    texts += [_anomaly()] if anomaly else []
+    polynomial = [render("js", "polynomial.mjs", {})] if texts else []
+    return [text.strip("\n") for text in (*polynomial, *texts)]
 
 
 def _anomaly() -> str:
@@ -31,7 +31,7 @@ def _anomaly() -> str:
 
 
 def _listed(numbers: Sequence[float]) -> list[str]:
-    """Numbers in lines, each with a comma after it."""
+    """Return numbers as lines of four, each number followed by a comma."""
     return [" ".join(f"{c!r}," for c in numbers[k : k + 4]) for k in range(0, len(numbers), 4)]
 
 
@@ -48,11 +48,11 @@ def _phi(function: str) -> dict[str, Any]:
 
 
 def _entire(function: str, printer: Callable[[Scope], Printer]) -> dict[str, Any]:
-    found = ENTIRE[function]
+    entire = ENTIRE[function]
     return {
         "function": function,
-        "meaning": found.meaning,
-        "radius": repr(found.radius),
-        "coefficients": _listed([float(c) for c in found.terms()]),
+        "meaning": entire.meaning,
+        "radius": repr(entire.radius),
+        "coefficients": _listed([float(c) for c in entire.terms()]),
         **special.far(function, printer, "s > 0 ? {0} : {1}"),
     }

@@ -1,4 +1,4 @@
-"""Lattices in JavaScript: kernels as loops over the sites, and the tables that the runtime goes by."""
+"""Lattices in JavaScript: kernels as loops over the sites, and the tables that the runtime reads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MODULES = ("errors", "march", "lattice", "sites")
 
 
 def modules(program: Program, step: Sweeps) -> list[str]:
-    """The modules of the runtime."""
+    """Return the names of the modules of the runtime."""
     noise = ["philox", "site_noise"] if program.noise else []
     if step.equation is None:
         return [*MODULES, *noise, "flows"]
@@ -35,22 +35,22 @@ def modules(program: Program, step: Sweeps) -> list[str]:
 
 
 def features(program: Program, step: Sweeps) -> dict[str, bool]:
-    """The switches of the runtime, those of lattices among them."""
+    """Return the switches of the runtime, including those of lattices."""
     return switches(program) | lattice.switches(step) | {"SPLIT": step.equation is None}
 
 
 def tables(program: Program, step: Sweeps) -> str:
-    """What is printed of the system beside its kernels."""
-    found = _tables(program, step)
+    """Return the constants and tables of the system."""
+    values = _tables(program, step)
     listed = [render("js", "lattice.mjs", _facts(program, step))]
-    listed += [render("js", f"{part}.mjs", found) for part in ("lattice_tables", "lattice_schedule")]
+    listed += [render("js", f"{part}.mjs", values) for part in ("lattice_tables", "lattice_schedule")]
     lines = "\n".join(listed).splitlines()
     broken = [wrapped(line, "") if line.startswith("const") else [line] for line in lines]
     return "\n".join(part for parts in broken for part in parts).replace(_FIXED, " ")
 
 
 def _facts(program: Program, step: Sweeps) -> dict[str, object]:
-    """What users see."""
+    """Return the values of the template of public constants."""
     return {
         "contents": [f" * {line}".rstrip() for line in _contents(program, step)],
         **facts(program, json.dumps, key),
@@ -99,7 +99,7 @@ def _functions(lattice: LatticeLoops) -> Iterator[ir.Function]:
 
 def _contents(program: Program, step: Sweeps) -> list[str]:
     sizes = ", ".join(f"N_{axis}" for axis in step.sites.axes)
-    given = [
+    options = [
         "x0: [...]",
         *(["t0"] if program.time else []),
         f"sizes: [{sizes}]",
@@ -109,7 +109,7 @@ def _contents(program: Program, step: Sweeps) -> list[str]:
     how = "stages, each solved by sweeps over the sites" if step.equation else "flows of parts of H"
     return [
         f"import {{ Solver, StepError }} from './{program.name}.mjs';",
-        f"const solver = new Solver({{ {', '.join(given)} }});",
+        f"const solver = new Solver({{ {', '.join(options)} }});",
         "solver.integrate(h, steps); then solver.x, .field(name), .t, .hamiltonian(), .density(), .casimirs()",
         "",
         f"Contents: the system, with its kernels; the class Solver; the sites; the step, by {how}.",

@@ -1,4 +1,4 @@
-"""What printing JavaScript takes: the language, lines that are not too wide, comments."""
+"""Printing of JavaScript: the description of the language, line breaks, comments."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ LANGUAGE = Language(
 
 
 def wrapped(statement: str, indent: str = "  ") -> list[str]:
-    """A statement in lines that are not too wide; it has no strings, so any space will do."""
+    """Return a statement in lines of limited width, broken at any space: the statement contains no strings."""
     deeper = f"{indent}  " if not indent else f"{indent}    "
     return textwrap.wrap(statement, WIDTH, initial_indent=indent, subsequent_indent=deeper, break_long_words=False)
 
 
 def camel(name: str) -> str:
-    """The name of a kernel as that of a function."""
-    return re.sub(r"_([a-z])", lambda found: found[1].upper(), name)
+    """Return the name of a kernel in camel case."""
+    return re.sub(r"_([a-z])", lambda match: match[1].upper(), name)
 
 
 def comment(text: str) -> list[str]:
-    """A sentence before a function."""
+    """Return the lines of the comment before a function."""
     said = plain(sentence(text))
     if len(said) <= WIDTH - 8:
         return [f"/** {said} */"]
@@ -48,11 +48,11 @@ def comment(text: str) -> list[str]:
 
 
 def properties(parameters: Sequence[Parameter]) -> list[str]:
-    """Parameters as a comment lists them."""
+    """Return the lines of a JSDoc comment that describe parameters."""
     kinds = [("number" if p.at == "all" else "Float64Array", p) for p in parameters]
     return [f" * @property {{{kind}}} {p.name} {plain(p.description)}".rstrip() for kind, p in kinds]
 
 
 def key(name: str) -> str:
-    """A parameter as a key of an object; this one would be taken for its prototype."""
+    """Return the name of a parameter as a key of an object; ``__proto__`` alone would set the prototype."""
     return f'["{name}"]' if name == "__proto__" else name

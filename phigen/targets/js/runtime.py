@@ -1,8 +1,8 @@
-"""The runtime of a solver in JavaScript: modules of `templates/js/runtime`, put together for one system.
+"""The runtime of a solver in JavaScript, assembled from the modules of `templates/js/runtime` for one system.
 
-They are JavaScript as they lie there. ``// #if NAME`` or ``// #if !NAME``, ``// #else`` and ``// #endif`` stand on
-lines of their own, in comments of several lines after ``*``; ``// #state copied`` stands for what
-`phigen.targets.state` lists; imports and exports are between the modules, and go.
+The modules are valid JavaScript. Lines ``// #if NAME`` or ``// #if !NAME``, ``// #else`` and ``// #endif`` include
+parts; in comments of several lines ``*`` replaces ``//``. ``// #state copied`` is replaced by the statements of
+`phigen.targets.state`. Imports and exports between the modules are removed.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ PUBLIC = ("errors", "solver", "lattice")
 
 
 def assembled(modules: list[str], features: Mapping[str, bool], policies: Mapping[str, Policy]) -> str:
-    """The modules, one after the other, as one text; before them the constants of the policies that they import."""
+    """Return the modules as one text, after the constants of the policies that they import."""
     lines = {name: _lines(name, features) for name in modules}
-    imported = {found[1]: None for each in lines.values() for line in each if (found := _IMPORT.fullmatch(line))}
+    imported = {match[1]: None for each in lines.values() for line in each if (match := _IMPORT.fullmatch(line))}
     constants = [JAVASCRIPT.text(policies[name]) for name in imported if name in policies]
     return "\n\n".join([*constants, *(_module(name, each) for name, each in lines.items())])
 
@@ -36,26 +36,26 @@ def _lines(name: str, features: Mapping[str, bool]) -> list[str]:
 
 
 def _module(name: str, lines: list[str]) -> str:
-    kept = [line for line in lines if not line.startswith("import ")]
+    code = [line for line in lines if not line.startswith("import ")]
     public = "export class" if name in PUBLIC else "\n"
-    text = "\n".join(line if line.startswith(public) else line.removeprefix("export ") for line in kept)
+    text = "\n".join(line if line.startswith(public) else line.removeprefix("export ") for line in code)
     return re.sub(r"\n{3,}", "\n\n", text).strip("\n")
 
 
 def resolved(text: str, features: Mapping[str, bool]) -> list[str]:
-    """The lines that the features ask for. KeyError for a feature that is not told."""
+    """Return the lines of a text that remain for the given features. Raises `KeyError` for an unknown feature."""
     lines, open_ = list[str](), [True]
     for line in text.splitlines():
-        found = _DIRECTIVE.fullmatch(line)
+        directive = _DIRECTIVE.fullmatch(line)
         if line.strip() == "// #state copied":
             indent = line[: line.index("/")]
             lines += [indent + statement for statement in state.copied(features)]
-        elif not found:
+        elif not directive:
             if all(open_):
                 lines.append(line)
-        elif found[1] == "if":
-            open_.append(features[found[3]] != bool(found[2]))
-        elif found[1] == "else":
+        elif directive[1] == "if":
+            open_.append(features[directive[3]] != bool(directive[2]))
+        elif directive[1] == "else":
             open_.append(not open_.pop())
         else:
             open_.pop()

@@ -1,4 +1,4 @@
-"""Attitudes in NumPy, from the states of a run."""
+"""Attitudes in NumPy, computed from the states of a run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from phigen.targets.rendering import render
 
 
 def pieces(program: Program, attitude: Attitude) -> list[str]:
-    """Attitudes: the kernels, and their use."""
+    """Return the texts of the kernels of attitudes, and of the functions that call them."""
     group, step, rows = attitude.group, program.step, attitude.group.rows
     solved = "_path(stage[0], x, solved)[1]" if step.path else "solved"
     shown = f"Attitudes have shape (rows, ..., {rows}, {rows})" if rows else "Attitudes have shape (rows, ..., 4)"
@@ -33,21 +33,21 @@ def pieces(program: Program, attitude: Attitude) -> list[str]:
     }
     turns = "TURNS = (" + ", ".join(f"_turn{k}" for k in range(1, len(attitude.turns) + 1)) + ",)\n"
     unused = attitude.turn if attitude.along else attitude.along
-    found = [function(program, kernel) for kernel in attitude.kernels if kernel is not unused]
-    found += [turns] if attitude.turns else []
-    own = ("matrices", "matrix_start") if rows else ("quaternions", "rotations", "start")
-    parts = [*(f"attitude_{part}" for part in own), "attitude", "reconstruct"]
-    return [*found, *(render("numpy", f"{part}.py", values) for part in parts)]
+    functions = [function(program, kernel) for kernel in attitude.kernels if kernel is not unused]
+    functions += [turns] if attitude.turns else []
+    templates = ("matrices", "matrix_start") if rows else ("quaternions", "rotations", "start")
+    parts = [*(f"attitude_{part}" for part in templates), "attitude", "reconstruct"]
+    return [*functions, *(render("numpy", f"{part}.py", values) for part in parts)]
 
 
 def _turn_of_stage(attitude: Attitude, solved: str) -> str:
-    """The factors of a stage, less 1."""
+    """Return the expression of the attitude increment of a stage, minus the identity."""
     turn = "_along(solved)" if attitude.along else f"_turn(stage[0], x + {solved})"
     return f"_of_covector({turn})" if attitude.group.matrices and not attitude.cayley else turn
 
 
 def _shaped(rows: int, position: bool) -> str:
-    """The arrays that users get of rows of elements."""
+    """Return the expression that reshapes rows of group elements to the arrays of attitudes and positions."""
     if rows:
         return f"elements.reshape(shape + ({rows}, {rows}))"
     if not position:
@@ -56,7 +56,7 @@ def _shaped(rows: int, position: bool) -> str:
 
 
 def _ordered(spatial: bool) -> dict[str, str]:
-    """Factors of products: later ones stand on the left where momenta are in space."""
+    """Return the factors of products in order: later ones are on the left if momenta are in space coordinates."""
     pairs = {
         "uniform_first": ("first", "_uniform(rate, t)"),
         "element_first": ("first", "element"),

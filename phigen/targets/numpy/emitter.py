@@ -16,13 +16,13 @@ from phigen.targets.rendering import render
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """The file name and its contents."""
+    """Return the file name and its contents."""
     body = _body(program)
     return {f"{program.name}.py": sealed(header_lines(program, command), body, "# ", "", "")}
 
 
 def _body(program: Program) -> str:
-    """The module without its header."""
+    """Return the module without its header."""
     if step := program.step.swept:
         from phigen.targets.numpy import lattice
 
@@ -64,7 +64,7 @@ def _body(program: Program) -> str:
 
 
 def _monitor(program: Program) -> list[str]:
-    """The time that steps take, of a monitored solver."""
+    """Return the functions that compute the physical time of steps, [] without a monitor."""
     if not program.monitor:
         return []
     kernels = [k for k in (program.monitor.elapsed, program.monitor.rate) if k]
@@ -72,14 +72,14 @@ def _monitor(program: Program) -> list[str]:
 
 
 def _tangent(program: Program) -> list[str]:
-    """The tangent map of a step, with what it needs."""
+    """Return the functions of the tangent map of a step."""
     part = functions_of(program).tangent(program, program.step)
     values = {**values_of(program), **part.values}
     return [*part.functions(program), *part.rendered(program, "tangent_"), render("numpy", "tangent.py", values)]
 
 
 def _adjoint(program: Program, adjoint: Adjoint) -> list[str]:
-    """The transpose of steps, with what it needs."""
+    """Return the functions of the reverse pass."""
     step, level = program.step, program.monitor.level if program.monitor else None
     part = functions_of(program).adjoint(program, step)
     kernels = [_with_level(k) if k is adjoint.prepare else k for k in adjoint.kernels]
@@ -91,12 +91,12 @@ def _adjoint(program: Program, adjoint: Adjoint) -> list[str]:
 
 
 def _with_level(prepare: Kernel) -> Kernel:
-    """The transpose of ``prepare`` with a second result, which is empty where no e is held."""
+    """Return the transpose of ``prepare`` with a second result, which is empty without an energy level e."""
     return replace(prepare, outputs=(*prepare.outputs, Output("gauge_bar", ()))[:2])
 
 
 def _of_pullback(program: Program, step: Step) -> dict[str, object]:
-    """What the templates of whole runs read."""
+    """Return the values of the templates of the reverse pass."""
     rows = len(step.flow_schedule.times) if step.flow_schedule else 1
     moment = ", t0 + done * h, h" if step.flow_schedule else ""
     said = "the e of a trajectory follows x0\n    and the parameters, unless a gauge is given."

@@ -1,4 +1,4 @@
-"""Functions of phigen's own in NumPy: polynomials where these suffice, else those of NumPy."""
+"""Definitions of functions that NumPy lacks: polynomials for small arguments, else formulas of NumPy's functions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from phigen.targets.rendering import render
 
 
 def called(program: Program) -> list[str]:
-    """Functions of `SPECIAL` and of `ENTIRE` that kernels call."""
+    """Return the definitions of functions of `SPECIAL` and of `ENTIRE` that kernels call."""
     phis = [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     entire = [render("numpy", "entire.py", _entire(f)) for f in special.entire_used(program)]
     anomaly = [_anomaly()] if special.calls_anomaly(program) else []
@@ -20,7 +20,7 @@ def called(program: Program) -> list[str]:
 
 
 def _exponentials(program: Program) -> list[str]:
-    """The exponential of matrices, if ``prepare`` takes some."""
+    """Return the matrix exponential, [] if ``prepare`` does not call it."""
     if not special.largest_exponential(program):
         return []
     values = {"adjoint": special.transposes_exponentials(program), **special.exponential_constants()}
@@ -28,7 +28,7 @@ def _exponentials(program: Program) -> list[str]:
 
 
 def _anomaly() -> str:
-    """The universal anomaly of Kepler motions."""
+    """Return the universal anomaly of Kepler motions."""
     c2, c3 = ([repr(float(c)) for c in reversed(series)] for series in special.stumpff())
     others = list(zip(c2[1:], c3[1:], strict=True))
     values = {"c2_last": c2[0], "c3_last": c3[0], "others": others, **special.anomaly_values()}
@@ -36,12 +36,12 @@ def _anomaly() -> str:
 
 
 def _entire(function: str) -> Mapping[str, object]:
-    found = ENTIRE[function]
-    last, *others = [repr(float(c)) for c in reversed(found.terms())]
+    entire = ENTIRE[function]
+    last, *others = [repr(float(c)) for c in reversed(entire.terms())]
     return {
         "function": function,
-        "meaning": found.meaning,
-        "radius": repr(found.radius),
+        "meaning": entire.meaning,
+        "radius": repr(entire.radius),
         "last": last,
         "others": others,
         **special.far(function, LANGUAGE.printer, "np.where(s > 0.0, {0}, {1})"),

@@ -20,7 +20,7 @@ from phigen.targets.reserved import PYTHON_RESERVED
 
 
 def function(program: Program, kernel: Kernel) -> str:
-    """A kernel as a function: from arrays with any axes before that of the coordinates to such arrays."""
+    """Return a kernel as a function of arrays with any number of axes before that of the coordinates."""
     if kernel.exponents:
         return _through_exponentials(program, kernel, kernel.exponents)
     code = lower(kernel)
@@ -36,7 +36,7 @@ def function(program: Program, kernel: Kernel) -> str:
 
 
 def _through_exponentials(program: Program, kernel: Kernel, inner: Kernel) -> str:
-    """The transpose of a kernel with exponentials: the matrices, their cotangents, and what follows from these."""
+    """Return the transpose of a kernel with matrix exponentials: functions of the matrices and of their cotangents."""
     outer = replace(kernel, name=f"{kernel.name}_of_exponents", exponentials=(), exponents=None)
     names = {i: "parameters" if i == "params" else i for i in kernel.inputs}
     matrices = f"_{inner.name}({', '.join(names[i] for i in inner.inputs)})"
@@ -83,7 +83,7 @@ def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> s
 
 
 def _state(kernel: Kernel) -> str:
-    """The argument that holds states (..., DIM), which arrays are shaped by; empty where there is none."""
+    """Return the argument that holds states (..., DIM), whose shape results have; "" if there is none."""
     others = [a for a in kernel.inputs if a not in (TABLE, "params", "gauge", *SCALARS)]
     return next((a for a in others if kernel.inputs[a] and not isinstance(kernel.inputs[a][0], Symbol)), "")
 

@@ -1,4 +1,4 @@
-"""How NumPy writes formulas."""
+"""Description of Python with NumPy as a target language."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ LANGUAGE = Language(
 
 
 def listed(items: Iterable[object]) -> str:
-    """A tuple."""
+    """Return items as the text of a tuple."""
     return "(" + "".join(f"{quoted(i) if isinstance(i, str) else repr(i)}, " for i in items).rstrip() + ")"
 
 
 def quoted(name: str) -> str:
-    """A name as a string."""
+    """Return a name in quotes."""
     return f'"{name}"'

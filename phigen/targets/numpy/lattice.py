@@ -26,7 +26,7 @@ _SERIES = ("lattice_series", "lattice_guesses", "lattice_newton")
 
 
 def body(program: Program, step: Sweeps, prepare: str) -> str:
-    """The text of the module; ``prepare`` are the functions that compute coefficients."""
+    """Return the text of the module; ``prepare`` are the functions that compute coefficients."""
     values: dict[str, object] = {
         **facts(program, listed, quoted),
         **lattice.tables(program, step, listed),
@@ -67,7 +67,7 @@ def _reductions(program: Program) -> dict[str, object]:
     """Return the rows of observables by the method of arrays that reduces them, and those that are means of bonds."""
     reductions = program.observables.reductions
     methods = ["mean" if r.kind == "mean" and r.over == "sites" else r.kind.replace("mean", "sum") for r in reductions]
-    rows = {m: [k for k, own in enumerate(methods) if own == m] for m in dict.fromkeys(methods)}
+    rows = {m: [k for k, method in enumerate(methods) if method == m] for m in dict.fromkeys(methods)}
     means = {over: [k for k, r in enumerate(reductions) if (r.kind, r.over) == ("mean", over)] for over in OVER}
     return {"reduced": [*rows.items()], "over_bonds": means["bonds"], "over_pairs": means["pairs"]}
 

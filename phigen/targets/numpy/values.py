@@ -1,4 +1,4 @@
-"""What the templates of modules in NumPy read that are not of one part of the module only."""
+"""Values that several templates of NumPy modules share."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _OF_TAU = """
 
 
 def values_of(program: Program) -> dict[str, object]:
-    """All of it, by subjects."""
+    """Return all shared values of a program."""
     said = {"title": plain(program.about.title) or program.name, **facts(program, listed, quoted)}
     policies = {name: PYTHON.text(policy) for name, policy in policies_of(program).items()}
     return {**said, **policies, **_of_fixed(program), **_of_time(program), **_of_noise(program), **_of_step(program)}
 
 
 def _of_fixed(program: Program) -> dict[str, object]:
-    """What a trajectory holds fixed, steps in tau, and runs between correctors."""
+    """Return the values for gauges, energy levels, steps in tau, and runs between correctors."""
     corrected = program.step.corrected
     return {
         "gauge": listed(program.held),
@@ -47,7 +47,7 @@ def _of_fixed(program: Program) -> dict[str, object]:
 
 
 def _of_time(program: Program) -> dict[str, object]:
-    """Where H depends on the time: arguments, and what is said of them."""
+    """Return the arguments and sentences on the time, empty if H does not depend on it."""
     time = bool(program.time)
     return {
         "time": time,
@@ -61,7 +61,7 @@ def _of_time(program: Program) -> dict[str, object]:
 
 
 def _of_step(program: Program) -> dict[str, object]:
-    """The kind of step, its coefficients and stages, and by what its equation is solved."""
+    """Return the values for the kind of step, its coefficients and stages, and the iteration that solves it."""
     step = program.step
     inner, schedule = step.inner_solve or InnerSolve(), step.flow_schedule
     longest = PathPolicy().longest_path
@@ -83,7 +83,7 @@ def _of_step(program: Program) -> dict[str, object]:
 
 
 def _of_noise(program: Program) -> dict[str, object]:
-    """What depends on whether coefficients are those of a single step, with its time or its noise."""
+    """Return the arguments and sentences on noise, and the expressions of stages that depend on time or noise."""
     noise = program.noise
     renewed, drawn = bool(program.time or noise), ["drawn(done)"] if noise else []
     now = ", ".join(["s", "t0 + done * h" if program.time else "done * h", "h", *drawn])
