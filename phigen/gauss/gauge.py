@@ -41,7 +41,7 @@ def _hessian(e: Expression, names: Sequence[str]) -> list[Expression]:
 def _projected(vector: Sequence[Expression], basis: Sequence[Sequence[Fraction]]) -> list[Expression]:
     """Return the coefficients of the element of the span of a basis that is nearest to a vector."""
     orthogonal: list[list[Fraction]] = []
-    transform: list[list[Fraction]] = []  # of the orthogonal vectors, by those of the basis
+    transform: list[list[Fraction]] = []  # coefficients of the orthogonal vectors in the basis
     for k, b in enumerate(basis):
         rest, row = list(b), [Fraction(int(i == k)) for i in range(len(basis))]
         for o, t in zip(orthogonal, transform, strict=True):

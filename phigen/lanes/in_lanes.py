@@ -169,7 +169,7 @@ def _of_newton(program: Program, step: Newton) -> Blocks | None:
 
 
 def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
-    """Return blocks of steps; where there are none, paths in the reverse pass, in double precision."""
+    """Return blocks of steps or, if there are none, paths in the reverse pass; the latter in double precision only."""
     blocks = None
     if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):
         blocks = _paths(program, step, step.lanes)

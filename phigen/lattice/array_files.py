@@ -26,7 +26,7 @@ ENDS = ("a", "b")
 
 
 @dataclass(frozen=True)
-class CsvTable:
+class NumberTable:
     """The numbers of a ``.csv`` file, and the column names of its first line, if there are any."""
 
     path: Path
@@ -79,7 +79,7 @@ def bonds_in(path: Path, parameters: Collection[str]) -> tuple[NDArray[np.int64]
     return ends.astype(np.int64), columns
 
 
-def _expect_columns(table: CsvTable, names: Sequence[str], parameters: Collection[str]) -> None:
+def _expect_columns(table: NumberTable, names: Sequence[str], parameters: Collection[str]) -> None:
     if not table.names and table.rows.shape[1] != len(ENDS):
         width = counted(table.rows.shape[1], "column")
         raise ValueError(f"{width} without names; a first line a,b,… names the ends of bonds and their parameters")
@@ -95,7 +95,7 @@ def _expect_columns(table: CsvTable, names: Sequence[str], parameters: Collectio
         raise ValueError(f"the column {shown(unknown[0])} is no parameter at bonds{hint and '; '}{hint}")
 
 
-def _table(path: Path) -> CsvTable:
+def _table(path: Path) -> NumberTable:
     with opened_text(path) as stream:
         lines: Iterator[str] = (line for line in stream if line.split("#")[0].strip())
         first = next(lines, None)
@@ -106,8 +106,8 @@ def _table(path: Path) -> CsvTable:
             names, lines = (), chain([first], lines)
         begin = next(lines, None)
         if begin is None:
-            return CsvTable(path, names, np.zeros((0, len(names))))
-        return CsvTable(path, names, np.loadtxt(chain([begin], lines), delimiter=",", ndmin=2))
+            return NumberTable(path, names, np.zeros((0, len(names))))
+        return NumberTable(path, names, np.loadtxt(chain([begin], lines), delimiter=",", ndmin=2))
 
 
 def _is_number(text: str) -> bool:

@@ -107,7 +107,7 @@ class Cell:
 
     @cached_property
     def terms(self) -> tuple[Expression, ...]:
-        """The additive terms of the density of a site, as they are written; an open end leaves out single terms."""
+        """The additive terms of the density of a site, as they are written; an open end removes single terms."""
         return tuple(self.additive_terms(self.hamiltonian))
 
     def additive_terms(self, density: Expression) -> Iterator[Expression]:

@@ -57,7 +57,7 @@ class Expansion:
         return tuple(n % size for n, size in zip(position, self.sizes, strict=True))
 
     def at(self, expression: Expression, site: Site) -> Expression | None:
-        """Return an expression of a grid, or of one site, at that site, or None if it reaches beyond an open end."""
+        """Return the value of an expression at a site, or None if the expression reaches beyond an open end."""
         values = {}
         for name, (base, offset) in self.cell.places(expression).items():
             source = self.neighbour(site, offset) if self.cell.axes else site

@@ -144,7 +144,7 @@ class _SiteEquation:
         self.gathered = merged_ends([replace(s, values={n: e for n, e in s.values.items() if n in used}) for s in sums])
 
     def _bond_forces(self) -> list[BondSum]:
-        """Return the forces of bonds on this site, which takes the end that the energy has in this part."""
+        """Return the forces of bonds on this site, at the end to which the energy of a bond belongs in this part."""
         sums, chosen = [], {ANYWHERE: "", INSIDE: "here", OUTSIDE: "there"}[self.place]
         for end in ENDS:
             coloured_end = {ANYWHERE: None, INSIDE: end, OUTSIDE: _OTHER[end]}[self.place]

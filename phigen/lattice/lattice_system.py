@@ -15,7 +15,7 @@ from phigen.spec.model import Spec
 class LatticeSystem:
     """A lattice of any size: ``spec`` is the whole file, ``cell`` holds the fields, brackets and densities of a site.
 
-    `phigen.compile` takes it, as it takes a `System`.
+    `phigen.compile` accepts a lattice like a `System`.
     """
 
     spec: Spec = field(repr=False)

@@ -127,10 +127,10 @@ def _divided(field: str, updated: Sequence[str], change: Expression) -> Expressi
 
 
 def apart(transpose: Kernel) -> tuple[Kernel, Kernel] | None:
-    """Return a transpose that recomputes as two kernels; None if the transpose reads sums over bonds or pairs.
+    """Return two kernels for a transpose that recomputes fields: one for cotangents, and one for the fields.
 
-    Only the second kernel, which recomputes, reads these sums, so they can be computed together with the cotangents
-    of bonds or pairs, by the same functions.
+    None if the cotangents depend on sums over bonds or pairs. Otherwise only the second kernel reads these sums, so
+    they can be computed together with the cotangents of bonds or pairs, by the same functions.
     """
     cotangent_outputs = tuple(o for o in transpose.outputs if o.name != UNDONE)
     state_outputs = tuple(o for o in transpose.outputs if o.name == UNDONE)

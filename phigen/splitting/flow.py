@@ -276,7 +276,7 @@ def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
 
 
 def _as_written(ring: Ring, g: Expression, solution: Solved) -> list[Expression]:
-    """Return t π∇g with g as written as the increments of shifted coordinates, if this takes fewer operations.
+    """Return the increments; those of shifted coordinates are t π∇g with g as written, if this is cheaper.
 
     An example is g = (x − y)⁴.
     """
