@@ -148,7 +148,7 @@ def rows_at(t: Floats, x: Floats, requested_times: Floats) -> Floats:
 
 
 def times(t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], more: dict[str, Any]) -> Floats | None:
-    """Return the times of states as an array (states,), for states of the given shape.
+    """Return the times ``t`` of states, whose leading axes have the given shape, as a flat array.
 
     Returns None if the Hamiltonian does not depend on the time. Then t may be the name of a parameter, and is added to
     ``more``.

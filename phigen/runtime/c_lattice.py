@@ -279,7 +279,10 @@ class CLatticeSession:
     # --- caller-driven stepping: see NAME.h
 
     def set_planes(self, first: int, planes: int) -> None:
-        """Declare that this lattice is the part from plane ``first`` on of one with ``planes`` planes; for noise."""
+        """Set the place of this part in a whole lattice, so that its sites have the random numbers of the whole.
+
+        ``first`` is the number of its first plane in the whole, which has ``planes`` planes.
+        """
         self._expect_done(self._c.set_planes(self._address, first, planes))
 
     def begin(self, h: float) -> None:

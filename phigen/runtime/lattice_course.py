@@ -48,7 +48,7 @@ class LatticeCourse:
         return math.nan
 
     def element(self) -> Floats:
-        """No numbers: lattices have no attitude."""
+        """Return an empty array, since lattices have no attitude."""
         return np.empty(0)
 
     def advance(self, h: float, steps: int) -> None:

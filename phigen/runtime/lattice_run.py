@@ -49,7 +49,7 @@ class Sink(Protocol):
 
 @dataclass
 class LatticeRun:
-    """One integration. ``rows`` takes in its rows, of which ``count`` are made, ``crossings`` those of its section."""
+    """One integration: ``rows`` stores its rows, of which ``count`` are complete, ``crossings`` those of a section."""
 
     solver: LatticeSolver
     plan: Plan

@@ -23,7 +23,9 @@ Values = Mapping[str, ArrayLike]
 
 @dataclass(frozen=True, eq=False)
 class Propagation:
-    """A run of ``steps`` steps of size ``h`` from the time ``t0`` on; with a ``stride``, of all rows of `integrate`.
+    """A run of ``steps`` steps of size ``h`` from the time ``t0`` on, as a function of initial states and parameters.
+
+    The result is the final states, or with a ``stride`` all rows of `Solver.integrate`.
 
     States have the shape (…, DIM), rows (…, rows, DIM), parameters a shape that broadcasts to (…). For a lattice DIM
     stands for (coordinates, *sizes), and parameters at sites or bonds have axes of sites or bonds after (…). ``shared``
