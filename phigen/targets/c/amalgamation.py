@@ -1,10 +1,9 @@
-"""The runtime in C, put together for one solver.
+"""Assembly of the C runtime for one solver.
 
-The files of ``templates/c/runtime`` are C99 as they lie there, with the prefix ``phi_`` and with switches and sizes
-(``PHI_BLOCKS``, ``PHI_DIM``) that a model defines. What a reader of the output should not see is resolved here, as a
-preprocessor would: ``#include "…"`` of these files, ``#if`` on switches, guards, and phrases
-(`phigen.targets.c.phrases`); so are static functions that nothing calls (`phigen.targets.c.unused`). All other
-directives stay.
+The files of ``templates/c/runtime`` are valid C99, with the prefix ``phi_`` and with switches and sizes
+(``PHI_BLOCKS``, ``PHI_DIM``) that a model defines. This module resolves, as a preprocessor would, ``#include "…"`` of
+these files, ``#if`` on switches, include guards, and phrases (`phigen.targets.c.phrases`), and removes static functions
+that nothing calls (`phigen.targets.c.unused`). Other directives remain.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from phigen.targets.c.unused import without_unused
 
 @dataclass
 class Amalgam:
-    """What is put together: ``switches`` by their names, ``printed`` files by theirs; ``headers`` of the library."""
+    """Assembly of one solver: ``switches`` and ``printed`` files by name; ``headers`` collects those of the library."""
 
     name: str
     switches: Mapping[str, bool]
@@ -39,15 +38,15 @@ class Amalgam:
 
     @property
     def left_out(self) -> dict[str, str]:
-        """The files of the runtime that the solver lacks, with their include guards."""
+        """Files of the runtime that the solver does not include → their include guards."""
         return left_out(self.switches)
 
     def text(self, file: str) -> str:
-        """The file with all that it includes and that was not included before."""
+        """Return a file with all files that it includes and that were not included before."""
         return _spaced(without_unused(self._expanded(file), f"{self.name}_"))
 
     def texts(self, header: str, code: str) -> tuple[str, str]:
-        """The same of a header and the code behind it."""
+        """Return the texts of a header and a source that includes it, as `text` does."""
         lines = [*self._expanded(header), _BEHIND, *self._expanded(code)]
         used = without_unused(lines, f"{self.name}_")
         border = used.index(_BEHIND)
@@ -59,26 +58,26 @@ class Amalgam:
             self._defined.add(file)
             return [] if done else ["", *self.printed[file].splitlines(), ""]
         lines: list[str] = []
-        own: list[str] = []
+        pending: list[str] = []
         for line in self._selected((resources.templates() / "c/runtime" / file).read_text(encoding="utf-8")):
             if line == '#include "phrases.h"':
                 continue
             if line.startswith('#include "state_'):
-                own += states.part(line.split('"')[1], self.switches)
+                pending += states.part(line.split('"')[1], self.switches)
                 continue
             if line.startswith('#include "'):
-                lines += [*self._own(own), *self._expanded(line.split('"')[1])]
-                own = []
+                lines += [*self._own(pending), *self._expanded(line.split('"')[1])]
+                pending = []
             elif line.startswith("#include <"):
                 self.headers.add(line)
             else:
-                own.append(line)
-        return [*lines, *self._own(own)]
+                pending.append(line)
+        return [*lines, *self._own(pending)]
 
     def _selected(self, text: str) -> list[str]:
-        """The lines that the switches choose."""
+        """Return the lines of a text that remain for the switches."""
         chosen: list[str] = []
-        frames: list[list[bool]] = []  # of each condition: whether it is chosen, was chosen before, is one of ours
+        frames: list[list[bool]] = []  # for each open #if: is this branch chosen, was one chosen, is it on a switch
         for line in text.splitlines():
             directive, _, condition = line.partition(" ")
             if directive in ("#if", "#ifdef", "#ifndef"):
@@ -110,16 +109,16 @@ class Amalgam:
         return holds(condition.replace("PHI_", ""), self.switches)
 
     def _own(self, lines: Sequence[str]) -> list[str]:
-        """Lines of the runtime with what macros stand for, and with the prefix of the solver."""
+        """Return lines of the runtime with macros expanded, and with the prefix of the solver."""
         lines = [line for line in lines if not self._not_called.match(line)]
         return [re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line) for line in self._macros.expanded(lines)]
 
 
-#: What is between a header and code while both are looked at together.
+#: Line between header and source while both are processed as one text.
 _BEHIND = "/* */"
 
 
 def _spaced(lines: Sequence[str]) -> str:
-    """The lines with one blank line at most between two, and none behind the name of a chapter."""
+    """Return the text of lines, with single blank lines only, and none after the title of a chapter."""
     text = re.sub(r"\n{3,}", "\n\n", "\n".join(lines))
     return re.sub(r"( ---- \*/\n)\n", r"\1", text).strip("\n") + "\n"

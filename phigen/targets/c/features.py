@@ -1,4 +1,4 @@
-"""What only a solver in C may have: what serves speed, gradients, and numbers of another size."""
+"""Features that only solvers in C have: for speed, gradients, and single precision."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _calls(lanes: Lanes | None, function: str) -> Callable[[Program], bool]:
 
 
 def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
-    """What depends on what is computed in lanes."""
+    """Yield the features that depend on the lowering to SIMD lanes."""
     blocks = lanes if isinstance(lanes, Blocks) else None
     traces = lanes if isinstance(lanes, Traces) else None
     packs = lanes if isinstance(lanes, Packs) else None
@@ -58,5 +58,5 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
 
 
 def switches(program: Program, lanes: Lanes | None) -> dict[str, bool]:
-    """Whether the program has each of the features."""
+    """Return the values of all switches of the C runtime for a program."""
     return features.switches(program, (*FEATURES, *_in_lanes(lanes)))

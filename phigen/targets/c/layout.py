@@ -1,4 +1,4 @@
-"""Lines of C that are no longer than a page is wide."""
+"""Line breaks of generated C, for lines of at most 110 columns."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ WIDTH = 110
 _BEHIND = re.compile(r"( *[^ /].*?[;,0-9A-Z]) +(/\*.*\*/)")
 _STRING = re.compile(r'"[^"]*"')
 
-#: What a level of parentheses, and of brackets, costs a place to break at, in columns: outer places are preferred.
+#: Penalty in columns of a line break inside parentheses, and inside brackets, for each level: outer ones are preferred.
 _DEPTH, _INDEX = 18, 60
 
-#: The same for operators that bind: where one of them is broken at, what it holds together falls apart.
+#: Penalty in columns of a line break at an operator: the more strongly it binds, the worse a break reads.
 _BOUND = dict.fromkeys("*/", 50) | dict.fromkeys("+-", 36) | dict.fromkeys(("<", ">", "<=", ">=", "==", "!="), 28)
 
 
 def fitted(text: str) -> str:
-    """The text with long lines of code broken, long comments wrapped anew, and comments behind code aligned."""
+    """Return the text with long lines of code broken, long comments wrapped, and trailing comments aligned."""
     return "\n".join([*_aligned(_lines(text.split("\n")))][:-1])
 
 
 def _aligned(lines: Iterable[str]) -> Iterator[str]:
-    """The lines with the comments behind successive lines of code below one another, where they fit."""
+    """Yield the lines with the trailing comments of successive lines aligned, if they fit."""
     run: list[tuple[str, str]] = []
     for line in [*lines, ""]:
-        found = _BEHIND.fullmatch(line)
-        if found:
-            run.append((found[1], found[2]))
+        match = _BEHIND.fullmatch(line)
+        if match:
+            run.append((match[1], match[2]))
             continue
         width = max((len(code) for code, _ in run), default=0)
         fits = all(width + 1 + len(said) <= WIDTH for _, said in run)
@@ -60,7 +60,7 @@ def _lines(lines: list[str]) -> Iterator[str]:
 
 
 def _statement(lines: list[str], first: int) -> int:
-    """The line in which the parentheses that are open at the end of this one are closed."""
+    """Return the number of the line in which all parentheses of a statement are closed."""
     depth = 0
     for k in range(first, len(lines)):
         code = _STRING.sub("", lines[k])
@@ -71,7 +71,7 @@ def _statement(lines: list[str], first: int) -> int:
 
 
 def comment(text: str, indent: str = "") -> list[str]:
-    """A comment, marks included, over as many lines as it needs; none is left to the mark at its end."""
+    """Return a comment, marks included, wrapped to lines; the end mark never stands alone."""
     lines = textwrap.wrap(
         text.replace(" */", "\N{NO-BREAK SPACE}*/"),
         WIDTH,
@@ -95,10 +95,10 @@ def _code(line: str) -> Iterator[str]:
     if function := _FUNCTION.fullmatch(line):
         yield from (*_code(function[1]), "{", *_code(f"    {function[2]}"), "}")
         return
-    found = re.match(r"(.*?\S)\s+(/\*.*\*/)$", line)
-    if found:
-        yield from comment(found[2], _indent(line))
-        line = found[1]
+    match = re.match(r"(.*?\S)\s+(/\*.*\*/)$", line)
+    if match:
+        yield from comment(match[2], _indent(line))
+        line = match[1]
     further = _indent(line) + "    "
     while len(line) > WIDTH:
         place = max(_places(line, len(further)), default=(0, 0))[1]
@@ -112,9 +112,9 @@ def _code(line: str) -> Iterator[str]:
 
 
 def _places(line: str, least: int) -> Iterator[tuple[int, int]]:
-    """Where the line may be broken, each place behind its worth."""
+    """Yield the columns at which a line may be broken, each after its score; the highest score is the best."""
     depth, index, head = 0, 0, re.match(r" *(for|if|while) \(", line)
-    line = _STRING.sub(lambda found: "'" * len(found[0]), line)
+    line = _STRING.sub(lambda match: "'" * len(match[0]), line)
     for k, c in enumerate(line[: WIDTH + 1]):
         depth += (c in "({") - (c in ")}")
         index += (c == "[") - (c == "]")

@@ -1,7 +1,7 @@
-"""Macros of the runtime in C that its readers need and readers of the output do not: what they stand for is put there.
+"""Expansion of the macros by which the C runtime is written, and which generated files do not contain.
 
-They are as in C, but for what has no place in the output: a line is all that they and their arguments are on; where one
-stands for nothing before a statement or a block, as does a loop that is made once, what is below it is there by itself.
+Macros are those of C, with two differences. A macro and its arguments are on one line. If a macro before a statement or
+a block is empty, such as a loop that is made once, the statement loses its indentation.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ _DEFINITION = re.compile(r"#define (\w+)(?:\(([^)]*)\))?(?: (.*))?$")
 
 @dataclass(frozen=True)
 class Macro:
-    """What ``text`` a name stands for; ``parameters`` are None where it is used without any."""
+    """A macro with its ``text``; ``parameters`` is None for a macro without a parameter list."""
 
     parameters: tuple[str, ...] | None
     text: str
 
     def of(self, arguments: Sequence[str]) -> str:
-        """The text for arguments; ValueError if they are too many or too few."""
-        given = dict(zip(self.parameters or (), arguments, strict=True))
-        return re.sub(r"\b\w+\b", lambda word: given.get(word[0], word[0]), self.text) if given else self.text
+        """Return the text for given arguments. Raises `ValueError` if their number is wrong."""
+        values = dict(zip(self.parameters or (), arguments, strict=True))
+        return re.sub(r"\b\w+\b", lambda word: values.get(word[0], word[0]), self.text) if values else self.text
 
 
 @dataclass
@@ -34,27 +34,27 @@ class Macros:
     _known: dict[str, Macro] = field(default_factory=dict)
 
     def define(self, line: str) -> None:
-        """Keep the macro, if the line defines one."""
-        if found := _DEFINITION.match(line):
-            self._known[found[1]] = Macro(tuple(found[2].split(", ")) if found[2] else None, found[3] or "")
+        """Add the macro that a line defines, if it defines one."""
+        if match := _DEFINITION.match(line):
+            self._known[match[1]] = Macro(tuple(match[2].split(", ")) if match[2] else None, match[3] or "")
 
     def expanded(self, lines: Sequence[str]) -> list[str]:
-        """The lines with what macros stand for; ValueError where one lacks arguments."""
+        """Return lines with macros expanded. Raises `ValueError` if a macro lacks arguments."""
         nothing = [name for name, macro in self._known.items() if macro == Macro(None, "")]
         lines = _without_heads(lines, nothing)
         expanded = [(line, self._line(line)) for line in lines]
         return [text for line, text in expanded if text or not line]  # a statement that is nothing leaves no line
 
     def _line(self, line: str) -> str:
-        """The line with what macros stand for. A comma, or nothing, has no blank before it."""
+        """Return a line with macros expanded, without spaces before a comma or an empty expansion."""
         at = 0
-        while found := _NAME.search(line, at):
-            macro = self._known.get(found[0])
-            at = found.end()
+        while match := _NAME.search(line, at):
+            macro = self._known.get(match[0])
+            at = match.end()
             if macro is None:
                 continue
             arguments, after = ([], at) if macro.parameters is None else _arguments(line, at)
-            text, at = macro.of(arguments), found.start()
+            text, at = macro.of(arguments), match.start()
             before = line[:at].rstrip(" ") if text[:1] in ("", ",") else line[:at]
             line, at = before + text + line[after:], len(before)
         return line

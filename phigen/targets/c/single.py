@@ -37,21 +37,21 @@ _LEAST, _MOST = 2.0**-126, (2.0 - 2.0**-23) * 2.0**127
 
 
 def single(text: str) -> str:
-    """C in double precision, rewritten."""
+    """Return C in single precision from C in double precision."""
     return "".join(_rewritten(text))
 
 
 def _rewritten(text: str) -> Iterator[str]:
     naming = False  # whether this is the line of a #define
-    for found in _TOKEN.finditer(text):
-        token, kind = found[0], found.lastgroup
-        if found["real"] and not found["suffix"]:
-            token = found["real"]
+    for match in _TOKEN.finditer(text):
+        token, kind = match[0], match.lastgroup
+        if match["real"] and not match["suffix"]:
+            token = match["real"]
             value = float.fromhex(token) if token.startswith("0x") else float(token)
             yield literal(threshold(value) if naming and 0.0 < value < _THRESHOLD else value)
         elif kind == "name" and token in _NAMES:
             yield _NAMES[token]
-        elif kind == "name" and _FUNCTION.fullmatch(token) and text.startswith("(", found.end()):
+        elif kind == "name" and _FUNCTION.fullmatch(token) and text.startswith("(", match.end()):
             yield f"{token}f"
         else:
             naming = (naming or token == "define") and "\n" not in token
@@ -59,12 +59,12 @@ def _rewritten(text: str) -> Iterator[str]:
 
 
 def threshold(value: float) -> float:
-    """Of the digits of float the part that ``value`` is of those of double."""
+    """Return the threshold in single precision that has the same share of the digits as ``value`` in double."""
     return float(f"{value**DIGITS:.0e}")
 
 
 def literal(value: float) -> str:
-    """The shortest literal of the nearest float; numbers that are too small or large for one are at its limits."""
+    """Return the shortest literal of the nearest float; values beyond the range of floats become its limits."""
     if value:
         value = min(max(value, _LEAST), _MOST)
     nearest = struct.unpack("f", struct.pack("f", value))[0]

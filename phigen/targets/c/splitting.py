@@ -18,32 +18,32 @@ from phigen.targets.rendering import render
 
 
 def sizes(step: Splitting) -> list[tuple[str, int, str]]:
-    """The constants of a splitting."""
-    found = [("ROWS_OF_FLOWS", len(step.schedule.times), "times of flows in a step, each with its coefficients")]
-    found.append(("ROW", max(1, step.row), "coefficients for one of them"))
+    """Return the constants of a splitting: name, value and comment."""
+    constants = [("ROWS_OF_FLOWS", len(step.schedule.times), "times of flows in a step, each with its coefficients")]
+    constants.append(("ROW", max(1, step.row), "coefficients for one of them"))
     flows = len(step.schedule.flows_of_run)
     said = "in a run of one step" if step.schedule.begin else "in a step"
-    return found + ([("FLOWS", flows, said)] if step.tangents or step.adjoint else [])
+    return constants + ([("FLOWS", flows, said)] if step.tangents or step.adjoint else [])
 
 
 def printed(program: Program, step: Splitting) -> str:
-    """The flows, and one step."""
-    found = [function(program, replace(step.prepare, name="prepare_row"))]
-    found += [function(program, step.refresh, name="at_step" if program.noise else "at_time")] if step.refresh else []
+    """Return the functions of the flows, and of one step."""
+    texts = [function(program, replace(step.prepare, name="prepare_row"))]
+    texts += [function(program, step.refresh, name="at_step" if program.noise else "at_time")] if step.refresh else []
     more = f", double element[{program.name}_ELEMENT]" if program.attitude else ""
     for k, flow in enumerate(program.attitude.turns if program.attitude else step.flows, 1):
         kernel, values = _flow(program, flow, k)
         text = function(program, kernel, functions=_functions(program))
         # With an element compilers would find it too long to be put into its only callers.
-        found.append(_linked(text, "static inline") if more else text)
-        found.append(render("c", "flow.c", {**values, "more": more}))
+        texts.append(_linked(text, "static inline") if more else text)
+        texts.append(render("c", "flow.c", {**values, "more": more}))
     along = _along(program)
     arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"
     passed = _moves(bool(program.attitude))
-    kept = f", double (*kept)[{program.dimension}]" if step.adjoint else ""
-    found.append(_steps(program, step, "", "static inline ", arguments + more + kept, passed, kept=bool(kept)))
-    found += [_corrector(program, step.schedule, along)] if step.schedule.begin else []
-    return "\n".join(found)
+    stored = f", double (*kept)[{program.dimension}]" if step.adjoint else ""
+    texts.append(_steps(program, step, "", "static inline ", arguments + more + stored, passed, kept=bool(stored)))
+    texts += [_corrector(program, step.schedule, along)] if step.schedule.begin else []
+    return "\n".join(texts)
 
 
 def _corrector(program: Program, schedule: Schedule, along: int) -> str:
@@ -56,22 +56,22 @@ def _corrector(program: Program, schedule: Schedule, along: int) -> str:
 
 
 def in_lanes(program: Program, step: Splitting, form: str, functions: Mapping[str, str]) -> list[str]:
-    """Steps of the members of packs, which call ``functions``; ``form`` is added to the names."""
-    found = []
+    """Return the step of packs of members, which calls ``functions``; ``form`` is added to the names."""
+    texts = []
     for k, flow in enumerate(step.flows, 1):
         kernel, values = _flow(program, flow, k)
         kernel = replace(kernel, name=kernel.name + form)
-        found.append(function(program, kernel, lanes=True, alike=["coef"], functions=functions))
-        found.append(render("c", "flow.c", {**values, "form": f"{form}_lanes"}))
+        texts.append(function(program, kernel, lanes=True, alike=["coef"], functions=functions))
+        texts.append(render("c", "flow.c", {**values, "form": f"{form}_lanes"}))
     arguments = f"int row, int own, {program.name}_group *group"
     linkage = f"{program.name}_IN_PLACE static inline "
-    return [*found, _steps(program, step, f"{form}_lanes", linkage, arguments, "own, group")]
+    return [*texts, _steps(program, step, f"{form}_lanes", linkage, arguments, "own, group")]
 
 
 def tangent(program: Program, step: Splitting) -> str:
-    """The derivatives of the flows."""
+    """Return the derivatives of the flows."""
     count, flows, turned = len(step.flows), step.schedule.flows_of_run, bool(program.attitude)
-    own = {
+    values = {
         "turned": turned,
         "moves": _moves(turned),
         "NAME": program.name,
@@ -82,51 +82,53 @@ def tangent(program: Program, step: Splitting) -> str:
         "part_of": ", ".join(str(part + 1) for part, _ in flows),
         "row_of": ", ".join(str(row) for _, row in flows),
     }
-    found = [function(program, kernel, functions=_functions(program)) for kernel in step.tangents]
-    return "\n".join([*found, render("c", "tangent_flows.c", own)])
+    texts = [function(program, kernel, functions=_functions(program)) for kernel in step.tangents]
+    return "\n".join([*texts, render("c", "tangent_flows.c", values)])
 
 
 def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
-    """The transposes of the flows."""
-    flows, (kernels, own) = step.schedule.flows, _transposed(program, step, adjoint.steps)
-    own["part_of"] = ", ".join(str(part + 1) for part, _ in flows)
-    own["row_of"] = ", ".join(str(row) for _, row in flows)
-    own["unused"] = not any(kernel.outputs[1].values for kernel in kernels)
-    found = [function(program, kernel, functions=_functions(program)) for kernel in kernels]
-    return "\n".join([*found, render("c", "adjoint_flows.c", own)])
+    """Return the transposes of the flows."""
+    flows, (kernels, values) = step.schedule.flows, _transposed(program, step, adjoint.steps)
+    values["part_of"] = ", ".join(str(part + 1) for part, _ in flows)
+    values["row_of"] = ", ".join(str(row) for _, row in flows)
+    values["unused"] = not any(kernel.outputs[1].values for kernel in kernels)
+    texts = [function(program, kernel, functions=_functions(program)) for kernel in kernels]
+    return "\n".join([*texts, render("c", "adjoint_flows.c", values)])
 
 
 def adjoint_in_lanes(
     program: Program, step: Splitting, back: Sequence[Kernel], near: Mapping[str, str], far: Mapping[str, str]
 ) -> list[str]:
-    """Those of members of packs, which call the functions ``near``; where that makes a difference, also by those that
-    are for large arguments, ``far``."""
-    kernels, own = _transposed(program, step, back)
-    found = []
+    """Return the transposes of the flows of packs, which call the small-argument functions ``near``.
+
+    Flows that call such functions have a second version with the full-range functions ``far``.
+    """
+    kernels, values = _transposed(program, step, back)
+    texts = []
     for kernel in kernels:
         text = function(program, kernel, lanes=True, functions=near)
-        found.append(_linked(text, f"{program.name}_IN_PLACE static inline"))
+        texts.append(_linked(text, f"{program.name}_IN_PLACE static inline"))
         if reaches_far(kernel):
             text = function(program, replace(kernel, name=f"{kernel.name}_far"), lanes=True, functions=far)
-            found.append(_linked(text, f"{program.name}_APART static"))
-    own["more"] = ", before" * any(len(kernel.outputs) > 2 for kernel in kernels)
-    own["undone"] = any(len(kernel.outputs) > 2 for kernel in kernels)
-    own["linear"] = not any(_read(kernel) for kernel in kernels)
-    return [*found, render("c", "adjoint_flows_lanes.c", own)]
+            texts.append(_linked(text, f"{program.name}_APART static"))
+    values["more"] = ", before" * any(len(kernel.outputs) > 2 for kernel in kernels)
+    values["undone"] = any(len(kernel.outputs) > 2 for kernel in kernels)
+    values["linear"] = not any(_read(kernel) for kernel in kernels)
+    return [*texts, render("c", "adjoint_flows_lanes.c", values)]
 
 
 def _linked(text: str, linkage: str) -> str:
-    """A function where compilers are told whether to put it into its only caller."""
+    """Return a function with another linkage, which tells compilers whether to inline it."""
     return text.replace("\nstatic void", f"\n{linkage} void")
 
 
 def reaches_far(kernel: Kernel) -> bool:
-    """Whether there is another way in lanes to compute a kernel where arguments are large."""
+    """Whether a kernel has a second version in lanes, with full-range functions for large arguments."""
     return not operations([kernel]).isdisjoint(SMALL_ARGUMENT_FUNCTIONS)
 
 
 def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tuple[list[Kernel], dict[str, object]]:
-    """The transposes of the flows without what they do not reach, and what the templates read."""
+    """Return the transposes of the flows without outputs that are always zero, and the values of the templates."""
     kernels, parts = [], []
     for k, kernel in enumerate(back, 1):
         reached = [[i for i, e in enumerate(o.values) if not e.is_zero] for o in kernel.outputs]
@@ -142,15 +144,15 @@ def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tu
 
 
 def _read(kernel: Kernel) -> list[tuple[int, int]]:
-    """Which coordinates of the state a kernel reads, in runs: the first, and how many."""
+    """Return the coordinates of the state that a kernel reads, as runs: the first of each, and their number."""
     used = {s for e in kernel.roots for s in symbols_of(e)}
     places = [i for i, s in enumerate(kernel.inputs["state"]) if s in used]
     runs = groupby(places, key=lambda i: i - places.index(i))
-    return [(of[0], len(of)) for _, found in runs for of in [list(found)]]
+    return [(of[0], len(of)) for _, run in runs for of in [list(run)]]
 
 
 def _moves(turned: bool) -> str:
-    """What a flow moves, as its arguments."""
+    """Return the arguments of a flow that it updates."""
     return "x, moved, start" + ", element" * turned
 
 
