@@ -78,7 +78,9 @@ terms: 2
 monitor: 1/(1 + p**2)
 adjoint: true
 modified_hamiltonian: 0
-runs: {a: {initial: [1, 0], step: 0.1, steps: 10, exact: {q: x0_q}}}
+runs:
+  a: {initial: [1, 0], step: 0.1, steps: 10, exact: {q: x0_q}}
+  b: {initial: [1, 0], step: 0.1, steps: 5, at: [0.2]}
 """,
     "splitting": """\
 phigen: 1

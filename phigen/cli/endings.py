@@ -85,25 +85,34 @@ def timed(experiment: E, solver: AnySolver, every: float | None = None, at: str 
     """The experiment with the times of the states that are stored: every so often, or those listed, up to the end."""
     if every is None and at is None and experiment.run.every is not None:
         every = float(experiment.run.every)
-    if every is None and at is None:
+    listed = _listed(at) if at is not None else [float(t) for t in experiment.run.at] if every is None else []
+    if every is None and not listed:
         return experiment
     if experiment.end is None and solver.interface.monitored:  # how much time its steps take, they tell
         whole = after_steps(experiment.begun(solver), experiment.h, experiment.run.steps)
         experiment = replace(experiment, end=whole)
-    times = _regular(experiment, solver, every) if every is not None else _chosen(experiment, solver, str(at))
+    times = (
+        _regular(experiment, solver, every)
+        if every is not None
+        else _chosen(experiment, solver, listed, at is not None)
+    )
     return replace(experiment, times=tuple(times))
 
 
-def _chosen(experiment: Experiment, solver: AnySolver, at: str) -> list[float]:
-    """The times that are listed, in the order in which they come, none of them the start or beyond a stop."""
+def _chosen(experiment: Experiment, solver: AnySolver, times: list[float], asked: bool) -> list[float]:
+    """The times that are listed, in the order in which they come, none of them the start or beyond a stop.
+
+    Those of the command line, if they are ``asked`` for there, are before the end; those of the spec are left out
+    beyond another end than that of the run.
+    """
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
-    times = _listed(at)
     beyond = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]
     stopped = experiment.end is not None and experiment.end.stopped
-    outside = [t for t in times if (t - begin) * sign < 0] + ([] if stopped else beyond)
-    if outside:
+    before = [t for t in times if (t - begin) * sign < 0]
+    outside = before + ([] if stopped else beyond)
+    if outside and asked:
         raise click.BadParameter(f"{outside[0]!r} is not between {begin!r} and {end!r}", param_hint="--at")
-    times = sorted({*times} - {begin, *beyond}, reverse=sign < 0)
+    times = sorted({*times} - {begin, *before, *beyond}, reverse=sign < 0)
     _expect_whole(experiment, solver, times, "--at")
     return times
 

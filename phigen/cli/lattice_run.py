@@ -78,6 +78,8 @@ def run_lattice(
     if extend:
         if output is None or not output.exists():
             raise click.UsageError("--extend continues a finished run: name its file by --output")
+        if output.suffix.lower() == ".zarr":
+            raise click.UsageError("--extend continues .npz and .csv files; a .zarr is written as a whole")
         experiment = extended(experiment, output, solver)
     experiment = timed(ended(experiment, solver, console), solver, every, at)
     whole, failure = _integrated(console, experiment, solver, output, section, resume=resume)

@@ -70,6 +70,7 @@ def _run(material: Material) -> Iterator[Markup]:
     start, end = (_values(dict(zip(first.coordinates, first.x[row].tolist(), strict=True))) for row in (0, last))
     stored = "all stored" if run.stride == 1 else f"one in {run.stride} stored"
     stored = stored if run.every is None else f"states stored at times {float(run.every):.9g} apart"
+    stored = f"states stored at {len(run.at)} given times" if run.at else stored
     pairs = [("run", run.name), ("start", start)]
     if run.description:
         pairs.insert(1, ("description", run.description))

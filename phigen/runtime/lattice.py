@@ -526,16 +526,16 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
     def _plan_of(self, run: Run, at: Beginning, retry: int) -> Plan:
         """The plan of a run of the spec, from a start that has been checked."""
-        if retry or run.every is not None:
+        if retry or run.is_timed:
             arguments.expect_no_noise("retry" if retry else "every", self.interface)
         end = None
         if run.stop is not None or run.until is not None:
             stop = self.function(run.stop, at.values) if run.stop is not None else None
             end = runs.end_of(ObservedCourse.begun(self, at, retry), run, stop, timed=bool(self.interface.time))
         rows = strided(at.h, run.steps, run.stride, end)
-        if run.every is not None:
+        if run.is_timed:
             span = at.h * run.steps if end is None else end.span
-            rows = timed(at.h, run.steps, runs.spans_of(float(run.every), span), end)
+            rows = timed(at.h, run.steps, runs.spans_of_run(run, span), end)
         return Plan(at, rows, at.t0, retry, self.section_of(run, at.values), self.transforms_of(run))
 
     def function(self, expression: Expression, values: Mapping[str, Any]) -> Function:

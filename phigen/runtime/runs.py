@@ -67,12 +67,12 @@ def changed(spec: Spec, run: Run, settings: Settings) -> Run:
     if run.until is not None and (run.until - run.start) / run.step <= 0:
         raise ValueError(f"until = {float(run.until)!r} is never reached by steps of {float(run.step)!r}")
     if settings.stride is not None:
-        run = replace(run, stride=arguments.count(settings.stride, "stride", 1), every=None)
+        run = replace(run, stride=arguments.count(settings.stride, "stride", 1), every=None, at=())
     if settings.every is not None:
         every = _number(settings.every, "every")
         if every <= 0:
             raise ValueError(f"every must be positive, not {settings.every!r}")
-        run = replace(run, every=every)
+        run = replace(run, every=every, at=())
     return _resized(spec, run, settings.sizes)
 
 
@@ -118,6 +118,14 @@ def spans_of(every: float, span: float) -> list[float]:
     return [k * math.copysign(every, span) for k in range(1, count)]
 
 
+def spans_of_run(run: Run, span: float) -> list[float]:
+    """Return the times from the start to the rows of a run with ``every`` or ``at``, before the end of a span."""
+    if run.every is not None:
+        return spans_of(float(run.every), span)
+    asked = [float(time - run.start) for time in run.at]
+    return [s for s in asked if 0 < s / span < 1 - EQUAL]
+
+
 def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
     """Yield a session at each row of a run up to its end, the start first, with the steps made, the last one in part.
 
@@ -125,7 +133,7 @@ def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, flo
     the next. Raises `BackendError`.
     """
     yield session, 0.0
-    yield from _timed_rows(session, run, end) if run.every is not None else _strided_rows(session, run, end)
+    yield from _timed_rows(session, run, end) if run.is_timed else _strided_rows(session, run, end)
     session.advance(float(run.step), end.steps - session.steps)
     yield end.finish(session)
 
@@ -138,10 +146,12 @@ def _strided_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Sessio
 
 
 def _timed_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield the states at multiples of ``every`` before the end, each by a part of a step from the step before it."""
-    assert run.every is not None
+    """Yield the states at the multiples of ``every``, or the times of ``at``, before the end.
+
+    Each is reached by a part of a step from the step before it.
+    """
     h = float(run.step)
-    for span in spans_of(float(run.every), end.span):
+    for span in spans_of_run(run, end.span):
         passed = session.time() if math.isfinite(session.time()) else session.steps * h
         steps, left = steps_until(session, h, span - passed)
         session.advance(h, steps)

@@ -170,7 +170,7 @@ class Solver(Named[Backend, Interface]):
         values |= arguments.together(parameters, more)
         t0 = float(chosen.start) if self.interface.time else None
         drawn = {"seed": chosen.seed if seed is None and self.interface.noise else seed}
-        if chosen.stop is None and chosen.every is None:
+        if chosen.stop is None and not chosen.is_timed:
             length: dict[str, Any] = {"steps": chosen.steps} if chosen.until is None else {"until": float(chosen.until)}
             return self.integrate(
                 start, float(chosen.step), stride=chosen.stride, t0=t0, seed=drawn["seed"], progress=progress,

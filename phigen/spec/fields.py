@@ -321,6 +321,7 @@ RUN = Record(
             default=1,
         ),
         Field("every", CONSTANT, "the time from one stored state to the next, instead of the stride"),
+        Field("at", ListOf(CONSTANT, least=1), "the times of the stored states, instead of the stride"),
         Field("parameters", MapOf(NAME, VALUES), "parameter values that differ from the defaults"),
         Field("exact", FORMULAS, "closed form by coordinate, in t and x0_NAME for initial values"),
         Field("compare", ListOf(Choice(CLASSICAL_METHODS)), "classical methods to compare with"),

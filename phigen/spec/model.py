@@ -243,10 +243,16 @@ class Run:
     until: Fraction | None = None  # the physical time where it ends, by a part of a step
     every: Fraction | None = None  # of physical time between rows that are stored, in place of the stride
     average: AverageChoice = AverageChoice()
+    at: tuple[Fraction, ...] = ()  # the times of rows, in place of the stride
     stop: Expression | None = None  # it ends where this passes through 0
     record: tuple[str, ...] = ()  # columns of the output: state, energy, Casimirs, observables; all by default
     description: str = ""
     lattice: LatticeRun | None = None
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether rows are at given times, not after given steps."""
+        return self.every is not None or bool(self.at)
 
     @property
     def records_numbers(self) -> bool:

@@ -52,6 +52,7 @@ def run(
         _fail(name, "every", f"every: {raw['every'].text} is not positive", declared)
     elif every is not None and "stride" in raw:
         _fail(name, "every", "every and stride exclude each other", declared, "give one of them")
+    listed = _times(name, raw, start, until, step, steps, declared)
     if "direction" in raw and "section" not in raw:
         example = "x1" if declared.lattice is None else "M"
         hint = f"section: {example} records where {example} passes through 0"
@@ -78,12 +79,39 @@ def run(
         duration=duration,
         until=until,
         every=every,
+        at=listed,
         stop=_crossed(name, "stop", raw, declared, replace(watched, piecewise=True)),
         average=_average(raw.get("average"), declared),
         record=_recorded(name, raw.get("record"), declared, recordable),
         description=raw.get("description", ""),
         lattice=replace(lattice, arrays=arrays) if lattice else None,
     )
+
+
+def _times(
+    name: str,
+    raw: Mapping[str, Any],
+    start: Fraction,
+    until: Fraction | None,
+    step: Fraction | None,
+    steps: int | None,
+    declared: Declarations,
+) -> tuple[Fraction, ...]:
+    """The times of ``at``, each once, in the order in which they come."""
+    nodes = raw.get("at") or ()
+    if nodes and (other := next((key for key in ("every", "stride") if key in raw), None)):
+        _fail(name, "at", f"at and {other} exclude each other", declared, "give one of them")
+    end = until if until is not None else start + step * steps if step and steps else None
+    times = []
+    for node in nodes:
+        time = declared.number(node, declared.numbers())
+        if time is None or node is None:
+            continue
+        if end is not None and not min(start, end) <= time <= max(start, end):
+            span = f"between {float(start):.9g} and {float(end):.9g}"
+            declared.reader.error(node, f"at: {node.text} is not {span}, where the run begins and ends")
+        times.append(time)
+    return tuple(sorted(set(times), reverse=step is not None and step < 0))
 
 
 def _fail(name: str, key: str, message: str, declared: Declarations, hint: str = "") -> None:

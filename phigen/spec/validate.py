@@ -166,7 +166,7 @@ NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "adjoint": ((False,), "it is not offered", ""),
 }
 #: Keys of runs that it excludes, and those that mean nothing without it.
-NOT_IN_NOISY_RUNS, IN_NOISY_RUNS = ("exact", "compare", "section", "stop", "every"), ("seed", "members")
+NOT_IN_NOISY_RUNS, IN_NOISY_RUNS = ("exact", "compare", "section", "stop", "every", "at"), ("seed", "members")
 
 
 def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reader) -> None:

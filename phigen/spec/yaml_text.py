@@ -190,6 +190,8 @@ def _run(run: Run) -> Iterator[str]:
     yield f"  steps: {run.steps}" if run.until is None else f"  until: {_number(run.until)}"
     if run.every is not None:
         yield f"  every: {_number(run.every)}"
+    elif run.at:
+        yield f"  at: [{', '.join(map(_number, run.at))}]"
     elif run.stride != 1:
         yield f"  stride: {run.stride}"
     if run.start:

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from interrupting import interrupted
 
+from phigen import compile as compiled
+from phigen import spec as specs
+
 SWING = """phigen: 1
 name: swing
 coordinates: [q, p]
@@ -18,6 +21,8 @@ runs:
   steps: {initial: [1, 0], step: 0.1, steps: 60}
   until: {initial: [1, 0], step: 0.1, until: 6.05, stride: 10}
   stopped: {initial: [1, 0], step: 0.1, steps: 100, stop: q - 1/2, every: 0.3}
+  listed: {initial: [1, 0], step: 0.1, until: 2.05, at: [1.3, 0.25, 2]}
+  past: {initial: [1, 0], step: -0.1, steps: 20, at: [-1.33, -0.5], stop: q}
   back: {initial: [0, 1], step: -0.1, steps: 100, stop: q}
   never: {initial: [1, 0], step: 0.1, steps: 20, stop: q - 2}
   falling: {initial: [1, 0], step: 0.1, steps: 140, section: p, direction: falling}
@@ -438,3 +443,17 @@ def test_what_does_not_fit_is_told(phigen, write):
     for option in ("--until", "--steps"):
         done = phigen("run", swing, option, 10**16, "-t", "numpy")
         assert (done.exit_code, "more than the limit of 1000000000000" in done.stderr) == (3, True), done.stderr
+
+
+def test_times_of_a_spec_are_those_of_the_command_line(phigen, swing):
+    ran(phigen, swing, "--run", "listed", "-o", "a.csv")
+    ran(phigen, swing, "--run", "until", "--until", "2.05", "--at", "1.3,0.25,2", "-o", "b.csv")
+    rows = table("a.csv")
+    assert rows[:, 0] == pytest.approx([0, 0.25, 1.3, 2, 2.05], rel=1e-14)
+    np.testing.assert_array_equal(rows, table("b.csv"))
+    ran(phigen, swing, "--run", "past", "-o", "c.csv")  # its stop at -pi/2 comes after both
+    assert table("c.csv")[:, 0] == pytest.approx([0, -0.5, -1.33, -np.pi / 2], abs=1e-11)
+    solver = compiled(specs.load(str(swing)), target="numpy")
+    assert solver.run("listed").t == pytest.approx([0, 0.25, 1.3, 2, 2.05], rel=1e-14)
+    assert solver.run("past").t == pytest.approx([0, -0.5, -1.33, -np.pi / 2], abs=1e-11)
+    np.testing.assert_allclose(solver.run("listed").x, rows[:, 1:3], atol=1e-14)

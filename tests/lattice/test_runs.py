@@ -36,6 +36,7 @@ ROTORS += f"""\
   mix: {{{RUN}, step: 0.1, steps: 80, stop: T - 0.06, every: 0.25, section: T - level, direction: falling}}
   until: {{{RUN}, step: 0.1, until: 2.05, stride: 7}}
   both: {{{RUN}, step: 0.1, steps: 60, section: T - level, direction: both, record: [T, energy], stride: 6}}
+  listed: {{{RUN}, step: 0.1, until: 2.05, at: [1.3, 0.25, 2, 2.05, 0.25]}}
   back: {{{RUN}, step: -0.1, until: -2.05, section: C - 0.5, direction: both}}
 """
 DRIVEN = """\
@@ -178,6 +179,21 @@ def test_retries_and_extremes_of_a_section_outlast_an_interrupt(rotors, tmp_path
         np.testing.assert_array_equal(resumed.t, whole.t)
         np.testing.assert_array_equal(resumed.last, whole.last)
         np.testing.assert_array_equal(resumed.crossings.t, whole.crossings.t)
+
+
+def test_times_of_a_spec_are_those_of_the_command_line(rotors, cli, spec):
+    run = rotors.run("listed")
+    assert list(run.t) == pytest.approx([0, 0.25, 1.3, 2, 2.05], rel=1e-14)
+    np.testing.assert_allclose(run.x[2], rotors.integrate(run.x[0], 0.1, until=1.3).x[-1], atol=1e-14)
+    assert len(rotors.run("listed", stride=7)) == 4
+    assert list(rotors.run("listed", until=1.5).t) == pytest.approx([0, 0.25, 1.3, 1.5], rel=1e-14)
+    for more in ([], ["--at", "1.3,0.25,2"]):
+        ran(cli, spec, "--run", "listed", "-o", "a.npz", *more)
+        with np.load("a.npz") as stored:
+            np.testing.assert_array_equal(stored["x"], run.x)
+    ran(cli, spec, "--run", "listed", "-o", "a.npz", "--until", "1.5")
+    with np.load("a.npz") as stored:
+        assert list(stored["t"]) == pytest.approx([0, 0.25, 1.3, 1.5], rel=1e-14)
 
 
 def test_processes_refuse_parts_of_steps():
