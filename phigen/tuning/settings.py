@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from phigen.compilation import Compilation
+from phigen.errors import PhigenError
 from phigen.geometry.shapes import Affine, Canonical, Constant, LiePoisson
 from phigen.geometry.system import System
 from phigen.scheme import choosing
@@ -13,6 +14,7 @@ from phigen.spec import limits
 from phigen.spec.grammar import Scope, parse
 from phigen.spec.model import BirealisationChoice, Spec
 from phigen.spec.names import BIREALISATIONS, LOGARITHMIC
+from phigen.splitting.parts import split as split_in_parts
 from phigen.symbolic.expression import Expression, symbol
 
 #: Stands for the choice of the spec where it has no name: formulas, or options of a kind.
@@ -27,6 +29,10 @@ SPLITTING = "splitting"
 #: So does this; the orders that are tried of it.
 GAUSS = "gauss"
 GAUSS_ORDERS = (4, 8, 12, 16)
+
+#: Methods for near-integrable systems that are tried, with their orders: the best of each set of errors, by powers of
+#: ε and h, and the one with a corrector, whose steps are the cheapest.
+NEAR_INTEGRABLE = (("saba-8-2", 2), ("wisdom-holman-17", 2), ("aba-8-4", 4), ("aba-10-6-4", 4))
 
 #: Kinds that need formulas of the user, and those with choices of their own.
 FORMULAS = ("custom", "group-map", "spray")
@@ -152,11 +158,21 @@ def charts(system: System, current: Setting) -> list[Setting]:
     nested = [Setting(kind, 4, of=of) for kind, of in _NESTED]
     # The other side is the adjoint, whose errors are the same in reversed time.
     euler = [Setting("canonical-euler", order) for order in (1, 4)]
+    composed = _near_integrable(system)
     split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
     split += [Setting(GAUSS, order, "none") for order in (8, 16)]
     first = [replace(current, order=order, composition=direct(current)) for order in (4, 8)]
     others = [s for s in (*split, *named, *nested, *euler) if s.chart != current.chart]
-    return [s for s in (*first, *others) if s != current]
+    return [s for s in (*first, *composed, *others) if s != current]
+
+
+def _near_integrable(system: System) -> list[Setting]:
+    """Splittings of H = A + εB with the methods for these; none if H is no such sum."""
+    try:
+        small = split_in_parts(system).small
+    except PhigenError:
+        return []
+    return [Setting(SPLITTING, order, "none", name) for name, order in NEAR_INTEGRABLE] if small is not None else []
 
 
 def direct(setting: Setting) -> str:

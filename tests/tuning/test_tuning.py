@@ -8,12 +8,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import NAMES, compiled, described, plain, slow_but
+from support import NAMES, compile_text, compiled, described, plain, slow_but
 
 from phigen import resources, spec
 from phigen.compiler import compile_spec, emit
 from phigen.errors import CheckError
 from phigen.realisations.catalogue import realise
+from phigen.spec.names import NEAR_INTEGRABLE
 from phigen.targets.header import split
 from phigen.tuning import search
 from phigen.tuning.building import Built, Refusal, build, build_all
@@ -392,6 +393,18 @@ def test_charts_leave_out_what_needs_formulas_and_start_with_the_own_one():
     assert SPLITTING in kinds
     assert kinds & {"custom", "group-map", "spray", "auto", "karasev"} == set()
     assert "karasev" in {s.kind for s in charts(compiled("lotka_volterra").system, Setting("log-canonical", 2))}
+
+
+@pytest.mark.parametrize(("eps", "tried"), [("0.001", True), ("0.5", False)])
+def test_charts_try_methods_for_small_perturbations_where_there_is_one(eps, tried):
+    text = "coordinates: [x, y, px, py]\npoisson: {canonical: {q: [x, y], p: [px, py]}}\nscheme: splitting\n"
+    made = compile_text(text + f"hamiltonian: (px**2 + py**2)/2 - 1/sqrt(x**2 + y**2) - {eps}*x**2\n", 4)
+    names = [s.composition for s in charts(made.system, own_setting(made)) if s.composition in NEAR_INTEGRABLE]
+    assert names == (["saba-8-2", "wisdom-holman-17", "aba-8-4", "aba-10-6-4"] if tried else [])
+    for setting in charts(made.system, own_setting(made)):
+        if setting.composition in NEAR_INTEGRABLE:
+            again = compile_spec(setting.applied(made.spec))
+            assert (again.program.step.composition, again.order.order) == (setting.composition, setting.order)
 
 
 def test_variants_compose_symmetric_methods_only():
