@@ -3,7 +3,7 @@ import { MOST_RISING, NEARLY_ROUNDING, ROUNDING, SOLVED, STALLED } from "./gauss
 import { DIM, MAX_SWEEPS, MIXING, PLAIN, POINT, PREDICTION, UNKNOWNS, WEIGHTS } from "./model.mjs";
 import { stageChange, stageField } from "./model.mjs";
 // #if MONITOR
-import { pass, timeOf } from "./level.mjs";
+import { pass, timeOfStep } from "./level.mjs";
 // #endif
 // #if FRAMED
 import { nextFrame } from "./model.mjs";
@@ -151,7 +151,7 @@ function attempt(solver, stage) {
   stageChange(solver.coef[stage], start, end, change);
   // #if MONITOR
   mixed(MIXING, work.now, mixedMoves);
-  const time = timeOf(solver, stage, start, mixedMoves);
+  const time = timeOfStep(solver, stage, start, mixedMoves);
   if (Number.isNaN(time)) return "NOT_FINITE";
   // #endif
   if (!advance(solver, change, solver.carry)) return "NOT_FINITE";

@@ -33,7 +33,7 @@ export function timeOf(solver, stage, y) {
 
 // #if GAUSS
 /** The time that a step takes, by its start and the unknowns at its stages; NaN unless it has the sign of the step. */
-export function timeOf(solver, stage, start, z) {
+export function timeOfStep(solver, stage, start, z) {
   let sum = 0;
   WEIGHTS.forEach((b, i) => {
     elapsed(solver.coef[stage], start, z[i], Float64Array.of(solver.h * b), one);
