@@ -58,15 +58,17 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
 
 
 def _unrestricted(program: Program, code: str) -> str:
-    """The code where ``restrict`` does no harm to compilers that have no such word: only loops over lanes and sites
-    become faster by it."""
+    """Return code that compilers without ``restrict`` accept too.
+
+    Only loops over lanes and sites become faster by it. Other code loses the word.
+    """
     if program.profile == "small" and not program.step.kind.sites and "_EACH_LANE" not in code:
         return re.sub(r"\brestrict\b ?", "", code)
     return render("c", "restrict.c", {"code": code.strip()})
 
 
 def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
-    """What is put together, and the files of the runtime to begin with: of a header, and of the code."""
+    """Return the assembly of a solver, and the files of the runtime from which header and source start."""
     lanes = in_lanes(program)
     has = switches(program, lanes)
     policies = _policies(program)
@@ -117,14 +119,14 @@ def _sealed(lines: Sequence[str], body: str) -> str:
 
 
 def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, str]:
-    """What the runtime includes of the model, by the names that it has there."""
+    """Return the printed parts of the model by the names under which the runtime includes them."""
     step = program.step
-    found = text_of(program).texts(program, step, lanes, has)
+    texts = text_of(program).texts(program, step, lanes, has)
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"] or has["STAGED"]):
         packed = partial(text_of(program).packed, program, step)
-        found["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes, packed))
+        texts["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes, packed))
     declarations = render("c", "declarations.h", _declarations(program, lanes, has))
-    return {"declarations.h": declarations, "model.h": _model(program, lanes, has, found.values()), **found}
+    return {"declarations.h": declarations, "model.h": _model(program, lanes, has, texts.values()), **texts}
 
 
 def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
@@ -273,7 +275,7 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
 
 
 def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
-    """How many members, in packs of lanes, are pulled back together; 0 where each is by itself."""
+    """Return the number of SIMD packs of members in one reverse pass, 0 if members are treated one by one."""
     if not has["ABREAST"]:
         return 0
     return lanes.reverse_packs if isinstance(lanes, Packs) else 1
@@ -282,20 +284,20 @@ def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
 def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
     step = program.step
     body = functions.called(program)
-    own = text_of(program).kernels(step, has)
-    own += program.choice
-    own += [program.monitor.elapsed] if program.monitor and not has["STAGED"] else []
-    own += text_of(program).tangents(step)
+    kernels_of_step = text_of(program).kernels(step, has)
+    kernels_of_step += program.choice
+    kernels_of_step += [program.monitor.elapsed] if program.monitor and not has["STAGED"] else []
+    kernels_of_step += text_of(program).tangents(step)
     turned = program.attitude
-    own += [turned.exponential, turned.turn, turned.rate] if turned else []
+    kernels_of_step += [turned.exponential, turned.turn, turned.rate] if turned else []
     if step.refresh and not step.kind.flows:
         body.append(function(program, step.refresh, name="at_step" if program.noise else "at_time"))
     if step.adjoint:
-        own += text_of(program).transposes(step)
-        own += _of_adjoint(program, step.adjoint)
+        kernels_of_step += text_of(program).transposes(step)
+        kernels_of_step += _of_adjoint(program, step.adjoint)
         if step.adjoint.refresh:
             body.append(function(program, step.adjoint.refresh, name="at_time_adjoint"))
-    body += [function(program, kernel) for kernel in own if kernel]
+    body += [function(program, kernel) for kernel in kernels_of_step if kernel]
     for _, kernels in _observables(program):
         body += [function(program, k, name=name, exported=True, returning=one) for k, name, one in kernels]
     text = "\n".join(body)
@@ -330,7 +332,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
 
 
 def _of_adjoint(program: Program, adjoint: Adjoint) -> list[Kernel]:
-    """What the transpose of any step needs."""
+    """Return the kernels that the reverse pass of any step calls."""
     path = [adjoint.path.curvature, adjoint.path.slope] if adjoint.path else []
-    found = [*path, *([adjoint.prepare] if program.parameters or program.monitor else [])]
-    return [*found, program.monitor.level] if program.monitor and program.monitor.level else found
+    kernels = [*path, *([adjoint.prepare] if program.parameters or program.monitor else [])]
+    return [*kernels, program.monitor.level] if program.monitor and program.monitor.level else kernels

@@ -98,7 +98,7 @@ def near(program: Program, names: Iterable[str]) -> list[str]:
 
 
 def _anomaly(program: Program, *, near: bool = False) -> str:
-    """The universal anomaly of Kepler motions, with c2 and c3 by series in the same powers."""
+    """Return the universal anomaly of Kepler motions, with c2 and c3 by series in the same powers."""
     c2, c3 = special.stumpff()
     lines, first = estrin(c2, "z", "a")
     (_, *others), second = estrin(c3, "z", "e")
@@ -107,15 +107,15 @@ def _anomaly(program: Program, *, near: bool = False) -> str:
 
 
 def near_rows(program: Program, names: Iterable[str]) -> list[str]:
-    """Versions for the loops over sites, of small arguments only: the fewest operations that keep all digits."""
+    """Return small-argument functions for the loops over sites, with the fewest operations that give all digits."""
     return [render("c", "row_near.c", _row_values(program, f)) for f in names]
 
 
 def _row_values(program: Program, f: str) -> dict[str, object]:
     if f in ENTIRE:
-        found, t = ENTIRE[f], "s"
-        meaning, radius, squared, form = found.meaning, Fraction(found.radius), False, "{P}"
-        coefficients = list(found.terms())
+        entire, t = ENTIRE[f], "s"
+        meaning, radius, squared, form = entire.meaning, Fraction(entire.radius), False, "{P}"
+        coefficients = list(entire.terms())
     else:
         small, t = _SMALL[f], "t"
         (radius, count, form), meaning, squared = small.rows, small.meaning, small.step == 2
@@ -124,8 +124,8 @@ def _row_values(program: Program, f: str) -> dict[str, object]:
     polynomial = _nested([float(c) for c in coefficients])
     text = f"return {form.format(P=polynomial, t=t)};"
     lines = textwrap.wrap(text, WIDTH - 12, subsequent_indent="    ", break_on_hyphens=False)
-    own = {"meaning": meaning, "t": t, "radius": repr(float(radius)), "squared": squared}
-    return {"NAME": program.name, "function": f, "lines": lines, **own}
+    values = {"meaning": meaning, "t": t, "radius": repr(float(radius)), "squared": squared}
+    return {"NAME": program.name, "function": f, "lines": lines, **values}
 
 
 def _nested(coefficients: Sequence[float]) -> str:
@@ -135,39 +135,39 @@ def _nested(coefficients: Sequence[float]) -> str:
 
 
 def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
-    """φ and its derivatives for the loops over lanes, as far as these operations call them."""
-    found = []
+    """Return φ and its derivatives for the loops over lanes, as far as ``ops`` contain them."""
+    texts = []
     for f in (f for f in SPECIAL if f in ops):
         first, *rest = map(repr, lane_coefficients(order_of(f)))
         before, last = rest[-2:]
         others = list(zip(rest[-3::-2], rest[-4::-2], strict=True))
-        own = {"first": first, "before": before, "last": last, "others": others, "reach": repr(LANE_REACH)}
-        found.append(render("c", "phi_lane.c", {"NAME": program.name, "function": f, **own}))
-    return found
+        values = {"first": first, "before": before, "last": last, "others": others, "reach": repr(LANE_REACH)}
+        texts.append(render("c", "phi_lane.c", {"NAME": program.name, "function": f, **values}))
+    return texts
 
 
 def _phi(program: Program, f: str) -> Mapping[str, object]:
     near, rest = near_coefficients(order_of(f)), rest_coefficients(order_of(f))
     tables = [line for name, numbers in (("near", near), ("rest", rest)) for line in _table(name, numbers)]
-    given = dict(special.values(f, f)) | {"NAME": program.name, "function": f, "tables": tables}
+    values = dict(special.values(f, f)) | {"NAME": program.name, "function": f, "tables": tables}
     *closed, last = special.closed(order_of(f))
-    own = {"closed": closed, "value": last.split(" = ")[1]}
-    return given | own | {"near_count": len(near), "rest_count": len(rest)}
+    closed_form = {"closed": closed, "value": last.split(" = ")[1]}
+    return values | closed_form | {"near_count": len(near), "rest_count": len(rest)}
 
 
 def _table(name: str, numbers: Sequence[float]) -> list[str]:
-    """The declaration of a table, in lines."""
+    """Return the declaration of a table, in lines."""
     text = f"static const double {name}[{len(numbers)}] = {{ {', '.join(map(repr, numbers))} }};"
     return textwrap.wrap(text, WIDTH - 4, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def _values(program: Program, f: str) -> dict[str, object]:
     if f in ENTIRE:
-        found, t, form = ENTIRE[f], "s", "{P}"
-        meaning, radius = found.meaning, found.radius
-        own = {**FUNCTIONS, **{name: f"{program.name}_{name}" for name in ENTIRE}}
-        outside = special.far(f, lambda scope: printer(scope, own), "s > 0.0 ? {0} : {1}")
-        lines, value = estrin(found.terms(), t)
+        entire, t, form = ENTIRE[f], "s", "{P}"
+        meaning, radius = entire.meaning, entire.radius
+        names = {**FUNCTIONS, **{name: f"{program.name}_{name}" for name in ENTIRE}}
+        outside = special.far(f, lambda scope: printer(scope, names), "s > 0.0 ? {0} : {1}")
+        lines, value = estrin(entire.terms(), t)
     else:
         small, t = _SMALL[f], "t"
         (radius, count, form), meaning, squared = small.flows, small.meaning, small.step == 2

@@ -42,10 +42,13 @@ SHARED_LINE = 105
 
 @dataclass(frozen=True)
 class Form:
-    """How a kernel is printed: under which name; ``exported``, where NULL stands for the default parameters;
-    ``returning`` its only value; at one point or in ``lanes``; at a ``single`` lane; without zeros if ``sparse``; what
-    it calls; which arrays all lanes share, and of which they share the first lane where the argument ``own`` is 0; how
-    large its workspace is, if it is a part."""
+    """Form in which a kernel is printed as a C function called ``name``.
+
+    An ``exported`` function takes NULL for the default parameters. ``returning`` returns the only output. ``lanes``
+    evaluates at all SIMD lanes, ``single`` at one of them. ``sparse`` stores no zeros. ``functions`` are the names of
+    the functions that it calls. All lanes share the arrays in ``shared``; those in ``alike`` have one value for all
+    lanes if the argument ``own`` is 0. ``workspace`` is the size of the workspace of a function that is cut into parts.
+    """
 
     name: str
     exported: bool = False
@@ -95,9 +98,11 @@ def function(
         functions = lane_calls(program) if lanes else FUNCTIONS
     if kernel.exponents:
         return _through_exponentials(program, kernel)
-    own = f"{program.name}_{name or kernel.name}{'_lane' if single else '_lanes' if lanes else ''}"
+    full_name = f"{program.name}_{name or kernel.name}{'_lane' if single else '_lanes' if lanes else ''}"
     plain_arrays = {*shared, "work", *(o.name for o in kernel.outputs)} if single else {*shared}
-    form = Form(own, exported, returning, lanes, single, sparse, functions, frozenset(plain_arrays), frozenset(alike))
+    form = Form(
+        full_name, exported, returning, lanes, single, sparse, functions, frozenset(plain_arrays), frozenset(alike)
+    )
     where = f" in {'one lane' if single else 'all lanes'}" if lanes else ""
     called = f"{program.name}_{name or kernel.name}{where}"
     code = lower(kernel)
@@ -110,7 +115,7 @@ def function(
     workspace = 1 + max((k for p in pieces for k in p.kept), default=0)
     texts = []
     for k, piece in enumerate(pieces, 1):
-        part = replace(form, name=f"{own}_part{k}", workspace=workspace, exported=False, returning=False)
+        part = replace(form, name=f"{full_name}_part{k}", workspace=workspace, exported=False, returning=False)
         part = replace(part, alike=frozenset())
         lines = [*_comment(f"{called}, part {k} of {len(pieces)}."), _signature(program, kernel, part) + "\n{"]
         texts.append("\n".join([*lines, *_body(program, kernel, part, piece), "}\n"]))
@@ -121,7 +126,7 @@ def function(
         arguments = arguments.replace(f", {kernel.outputs[0].name}, work", ", value, work")
         head += [f"    double value[{len(kernel.roots)}];", *_default_parameters(program, kernel, form)]
     head += [_clear(array, size) for array, size in code.cleared]
-    head += [f"    {own}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
+    head += [f"    {full_name}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
     head += _exponentials(program, kernel)
     if exported:
         head.append("    return value[0];" if returning else "    memcpy(out, value, sizeof value);")
@@ -155,29 +160,29 @@ def _through_exponentials(program: Program, kernel: Kernel) -> str:
 
 
 def declaration(program: Program, kernel: Kernel, *, name: str = "", returning: bool = False) -> str:
-    """The declaration of a function of the API, as `function` defines it."""
+    """Return the declaration of an exported function, as `function` defines it."""
     form = Form(f"{program.name}_{name or kernel.name}", exported=True, returning=returning)
     return f"{_signature(program, kernel, form)};"
 
 
 def lane_calls(program: Program) -> Mapping[str, str]:
-    """The functions that the loops over lanes call: their own versions where there are such."""
-    own = {f: f"{program.name}_{f}_lane" for f in LANE_FUNCTIONS}
-    return {**FUNCTIONS, **own, **{f: text.format_map(own) for f, text in LANE_FORMULAS.items()}}
+    """Return the names of the functions that the loops over lanes call: SIMD versions if there are any."""
+    versions = {f: f"{program.name}_{f}_lane" for f in LANE_FUNCTIONS}
+    return {**FUNCTIONS, **versions, **{f: text.format_map(versions) for f, text in LANE_FORMULAS.items()}}
 
 
 def _in_order(kernel: Kernel, code: Code) -> Code:
-    """The same with what has a name first, then what each output needs beyond that, each with its stores."""
-    made = {a.target: a for a in code.assignments}
+    """Return code in another order: first named values, then for each output its further values and its stores."""
+    by_target = {a.target: a for a in code.assignments}
     ordered: dict[str, Assignment] = {}
 
     def take(targets: Iterable[str]) -> None:
         needed, left = set(), [*targets]
         while left:
             target = left.pop()
-            if target in made and target not in needed:
+            if target in by_target and target not in needed:
                 needed.add(target)
-                left += _reads(made[target].value)
+                left += _reads(by_target[target].value)
         ordered.update((a.target, a) for a in code.assignments if a.target in needed)
 
     take(name for name, _ in kernel.named)
@@ -193,8 +198,8 @@ def _reads(value: Expression) -> list[str]:
 def _signature(program: Program, kernel: Kernel, form: Form) -> str:
     # C99 has no conversion from double (*)[8] to const double (*)[8]: the inputs of lanes are not const.
     number = f"{program.name}_lanes" if form.lanes else "double"
-    given, alone = (number, "restrict ") if form.lanes else ("const double", "")
-    kinds = {i: ("const double", "") if i in form.shared else (given, alone) for i in kernel.inputs}
+    inputs, alone = (number, "restrict ") if form.lanes else ("const double", "")
+    kinds = {i: ("const double", "") if i in form.shared else (inputs, alone) for i in kernel.inputs}
     arguments = [
         f"const {program.name}_params *params"
         if i == "params"
@@ -251,14 +256,14 @@ def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]
 
 
 def _default_parameters(program: Program, kernel: Kernel, form: Form) -> list[str]:
-    given = form.exported and "params" in kernel.inputs
-    return [f"    if (params == NULL) params = &{program.name}_default_params;"] if given else []
+    optional = form.exported and "params" in kernel.inputs
+    return [f"    if (params == NULL) params = &{program.name}_default_params;"] if optional else []
 
 
 def _bound(program: Program, kernel: Kernel, form: Form, code: Code, scope: Scope) -> list[str]:
-    """Binds the inputs that are used to what they are called; the declarations of those that get a name.
+    """Bind the used inputs of a kernel in a scope, and return the declarations of those that get a variable.
 
-    Of functions of the API all is read before anything is written: their arguments may overlap.
+    Exported functions read all inputs before they write any output, since their arguments may overlap.
     """
     member = members(program)
 

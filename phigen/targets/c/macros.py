@@ -61,24 +61,24 @@ class Macros:
 
 
 def _arguments(line: str, at: int) -> tuple[list[str], int]:
-    """The arguments of a macro in parentheses, and where these end; ValueError where the line has no such."""
+    """Return the arguments of a macro, and the column after them. Raises `ValueError` if a line has none."""
     if line[at : at + 1] != "(":
         raise ValueError(f"a macro without its arguments: {line.strip()}")
-    found, depth, begin = [], 0, at + 1
+    arguments, depth, begin = [], 0, at + 1
     for k in range(at, len(line)):
         depth += (line[k] in "([") - (line[k] in ")]")
         if depth == 0 or (depth == 1 and line[k] == ","):
-            found.append(line[begin:k].strip())
+            arguments.append(line[begin:k].strip())
             begin = k + 1
         if depth == 0:
-            return found, k + 1
+            return arguments, k + 1
     raise ValueError(f"a macro whose arguments do not end on its line: {line.strip()}")
 
 
 def _without_heads(lines: Sequence[str], heads: Sequence[str]) -> list[str]:
-    """The lines without these heads of loops; what is below a head, in braces or not, is there by itself."""
+    """Return lines without the given heads of loops; the body of a loop, in braces or not, is dedented."""
     over = re.compile(rf"^( *)(?:{'|'.join(heads)})(?: (.*))?$") if heads else re.compile("(?!)")
-    kept: list[str] = []
+    remaining: list[str] = []
     ends: list[tuple[str, str]] = []  # of each loop that was struck out: its indentation, and the line that ends it
     for line in lines:
         while ends and ends[-1][1] == "" and not line.startswith(ends[-1][0] + " "):
@@ -87,11 +87,11 @@ def _without_heads(lines: Sequence[str], heads: Sequence[str]) -> list[str]:
             ends.pop()
             continue
         shift = 4 * len(ends)
-        found = over.match(line)
-        if found is None:
-            kept.append(line[shift:] if line.startswith(" " * shift) else line)
-        elif found[2] in (None, "{"):
-            ends.append((found[1], f"{found[1]}}}" if found[2] else ""))
+        match = over.match(line)
+        if match is None:
+            remaining.append(line[shift:] if line.startswith(" " * shift) else line)
+        elif match[2] in (None, "{"):
+            ends.append((match[1], f"{match[1]}}}" if match[2] else ""))
         else:
-            kept.append(f"{found[1]}{found[2]}"[shift:])
-    return kept
+            remaining.append(f"{match[1]}{match[2]}"[shift:])
+    return remaining

@@ -38,7 +38,7 @@ def printed(program: Program, step: Path, slopes: PathSlopes) -> str:
         _rules(program, show, every, range(base, len(every))),
     )
     used = step.back.used if step.back else ()
-    own = {
+    values = {
         "NAME": program.name,
         "follow": [
             ("follow", "the series that follow from those of the coordinates", *follow),
@@ -53,8 +53,8 @@ def printed(program: Program, step: Path, slopes: PathSlopes) -> str:
             for e in slopes.along
         ],
     }
-    along = "\n" + render("c", "path_along_lanes.c", own) if used else ""
-    return render("c", "path_lanes.c", own) + along
+    along = "\n" + render("c", "path_along_lanes.c", values) if used else ""
+    return render("c", "path_lanes.c", values) + along
 
 
 class _Show:
@@ -70,12 +70,12 @@ class _Show:
         for i in range(len(path.series) + len(slopes.series)):
             scope.bind(Symbol(SERIES, i), f"{self.series(i)}[0][lane]")
         for i in range(len(path.fixed) + len(slopes.fixed)):
-            own = i - len(path.fixed)
-            scope.bind(Symbol(FIXED, i), f"e->fixed[{i}][lane]" if own < 0 else f"e->slope_fixed[{own}][lane]")
+            further = i - len(path.fixed)
+            scope.bind(Symbol(FIXED, i), f"e->fixed[{i}][lane]" if further < 0 else f"e->slope_fixed[{further}][lane]")
         self._printer = printer(scope, FUNCTIONS)
 
     def series(self, i: int) -> str:
-        """The series of a number."""
+        """Return the array of the series with number i."""
         return f"e->s[{i}]" if i < self._base else f"e->slope[{i - self._base}]"
 
     def __call__(self, e: Expression) -> str:
@@ -162,7 +162,7 @@ def _variation(show: _Show, jacobian: Sequence[SeriesEntry], width: int) -> list
 
 
 def _source(show: _Show, slopes: PathSlopes) -> list[str]:
-    """What order k of ∂(π p)/∂m contributes by itself, and half of π: the derivative along p is that of ½π(m)p."""
+    """Return the statements that add order k of ∂(π p)/∂m, and of ½π: the derivative by p is that of ½π(m)p."""
     n = show.dimension
     along_m = [(e.row * 2 * n + e.column, "share", e) for e in slopes.jacobian]
     along_p = [(e.row * 2 * n + n + e.column, "0.5 * share", e) for e in slopes.tensor]

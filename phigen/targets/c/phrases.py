@@ -34,8 +34,10 @@ class Choice:
         """The definitions for all solvers."""
         yield f"/* {self.about} */"
         for k, condition in enumerate((*self.conditions, "")):
-            given = " ".join(f"PHI_{word}" if word.isupper() else word for word in condition.replace("!", "! ").split())
-            yield f"#{'if' if k == 0 else 'elif'} {given}" if given else "#else"
+            expression = " ".join(
+                f"PHI_{word}" if word.isupper() else word for word in condition.replace("!", "! ").split()
+            )
+            yield f"#{'if' if k == 0 else 'elif'} {expression}" if expression else "#else"
             yield from (_definition(name, texts[k]) for name, texts in self.phrases.items())
         yield "#endif"
 

@@ -41,7 +41,7 @@ def printed(program: Program, step: Splitting) -> str:
     arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"
     passed = _moves(bool(program.attitude))
     stored = f", double (*kept)[{program.dimension}]" if step.adjoint else ""
-    texts.append(_steps(program, step, "", "static inline ", arguments + more + stored, passed, kept=bool(stored)))
+    texts.append(_steps(program, step, "", "static inline ", arguments + more + stored, passed, stores=bool(stored)))
     texts += [_corrector(program, step.schedule, along)] if step.schedule.begin else []
     return "\n".join(texts)
 
@@ -157,35 +157,39 @@ def _moves(turned: bool) -> str:
 
 
 def _along(program: Program) -> int:
-    """What flows move: the coordinates; with a monitor also the time, and a sum that is no number out of the domain."""
+    """Return the number of values that flows update: the coordinates, with a monitor also the time and a sum.
+
+    The sum is NaN outside of the domain of the flows.
+    """
     return program.dimension + (2 if program.monitor else 0)
 
 
 def _functions(program: Program) -> dict[str, str]:
-    """What flows call functions: those that have a version for small arguments."""
+    """Return the names of the functions that flows call, which have small-argument versions."""
     return FUNCTIONS | {f: f"{program.name}_{f}" for f in FLOW_FUNCTIONS}
 
 
 def _flow(program: Program, kernel: Kernel, k: int) -> tuple[Kernel, dict[str, object]]:
-    """The kernel of a flow without the zero increments, and what the template of the flow reads."""
+    """Return the kernel of a flow without the zero increments, and the values of the template of the flow."""
     moved, increment = _moved(kernel), kernel.outputs[0].values
     output = Output("change", tuple(increment[i] for i in moved))
     values = {"NAME": program.name, "n": _along(program), "k": k, "moved": list(enumerate(moved)), "form": ""}
-    made = replace(kernel, name=f"change{k}", outputs=(output, *kernel.outputs[1:]))
-    return made, values | {"count": max(1, len(moved))}
+    change = replace(kernel, name=f"change{k}", outputs=(output, *kernel.outputs[1:]))
+    return change, values | {"count": max(1, len(moved))}
 
 
 def _moved(kernel: Kernel) -> list[int]:
-    """The values that a flow changes."""
+    """Return the indices of the values that a flow changes."""
     return [i for i, e in enumerate(kernel.outputs[0].values) if not e.is_zero]
 
 
 def _steps(
-    program: Program, step: Splitting, form: str, linkage: str, arguments: str, passed: str, *, kept: bool = False
+    program: Program, step: Splitting, form: str, linkage: str, arguments: str, passed: str, *, stores: bool = False
 ) -> str:
-    """The schedule; flows are told their coefficients by an address, and those in lanes by the number of the row.
+    """Return the functions of the schedule of flows.
 
-    With ``kept`` the states before each flow are left there, unless it is NULL.
+    Flows receive the address of their coefficients, in lanes the number of their row. With ``stores``, the argument
+    ``kept`` of the step receives the states before each flow, unless it is NULL.
     """
     schedule = step.schedule
     first, row = ("row", "") if form else ("coef", f"{program.name}_ROW")
@@ -194,6 +198,13 @@ def _steps(
         return f"{rows} * {row}" if row and rows > 1 else row or str(rows)
 
     pattern = [(part + 1, f"{first} + {further(at)}" if at else first) for part, at in schedule.pattern]
-    own = {"form": form, "linkage": linkage, "arguments": arguments, "passed": passed, "pattern": pattern, "kept": kept}
-    own |= {"start": first, "next": f"{first} += {further(1)}", "further": f"{first} += {further(schedule.rows)}"}
-    return render("c", "flows.c", {"NAME": program.name, "stages": schedule.stages, **own})
+    values: dict[str, object] = {
+        "form": form,
+        "linkage": linkage,
+        "arguments": arguments,
+        "passed": passed,
+        "pattern": pattern,
+    }
+    values |= {"kept": stores}
+    values |= {"start": first, "next": f"{first} += {further(1)}", "further": f"{first} += {further(schedule.rows)}"}
+    return render("c", "flows.c", {"NAME": program.name, "stages": schedule.stages, **values})

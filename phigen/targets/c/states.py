@@ -39,17 +39,17 @@ PARTS = {
 
 
 def part(file: str, switches: Mapping[str, bool]) -> list[str]:
-    """The lines of one of `PARTS` for a solver."""
-    made = PARTS[file]
-    return [" " * made.indent + line for b in made.blocks if belongs(b, switches) for line in made.lines(b)]
+    """Return the lines of one of `PARTS` for a solver."""
+    lines = PARTS[file]
+    return [" " * lines.indent + line for b in lines.blocks if belongs(b, switches) for line in lines.lines(b)]
 
 
 def header(file: str) -> str:
-    """The same for all solvers, with conditions, for a compiler that reads the runtime as it lies there."""
-    made = PARTS[file]
-    found = []
-    for block in made.blocks:
-        text = [" " * made.indent + line for line in made.lines(block)]
+    """Return one of `PARTS` for all solvers, with conditions, so that the runtime compiles without a solver."""
+    lines = PARTS[file]
+    text_lines = []
+    for block in lines.blocks:
+        text = [" " * lines.indent + line for line in lines.lines(block)]
         condition = " ".join(f"PHI_{w}" if w.isupper() else w for w in block.when.replace("!", "! ").split())
-        found += [f"#if {condition}", *text, "#endif"] if text and condition else text
-    return "\n".join(found)
+        text_lines += [f"#if {condition}", *text, "#endif"] if text and condition else text
+    return "\n".join(text_lines)

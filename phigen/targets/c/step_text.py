@@ -96,17 +96,17 @@ def _path_constants(program: Program, step: Path) -> Sizes:
 
 
 def _adjoint_path(program: Program, path: PathAdjoint) -> str:
-    """The recurrences of a path that is traced back, and which coefficients it depends on."""
-    own = {"NAME": program.name, "count": len(path.used), "used": ", ".join(map(str, path.used))}
+    """Return the recurrences of the reverse pass of a path, and the coefficients that it depends on."""
+    values = {"NAME": program.name, "count": len(path.used), "used": ", ".join(map(str, path.used))}
     extended = adjoint_program(program, path)
-    return render("c", "adjoint_path.c", own) + "\n" + _path(extended, path.recurrences, "back")
+    return render("c", "adjoint_path.c", values) + "\n" + _path(extended, path.recurrences, "back")
 
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
-    """The recurrences of a path, or of one with its variation."""
+    """Return the recurrences of a path, or of a tangent path."""
     slope = "s[{i}][k + 1] = s[{slope}][k] / (double)(k + 1);"
     syntax = Syntax(printer, slope, sums=f"{program.name}_taylor_{{kind}}")
-    found = statements(program, path, syntax)
+    texts = statements(program, path, syntax)
     derived = path.series[program.dimension :]
     firsts, factors = [q.first for q in derived], [factor for q in derived for _, factor in q.linear]
     defined = ("coef", "p") if path.fixed else ("coef", "p", "f")  # f is written where it has values
@@ -114,7 +114,7 @@ def _path(program: Program, path: Recurrences, kind: str) -> str:
         "c",
         "path.c",
         {
-            **found,
+            **texts,
             "NAME": program.name,
             "kind": kind,
             "n": program.dimension,
