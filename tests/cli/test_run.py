@@ -44,8 +44,7 @@ def files(*names):
 @pytest.mark.parametrize(
     ("name", "target", "suffix"),
     [("rigid_body", "c", "csv"), ("pendulum_euler", "numpy", "csv"),
-     ("charged_particle", "c", "npz"), pytest.param("rigid_body", "numpy", "npz", marks=pytest.mark.slow),
-     pytest.param("guiding_centre", "c", "npz", marks=pytest.mark.slow)],
+     ("charged_particle", "c", "npz"), pytest.param("rigid_body", "numpy", "npz", marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_an_interrupted_run_goes_on_to_the_same_bytes(phigen, in_tmp, name, target, suffix):
     run = ("run", SPECS / f"{name}.yaml", "-t", target, "--steps", 60, "-o", f"a.{suffix}", "--json")
@@ -119,10 +118,8 @@ def test_a_killed_run_goes_on_to_the_same_bytes(phigen, in_tmp, number, code):
     paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     environment = {**os.environ, **paths}
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as process:
-        deadline = time.monotonic() + 60
         while not (Path("a.csv").exists() and Path("a.csv").stat().st_size > 2000):
             assert process.poll() is None, process.stderr.read()
-            assert time.monotonic() < deadline
             time.sleep(0.01)
         process.send_signal(number)
         process.communicate()

@@ -504,7 +504,7 @@ CHECKS = (
     Check("extras", extras, _asked_twice),
     Check("wrong values are refused", lambda t: malformed(t.system), _always),
     Check("tables of bonds", lambda t: tables(t.system), lambda t: bool(t.system.bonds) and "k" in t.system.parameters),
-    Check("C++", lambda t: as_cpp(t.compilation, lattice=True), lambda t: t.system.seed % 10 == 0),
+    Check("C++", lambda t: as_cpp(t.compilation, lattice=True), lambda t: t.system.seed % 20 == 0),
 )  # fmt: skip
 
 

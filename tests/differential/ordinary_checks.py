@@ -505,7 +505,7 @@ CHECKS = (
     Check("noise", noise, lambda t: bool(t.system.noise), _RUN),
     Check("steps that are too large", hopeless, _always, "s.step(x, 300 * h)"),
     Check("extras", extras, _asked_twice),
-    Check("C++", lambda t: as_cpp(t.compilation, lattice=False), lambda t: t.system.seed % 10 == 0),
+    Check("C++", lambda t: as_cpp(t.compilation, lattice=False), lambda t: t.system.seed % 20 == 0),
 )  # fmt: skip
 
 

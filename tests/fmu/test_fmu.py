@@ -257,12 +257,12 @@ def test_noise_takes_its_seed_and_whole_steps_only(tmp_path):
 
 
 @pytest.mark.slow
-def test_satellite_keeps_quaternion_and_casimirs_for_a_million_steps(tmp_path):
+def test_satellite_keeps_quaternion_and_casimirs_for_many_steps(tmp_path):
     _, paths = written("satellite", tmp_path, (3,))
     casimirs = ["casimirs.N", "casimirs.G", "casimirs.A"]
     with running(paths[3], tmp_path) as instance:
         start, worst = np.array(instance.get(*casimirs)), 0.0
-        for k in range(50):
+        for k in range(15):
             instance.step(k * 1000.0, 1000.0)
             worst = max(worst, np.abs(np.array(instance.get(*casimirs)) - start).max())
             worst = max(worst, abs(np.linalg.norm(instance.get(*ATTITUDE)) - 1))

@@ -1,7 +1,6 @@
 """Blocks of steps and groups of members do what single steps do, to round-off."""
 
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +51,7 @@ def test_blocks_and_groups_equal_single_steps(name, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "volterra5", "toda3", "kowalevski_top"]))
+@pytest.mark.parametrize("name", ["rigid_body", "toda3", "volterra5"])
 def test_vectorised_blocks_and_groups_equal_single_steps(name, tmp_path):
     """-O0 leaves the loops over lanes as they are, -O3 makes vector instructions of them."""
     exercise(compiled(name), "-O3", tmp_path)
@@ -70,7 +69,7 @@ def test_blocks_of_several_stages_equal_single_steps(name, tmp_path):
 
 @pytest.mark.parametrize(
     ("composition", "optimisation"),
-    slow_but([("suzuki", "-O0")], product(["none", "suzuki"], ["-O0", "-O3"])),
+    slow_but([("suzuki", "-O0")], [("none", "-O0"), ("suzuki", "-O0"), ("suzuki", "-O3")]),
 )
 def test_blocks_with_sparse_factors_equal_single_steps(composition, optimisation, tmp_path):
     """A ring of nine species, whose Newton matrix has three entries in each row."""

@@ -21,7 +21,7 @@ from phigen.errors import PhigenError, SpecError
 from phigen.spec import loads
 
 SEEDS = int(os.environ.get("PHIGEN_RANDOM_SEEDS", "1"))
-SAMPLE, MOST_RUNS = 150, 8
+SAMPLE, MOST_RUNS = 150, 5
 #: What only texts and names consist of, so that there is nothing to run.
 TEXTS = {"title", "description", "references", "license", "name", "phigen", "targets", "sweeps"}
 

@@ -38,9 +38,9 @@ hamiltonian: (u**2 + v**2)/2 - 1/sqrt(x**2 + y**2)
 monitor: (x**2 + y**2)**(3/4)
 order: 4
 runs:
-  steps: {initial: [1, 0, 0, 0.6], step: 0.1, steps: 90, stride: 4}
-  timed: {initial: [1, 0, 0, 0.6], step: 0.1, steps: 90, every: 0.5}
-  until: {initial: [1, 0, 0, 0.6], step: 0.1, until: 5, every: 0.7}
+  steps: {initial: [1, 0, 0, 0.6], step: 0.1, steps: 30, stride: 4}
+  timed: {initial: [1, 0, 0, 0.6], step: 0.1, steps: 30, every: 0.5}
+  until: {initial: [1, 0, 0, 0.6], step: 0.1, until: 2, every: 0.7}
   stopped: {initial: [1, 0, 0, 0.6], step: 0.1, steps: 90, stop: y - x/3}
 """
 

@@ -23,7 +23,7 @@ from phigen.spec.kinds import Either, Kind, ListOf, MapOf, Record
 from phigen.spec.model import Spec
 
 SEEDS = int(os.environ.get("PHIGEN_RANDOM_SEEDS", "2"))
-FEW, MANY = 6, 100
+FEW, MANY = 6, 50
 SAMPLES = slow_but(product(BASES, [0]), product(BASES, range(SEEDS)))
 #: Values that a key may have by default; all others must change what is read.
 DEFAULTS = ("[]", "{}", '""', "0", "auto", "true", "q")

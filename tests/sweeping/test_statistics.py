@@ -24,8 +24,7 @@ sweeps:
 
 
 @pytest.mark.slow  # each starts a cluster of workers
-@pytest.mark.parametrize("frames", [0, 7])
-@pytest.mark.parametrize("after", [None, 2.5])
+@pytest.mark.parametrize(("after", "frames"), [(None, 0), (2.5, 7)])
 def test_statistics_are_those_of_single_runs(frames, after):
     text = DRIVEN if after is None else DRIVEN.replace("start: 0.5", f"start: 0.5, average: {{after: {after}}}")
     spec = phigen.spec.loads(text)
