@@ -93,9 +93,11 @@ def cpu_seconds(work: Callable[[], Any]) -> float:
 
 def contestants(periods: int) -> Iterator[Contestant]:
     """All methods; heyoka where it is installed."""
-    yield monitored("log", 8, periods, 240)
+    yield monitored("splitting", 8, periods, 240)
     for order, coarsest in ((8, 24), (10, 16)):
-        yield monitored("r2**(3/4)", order, periods, coarsest)
+        yield monitored("series", order, periods, coarsest)
+    for order in (12, 16):
+        yield monitored("gauss", order, periods, 8)
     yield Contestant("DOP853 with step control, in C", controlled(periods), 1e-6, 0.1)
     for order in (12, 16):
         yield Contestant(f"Gauss {order}, SIMD, g = r^(3/2), in C", gauss(order, periods), 8, FINER)
@@ -105,15 +107,15 @@ def contestants(periods: int) -> Iterator[Contestant]:
         return
 
 
-def monitored(monitor: str, order: int, periods: int, coarsest: float) -> Contestant:
-    """phigen with a monitor, by splitting where K splits and by the series where it does not."""
+def monitored(scheme: str, order: int, periods: int, coarsest: float) -> Contestant:
+    """phigen with a monitor: the logarithmic one for a splitting, a power of the distance for other schemes."""
     text = (Path(phigen.__file__).parents[1] / "specs" / "kepler_eccentric.yaml").read_text(encoding="utf-8")
-    scheme = "splitting" if monitor == "log" else "series"
+    monitor = "log" if scheme == "splitting" else "r2**(3/4)"
     changes = {"scheme: splitting": f"scheme: {scheme}", "monitor: log": f"monitor: {monitor}", "profile: small": ""}
     for old, new in changes.items():
         text = text.replace(old, new)
     solver = solver_of(compile_spec(spec.loads(text), order=order), "c")
-    name = f"phigen {order}, " + ("`log`" if monitor == "log" else "series, g = r^(3/2)")
+    name = f"phigen {order}, " + ("`log`" if scheme == "splitting" else f"{scheme}, g = r^(3/2)")
     start, end = list(START), periods * PERIOD
 
     def advance(h: float, steps: int, stride: int) -> Any:

@@ -214,8 +214,9 @@ def test_all_rows_of_the_eccentric_orbit_cover_the_same_physical_time():
     periods = 3
     end = periods * eccentric.PERIOD
     trials = [
-        (eccentric.monitored("log", 4, periods, 0).trial, 400),
-        (eccentric.monitored("r2**(3/4)", 4, periods, 0).trial, 200),
+        (eccentric.monitored("splitting", 4, periods, 0).trial, 400),
+        (eccentric.monitored("series", 4, periods, 0).trial, 200),
+        (eccentric.monitored("gauss", 16, periods, 0).trial, 20),
         (eccentric.controlled(periods), 1e-9),
         (eccentric.gauss(16, periods), 20),
     ]
