@@ -20,12 +20,24 @@ DIGITS = 60
 #: Largest number of stages, for the orders 2 to 16.
 MOST_STAGES = 8
 
-#: Spacing of the floating-point numbers from 1 to 2; its multiples below 2, and 1 minus them, are exact.
-GRID = Fraction(1, 2**52)
-
 #: The predictor of the stages of the next step is optimal for motions whose frequencies, times h, do not exceed BAND
-#: times the number of stages, known up to relative errors of NOISE. More stages are used with longer steps.
-BAND, NOISE = Fraction(1, 4), Fraction(1, 10**12)
+#: times the number of stages. More stages are used with longer steps.
+BAND = Fraction(1, 4)
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Floating-point numbers: the ``spacing`` from 1 to 2, whose multiples below 2, and 1 minus them, are exact.
+
+    The predictor takes values to be known up to relative errors of ``noise``.
+    """
+
+    spacing: Fraction
+    noise: Fraction
+
+
+DOUBLE = Precision(Fraction(1, 2**52), Fraction(1, 10**12))
+SINGLE = Precision(Fraction(1, 2**23), Fraction(1, 10**5))
 
 
 @dataclass(frozen=True)
@@ -54,7 +66,7 @@ class Tableau:
 
 
 @cache
-def tableau(stages: int) -> Tableau:
+def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
     """Return the coefficients of the method with this number of stages."""
     nodes = gauss_nodes(stages)
     basis = _lagrange(nodes)
@@ -63,8 +75,8 @@ def tableau(stages: int) -> Tableau:
     return Tableau(
         tuple(map(float, nodes)),
         tuple(map(float, weights)),
-        tuple(map(tuple, _rounded(exact))),
-        tuple(map(tuple, _prediction(nodes, weights, exact))),
+        tuple(map(tuple, _rounded(exact, precision.spacing))),
+        tuple(map(tuple, _prediction(nodes, weights, exact, precision.noise))),
     )
 
 
@@ -105,36 +117,38 @@ def _integral(p: Sequence[Fraction], end: Fraction) -> Fraction:
     return sum((a * end ** (k + 1) / (k + 1) for k, a in enumerate(p)), Fraction(0))
 
 
-def _rounded(exact: Sequence[Sequence[Fraction]]) -> list[list[float]]:
+def _rounded(exact: Sequence[Sequence[Fraction]], spacing: Fraction) -> list[list[float]]:
     """Return the matrix μ as floating-point numbers with μ_ij + μ_ji = 1."""
     n = len(exact)
     mu = [[Fraction(1, 2)] * n for _ in range(n)]
     for i in range(n):
         for j in range(i):
-            mu[i][j] = round(exact[i][j] / GRID) * GRID
+            mu[i][j] = round(exact[i][j] / spacing) * spacing
             mu[j][i] = 1 - mu[i][j]
     return [[float(v) for v in row] for row in mu]
 
 
 def _prediction(
-    nodes: Sequence[Fraction], weights: Sequence[Fraction], mixing: Sequence[Sequence[Fraction]]
+    nodes: Sequence[Fraction], weights: Sequence[Fraction], mixing: Sequence[Sequence[Fraction]], noise: Fraction
 ) -> list[list[float]]:
     """Return μ diag(b) W diag(1/b), where W extrapolates f from the stages of one step to those of the next."""
     n = len(nodes)
-    extrapolation = _extrapolation([c - 1 for c in nodes], nodes, BAND * n)
+    extrapolation = _extrapolation([c - 1 for c in nodes], nodes, BAND * n, noise)
     return [
         [float(sum(mixing[i][k] * weights[k] * extrapolation[k][j] for k in range(n)) / weights[j]) for j in range(n)]
         for i in range(n)
     ]
 
 
-def _extrapolation(known: Sequence[Fraction], times: Sequence[Fraction], band: Fraction) -> list[list[Fraction]]:
+def _extrapolation(
+    known: Sequence[Fraction], times: Sequence[Fraction], band: Fraction, noise: Fraction
+) -> list[list[Fraction]]:
     """Return for each time in ``times`` the weights of values at the times ``known``.
 
     They give the best linear prediction of a signal whose spectrum is flat up to a band limit, and zero beyond, from
-    values with errors of the size NOISE.
+    values with errors of the size ``noise``.
     """
-    rows = [[_sinc(band * (a - b)) + (NOISE**2 if a == b else 0) for b in known] for a in known]
+    rows = [[_sinc(band * (a - b)) + (noise**2 if a == b else 0) for b in known] for a in known]
     sides = [[_sinc(band * (a - b)) for b in times] for a in known]
     solved = _solved(rows, sides)
     return [[solved[j][i] for j in range(len(known))] for i in range(len(times))]

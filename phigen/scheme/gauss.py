@@ -59,8 +59,6 @@ def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
         yield ("modified_hamiltonian",), "the modified Hamiltonian is not computed", series
     if spec.reconstruct:
         yield ("reconstruct",), "attitudes are not offered", "scheme: series or splitting"
-    if extras.real == "float":
-        yield ("real",), "not in single precision", "scheme: series or splitting"
     if spec.composition not in ("auto", "none"):
         yield ("composition",), "steps are not composed", f"order: up to {2 * MOST_STAGES}, in one step"
     if spec.solver.tolerance is not None:

@@ -381,7 +381,7 @@ def _extras(source: random.Random, drawn: Ordinary) -> Ordinary:
 
 
 #: Options of other schemes.
-_NOT_OF_GAUSS = ("birealisation", "composition", "reconstruct", "real", "solver")
+_NOT_OF_GAUSS = ("birealisation", "composition", "reconstruct", "solver")
 
 
 def _collocated(source: random.Random, drawn: Ordinary) -> Ordinary:
@@ -394,4 +394,6 @@ def _collocated(source: random.Random, drawn: Ordinary) -> Ordinary:
         options["structure"] = "to truncation"
     if source.random() < 0.2:
         options["solver"] = {"lanes": False}
+    if source.random() < 0.1:
+        options |= {"real": "float", "profile": "small"}
     return replace(drawn, options=options)

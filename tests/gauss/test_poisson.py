@@ -166,7 +166,6 @@ REFUSED = {
     "monitor": (f"{BODY}monitor: log\nscheme: gauss\n", "log needs H = A + B split in two", "splitting"),
     "modified": (f"{BODY}modified_hamiltonian: 1\nscheme: gauss\n", "belongs to scheme: series", "remove"),
     "attitude": (f"{BODY}reconstruct: quaternion\nscheme: gauss\n", "attitudes are not offered", "series"),
-    "float": (f"{BODY}real: float\nscheme: gauss\n", "single precision", "series"),
     "composition": (f"{BODY}composition: suzuki\nscheme: gauss\n", "not composed", "order"),
     "terms": (f"{BODY}terms: 3\nscheme: gauss\n", "belongs to scheme: series", "remove"),
     "birealisation": (f"{BODY}birealisation: cayley\nscheme: gauss\n", "belongs to scheme: series", "remove"),

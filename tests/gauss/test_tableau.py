@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from phigen.gauss.statements import check
-from phigen.gauss.tableau import gauss_nodes, tableau
+from phigen.gauss.tableau import DOUBLE, SINGLE, gauss_nodes, tableau
 
 STAGES = range(1, 9)
 
@@ -29,9 +29,12 @@ def test_nodes_have_more_digits_than_are_used():
 @pytest.mark.parametrize("stages", STAGES)
 def test_mixing_is_symplectic_without_rounding(stages):
     """μ_ij + μ_ji = 1 in exact arithmetic, and reversing the order of the stages gives the adjoint method."""
-    mu = [[Fraction(v) for v in row] for row in tableau(stages).mixing]
-    assert set(tableau(stages).defects) == {0}
-    assert all(mu[i][j] + mu[stages - 1 - i][stages - 1 - j] == 1 for i in range(stages) for j in range(stages))
+    for precision, digits in ((DOUBLE, np.float64), (SINGLE, np.float32)):
+        table = tableau(stages, precision)
+        mu = [[Fraction(v) for v in row] for row in table.mixing]
+        assert set(table.defects) == {0}
+        assert all(mu[i][j] + mu[stages - 1 - i][stages - 1 - j] == 1 for i in range(stages) for j in range(stages))
+        assert np.array_equal(table.mixing, np.array(table.mixing, dtype=digits))
 
 
 @pytest.mark.parametrize("stages", STAGES)

@@ -1,11 +1,12 @@
 """Gauss steps in all targets and profiles: equal to round-off, tangents and failures included."""
 
+import re
 from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from support import SCALED, compile_text, compiled, first_run, javascript, small, solver, spec_of
+from support import SCALED, compile_text, compiled, files, first_run, javascript, small, solver, spec_of
 
 from phigen.compiler import compile_spec
 from phigen.errors import StepError
@@ -173,3 +174,28 @@ def test_gauge_makes_velocities_small():
     assert value == number(Fraction(208, 6))  # C has the second derivatives 2
     assert not tops.gauge.fixed  # those of its Casimirs are orthogonal to those of H
     assert not gauged(f"{STIFF}gauge: none\n", 4).gauge.fixed
+
+
+def in_single_precision(name, order):
+    """The compilation whose C computes with numbers of 32 bits."""
+    double = small(compiled(name, order, "gauss"))
+    return replace(double, program=replace(double.program, extras=replace(double.program.extras, real="float")))
+
+
+def test_energy_does_not_drift_in_single_precision():
+    """Over 20,000 steps it wanders by some units of rounding."""
+    compilation = in_single_precision("henon_heiles", 12)
+    run = solver(compilation, "c").integrate([float(v) for v in first_run(compilation).initial], 0.4, 20_000, 500)
+    assert np.abs(run.energy - run.energy[0]).max() <= 1e-6
+
+
+def test_coefficients_are_symplectic_in_single_precision():
+    """mu_ij + mu_ji = 1 without error, for the literals as a compiler reads them."""
+    text = files(in_single_precision("henon_heiles", 12), "c")["henon_heiles.c"]
+    rows = re.search(r"henon_heiles_mixing\[.*?\] = \{(.*?)\};", text, re.S)[1].strip().split("\n")
+    mixing = [[Fraction(float(np.float32(v))) for v in re.findall(r"(-?[\d.e-]+)f", row)] for row in rows]
+    columns = list(zip(*mixing, strict=True))
+    assert len(columns) == len(mixing) == 6
+    assert all(
+        a + b == 1 for row, column in zip(mixing, columns, strict=True) for a, b in zip(row, column, strict=True)
+    )

@@ -20,6 +20,7 @@ from phigen.spec.model import Parameter
 from phigen.targets.c import functions, paths
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
+from phigen.targets.c.gauss import SINGLE_POLICY
 from phigen.targets.c.kernels import declaration, function, members
 from phigen.targets.c.lanes import KNOTS, remembered, travels
 from phigen.targets.c.lanes import printed as kernels_in_lanes
@@ -98,7 +99,8 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
 def _policies(program: Program) -> dict[str, str]:
     """The headers with the constants of policies; sizes of arrays are declared with the solver."""
     sizes = ("DIFFERENCES", "DIRECTIONS")
-    texts = {f"{name}.h": C.text(policy, sizes) for name, policy in policies_of(program).items()}
+    policies = policies_of(program) | ({"gauss_policy": SINGLE_POLICY} if program.single else {})
+    texts = {f"{name}.h": C.text(policy, sizes) for name, policy in policies.items()}
     return {file: text.replace("PHI_", f"{program.name}_") for file, text in texts.items()}
 
 
