@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ed4e2e6a74f6200cd442a9dd75dc1e20b6787608bea46b23b35683f2e63f4a95
+ * body-sha256: 301de8f6a179b0d02af55dcde32cd26d2335ddb36531cd2d4319b9bc4d9b54f8
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -292,7 +292,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -350,7 +350,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
+   * successful ones.
    *
    * @param {number} h
    * @param {number} count

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6b73809d4d806e8994f763fbc573013090a4c1c1ab62b2de2df2fd777d2e9cf2
+ * body-sha256: feb5a78d086afb8f825e3a05709f61681195e330d5713cd833e4f843361fc8ab
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -179,7 +179,7 @@ export class Solver {
   params;
   /** Coefficients of each stage: functions of parameters and step size. */
   coef = emptyTables();
-  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -226,7 +226,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
+   * successful ones.
    *
    * @param {number} h
    * @param {number} count

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4141bf7c43f0a509e7f36b6c68fc894ae8415ef1131ce85b16f2aaa8d8706a38
+ * body-sha256: 77e0322b17183de205a3cc3f72a32c3fd387a146f83b680b466dbd91dadbbe13
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -595,7 +595,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -647,7 +647,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
+   * successful ones.
    *
    * @param {number} h
    * @param {number} count

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b2b4083d1e4c55b1b5acb8944b4c5504f46b016b42026a2e0844859336ec90b6
+ * body-sha256: 986d0904419e2f3e862e420ca51f3af4e418e7eca7af969f52dfb984a7431f9c
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -393,7 +393,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -456,7 +456,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
+   * successful ones.
    *
    * @param {number} h
    * @param {number} count

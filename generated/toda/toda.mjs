@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 391aac686a423b0a09e358a307eab46c430b69e37f52660bb12b1e4903e75210
+ * body-sha256: 77d960dfb4092724eccebe76cf849774bab7a3e0f79bb2ea6cf30ecd90797503
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -232,7 +232,7 @@ export class Solver {
   before;
   /** Predictors and other results of steps of one size, for later steps. */
   past = {};
-  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -242,7 +242,8 @@ export class Solver {
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES
    * @param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default
-   * @param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number for all
+   * @param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number
+   * for all
    */
   constructor(options) {
     const { x0 } = options;
@@ -304,7 +305,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
+   * successful ones.
    *
    * @param {number} h
    * @param {number} count

@@ -74,7 +74,10 @@ export class Solver {
   t = 0;
   // #endif
   // #if NOISE
-  /** The random numbers of a site are a function of these three, the number of steps made before, and the site. */
+  /**
+   * The random numbers of a site are a function of these three, the number of steps made before, and the
+   * site.
+   */
   seed = 0;
   member = 0;
   step0 = 0;
@@ -95,7 +98,7 @@ export class Solver {
   before;
   /** Predictors and other results of steps of one size, for later steps. */
   past = {};
-  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -105,7 +108,8 @@ export class Solver {
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES
    * @param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default
-   * @param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number for all
+   * @param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number
+   * for all
    * #if TIMED
    * @param {number} [options.t0] the time of x0, 0 by default
    * #endif
@@ -192,7 +196,8 @@ export class Solver {
 
   // #if TANGENT
   /**
-   * Make one step as `step` does, and multiply vectors by its derivative, exact to round-off. Throws StepError;
+   * Make one step as `step` does, and multiply vectors by its derivative, exact to round-off. Throws
+   * StepError;
    * then the state is as before.
    *
    * @param {number} h
@@ -211,7 +216,8 @@ export class Solver {
 
   // #endif
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
+   * successful ones.
    *
    * @param {number} h
    * @param {number} count

@@ -32,7 +32,10 @@ export function timeOf(solver, stage, y) {
 // #endif
 
 // #if GAUSS
-/** The time that a step takes, by its start and the unknowns at its stages; NaN unless it has the sign of the step. */
+/**
+ * The time that a step takes, by its start and the unknowns at its stages; NaN unless it has the sign
+ * of the step.
+ */
 export function timeOfStep(solver, stage, start, z) {
   let sum = 0;
   WEIGHTS.forEach((b, i) => {

@@ -66,7 +66,9 @@ function admitted(given) {
     const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
     // #if NONNEGATIVE
-    if (value < 0 && NONNEGATIVE.includes(name)) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+    if (value < 0 && NONNEGATIVE.includes(name)) {
+      throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+    }
     // #endif
   }
   const [table] = emptyTables();
@@ -157,7 +159,7 @@ export class Solver {
   // #endif
   // #endif
   // #if !MONITOR
-  /** Steps and time at the last change of h: the time is a multiple of h from there, without summed errors. */
+  /** Steps and time at the last change of h: the time is a multiple of h from there. */
   #stepsBefore = 0;
   #timeBefore = 0;
   // #endif
@@ -217,7 +219,10 @@ export class Solver {
   }
 
   // #if ATTITUDE
-  /** The attitude: a quaternion (w, x, y, z) that rotates body into space coordinates, or a matrix by rows. */
+  /**
+   * The attitude: a quaternion (w, x, y, z) that rotates body into space coordinates, or a matrix by
+   * rows.
+   */
   get attitude() {
     return currentElement(this).slice(0, ATTITUDE);
   }
@@ -361,7 +366,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the successful ones.
+   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
+   * successful ones.
    *
    * @param {number} h
    * @param {number} count
