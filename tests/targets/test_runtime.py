@@ -139,6 +139,9 @@ def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
     ids=lambda p: p.name,
 )
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
+    """Parts of a file, which it includes in its midst, do so with all of it."""
+    while whole := whole_of(path):
+        path = whole
     kinds = {"packs.c": "SPLITTING", "adjoint_segments.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH"}
     kinds |= dict.fromkeys(("path_lanes.c", "expansion_lanes.c", "adjoint_lanes.c"), "PATH")
     kinds |= dict.fromkeys(("gauss.c", "adjoint_gauss.c"), "GAUSS")
@@ -154,6 +157,18 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
     kind = kinds.get(path.name, "NEWTON")
     switches = defined((kind, "FAST", "TANGENT", "ADJOINT", *own.get(path.name, ())))
     run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, path], tmp_path)
+
+
+def whole_of(path):
+    """The file that includes a part in its midst, and that the part includes at its head, if there is one."""
+    included = [RUNTIME / file for file in re.findall(r'#include "(\w+\.c)"', head(path))]
+    here = f'#include "{path.name}"'
+    return next((f for f in included if here in f.read_text(encoding="utf-8") and here not in head(f)), None)
+
+
+def head(path):
+    """What is before the first line of code or comment."""
+    return re.match(r"(#.*\n|\n)*", path.read_text(encoding="utf-8"))[0]
 
 
 @pytest.mark.parametrize("more", [(), ("SPATIAL",), ("MATRICES",), ("MATRICES", "SPATIAL")], ids=" ".join)

@@ -43,40 +43,9 @@ static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, si
     return 1;
 }
 
-#if PHI_EXPLICIT
-/* Pull cotangents x back through a stage that began at y. */
-static inline void phi_pull_stage(phi_lanes *coef, phi_lanes y[restrict PHI_DIM], phi_lanes x[restrict PHI_DIM],
-    phi_lanes coef_bar[restrict PHI_COEFFICIENTS])
-{
-    phi_lanes back[PHI_DIM], slopes[PHI_COEFFICIENTS];
-    phi_explicit_adjoint_lanes(coef, y, x, back, slopes);
-    for (int i = 0; i < PHI_DIM; ++i) phi_gain_lanes(x[i], back[i]);
-    for (int c = 0; c < PHI_COEFFICIENTS; ++c) phi_gain_lanes(coef_bar[c], slopes[c]);
-}
+#include "adjoint_kept_explicit.c"
+#include "adjoint_kept_implicit.c"
 
-#else
-/* Pull cotangents x back through a stage that has solved for g->y. They become infinite where lanes do not suffice. */
-static void phi_pull_stage(phi_traced *g, phi_lanes x[restrict PHI_DIM], phi_lanes coef_bar[restrict PHI_COEFFICIENTS])
-{
-    phi_lanes slopes[PHI_COEFFICIENTS];
-    phi_linearise_back(g);
-    memcpy(g->after, x, sizeof g->after);
-    memset(g->change, 0, sizeof g->change);
-    for (int i = 0; i < PHI_DIM; ++i)
-        for (int j = 0; j < PHI_DIM; ++j) {
-            PHI_EACH_LANE
-            for (int lane = 0; lane < PHI_LANES; ++lane) g->change[i][lane] += g->gain[i * PHI_DIM + j][lane] * x[j][lane];
-        }
-    phi_solve_lanes(g->jacobian, g->change, 1, g->wrong);
-    for (int i = 0; i < PHI_DIM; ++i) {
-        phi_gain_lanes(x[i], g->change[i]);
-        phi_gain_lanes(x[i], g->wrong);
-    }
-    phi_slopes_back(g, slopes);
-    for (int c = 0; c < PHI_COEFFICIENTS; ++c) phi_gain_lanes(coef_bar[c], slopes[c]);
-}
-
-#endif
 /* Pull the cotangents of rows back through all steps. */
 static void phi_pull_back(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
 {

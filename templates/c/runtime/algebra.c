@@ -37,17 +37,8 @@ static int phi_advance(phi_solver *s, const double *change, const double *small)
     return 1;
 }
 
-#if PHI_MONITOR
-/* The time that has passed gains that of a stage. */
-static void phi_pass(phi_solver *s, double elapsed)
-{
-    const double sum = s->t + elapsed, added = sum - s->t;
-    const double small = s->t_carry + ((s->t - (sum - added)) + (elapsed - added));
-    s->t = sum + small;
-    s->t_carry = small - (s->t - sum);
-}
+#include "elapsed.c"
 
-#endif
 /* In a step from start, moved holds the sum of the changes so far, and the carry; x is start + moved, rounded. */
 static inline void phi_add(double x[PHI_DIM], double moved[PHI_DIM], const double start[PHI_DIM], int i, double change)
 {

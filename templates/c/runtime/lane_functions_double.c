@@ -9,7 +9,6 @@
 #define PHI_ROUNDER 6755399441055744.0 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
 
 #endif
-#if PHI_CALLS_EXP || PHI_CALLS_EXPM1
 /* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
 static inline double phi_exp_parts(double u, double *power)
 {
@@ -35,8 +34,6 @@ static inline double phi_exp_parts(double u, double *power)
     return *power * sum;
 }
 
-#endif
-#if PHI_CALLS_EXP
 /* exp(u) for the loops over lanes. No number beyond |u| = 700. */
 static inline double phi_exp_lane(double u)
 {
@@ -45,8 +42,6 @@ static inline double phi_exp_lane(double u)
     return rest + power + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-#endif
-#if PHI_CALLS_EXPM1
 /* exp(u) - 1 for the loops over lanes. No number beyond |u| = 700. */
 static inline double phi_expm1_lane(double u)
 {
@@ -55,8 +50,6 @@ static inline double phi_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-#endif
-#if PHI_CALLS_LOG
 /* log u for the loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2, no branches. No number where u is not
    positive, or not normal. */
 static inline double phi_log_lane(double u)
@@ -86,7 +79,6 @@ static inline double phi_log_lane(double u)
     return rest + (u >= DBL_MIN && u <= DBL_MAX ? 0.0 : (double)NAN);
 }
 
-#endif
 #if PHI_CALLS_SIN && !PHI_CALLS_COS
 /* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
 static inline double phi_sin_lane(double u)
@@ -127,8 +119,6 @@ static inline double phi_turned_sin(double u, double offset)
 static inline double phi_sin_lane(double u) { return phi_turned_sin(u, 0.0); }
 
 #endif
-#if PHI_CALLS_COS
 /* cos u for the loops over lanes. */
 static inline double phi_cos_lane(double u) { return phi_turned_sin(u, 0.5); }
-#endif
 #endif

@@ -9,7 +9,6 @@
 #define PHI_ROUNDER 12582912.0f /* 1.5 2^23: a number added to it and taken off again is rounded to an integer */
 
 #endif
-#if PHI_CALLS_EXP || PHI_CALLS_EXPM1
 /* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
 static inline float phi_exp_parts(float u, float *power)
 {
@@ -28,8 +27,6 @@ static inline float phi_exp_parts(float u, float *power)
     return *power * sum;
 }
 
-#endif
-#if PHI_CALLS_EXP
 /* exp(u) for the loops over lanes. No number beyond |u| = 87. */
 static inline float phi_exp_lane(float u)
 {
@@ -38,8 +35,6 @@ static inline float phi_exp_lane(float u)
     return rest + power + (fabsf(u) <= 87.0f ? 0.0f : (float)NAN);
 }
 
-#endif
-#if PHI_CALLS_EXPM1
 /* exp(u) - 1 for the loops over lanes. No number beyond |u| = 87. */
 static inline float phi_expm1_lane(float u)
 {
@@ -48,8 +43,6 @@ static inline float phi_expm1_lane(float u)
     return rest + (power - 1.0f) + (fabsf(u) <= 87.0f ? 0.0f : (float)NAN);
 }
 
-#endif
-#if PHI_CALLS_LOG
 /* log u for the loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2, no branches. No number where u is not
    positive, or not normal. */
 static inline float phi_log_lane(float u)
@@ -72,7 +65,6 @@ static inline float phi_log_lane(float u)
     return rest + (u >= FLT_MIN && u <= FLT_MAX ? 0.0f : (float)NAN);
 }
 
-#endif
 #if PHI_CALLS_SIN && !PHI_CALLS_COS
 /* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 8192. */
 static inline float phi_sin_lane(float u)
@@ -108,8 +100,6 @@ static inline float phi_turned_sin(float u, float offset)
 static inline float phi_sin_lane(float u) { return phi_turned_sin(u, 0.0f); }
 
 #endif
-#if PHI_CALLS_COS
 /* cos u for the loops over lanes. */
 static inline float phi_cos_lane(float u) { return phi_turned_sin(u, 0.5f); }
-#endif
 #endif

@@ -174,15 +174,8 @@ static void phi_copy(double *const *to, double *const *from, const phi_solver *s
     phi_copy_carry(s, to);
 }
 
-#if PHI_TANGENT
-/* The fields of a tangent vector. */
-static void phi_vector(const phi_solver *s, size_t number, double *v[PHI_DIM])
-{
-    const size_t block = PHI_DOUBLES;
-    for (size_t k = 0; k < PHI_DIM; ++k) v[k] = s->tangents + (number * PHI_DIM + k) * block;
-}
+#include "lattice_vectors.c"
 
-#endif
 #include "lattice_stages.c"
 #include "lattice_flows.c"
 

@@ -23,29 +23,8 @@ static void phi_add_up(const phi_solver *s, phi_transpose *g, double coef_bar[PH
         }
 }
 
-#if PHI_RENEWED
-/* The same after a step after so many others, where those of what depends on the time are pulled back to the others. */
-static void phi_add_up_step(const phi_solver *s, phi_transpose *g, size_t steps, double coef_bar[PHI_SUMS])
-{
-    double found[PHI_SUMS] = { 0.0 }, early[PHI_PREPARED];
-    phi_add_up(s, g, found);
-    for (int k = PHI_COEFFICIENTS; k < PHI_SUMS; ++k) coef_bar[k] += found[k];
-#if PHI_SERIES
-    PHI_EACH_STAGE {
-        const double *coef = PHI_ROW_OF(s->coef, stage), middle = PHI_OF(phi_middles, stage);
-        double *own = PHI_ROW_OF(found, stage), *to = PHI_ROW_OF(coef_bar, stage);
-#else
-    for (int row = 0; row < PHI_ROWS_OF_FLOWS; ++row) {
-        double *own = found + row * PHI_ROW, *to = coef_bar + row * PHI_ROW, coef[PHI_ROW];
-        const double middle = phi_moments[row];
-        phi_renew(s, row, steps, coef);
-#endif
-        phi_refresh_adjoint(coef, phi_time_after(s, steps) + middle * s->h, own + PHI_PREPARED, early);
-        for (int k = 0; k < PHI_PREPARED; ++k) to[k] += own[k] + early[k];
-    }
-}
+#include "lattice_adjoint_renewed.c"
 
-#endif
 /* Add the cotangents of parameters, those of numbers by way of the coefficients. */
 static void phi_add_parameters(const phi_solver *s, const phi_transpose *g, const double coef_bar[PHI_SUMS],
     phi_params_bar *params_bar)

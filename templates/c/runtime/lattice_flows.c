@@ -48,64 +48,9 @@ static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI
 }
 
 #endif
-#if PHI_WAVES || PHI_ADJOINT
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-#if PHI_RENEWED
-    double own[PHI_ROW];
-#endif
-#if PHI_UNDONE
-#if PHI_TAKES
-    int go;                    /* 0 onward; else back, 1 and 2 in turn, by which of the arrays what is handed goes, with: */
-#else
-    int go;                    /* 0 onward; else back, 1 at the sites themselves, and 2 as they are handed something then, with: */
-#endif
-    int row;
-    const struct phi_transpose *g;
-    double *const *bar;
-#endif
-} phi_flow;
+#include "lattice_found_flows.c"
+#include "lattice_made_flows.c"
 
-/* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void phi_find_flow(const phi_solver *s, size_t steps, int number, phi_flow *flow)
-{
-    flow->part = phi_flow_parts[number];
-#if PHI_UNDONE
-    flow->go = 0;
-#endif
-#if PHI_RENEWED
-    phi_renew(s, number, steps, flow->own);
-    flow->coef = flow->own;
-#else
-    flow->coef = s->coef + number * PHI_ROW;
-    (void)steps;
-#endif
-}
-
-static void phi_make_flow(const phi_solver *s, size_t steps, int number)
-{
-    phi_flow flow;
-    phi_find_flow(s, steps, number, &flow);
-    phi_sweep_part(s, flow.part, flow.coef PHI_AND_FAR(s->far > 0));
-}
-
-#elif !PHI_NOISE || PHI_RENEWED
-/* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void phi_make_flow(const phi_solver *s, size_t steps, int number)
-{
-#if PHI_RENEWED
-    double coef[PHI_ROW];
-    phi_renew(s, number, steps, coef);
-    phi_sweep_part(s, phi_flow_parts[number], coef PHI_AND_FAR(s->far > 0));
-#else
-    (void)steps;
-    phi_sweep_part(s, phi_flow_parts[number], s->coef + number * PHI_ROW PHI_AND_FAR(s->far > 0));
-#endif
-}
-
-#endif
 #if PHI_UNDONE
 static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first, size_t end);
 

@@ -52,105 +52,11 @@ static void phi_combine(const phi_solver *s, double *const *to, double a, double
     }
 }
 
-#if PHI_SLOPES
-/* to = v - what a sweep, or its transpose, does to that variation of s->y[now]. */
-static void phi_multiply(const phi_solver *s, const double *coef, int now, double *const *v, double *const *to)
-{
-    const size_t units = phi_units(s);
-#if PHI_ADJOINT
-    if (s->side != NULL) {
-        phi_pull(s, PHI_SLOPE_BACK, coef, v, NULL, to);
-        phi_combine(s, to, 1.0, v, -1.0, to);
-        return;
-    }
-#endif
-    PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) phi_slope_piece(s, coef, s->y[now], v, to, unit);
-    phi_combine(s, to, 1.0, v, -1.0, to);
-}
-#else
-/* to = v - what a sweep, which makes s->y[1 - now], does to that variation of s->y[now], by a difference. */
-static void phi_multiply(const phi_solver *s, const double *coef, int now, double *const *v, double *const *to)
-{
-    const size_t units = phi_units(s);
-    const double by = 0x1p-26 * sqrt((double)(PHI_DIM * s->sites));
-    phi_combine(s, s->y[2], 1.0, s->y[now], by, v);
-    PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) phi_stage_piece(s, coef PHI_AND_FAR(1), s->y[2], to, unit);
-    phi_combine(s, to, 1.0 / by, s->y[1 - now], -1.0 / by, to);
-    phi_combine(s, to, 1.0, v, 1.0, to);
-}
-#endif
+#include "lattice_krylov_slopes.c"
+#include "lattice_krylov_differences.c"
 
-#if PHI_SITE_BLOCKS
-/* The inverse of a matrix in its place; 1 where there is none. */
-static void phi_invert_block(double b[PHI_DIM][PHI_DIM])
-{
-    double zero = 0.0;
-    for (int k = 0; k < PHI_DIM; ++k) {
-        const double pivot = 1.0 / b[k][k];
-        b[k][k] = 1.0;
-        for (int j = 0; j < PHI_DIM; ++j) b[k][j] *= pivot;
-        for (int i = 0; i < PHI_DIM; ++i) {
-            const double factor = b[i][k];
-            if (i == k) continue;
-            b[i][k] = 0.0;
-            for (int j = 0; j < PHI_DIM; ++j) b[i][j] -= factor * b[k][j];
-        }
-    }
-    for (int k = 0; k < PHI_DIM * PHI_DIM; ++k) zero += 0.0 * b[k / PHI_DIM][k % PHI_DIM];
-    for (int k = 0; zero != 0.0 && k < PHI_DIM * PHI_DIM; ++k) b[k / PHI_DIM][k % PHI_DIM] = k % (PHI_DIM + 1) == 0;
-}
+#include "lattice_site_blocks.c"
 
-/* Where fields at a site act on each other by much, as a momentum and its field do, a space of the matrix times the inverses of what
-   it does at the sites themselves takes half as many directions. These inverses at s->y[now]. */
-static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
-{
-    const size_t units = phi_units(s);
-    PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) {
-        const phi_row row = phi_piece_of(s, unit);
-#if PHI_ADJOINT
-        phi_own_slope_piece(s, coef, s->y[s->side != NULL ? 2 : now], s->block, unit);
-#else
-        phi_own_slope_piece(s, coef, s->y[now], s->block, unit);
-#endif
-        for (ptrdiff_t i = row.from; i < row.to; ++i) {
-            double b[PHI_DIM][PHI_DIM];
-            for (int k = 0; k < PHI_DIM * PHI_DIM; ++k)
-                b[k / PHI_DIM][k % PHI_DIM] = (k % (PHI_DIM + 1) == 0) - s->block[k][PHI_SITE(i)];
-            phi_invert_block(b);
-            for (int k = 0; k < PHI_DIM * PHI_DIM; ++k) s->block[k][PHI_SITE(i)] = b[k / PHI_DIM][k % PHI_DIM];
-        }
-    }
-}
-
-/* to = from + these inverses times v; without from that alone. */
-static void phi_apply_blocks(const phi_solver *s, double *const *v, double *const *from, double *const *to)
-{
-    const size_t units = phi_units(s);
-    PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) {
-        const phi_row row = phi_piece_of(s, unit);
-        for (int k = 0; k < PHI_DIM; ++k) {
-            double *sum = PHI_HERE(to[k]);
-            for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][PHI_SITE(i)];
-            for (int l = 0; l < PHI_DIM; ++l) {
-#if PHI_ADJOINT
-                const int entry = s->side != NULL ? l * PHI_DIM + k : k * PHI_DIM + l;
-#else
-                const int entry = k * PHI_DIM + l;
-#endif
-                const double *one = PHI_HERE(v[l]), *by = PHI_HERE(s->block[entry]);
-                PHI_EACH_SITE
-                for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] += by[i] * one[i];
-            }
-            PHI_COPY_ENDS(sum, s->length, row.from, row.to)
-        }
-    }
-}
-
-#endif
 /* to = from - what solves matrix(v) = s->space[0], as well as a space of so many directions allows: GMRES, after Y. Saad
    and M. H. Schultz, without a restart. The matrix is that of phi_multiply. The length of s->space[0]; not finite if this
    is of no use. */

@@ -83,71 +83,9 @@ static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int
     return moved;
 }
 
-#if !PHI_GUESSES
-#define phi_predict(s, x) phi_copy((s)->y[0], x, s)
-#define phi_forget(s) ((s)->stiff = 0)
+#include "lattice_without_guesses.c"
+#include "lattice_guesses.c"
 
-#else
-/* x and the extrapolated y - x into s->y[0], with the copied ends. */
-static void phi_predict(const phi_solver *s, double *const *x PHI_AND_INT_STAGE)
-{
-    PHI_EACH_PIECE
-    for (size_t row = 0; row < s->rows; ++row)
-        for (int k = 0; k < PHI_DIM; ++k) {
-            const ptrdiff_t first = PHI_FIRST_COPY((ptrdiff_t)row * s->width), end = first + PHI_WITH_COPIES(s->length);
-            for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
-            for (int d = 0; d < PHI_OF(s->guess, stage).order; ++d) {
-                const double *difference = PHI_OF(s->guess, stage).difference[d][k];
-                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
-            }
-        }
-}
-
-/* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best order. */
-static void phi_remember(phi_solver *s, double *const *from PHI_AND_INT_STAGE, int now)
-{
-    phi_guess *guess = &PHI_OF(s->guess, stage);
-    double size[PHI_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
-    PHI_EACH_PIECE
-    for (size_t row = 0; row < s->rows; ++row) {
-        double own[PHI_DIFFERENCES] = { 0.0 };
-        for (int k = 0; k < PHI_DIM; ++k) {
-            const ptrdiff_t first = PHI_FIRST_COPY((ptrdiff_t)row * s->width), end = first + PHI_WITH_COPIES(s->length);
-            const double *restrict y = s->y[now][k], *restrict x = from[k];
-            for (ptrdiff_t i = first; i < end; ++i) {
-                double next = y[i] - x[i];
-                for (int d = 0; d < guess->count; ++d) {
-                    const double last = guess->difference[d][k][i];
-                    guess->difference[d][k][i] = next;
-                    next -= last;
-                    phi_raise(own + d, fabs(next));
-                }
-                if (guess->count < PHI_DIFFERENCES) guess->difference[guess->count][k][i] = next;
-            }
-        }
-        PHI_ONE_BY_ONE
-        for (int d = 0; d < PHI_DIFFERENCES; ++d) phi_raise(size + d, own[d]);
-    }
-    guess->order = 1;
-    for (int d = 0; d < guess->count; ++d)
-        if (size[d] < least) {
-            least = size[d];
-            guess->order = d + 1;
-        }
-    if (guess->count < PHI_DIFFERENCES) ++guess->count;
-}
-
-/* Begin without guesses, and with sweeps. */
-static void phi_forget(phi_solver *s)
-{
-    s->stiff = 0;
-#if PHI_BANDED
-    s->factored = NULL;
-#endif
-    PHI_EACH_STAGE PHI_OF(s->guess, stage).count = PHI_OF(s->guess, stage).order = 0;
-}
-
-#endif
 #include "lattice_newton.c"
 
 /* Keep the y of a stage, and x where its transpose reads that; returns where the next are kept. */

@@ -12,24 +12,8 @@ size_t phi_tangent_size(const phi_solver *s, size_t count)
     return count > SIZE_MAX / 16 / block - 2 ? 0 : (count + 2) * block * sizeof(double) + 64;
 }
 
-#if PHI_SERIES
-/* A step that carries tangent vectors along. */
-static phi_status phi_carry(phi_solver *s) { return phi_stages(s PHI_AND_FAR(1)); }
-#else
-/* A step that carries tangent vectors along, by functions for arguments of any size. */
-static phi_status phi_carry(phi_solver *s)
-{
-    const size_t far = s->far;
-    s->far = 1;
-    s->open = 0;
-    phi_steps(s, 1);
-    ++s->steps;
-    if (PHI_FLOWS > 1) phi_steps(s, 0);
-    --s->steps;
-    s->far = far;
-    return phi_all_hold(s, s->x) ? PHI_OK : PHI_NOT_FINITE;
-}
-#endif
+#include "lattice_tangent_stages.c"
+#include "lattice_tangent_flows.c"
 
 phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t count, double *v, void *work)
 {

@@ -78,18 +78,8 @@ static void phi_put_frame(const phi_members *all, size_t m, size_t done, const d
         all->frames[((done / all->stride - 1) * PHI_DIM + i) * all->members + m] = x != NULL ? x[i] : (double)NAN;
 }
 
-#if PHI_ATTITUDES
-/* The same for its attitude. */
-static void phi_put_attitude(const phi_members *all, size_t m, size_t done, const phi_solver *s)
-{
-    double element[PHI_ELEMENT];
-    if (all->attitudes == NULL || done % all->stride != 0) return;
-    if (s != NULL) phi_attitude(s, element);
-    for (size_t i = 0; i < PHI_ELEMENT; ++i)
-        all->attitudes[((done / all->stride - 1) * PHI_ELEMENT + i) * all->members + m] = s != NULL ? element[i] : (double)NAN;
-}
+#include "members_attitudes.c"
 
-#endif
 /* The steps of a member after so many, by itself. */
 static phi_status phi_end_member(const phi_members *all, size_t m, size_t done, phi_solver *s, phi_status status)
 {

@@ -62,60 +62,9 @@ static inline void phi_settle_lanes(double x[restrict PHI_LANES], double carry[r
 
 #include "model_lanes.h"
 
-#if PHI_EXPLICIT
-/* phi_stage for the members of a pack; the sums are those of phi_advance. */
-PHI_IN_PLACE static inline void phi_stage_lanes(phi_lanes *coef, int own, phi_pack *pack)
-{
-    phi_lanes increment[PHI_DIM];
-    phi_explicit_lanes(coef, pack->x, own, increment);
-    for (int i = 0; i < PHI_DIM; ++i) {
-        double *x = pack->x[i], *carry = pack->carry[i];
-        PHI_EACH_LANE
-        for (int lane = 0; lane < PHI_LANES; ++lane) {
-            const double change = increment[i][lane], sum = x[lane] + change, added = sum - x[lane];
-            const double small = ((x[lane] - (sum - added)) + (change - added)) + carry[lane];
-            x[lane] = sum + small;
-            carry[lane] = small - (x[lane] - sum);
-        }
-    }
-}
+#include "packs_explicit.c"
+#include "packs_splitting.c"
 
-/* Steps of a group: each stage for all packs. Where own is 0, all members have the coefficients of the first lane. */
-PHI_IN_PLACE static inline void phi_steps_lanes(int own, phi_group *group, int steps)
-{
-    for (int step = 0; step < steps; ++step)
-        PHI_EACH_STAGE
-            for (int k = 0; k < group->packs; ++k) phi_stage_lanes(PHI_OF(group->coef[own * k], stage), own, &group->pack[k]);
-}
-
-#else
-/* Before the flows of a step. */
-static void phi_begin_lanes(phi_group *group)
-{
-    for (int k = 0; k < group->packs; ++k) memcpy(group->pack[k].start, group->pack[k].x, sizeof group->pack[k].x);
-}
-
-/* After them. */
-static void phi_end_lanes(phi_group *group)
-{
-    for (int k = 0; k < group->packs; ++k) {
-        phi_pack *pack = &group->pack[k];
-        for (int i = 0; i < PHI_DIM; ++i) phi_settle_lanes(pack->x[i], pack->carry[i], pack->start[i]);
-    }
-}
-
-/* Steps of a group: as in phi_stages, each flow for all packs. Where own is 0, all members have the coefficients of the
-   first lane. */
-PHI_IN_PLACE static inline void phi_steps_lanes(int own, phi_group *group, int steps)
-{
-    for (int step = 0; step < steps; ++step) {
-        phi_begin_lanes(group);
-        phi_flows_lanes(0, own, group);
-        phi_end_lanes(group);
-    }
-}
-
-#endif
 #if PHI_FAR
 /* The same where arguments of functions are too large for polynomials. */
 PHI_APART static void phi_steps_far_lanes(phi_group *group, int steps)

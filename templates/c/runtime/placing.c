@@ -8,84 +8,11 @@
 #include "implicit.c"
 #include "level.c"
 #include "attitude.c"
-#if PHI_RECURRENCES
-#define PHI_NEAR_BY 0.125 /* how far the state may be moved, in its own size, for guesses to move with it */
 
-#endif
-#if PHI_MONITOR
-/* The level of s->x, which was moved from elsewhere; 0, and back there, where it has none. */
-static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const double carry[PHI_DIM])
-{
-    double level[PHI_GAUGES];
-    const double rate = phi_monitor(&s->params, s->x);
-    phi_choose_gauge(&s->params, s->x, level);
-    if (!isfinite(level[0]) || !isfinite(rate) || !(rate > 0.0)) {
-        memcpy(s->x, from, sizeof s->x);
-        memcpy(s->carry, carry, sizeof s->carry);
-        return 0;
-    }
-    memcpy(s->gauge, level, sizeof level);
-    PHI_EACH_STAGE /* where s->h is NaN the next step does it again */
-        phi_prepare(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(s->coef, stage));
-    return 1;
-}
+#include "placing_level.c"
 
-#endif
-#if PHI_RECURRENCES
-/* Guesses move with the state, by as many past values as extrapolation needs: to where a motion through x would have had
-   them, which differs from the motion as it was by what moved the state, and by the difference of their slopes. Recurrences
-   are of the motion as it was. From far away all begins anew, with the next step. */
-static void phi_move_guesses(phi_solver *s, const double from[PHI_DIM])
-{
-    double distance = 0.0, size = 0.0, before[PHI_DIM], slope[PHI_DIM];
-    for (int i = 0; i < PHI_DIM; ++i) {
-#if PHI_RELATIVE
-        distance = fmax(distance, fabs(s->x[i] / from[i] - 1.0));
-        size = 1.0;
-#else
-        distance += fabs(s->x[i] - from[i]);
-        size += fabs(from[i]);
-#endif
-    }
-    if (!(distance <= PHI_NEAR_BY * size)) {
-        s->h = (double)NAN;
-        return;
-    }
-#if PHI_TIMED
-    phi_vector_field(&s->params, s->t, from, before);
-    phi_vector_field(&s->params, s->t, s->x, slope);
-#else
-    phi_vector_field(&s->params, from, before);
-    phi_vector_field(&s->params, s->x, slope);
-#endif
-#if PHI_MONITOR
-    const double rate = phi_monitor(&s->params, s->x), rate_before = phi_monitor(&s->params, from);
-    for (int i = 0; i < PHI_DIM; ++i) slope[i] = rate * slope[i] - rate_before * before[i];
-#else
-    for (int i = 0; i < PHI_DIM; ++i) slope[i] -= before[i];
-#endif
-#if PHI_COMPOSED
-    double since = s->h; /* how long ago the last step began, and then each of its stages */
-#endif
-    PHI_EACH_STAGE {
-        phi_history *history = &PHI_OF(s->history, stage);
-#if PHI_COMPOSED
-        const double middle = since - 0.5 * PHI_FRACTION(s->h);
-        since -= PHI_FRACTION(s->h);
-#else
-        const double middle = 0.5 * s->h;
-#endif
-        const int count = history->count < PHI_HISTORY ? history->count : PHI_HISTORY;
-        memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
-        for (int k = 0; k < count; ++k)
-            for (int i = 0; i < PHI_DIM; ++i)
-                history->past[k][i] += (s->x[i] - from[i]) - (middle + (double)(count - 1 - k) * s->h) * slope[i];
-        history->count = count;
-        history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
-    }
-}
+#include "placing_recurrences.c"
 
-#endif
 phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
 {
     if (s == NULL || x == NULL || !phi_finite(x, PHI_DIM)) return PHI_BAD_ARGUMENT;

@@ -17,11 +17,11 @@
 #define PHI_SITE_PARAMETERS 0
 #define PHI_KICKS 0
 #define PHI_NEAR 0
-#define PHI_CALLS_EXP 0
-#define PHI_CALLS_EXPM1 0
-#define PHI_CALLS_LOG 0
-#define PHI_CALLS_SIN 0
-#define PHI_CALLS_COS 0
+#define PHI_CALLS_EXP 1
+#define PHI_CALLS_EXPM1 1
+#define PHI_CALLS_LOG 1
+#define PHI_CALLS_SIN 1
+#define PHI_CALLS_COS 1
 
 typedef struct {
     double g;

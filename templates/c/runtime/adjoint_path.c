@@ -1,0 +1,159 @@
+#ifndef PHI_FILE_ADJOINT_PATH
+#define PHI_FILE_ADJOINT_PATH
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "adjoint_stage.c"
+
+#define PHI_BACK_NEGLIGIBLE 1e-18    /* terms that rounding hides in their sum, in sizes of start and sum */
+#define PHI_BACK_ROUNDED_SLOPE 1e-13 /* rounding of slopes, in sizes of the path and its slope */
+#define PHI_ANCHORED 8               /* rounds at most that bring an end to where it was ... */
+#define PHI_ANCHORED_TO 1e-15        /* ... so well, in sizes of the state */
+
+/* The sizes of the groups of what is traced back: the state, its cotangent, and those of p and of coefficients. */
+static void phi_back_sizes(const double values[PHI_BACK], double sizes[4])
+{
+    for (int g = 0; g < 4; ++g) sizes[g] = 0.0;
+    for (int i = 0; i < PHI_BACK; ++i) sizes[i < 3 * PHI_DIM ? i / PHI_DIM : 3] += fabs(values[i]);
+}
+
+/* Whether a path that is traced back satisfies its equation at m, where its expansion has the given slope. */
+static int phi_back_holds(const double *coef, const double p[PHI_BACK], const double m[PHI_BACK],
+    const double slope[PHI_BACK])
+{
+    double field[PHI_BACK], of_m[4], of_slope[4];
+    phi_back_field(coef, p, m, field);
+    phi_back_sizes(m, of_m);
+    phi_back_sizes(slope, of_slope);
+    for (int i = 0; i < PHI_BACK; ++i) {
+        const int g = i < 3 * PHI_DIM ? i / PHI_DIM : 3;
+        if (!(fabs(field[i] - slope[i]) <= PHI_BACK_ROUNDED_SLOPE * (of_m[g] + of_slope[g]) + DBL_MIN)) return 0;
+    }
+    return 1;
+}
+
+/* A path that is traced back with its cotangents, 0 <= t <= 1, by their Taylor series: change is the end minus the start.
+   0 if PHI_TERMS terms do not suffice. */
+static int phi_back_piece(const double *coef, const double p[PHI_BACK], const double start[PHI_BACK],
+    double change[PHI_BACK])
+{
+    double series[PHI_BACK_SERIES][PHI_TERMS + 1], fixed[PHI_BACK_FIXED], end[PHI_BACK], slope[PHI_BACK];
+    double of_start[4], of_change[4];
+    int small = 0;
+    for (int i = 0; i < PHI_BACK; ++i) {
+        series[i][0] = start[i];
+        change[i] = slope[i] = 0.0;
+    }
+    phi_back_sizes(start, of_start);
+    phi_back_begin(coef, p, series, fixed);
+    for (int k = 0; k < PHI_TERMS; ++k) {
+        phi_back_order(coef, p, series, fixed, k);
+        for (int i = 0; i < PHI_BACK; ++i) {
+            const double term = series[i][k + 1];
+            change[i] += term;
+            slope[i] += (double)(k + 1) * term;
+            end[i] = start[i] + change[i];
+        }
+        int negligible = 1;
+        phi_back_sizes(change, of_change);
+        for (int i = 0; i < PHI_BACK; ++i) {
+            const int g = i < 3 * PHI_DIM ? i / PHI_DIM : 3;
+            const double size = of_start[g] + of_change[g];
+            if (!(fabs(series[i][k + 1]) <= PHI_BACK_NEGLIGIBLE * size + DBL_MIN)) negligible = 0;
+        }
+        small = negligible ? small + 1 : 0;
+        if (small >= 2 && phi_back_holds(coef, p, end, slope)) return 1;
+    }
+    return 0;
+}
+
+/* The cotangents of the start of a path, of p and of the coefficients that it depends on (found, after the state), from
+   those of its end and of its mean. 0 if it cannot be followed. */
+static int phi_traced_back(const double *coef, const double end[PHI_DIM], const double p[PHI_DIM],
+    const double bar[PHI_DIM], const double mean_bar[PHI_DIM], double found[PHI_BACK])
+{
+    for (int pieces = 1; pieces <= PHI_LONGEST_PATH; pieces *= 2) {
+        double given[PHI_BACK] = { 0.0 }, change[PHI_BACK];
+        int good = 1;
+        for (int i = 0; i < PHI_BACK; ++i) found[i] = 0.0;
+        for (int i = 0; i < PHI_DIM; ++i) {
+            given[i] = p[i] / (double)pieces;
+            given[PHI_DIM + i] = mean_bar[i] / (double)pieces;
+            found[i] = end[i];
+            found[PHI_DIM + i] = bar[i];
+        }
+        for (int piece = 0; piece < pieces && good; ++piece) {
+            good = phi_back_piece(coef, given, found, change);
+            for (int i = 0; i < PHI_BACK; ++i) found[i] += i / PHI_DIM == 2 ? change[i] / (double)pieces : change[i];
+        }
+        if (good) return 1;
+    }
+    return 0;
+}
+
+/* Move the end of a path, which is known nearly, to where the mean is y, as far as that brings it nearer: on long paths the
+   mean may follow the end by more than the end was moved. 0 if it cannot be followed. */
+static int phi_anchor(const double *coef, const double p[PHI_DIM], const double y[PHI_DIM], double end[PHI_DIM])
+{
+    double minus[PHI_DIM], change[PHI_DIM], mean[PHI_DIM], miss[PHI_DIM], moved[PHI_DIM], before = HUGE_VAL;
+    int made = 0;
+    for (int i = 0; i < PHI_DIM; ++i) minus[i] = -p[i];
+    memcpy(moved, end, sizeof moved);
+    for (int round = 0; round < PHI_ANCHORED; ++round) {
+        double size = 0.0, missed = 0.0;
+        if (!phi_path(coef, moved, minus, change, mean, &made)) return round > 0;
+        for (int i = 0; i < PHI_DIM; ++i) {
+            miss[i] = y[i] - (moved[i] + mean[i]);
+            size += fabs(y[i]);
+            missed += fabs(miss[i]);
+        }
+        if (!(missed < before)) return 1;
+        before = missed;
+        for (int i = 0; i < PHI_DIM; ++i) {
+            end[i] = moved[i];
+            moved[i] += miss[i];
+        }
+        if (missed <= PHI_ANCHORED_TO * size) return 1;
+    }
+    return 1;
+}
+
+/* Pull a cotangent back through a stage whose path had the mean y. With p = grad S_h(y) the cotangent w of p is
+   b + B H w: b is what the path gives for that of its end, B for those of its mean, and H the Hessian of S_h. */
+static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM], phi_cotangent *bar,
+    double coef_bar[PHI_COEFFICIENTS])
+{
+    double p[PHI_DIM], hessian[PHI_DIM * PHI_DIM], matrix[PHI_DIM * PHI_DIM], covector[PHI_DIM], mean_bar[PHI_DIM], found[PHI_BACK];
+    double columns[PHI_DIM][PHI_DIM], slopes[PHI_COEFFICIENTS];
+    const double zero[PHI_DIM] = { 0.0 };
+    const double *end = bar->end;
+    phi_curvature(coef, y, p, hessian);
+    if (!phi_anchor(coef, p, y, bar->end)) return PHI_NO_CONVERGENCE;
+    for (int j = 0; j < PHI_DIM; ++j) {
+        double unit[PHI_DIM] = { 0.0 };
+        unit[j] = 1.0;
+        if (!phi_traced_back(coef, end, p, zero, unit, found)) return PHI_NO_CONVERGENCE;
+        memcpy(columns[j], found + 2 * PHI_DIM, sizeof columns[j]);
+    }
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int j = 0; j < PHI_DIM; ++j) {
+            double sum = i == j ? 1.0 : 0.0;
+            for (int k = 0; k < PHI_DIM; ++k) sum -= columns[k][i] * hessian[j * PHI_DIM + k];
+            matrix[i * PHI_DIM + j] = sum;
+        }
+    if (!phi_traced_back(coef, end, p, bar->x, zero, found)) return PHI_NO_CONVERGENCE;
+    memcpy(covector, found + 2 * PHI_DIM, sizeof covector);
+    if (!phi_solve(matrix, covector)) return PHI_SINGULAR;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        mean_bar[i] = 0.0;
+        for (int k = 0; k < PHI_DIM; ++k) mean_bar[i] += hessian[k * PHI_DIM + i] * covector[k];
+    }
+    if (!phi_traced_back(coef, end, p, bar->x, mean_bar, found)) return PHI_NO_CONVERGENCE;
+    memcpy(bar->x, found + PHI_DIM, sizeof bar->x);
+    memcpy(bar->end, found, sizeof bar->end);
+    phi_slope_adjoint(coef, y, covector, slopes);
+    for (int k = 0; k < PHI_COEFFICIENTS; ++k) coef_bar[k] += slopes[k];
+    for (int k = 3 * PHI_DIM; k < PHI_BACK; ++k) coef_bar[phi_back_used[k - 3 * PHI_DIM]] += found[k];
+    return PHI_OK;
+}
+#endif

@@ -1,0 +1,162 @@
+#ifndef PHI_FILE_BLOCKS_ADAMS
+#define PHI_FILE_BLOCKS_ADAMS
+#include <math.h>
+#include <string.h>
+#include "blocks.c"
+
+enum {
+    PHI_STRIDES = 2, /* of the Runge-Kutta method in a step: errors that all stages of it share */
+    PHI_MEETINGS = 2 /* evaluations of a stage until its point is nearly where alpha(y) = x; the first takes one more */
+};
+
+#define PHI_ASTRAY 1e-3 /* how far a prediction may be from its correction, in sizes of the value and of the step */
+#define PHI_FADING 0.4  /* how much of what was found out from a stage still counts after the next */
+
+/* A step by the Runge-Kutta method, of one size or the other, from the time t. */
+static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM])
+{
+    double mean[PHI_DIM];
+#if PHI_TIMED
+    for (int part = 0; part < PHI_STRIDES; ++part)
+        phi_runge_kutta(s, t + part * h / (double)PHI_STRIDES, h / (double)PHI_STRIDES, x, mean);
+#else
+    (void)t;
+    for (int part = 0; part < PHI_STRIDES; ++part) phi_runge_kutta(s, h / (double)PHI_STRIDES, x, mean);
+#endif
+}
+
+/* The slope at x, where so many steps are done, counted from those of the last block. */
+static void phi_note_slope(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, const double x[PHI_DIM])
+{
+    double here[PHI_DIM];
+    phi_slope(s PHI_AND_T(s->t + (done - PHI_PAST) * s->h), x, here);
+    for (int i = 0; i < PHI_DIM; ++i) slope[i][done] = here[i];
+}
+
+/* Make a step by Adams' method of order 9, predicted by that of order 8, from x, where so many steps are done. 0, and x as
+   before, where the two differ much: the steps are too long for them then. Slopes are known as far as x, and become known
+   where the prediction leads. */
+static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, double x[PHI_DIM])
+{
+    static const double predict[PHI_PAST] = { -36799.0 / 120960.0, 295767.0 / 120960.0, -1041723.0 / 120960.0,
+        2102243.0 / 120960.0, -2664477.0 / 120960.0, 2183877.0 / 120960.0, -1152169.0 / 120960.0, 434241.0 / 120960.0 };
+    static const double correct[PHI_PAST + 1] = { -33953.0 / 3628800.0, 312874.0 / 3628800.0, -1291214.0 / 3628800.0,
+        3146338.0 / 3628800.0, -5033120.0 / 3628800.0, 5595358.0 / 3628800.0, -4604594.0 / 3628800.0, 4467094.0 / 3628800.0,
+        1070017.0 / 3628800.0 };
+    double predicted[PHI_DIM], corrected[PHI_DIM];
+    const int first = done + 1 - PHI_PAST;
+    int far = 0;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        double sum = 0.0;
+        for (int k = 0; k < PHI_PAST; ++k) sum += predict[k] * slope[i][first + k];
+        predicted[i] = x[i] + s->h * sum;
+    }
+    phi_note_slope(s, slope, done + 1, predicted);
+    for (int i = 0; i < PHI_DIM; ++i) {
+        double sum = 0.0;
+        for (int k = 0; k <= PHI_PAST; ++k) sum += correct[k] * slope[i][first + k];
+        corrected[i] = x[i] + s->h * sum;
+        far += !(fabs(corrected[i] - predicted[i]) <= PHI_ASTRAY * (fabs(x[i]) + fabs(s->h * slope[i][done + 1])));
+    }
+    if (far > 0) return 0;
+    memcpy(x, corrected, sizeof corrected);
+    return 1;
+}
+
+/* The slopes where steps of this size would have come from. */
+static void phi_look_back(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES])
+{
+    double x[PHI_DIM];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < PHI_PAST; ++k) {
+        phi_stride(s, s->t - k * s->h, -s->h, x);
+        phi_note_slope(s, slope, PHI_PAST - 1 - k, x);
+    }
+}
+
+/* Where all steps begin, one after the other: by Adams' method, as long as that will do, or else by that of Runge and
+   Kutta. */
+static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI_DIM])
+{
+    double x[PHI_DIM];
+    int by_adams = 1;
+    memcpy(x, s->x, sizeof x);
+    for (int i = 0; i < PHI_DIM && table->marching; ++i)
+        memmove(table->slope[i], table->slope[i] + PHI_LANES, PHI_PAST * sizeof table->slope[i][0]);
+    if (!table->marching) phi_look_back(s, table->slope);
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        for (int i = 0; i < PHI_DIM; ++i) begin[i][lane] = x[i];
+        phi_note_slope(s, table->slope, PHI_PAST + lane, x);
+        by_adams = by_adams && phi_adams(s, table->slope, PHI_PAST + lane, x);
+        if (!by_adams) phi_stride(s, s->t + lane * s->h, s->h, x);
+    }
+    phi_note_slope(s, table->slope, (int)PHI_PAST + PHI_LANES, x);
+    table->marching = 1;
+}
+
+/* What a stage moves by along the exact motion, in all lanes. */
+static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lanes moved[PHI_DIM])
+{
+    for (int i = 0; i < PHI_DIM; ++i) {
+        phi_lanes sum = { 0.0 };
+        for (int k = 0; k < PHI_KNOTS; ++k) {
+            const double part = s->h * phi_travels[stage][k], *from = &table->slope[i][PHI_PAST + 2 - PHI_KNOTS + k];
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) sum[lane] += part * from[lane];
+        }
+        memcpy(moved[i], sum, sizeof sum);
+    }
+}
+
+/* Begin a stage with half of what the exact motion moves by, less what half of it is thought to miss. */
+static void phi_begin_stage(phi_model *model, phi_lanes begin[restrict PHI_DIM], phi_lanes moved[restrict PHI_DIM],
+    phi_lanes missed[restrict PHI_DIM], double part)
+{
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            model->y[i][lane] = begin[i][lane] + (0.5 * moved[i][lane] - part * missed[i][lane]);
+    }
+}
+
+/* Bring the points of a stage nearer to where alpha(y) is its begin. */
+static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin[restrict PHI_DIM])
+{
+    phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) model->y[i][lane] = begin[i][lane] - model->displacement[i][lane];
+    }
+}
+
+/* Guesses where no recurrence is known. From the beginnings of all steps on each lane makes the stages of its own step, by
+   iteration. What half of the exact motion misses is of third order in the size of a stage, where y is the mean of its ends,
+   and otherwise of second: the factor is fitted to the stages before. */
+static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_model *model)
+{
+    phi_lanes begin[PHI_DIM], moved[PHI_DIM], missed[PHI_DIM];
+    double weight = 0.0;
+    phi_march(s, table, begin);
+    memset(missed, 0, sizeof missed);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_model *this_stage = model + stage;
+#if PHI_CENTRED
+        const double power = phi_fractions[stage] * phi_fractions[stage] * phi_fractions[stage];
+#else
+        const double power = phi_fractions[stage] * phi_fractions[stage];
+#endif
+        phi_travel(s, table, stage, moved);
+        phi_begin_stage(this_stage, begin, moved, missed, stage > 0 ? power / weight : 0.0);
+        for (int meeting = stage > 0; meeting <= PHI_MEETINGS; ++meeting) phi_meet(table->coef[stage], this_stage, begin);
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) {
+                const double miss = this_stage->displacement[i][lane] + 0.5 * moved[i][lane];
+                missed[i][lane] = PHI_FADING * missed[i][lane] + power * miss;
+                begin[i][lane] += this_stage->increment[i][lane];
+            }
+        }
+        weight = PHI_FADING * weight + power * power;
+    }
+}
+#endif

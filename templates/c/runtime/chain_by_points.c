@@ -1,0 +1,72 @@
+#ifndef PHI_FILE_CHAIN_BY_POINTS
+#define PHI_FILE_CHAIN_BY_POINTS
+#include <string.h>
+#include "model.h"
+#include "newton_lanes.c"
+
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. most is the largest
+   correction in each lane. */
+static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double x[PHI_DIM], double carry[PHI_DIM],
+    phi_lanes most)
+{
+    double residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM];
+#if PHI_SPARSE
+    double delta[PHI_DIM], gained[PHI_DIM];
+#endif
+    for (int i = 0; i < PHI_DIM; ++i) {
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+#if PHI_COMPOSED
+    for (int k = 0; k < (int)PHI_STAGES * PHI_LANES; ++k) {
+        const int lane = k / PHI_STAGES, after = (k + 1) / PHI_STAGES % PHI_LANES;
+        const int stage = k % PHI_STAGES, next = (k + 1) % PHI_STAGES;
+#else
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        const int after = (lane + 1) % PHI_LANES;
+#endif
+#if PHI_SPARSE
+        phi_substitute_lane(PHI_IN(model, stage, factor), PHI_IN(model, stage, slope), residual, lane, delta, gained);
+        for (int i = 0; i < PHI_DIM; ++i) {
+            const double change = PHI_IN(model, stage, increment)[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (PHI_IN(model, next, displacement)[i][after] - PHI_IN(model, stage, displacement)[i][lane]) - change;
+            PHI_IN(model, stage, residual)[i][lane] = residual[i];
+            residual[i] = (((PHI_IN(model, next, y)[i][after] - PHI_IN(model, stage, y)[i][lane]) + turn) + residual[i]) + gained[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - gained[i];
+            sum[i] = total;
+        }
+#else
+        double even[PHI_DIM] = { 0.0 }, odd[PHI_DIM] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_IN(model, stage, residual)[i][lane] = residual[i];
+            for (int j = 0; j < PHI_DIM; j += 2) even[i] += PHI_IN(model, stage, gain)[i * PHI_DIM + j][lane] * residual[j];
+            for (int j = 1; j < PHI_DIM; j += 2) odd[i] += PHI_IN(model, stage, gain)[i * PHI_DIM + j][lane] * residual[j];
+        }
+        for (int i = 0; i < PHI_DIM; ++i) {
+            const double change = PHI_IN(model, stage, increment)[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (PHI_IN(model, next, displacement)[i][after] - PHI_IN(model, stage, displacement)[i][lane]) - change;
+            const double moved = (PHI_IN(model, next, y)[i][after] - PHI_IN(model, stage, y)[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
+            sum[i] = total;
+        }
+#endif
+    }
+    for (int i = 0; i < PHI_DIM; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+#if PHI_COMPOSED
+    phi_lanes size;
+    memset(most, 0, PHI_LANES * sizeof most[0]);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_correct(model + stage, unit, size);
+        phi_keep_largest(most, size);
+    }
+#else
+    phi_correct(model, unit, most);
+#endif
+}
+#endif

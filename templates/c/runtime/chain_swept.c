@@ -1,0 +1,133 @@
+#ifndef PHI_FILE_CHAIN_SWEPT
+#define PHI_FILE_CHAIN_SWEPT
+#include <string.h>
+#include "model.h"
+#include "newton_lanes.c"
+
+/* What a step makes of a residual of its first stage, one of the next step: each stage makes 1 + gain of it. */
+static void phi_turn_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM])
+{
+    memset(turn, 0, PHI_DIM * PHI_DIM * sizeof turn[0]);
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int lane = 0; lane < PHI_LANES; ++lane) turn[i * PHI_DIM + i][lane] = 1.0;
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_model *this_stage = model + stage;
+        for (int j = 0; j < PHI_DIM; ++j) {
+            phi_lanes column[PHI_DIM], gained[PHI_DIM];
+            for (int i = 0; i < PHI_DIM; ++i) memcpy(column[i], turn[i * PHI_DIM + j], sizeof column[i]);
+            phi_gain(this_stage, column, gained);
+            for (int i = 0; i < PHI_DIM; ++i) {
+                PHI_EACH_LANE
+                for (int lane = 0; lane < PHI_LANES; ++lane)
+                    turn[i * PHI_DIM + j][lane] = column[i][lane] + gained[i][lane];
+            }
+        }
+    }
+}
+
+/* By how much the residual of a stage would change to that of the next, did it not turn. After the last stage comes the first
+   of the next lane; in the last lane it is of no use. */
+static void phi_shift(const phi_model *model, int stage, phi_lanes shift[restrict PHI_DIM])
+{
+    const phi_model *this_stage = model + stage, *next_stage = model + (stage + 1) % PHI_STAGES;
+    const int ahead = stage == PHI_STAGES - 1;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        phi_lanes y, displacement;
+        memcpy(y, next_stage->y[i], sizeof y);
+        memcpy(displacement, next_stage->displacement[i], sizeof displacement);
+        if (ahead) {
+            memmove(y, y + 1, sizeof y - sizeof y[0]);
+            memmove(displacement, displacement + 1, sizeof displacement - sizeof displacement[0]);
+        }
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double turn = (displacement[lane] - this_stage->displacement[i][lane]) - this_stage->increment[i][lane];
+            shift[i][lane] = (y[lane] - this_stage->y[i][lane]) + turn;
+        }
+    }
+}
+
+/* The residuals of the first stages of all steps: each step is affine in that of its first stage. */
+static void phi_first_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], const double x[PHI_DIM],
+    const double carry[PHI_DIM], phi_lanes residual[restrict PHI_DIM])
+{
+    phi_lanes end[PHI_DIM], gained[PHI_DIM];
+    double first[PHI_DIM];
+    memset(end, 0, sizeof end);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_model *this_stage = model + stage;
+        phi_shift(model, stage, this_stage->residual);
+        phi_gain(this_stage, end, gained);
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) end[i][lane] += gained[i][lane] + this_stage->residual[i][lane];
+        }
+    }
+    for (int i = 0; i < PHI_DIM; ++i)
+        first[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        double next[PHI_DIM];
+        for (int i = 0; i < PHI_DIM; ++i) {
+            residual[i][lane] = first[i];
+            next[i] = end[i][lane];
+            for (int j = 0; j < PHI_DIM; ++j) next[i] += turn[i * PHI_DIM + j][lane] * first[j];
+        }
+        memcpy(first, next, sizeof first);
+    }
+}
+
+/* What a residual takes from y, and from the increment. */
+static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes delta[restrict PHI_DIM],
+    phi_lanes gained[restrict PHI_DIM])
+{
+    phi_apply(model->inverse, residual, delta);
+#if PHI_CENTRED
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) gained[i][lane] = 2.0 * (delta[i][lane] - residual[i][lane]);
+    }
+#else
+    phi_gain(model, residual, gained);
+#endif
+}
+
+/* Correct the points of all stages by the residuals along their linear models, and find where the steps lead. As X, the
+   state with its carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
+   apart. most is the largest correction in each lane. */
+static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], phi_lanes unit[restrict PHI_DIM],
+    double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)
+{
+    phi_lanes residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM], size;
+    memset(most, 0, PHI_LANES * sizeof most[0]);
+    phi_first_residuals(model, turn, x, carry, residual);
+    memset(sum, 0, sizeof sum);
+    memset(small, 0, sizeof small);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_model *this_stage = model + stage;
+        phi_lanes delta[PHI_DIM], gained[PHI_DIM];
+        phi_answer(this_stage, residual, delta, gained);
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) {
+                const double change = this_stage->increment[i][lane], total = sum[i][lane] + change;
+                const double added = total - sum[i][lane];
+                small[i][lane] += ((sum[i][lane] - (total - added)) + (change - added)) - gained[i][lane];
+                sum[i][lane] = total;
+                residual[i][lane] = (residual[i][lane] + gained[i][lane]) + this_stage->residual[i][lane];
+            }
+        }
+        phi_take(this_stage, delta, unit, size);
+        phi_keep_largest(most, size);
+    }
+    for (int i = 0; i < PHI_DIM; ++i) {
+        double whole = x[i], rest = carry[i];
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double total = whole + sum[i][lane], added = total - whole;
+            rest += ((whole - (total - added)) + (sum[i][lane] - added)) + small[i][lane];
+            whole = total;
+        }
+        x[i] = whole + rest;
+        carry[i] = rest - (x[i] - whole);
+    }
+}
+#endif

@@ -1,0 +1,13 @@
+#ifndef PHI_FILE_ELAPSED
+#define PHI_FILE_ELAPSED
+#include "solver.h"
+
+/* The time that has passed gains that of a stage. */
+static void phi_pass(phi_solver *s, double elapsed)
+{
+    const double sum = s->t + elapsed, added = sum - s->t;
+    const double small = s->t_carry + ((s->t - (sum - added)) + (elapsed - added));
+    s->t = sum + small;
+    s->t_carry = small - (s->t - sum);
+}
+#endif

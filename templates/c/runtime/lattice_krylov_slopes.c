@@ -1,0 +1,21 @@
+#ifndef PHI_FILE_LATTICE_KRYLOV_SLOPES
+#define PHI_FILE_LATTICE_KRYLOV_SLOPES
+#include "lattice.h"
+#include "model.h"
+
+/* to = v - what a sweep, or its transpose, does to that variation of s->y[now]. */
+static void phi_multiply(const phi_solver *s, const double *coef, int now, double *const *v, double *const *to)
+{
+    const size_t units = phi_units(s);
+#if PHI_ADJOINT
+    if (s->side != NULL) {
+        phi_pull(s, PHI_SLOPE_BACK, coef, v, NULL, to);
+        phi_combine(s, to, 1.0, v, -1.0, to);
+        return;
+    }
+#endif
+    PHI_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) phi_slope_piece(s, coef, s->y[now], v, to, unit);
+    phi_combine(s, to, 1.0, v, -1.0, to);
+}
+#endif

@@ -1,0 +1,45 @@
+#ifndef PHI_FILE_LATTICE_SHARES
+#define PHI_FILE_LATTICE_SHARES
+#include "lattice.h"
+#include "model.h"
+
+#if !PHI_SWEPT
+/* Sums over sites, in lanes of eight: compilers may not write a loop over these out and make vectors of the loop around it. Clang
+   would keep such sums in memory: it is told of one loop over all sites, and that it may add in any order. */
+#if defined(__clang__) && __clang_major__ >= 13
+#define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) interleave_count(1)")
+#define PHI_LANES(sites) (sites)
+#define PHI_ADD(sums, l, value) { _Pragma("clang fp reassociate(on)") sums[0] += value; }
+#else
+#if defined(__clang__)
+#define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
+#elif defined(__GNUC__)
+#define PHI_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define PHI_EACH_LANE
+#endif
+#define PHI_LANES(sites) 8
+#define PHI_ADD(sums, l, value) sums[l] += value;
+#endif
+
+#endif
+/* The sum of all lanes, which are changed. */
+static inline double phi_total(double lanes[8])
+{
+    for (int l = 0; l < 4; ++l) lanes[l] += lanes[l + 4];
+    return lanes[0] + lanes[2] + (lanes[1] + lanes[3]);
+}
+
+enum { PHI_ADDED = 64 }; /* sites whose shares in a sum are kept apart before they are added */
+
+/* The sum of some values, in an order that lets loops vectorise. */
+static inline double phi_added(const double *values, ptrdiff_t count)
+{
+    double lanes[8] = { 0.0 }, rest = 0.0;
+    const ptrdiff_t whole = count - count % 8;
+    for (ptrdiff_t i = 0; i < whole; i += 8)
+        for (int l = 0; l < 8; ++l) lanes[l] += values[i + l];
+    for (ptrdiff_t i = whole; i < count; ++i) rest += values[i];
+    return phi_total(lanes) + rest;
+}
+#endif

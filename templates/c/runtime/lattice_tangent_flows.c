@@ -1,0 +1,19 @@
+#ifndef PHI_FILE_LATTICE_TANGENT_FLOWS
+#define PHI_FILE_LATTICE_TANGENT_FLOWS
+#include "lattice.h"
+#include "model.h"
+
+/* A step that carries tangent vectors along, by functions for arguments of any size. */
+static phi_status phi_carry(phi_solver *s)
+{
+    const size_t far = s->far;
+    s->far = 1;
+    s->open = 0;
+    phi_steps(s, 1);
+    ++s->steps;
+    if (PHI_FLOWS > 1) phi_steps(s, 0);
+    --s->steps;
+    s->far = far;
+    return phi_all_hold(s, s->x) ? PHI_OK : PHI_NOT_FINITE;
+}
+#endif

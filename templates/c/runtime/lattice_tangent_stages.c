@@ -1,0 +1,8 @@
+#ifndef PHI_FILE_LATTICE_TANGENT_STAGES
+#define PHI_FILE_LATTICE_TANGENT_STAGES
+#include "lattice.h"
+#include "model.h"
+
+/* A step that carries tangent vectors along. */
+static phi_status phi_carry(phi_solver *s) { return phi_stages(s PHI_AND_FAR(1)); }
+#endif

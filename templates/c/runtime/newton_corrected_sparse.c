@@ -1,0 +1,15 @@
+#ifndef PHI_FILE_NEWTON_CORRECTED_SPARSE
+#define PHI_FILE_NEWTON_CORRECTED_SPARSE
+#include <math.h>
+#include <string.h>
+#include "newton_lanes.c"
+
+/* Correct y by the residuals, with the factors of its matrix, and measure the corrections; also find what they take from
+   the increments. */
+static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_lanes size)
+{
+    phi_lanes delta[PHI_DIM];
+    phi_substitute_lanes(model->factor, model->slope, model->residual, delta, model->gained);
+    phi_take(model, delta, unit, size);
+}
+#endif

@@ -1,0 +1,32 @@
+#ifndef PHI_FILE_PACKS_SPLITTING
+#define PHI_FILE_PACKS_SPLITTING
+#include <math.h>
+#include <string.h>
+#include "packs.c"
+
+/* Before the flows of a step. */
+static void phi_begin_lanes(phi_group *group)
+{
+    for (int k = 0; k < group->packs; ++k) memcpy(group->pack[k].start, group->pack[k].x, sizeof group->pack[k].x);
+}
+
+/* After them. */
+static void phi_end_lanes(phi_group *group)
+{
+    for (int k = 0; k < group->packs; ++k) {
+        phi_pack *pack = &group->pack[k];
+        for (int i = 0; i < PHI_DIM; ++i) phi_settle_lanes(pack->x[i], pack->carry[i], pack->start[i]);
+    }
+}
+
+/* Steps of a group: as in phi_stages, each flow for all packs. Where own is 0, all members have the coefficients of the
+   first lane. */
+PHI_IN_PLACE static inline void phi_steps_lanes(int own, phi_group *group, int steps)
+{
+    for (int step = 0; step < steps; ++step) {
+        phi_begin_lanes(group);
+        phi_flows_lanes(0, own, group);
+        phi_end_lanes(group);
+    }
+}
+#endif

@@ -1,0 +1,25 @@
+#ifndef PHI_FILE_PLACING_LEVEL
+#define PHI_FILE_PLACING_LEVEL
+#include <math.h>
+#include <string.h>
+#include "model.h"
+#include "algebra.c"
+#include "level.c"
+
+/* The level of s->x, which was moved from elsewhere; 0, and back there, where it has none. */
+static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const double carry[PHI_DIM])
+{
+    double level[PHI_GAUGES];
+    const double rate = phi_monitor(&s->params, s->x);
+    phi_choose_gauge(&s->params, s->x, level);
+    if (!isfinite(level[0]) || !isfinite(rate) || !(rate > 0.0)) {
+        memcpy(s->x, from, sizeof s->x);
+        memcpy(s->carry, carry, sizeof s->carry);
+        return 0;
+    }
+    memcpy(s->gauge, level, sizeof level);
+    PHI_EACH_STAGE /* where s->h is NaN the next step does it again */
+        phi_prepare(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(s->coef, stage));
+    return 1;
+}
+#endif

@@ -1,0 +1,14 @@
+#ifndef PHI_FILE_PREDICTOR
+#define PHI_FILE_PREDICTOR
+#include <math.h>
+#include <string.h>
+#include "model.h"
+#include "recurrence.c"
+
+/* ---- Starting guesses ---- */
+#include "predictor_policy.h"
+
+#include "predictor_recurrences.c"
+#include "predictor_differences.c"
+
+#endif

@@ -1,0 +1,43 @@
+#ifndef PHI_FILE_PREDICTOR_DIFFERENCES
+#define PHI_FILE_PREDICTOR_DIFFERENCES
+#include <math.h>
+#include <string.h>
+#include "model.h"
+#include "predictor_policy.h"
+
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the equation of
+   a step has solutions that have nothing to do with the motion. */
+static int phi_predict(const phi_history *history, double value[PHI_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= PHI_REACH * size;
+}
+
+/* Take in a solved value. The guess of order k missed it by its k-th difference: the next has the best. */
+static void phi_remember(phi_history *history, const double value[PHI_DIM])
+{
+    double least = HUGE_VAL, next[PHI_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < PHI_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < PHI_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < PHI_DIFFERENCES) ++history->count;
+}
+#endif

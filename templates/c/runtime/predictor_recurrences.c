@@ -1,0 +1,111 @@
+#ifndef PHI_FILE_PREDICTOR_RECURRENCES
+#define PHI_FILE_PREDICTOR_RECURRENCES
+#include <math.h>
+#include <string.h>
+#include "model.h"
+#include "recurrence.c"
+#include "predictor_policy.h"
+
+/* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have nothing to do
+   with the motion. */
+static int phi_near(const double guess[PHI_DIM], const double last[PHI_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= PHI_REACH * size;
+}
+
+enum {
+    PHI_HISTORY = 8, /* values that extrapolation uses at most: more amplify rounding more than they gain */
+    PHI_REPAY = 150, /* steps that a fit costs, about */
+    PHI_LONG_WAIT = 20000 /* steps until a recurrence that often needs fitting is fitted again */
+};
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
+static int phi_predict(const phi_history *history, double value[PHI_DIM])
+{
+    const int last = history->count - 1;
+    double odd[PHI_DIM] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, PHI_DIM * sizeof value[0]);
+    if (history->use_recurrence) {
+        for (int k = 0; k < history->recurrence_terms; k += 2)
+            for (int i = 0; i < PHI_DIM; ++i) {
+                value[i] += history->weight[k][i][0] * history->past[last - k][i];
+                odd[i] += history->weight[k + 1][i][0] * history->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < PHI_DIM; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < history->extrapolation_order && k <= last; ++k) {
+            binomial *= -(double)(history->extrapolation_order - k) / (k + 1);
+            for (int i = 0; i < PHI_DIM; ++i) value[i] += binomial * history->past[last - k][i];
+        }
+    }
+    return last >= 0 && phi_near(value, history->past[last]);
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void phi_judge(phi_history *history, const double value[PHI_DIM])
+{
+    double row[PHI_HISTORY + 1][PHI_DIM], guess[PHI_DIM], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = history->count < PHI_HISTORY ? history->count : PHI_HISTORY;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], history->past[history->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < PHI_DIM; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < PHI_DIM; ++i) size += fabs(row[0][i]);
+        if (size < least) {
+            least = size;
+            history->extrapolation_order = order;
+        }
+    }
+    history->use_recurrence = history->recurrence_terms > 0;
+    if (history->use_recurrence && phi_predict(history, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < PHI_DIM; ++i) fitted += fabs(value[i] - guess[i]);
+    }
+    history->use_recurrence = history->recurrence_terms > 0 && fitted <= least;
+    if (history->extrapolation_order == 0) history->extrapolation_order = 1;
+}
+
+/* Drop what is old, if so many values would not fit into the history. */
+static void phi_make_room(phi_history *history, int values)
+{
+    if (history->count + values <= PHI_KEPT) return;
+    memmove(history->past, history->past + history->count - PHI_REMEMBERED, PHI_REMEMBERED * sizeof history->past[0]);
+    history->count = PHI_REMEMBERED;
+}
+
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. Whether it foresees. */
+static int phi_fit(phi_history *history)
+{
+    int found = 1;
+    history->recurrence_terms = 0;
+    for (int i = 0; i < PHI_DIM && found; ++i) {
+        const int terms = phi_train(history, i);
+        found = terms > 0;
+        if (terms > history->recurrence_terms) history->recurrence_terms = terms;
+    }
+    if (!found) history->recurrence_terms = 0;
+    history->use_recurrence = found;
+    ++history->fits;
+    history->slow_steps = 0;
+    history->slow_steps_allowed = history->slow_steps_allowed < PHI_LONG_WAIT / 2
+        ? 2 * history->slow_steps_allowed + PHI_REPAY : PHI_LONG_WAIT;
+    return found;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void phi_remember(phi_history *history, const double value[PHI_DIM], int iterations)
+{
+    if (iterations > 1) phi_judge(history, value);
+    phi_make_room(history, 1);
+    memcpy(history->past[history->count++], value, PHI_DIM * sizeof value[0]);
+    history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
+    if (history->slow_steps > history->slow_steps_allowed && history->count >= PHI_REMEMBERED) phi_fit(history);
+}
+#endif

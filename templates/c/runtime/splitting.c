@@ -1,0 +1,124 @@
+#ifndef PHI_FILE_SPLITTING
+#define PHI_FILE_SPLITTING
+#include <math.h>
+#include <string.h>
+#include "algebra.c"
+#include "model.h"
+
+#include "attitude.c"
+#include "flows.h"
+
+/* The coefficients of all flows of a step: a row for each time. */
+#if PHI_MONITOR
+static void phi_prepare(const phi_params *params, const double gauge[PHI_GAUGES], double h, double *coef)
+#else
+static void phi_prepare(const phi_params *params, double h, double *coef)
+#endif
+{
+    for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
+#if PHI_KICKS
+        const double kick[1] = { phi_multiples[k] * (h * h) };
+        phi_prepare_row(params, phi_times[k] * h, kick, coef + k * PHI_ROW);
+#elif PHI_MONITOR
+        phi_prepare_row(params, gauge, phi_times[k] * h, coef + k * PHI_ROW);
+#else
+        phi_prepare_row(params, phi_times[k] * h, coef + k * PHI_ROW);
+#endif
+    }
+}
+
+#if PHI_MONITOR
+/* What flows move: the state, the physical time, and a sum that is no number where a logarithm has none. */
+enum { PHI_TIME = PHI_DIM, PHI_DOMAIN, PHI_ALONG };
+
+/* One step: the exact flows of the parts of K, one after the other. If it fails, the state is as before. */
+#if PHI_ADJOINT
+static phi_status phi_stages(phi_solver *s, double (*kept)[PHI_DIM])
+#else
+static phi_status phi_stages(phi_solver *s)
+#endif
+{
+    double x[PHI_ALONG] = { 0.0 }, moved[PHI_ALONG] = { 0.0 }, start[PHI_ALONG] = { 0.0 };
+    memcpy(x, s->x, sizeof s->x);
+    memcpy(start, s->x, sizeof s->x);
+    memcpy(moved, s->carry, sizeof s->carry);
+#if PHI_ATTITUDE && PHI_ADJOINT
+    double element[PHI_ELEMENT] = { 0.0 };
+    phi_flows(s->coef, x, moved, start, element, kept);
+#elif PHI_ATTITUDE
+    double element[PHI_ELEMENT] = { 0.0 };
+    phi_flows(s->coef, x, moved, start, element);
+#elif PHI_ADJOINT
+    phi_flows(s->coef, x, moved, start, kept);
+#else
+    phi_flows(s->coef, x, moved, start);
+#endif
+    ++s->evaluations;
+    if (!phi_finite(x, PHI_ALONG)) return PHI_NOT_FINITE;
+    if (!(moved[PHI_TIME] * s->h > 0.0)) return PHI_NOT_FINITE;
+    phi_settle(s->x, s->carry, moved);
+    phi_pass(s, moved[PHI_TIME]);
+#if PHI_ATTITUDE
+    phi_turn_by(s, element);
+#endif
+    return PHI_OK;
+}
+
+#else
+/* One step: the exact flows of the parts of H, one after the other. If it fails, the state is as before. */
+#if PHI_ADJOINT
+static phi_status phi_stages(phi_solver *s, double (*kept)[PHI_DIM])
+#else
+static phi_status phi_stages(phi_solver *s)
+#endif
+{
+    double x[PHI_DIM], moved[PHI_DIM];
+    memcpy(x, s->x, sizeof x);
+    memcpy(moved, s->carry, sizeof moved);
+#if PHI_ATTITUDE && PHI_ADJOINT
+    double element[PHI_ELEMENT] = { 0.0 };
+    phi_flows(s->coef, x, moved, s->x, element, kept);
+#elif PHI_ATTITUDE
+    double element[PHI_ELEMENT] = { 0.0 };
+    phi_flows(s->coef, x, moved, s->x, element);
+#elif PHI_ADJOINT
+    phi_flows(s->coef, x, moved, s->x, kept);
+#else
+    phi_flows(s->coef, x, moved, s->x);
+#endif
+    ++s->evaluations;
+    if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
+    phi_settle(s->x, s->carry, moved);
+#if PHI_RATE_OF_GAUGE
+    phi_turn_by(s, element, s->aside);
+#elif PHI_ATTITUDE
+    phi_turn_by(s, element);
+#endif
+    return PHI_OK;
+}
+
+#if PHI_CORRECTED
+/* Bring the state to where the steps of a run move it, or after them back. If it fails, the state is as before. */
+static phi_status phi_correct(phi_solver *s, int after)
+{
+    double x[PHI_DIM], moved[PHI_DIM];
+    memcpy(x, s->x, sizeof x);
+    memcpy(moved, s->carry, sizeof moved);
+    phi_corrector(after, s->coef, x, moved, s->x);
+    if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
+    phi_settle(s->x, s->carry, moved);
+    return PHI_OK;
+}
+
+/* End a run that began at before: the status of its last step, or that of the corrector. Without a good step, or where
+   the corrector fails, the state is as before the run. */
+static phi_status phi_end_run(phi_solver *s, const phi_solver *before, phi_status status)
+{
+    const phi_status corrected = s->steps == before->steps ? PHI_OK : phi_correct(s, 1);
+    if (s->steps == before->steps || corrected != PHI_OK) *s = *before;
+    return status != PHI_OK ? status : corrected;
+}
+
+#endif
+#endif
+#endif
