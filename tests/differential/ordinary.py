@@ -222,7 +222,37 @@ def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:
     drawn = Ordinary(seed, structure, tuple(terms), start, parameters)
     drawn = _acted_upon(source, drawn, scheme, weight)
     drawn = replace(drawn, options=_options(source, drawn, scheme))
-    return _collocated(random.Random(f"gauss {seed} {attempt}"), _extras(source, drawn))
+    drawn = _with_exact_flows(random.Random(f"flows {seed} {attempt}"), _extras(source, drawn))
+    return _collocated(random.Random(f"gauss {seed} {attempt}"), drawn)
+
+
+def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:
+    """The system, or with the same pairs a linear one, or a Kepler motion with a small perturbation."""
+    acted_upon = drawn.timed or drawn.forced or drawn.noise or drawn.monitor is not None
+    if drawn.structure.kind != "canonical" or acted_upon:
+        return drawn
+    series_only = ("gauge", "birealisation", "solver", "composition")
+    options = {k: v for k, v in drawn.options.items() if k not in series_only}
+    options |= {"scheme": "splitting", "order": options["order"] + options["order"] % 2}
+    q, p = zip(*drawn.structure.pairs, strict=True)
+    way = source.choices(["", "linear", "Kepler"], [40, 15, 45])[0]
+    if way == "linear":
+        terms = [linear(source, (*q, *p)) ** 2 / 3 for _ in range(source.randint(2, 4))]
+        return replace(drawn, terms=(*terms, small(source) * q[0] * p[-1]), options=options)
+    if way != "Kepler" or len(q) < 2:
+        return drawn
+    size = len(q) if source.random() < 0.7 else 2
+    mass, pull = abs(small(source)) + 1, abs(small(source)) + 1
+    motion = [sum(v**2 for v in p[:size]) / (2 * mass), -pull / sympy.sqrt(sum(v**2 for v in q[:size]))]
+    beside = [v**2 / 300 for v in p[size:]]
+    terms = [*motion, *beside, small(source) * monomial(source, q, 3) / 300]
+    names = {2: ["saba-4-2", "saba-8-2", "wisdom-holman"], 4: ["aba-8-4", "aba-8-6-4", "aba-10-6-4"]}
+    differentiated = {**options, **drawn.asked}.get("adjoint")
+    if not beside and options["order"] in names and source.random() < 0.7:
+        name = source.choice(names[options["order"]])
+        corrected = name.startswith("wisdom")
+        options["composition"] = "saba-6-2" if corrected and differentiated else name + "-5" * corrected
+    return replace(drawn, terms=tuple(terms), options=options)
 
 
 def _any_terms(source: random.Random, structure: Structure, weight: Callable[[], Expr]) -> list[Expr]:
