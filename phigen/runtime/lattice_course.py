@@ -21,18 +21,34 @@ if TYPE_CHECKING:
 class LatticeCourse:
     """A lattice on its way (`phigen.runtime.session.Followed`), whose state has the shape (coordinates, *sizes).
 
-    Steps of a branch, and of a course that goes on from `saved`, have the bits of those of one integration.
+    Steps of a branch, and of a course that goes on from `saved`, have the bits of those of one integration. The solver
+    of a branch is made when it is needed: sections take a branch at every step, and need few of them.
     """
 
     def __init__(self, solver: LatticeSolver, at: Beginning) -> None:
         self.solver, self.at = solver, at
-        self.sites: LatticeSession = solver.started(at)
+        self._arrays: Mapping[str, Any] = {}
+        self._sites: LatticeSession | None = solver.started(at)
         self._clock, self._before = Clock(at.t0), 0
+
+    @property
+    def sites(self) -> LatticeSession:
+        """The session."""
+        if self._sites is None:
+            # counted from where the size of the step was set: with the same times and random numbers
+            arrays, clock, counted = self._arrays, self._clock, self._before
+            draws = replace(self.at.draws, step=self.at.draws.step + counted)
+            begin = Beginning(np.asarray(arrays["state"]), clock.h, self.at.values, clock.t, draws)
+            self._sites = self.solver.started(begin)
+            if clock.h:
+                self._sites.resume(clock.h, int(arrays["counts"][1]) - counted, arrays)
+            self._arrays = {}
+        return self._sites
 
     @property
     def steps(self) -> int:
         """Good steps since the start."""
-        return self._before + self.sites.steps
+        return int(self._arrays["counts"][1]) if self._sites is None else self._before + self.sites.steps
 
     @property
     def rounding(self) -> float:
@@ -53,8 +69,9 @@ class LatticeCourse:
 
     def advance(self, h: float, steps: int) -> None:
         """Make so many steps."""
+        sites = self.sites  # begins with the step size so far
         self._clock.set_step(h, self.steps)
-        self.sites.advance(h, steps)
+        sites.advance(h, steps)
 
     def branch(self) -> LatticeCourse:
         """An independent copy."""
@@ -70,6 +87,8 @@ class LatticeCourse:
 
     def saved(self) -> dict[str, Any]:
         """Arrays for `restored`."""
+        if self._sites is None:
+            return dict(self._arrays)
         clock = self._clock
         counts = np.array([clock.counted, self.steps])
         return {"state": self.state(), "clock": np.array([clock.t, clock.h]), "counts": counts, **self.sites.saved()}
@@ -86,13 +105,9 @@ class LatticeCourse:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.solver, self.at, arrays = state["solver"], state["at"], state["saved"]
-        (t, h), (counted, steps) = arrays["clock"].tolist(), arrays["counts"].tolist()
-        # counted from where the size of the step was set: with the same times and random numbers
+        (t, h), (counted, _) = arrays["clock"].tolist(), arrays["counts"].tolist()
         self._clock, self._before = Clock(t, h, counted), counted
-        draws = replace(self.at.draws, step=self.at.draws.step + counted)
-        self.sites = self.solver.started(Beginning(np.asarray(arrays["state"]), h, self.at.values, t, draws))
-        if h:
-            self.sites.resume(h, steps - counted, arrays)
+        self._arrays, self._sites = arrays, None
 
 
 class ObservedCourse(Retrying):
