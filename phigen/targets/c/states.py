@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from phigen.targets.c.lattice.state import LATTICE, ROW
+from phigen.targets.c.row_state import LATTICE, ROW
 from phigen.targets.state import STATE, StateBlock, belongs
 
 
