@@ -212,8 +212,13 @@ def test_whole_interface_is_clean_under_valgrind(name, sources):
     run([valgrind, "--error-exitcode=9", "--quiet", "--track-origins=yes", program], sources)
 
 
+#: A graph, a chain, rows; and what the quick systems have not: Gauss collocation, splittings, forces, noise.
+INITIALISED = ["food_web", "kdv", "heisenberg"]
+FURTHER_KINDS = ["kowalevski_gauss", "satellite_wheels", "landau_lifshitz", "thermal_spin", "kepler_eccentric"]
+
+
 @pytest.mark.thin(2)
-@pytest.mark.parametrize("name", ["food_web", "kdv", "heisenberg"])  # a graph, a chain, rows
+@pytest.mark.parametrize("name", slow_but(INITIALISED, [*INITIALISED, *FURTHER_KINDS]))
 def test_compilers_see_that_all_is_initialised(name, tmp_path):
     """With -O1 it looks into functions, but not as far as with more; clang asks whether all ways to a use assign."""
     write(tmp_path, files(as_given(name), "c"))
