@@ -202,7 +202,8 @@ class Taylor:
             for j in range(1, i + 1)
             if not (zero(a[j]) or zero(powers[i - j]))
         ]
-        return self.ring.combine(terms) * self.ring.power(a[0], -1)
+        # Of a base that does not move, the ring may have the power and not the reciprocal.
+        return self.ring.combine(terms) * self.ring.power(a[0], -1) if terms else self._zero
 
     def _integer_power(self, a: list[Any], n: int, i: int) -> Any:
         if n == 1:

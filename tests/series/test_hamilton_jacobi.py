@@ -247,6 +247,7 @@ FREE_OF_MOMENTUM = [
     (call("tan", q) * PI, lambda x: mpmath.tan(x) * mpmath.pi),
     (call("atan2", q, ONE), lambda x: mpmath.atan2(x, 1)),
     (call("abs", q) * q, lambda x: abs(x) * x),
+    (sqrt(power(symbol("g"), Fraction(2))) * q, lambda x: x),  # g = 1, and no 1/g is needed
 ]
 
 
