@@ -47,11 +47,12 @@ def test_lane_functions_agree_with_the_library(real, name, flags, tmp_path):
     single = real == "float"
     reach, units = (SINGLE if single else RANGES)[name]
     switches = {f"CALLS_{f.upper()}": f == name for f in RANGES} | {"COMPOSED": True, "SINGLE": single}
-    code = Amalgam("t", switches, {}).text("lane_functions.c")
     head = "#include <float.h>\n#include <math.h>\n#include <stdint.h>\n#include <string.h>\n"
     arguments = ARGUMENTS["log" if name == "log" else "others"]
     numbers = {"real": real, "epsilon": "FLT_EPSILON" if single else "DBL_EPSILON", "large": 87.0 if single else 700.0}
-    write(tmp_path, {"main.c": head + code + MAIN.format(name=name, reach=reach, arguments=arguments, **numbers)})
+    main = MAIN.format(name=name, reach=reach, arguments=arguments, **numbers)
+    called = Amalgam("t", switches, {"main.c": main}).texts("lane_functions.c", "main.c")
+    write(tmp_path, {"main.c": head + "".join(called)})
     run([tool("gcc"), "-std=c99", *flags.split(), "main.c", "-o", "main", "-lm"], tmp_path)
     assert float(run([tmp_path / "main"], tmp_path)) <= units
 
