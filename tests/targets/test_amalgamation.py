@@ -150,7 +150,14 @@ int n_nowhere(void);
 
 static int n_ahead(void);
 int foreign(void);
-int n_defined(void) { return n_called(); }"""
+int n_defined(void) { return n_called() + n_short(); }
+static int n_short(void) { return 1; } /* on one line */
+
+/* Behind it. */
+static int n_behind(void)
+{
+    return n_never();
+}"""
 
 
 def test_functions_without_use_are_left_out_with_what_is_said_of_them():
@@ -166,7 +173,8 @@ def test_functions_without_use_are_left_out_with_what_is_said_of_them():
         "/* Two of one subject. */",
         "int n_defined(void);",
         "int foreign(void);",
-        "int n_defined(void) { return n_called(); }",
+        "int n_defined(void) { return n_called() + n_short(); }",
+        "static int n_short(void) { return 1; } /* on one line */",
     ]
 
 

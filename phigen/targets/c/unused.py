@@ -64,7 +64,7 @@ def _functions(lines: Sequence[str]) -> Iterator[Function]:
             k += 1
             continue
         defined = "{" in lines[end]
-        while defined and not lines[end].endswith("}"):
+        while defined and not _COMMENT.sub("", lines[end]).rstrip().endswith("}"):
             end = next(e for e in range(end + 1, len(lines)) if lines[e].startswith("}"))
         yield Function(head[1], k, end + 1, lines[k].startswith("static "), defined)
         k = end + 1
