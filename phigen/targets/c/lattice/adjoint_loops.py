@@ -30,15 +30,15 @@ class Seeds:
 
 
 def handed_by(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
-    """What a kernel hands to sites beside, in arrays from the first on: one for values that are the same."""
+    """List the cotangents that a kernel passes to neighbours, in arrays from the first on; equal values share one."""
     arrays: dict[int, int] = {}
-    found = []
+    contributions = []
     for name, value in kernel.along("site"):
         base, offset = layout.step.sites.places[name]
         if any(offset) and not value.is_zero:
             array = arrays.setdefault(id(value), first + len(arrays))
-            found.append(Handed(array, layout.bar(base), offset))
-    return found
+            contributions.append(Handed(array, layout.bar(base), offset))
+    return contributions
 
 
 def first_loop(
@@ -52,13 +52,13 @@ def first_loop(
     begin: int,
     calls: Mapping[str, str],
     moved: Sequence[str] = (),
-    taken: Sequence[Handed] = (),
+    received: Sequence[Handed] = (),
 ) -> Loop:
     """The first go of a kernel; cotangents of ``sums`` over bonds or pairs, if it finds any, are handed in arrays from
     ``begin`` on.
 
-    ``moved`` are the fields that it finds as they were before the sweep. What the flow after it has handed is ``taken``
-    before."""
+    ``moved`` are the fields that it finds as they were before the sweep. The cotangents passed by the flow after it
+    are ``received`` before."""
     summed = len(sums) * any(o.name == "gathered_bar" for o in kernel.outputs)
     transpose = row_transposes.Transpose(
         temporaries(layout.loops(program).recomputing(kernel, sums, moved)),
@@ -67,7 +67,7 @@ def first_loop(
         tuple(handed),
         begin,
         summed,
-        tuple(taken),
+        tuple(received),
         frozenset(moved),
         seeds.colour if layout.leaves_out(seeds.colour) else None,
     )
@@ -77,7 +77,7 @@ def first_loop(
 
 
 def copied_ends(program: Program, layout: Layout, handed: Sequence[Handed], swept: str) -> Iterator[str]:
-    """What copies the ends of rows of what is handed along them, if ``swept``; beyond open ends there is nothing."""
+    """Yield the copies of the ends of rows for cotangents passed along rows, if ``swept``; open ends have none."""
     if layout.step.sites.open[-1]:
         return
     for array in sorted({h.array for h in handed if h.offset[-1]}):

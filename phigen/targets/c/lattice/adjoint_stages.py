@@ -1,4 +1,4 @@
-"""What a stage of the series is gone back through by: the transposes of its kernels, in the shares that are needed."""
+"""Transposed kernels of the reverse pass through a stage of the series, restricted to some of their cotangents."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ _ALL, _FIELDS, _OTHERS = (True, True), (True, False), (False, True)
 KERNELS = (("advance_back", "increment", _ALL), ("slope_back", "relax", _FIELDS), ("relax_back", "relax", _OTHERS))
 
 
-def restricted(layout: Layout, fields: Sequence[str], kernel: Kernel, wanted: tuple[bool, bool], name: str) -> Kernel:
-    """A transposed kernel that finds the cotangents of fields only, or of all else; those of sums serve both."""
+def restricted(
+    layout: Layout, fields: Sequence[str], kernel: Kernel, selection: tuple[bool, bool], name: str
+) -> Kernel:
+    """Restrict a transposed kernel to the cotangents of fields, or to the others; those of sums are in both."""
     places, ends = layout.step.sites.places, layout.step.sites.ends
-    of_fields, of_others = wanted
+    of_fields, of_others = selection
     outputs = []
     for o in kernel.outputs:
         array = o.name.removesuffix("_bar")
         if array == "gathered":
-            kept = [True] * len(o.values)
+            selected = [True] * len(o.values)
         elif array == "site":
             bases = [(ends if "sums_bar" in kernel.inputs else places)[s][0] for s in kernel.inputs["site"]]
-            kept = [of_fields if base in fields else of_others for base in bases]
+            selected = [of_fields if base in fields else of_others for base in bases]
         else:
-            kept = [of_others] * len(o.values)
-        values = tuple(e if keep else ZERO for e, keep in zip(o.values, kept, strict=True))
+            selected = [of_others] * len(o.values)
+        values = tuple(e if keep else ZERO for e, keep in zip(o.values, selected, strict=True))
         outputs.append(replace(o, values=values))
     return replace(kernel, name=name, outputs=tuple(outputs))

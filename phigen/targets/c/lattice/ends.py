@@ -1,4 +1,4 @@
-"""What bonds add up at both of their ends, as one loop where it differs in the signs of parameters only."""
+"""Loops over the bonds of a site, one for both ends of bonds where the ends differ in signs of parameters only."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class Layout:
         return self.lines.index(tuple(offset[:-1]))
 
     def at(self, line: int, row: str = "row->") -> str:
-        """What is added to the beginning of an array for a line beside a row; with one axis there is but one row."""
+        """Return the term that leads from the beginning of an array to a line beside a row; empty with one axis."""
         return f" + {row}at[{line}]" if len(self.step.sites.axes) > 1 else ""
 
     def swept(self, piece: str = "row.from, row.to") -> str:
@@ -82,7 +82,7 @@ class Layout:
 
     @property
     def reach(self) -> int:
-        """How far the equation of a stage reaches, of a lattice with one axis."""
+        """Distance of the farthest neighbour in the equation of a stage, of a lattice with one axis."""
         relax = self.step.equation.relax if self.step.equation else None
         places = [self.step.sites.places[s] for s in relax.inputs["site"]] if relax else []
         return max((abs(offset[-1]) for f, offset in places if f not in self.step.sites.parameters), default=0)
@@ -99,11 +99,11 @@ class Layout:
     @property
     def partners(self) -> Partners:
         """Bonds or pairs, with their variations where these are followed; nothing where there are none."""
-        found = self.step.others
-        return found if self.slopes else replace(found, varied=Gather((), ()))
+        partners = self.step.others
+        return partners if self.slopes else replace(partners, varied=Gather((), ()))
 
     def gathered(self, kernel: Kernel) -> Gather:
-        """What a kernel of the equation of a stage reads of bonds or pairs."""
+        """Return the sums over bonds or pairs that a kernel of the equation of a stage reads."""
         return self.partners.varied if kernel.reads_variations else self.partners.field
 
     @property
@@ -126,9 +126,9 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
     lines = dict.fromkeys([(0,) * (len(sites.axes) - 1), *sorted({o[:-1] for o in offsets})])
     halo = max((abs(o[-1]) for o in offsets), default=0)
     arrays = (*program.coordinates, *sites.parameters, *sites.increments)
-    found = Layout(step, tuple(lines), halo, weights(program, step), arrays)
-    banded = found.band > 0 and program.offers("recurrences")
-    return replace(found, slopes=program.profile == "fast" or program.extras.tangent or banded or bool(step.adjoint))
+    layout = Layout(step, tuple(lines), halo, weights(program, step), arrays)
+    banded = layout.band > 0 and program.offers("recurrences")
+    return replace(layout, slopes=program.profile == "fast" or program.extras.tangent or banded or bool(step.adjoint))
 
 
 def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
@@ -198,8 +198,8 @@ def waves(program: Program, step: Sweeps) -> bool:
 
 @once
 def hands(program: Program, step: Sweeps) -> list[bool]:
-    """Of each part of H whether its transpose gives anything to other sites."""
-    found: list[bool] = []
+    """Tell for each part of H whether its transpose passes cotangents to other sites."""
+    passes: list[bool] = []
     if step.equation and step.adjoint:
         kernels = [kernel for kernel in step.adjoint.steps if "sums_bar" not in kernel.inputs]
         read = [pair for kernel in kernels for pair in kernel.along("site")]
@@ -208,8 +208,8 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
     for part, kernels in zip(step.parts, transposes(program, step), strict=False):
         read = [(s, e) for kernel in kernels for s, e in kernel.along("site")]
         beside = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)
-        found.append(beside or any(sweep.gather for sweep in part))
-    return found
+        passes.append(beside or any(sweep.gather for sweep in part))
+    return passes
 
 
 def takes(program: Program, step: Sweeps) -> bool:
@@ -222,15 +222,17 @@ def takes(program: Program, step: Sweeps) -> bool:
 
 
 def handed_apart(program: Program, step: Sweeps) -> list[bool]:
-    """Of each part of H whether what its sweeps hand is added by loops of their own: where others take it, that of the
-    first flow only, which is the last on the way back."""
+    """Tell for each part of H whether separate loops add the cotangents that its sweeps pass to other sites.
+
+    Where the loop of the next flow adds them, that is the first flow only, which is the last in the reverse pass."""
     first = step.schedule.flows[0][0] if takes(program, step) else None
-    return [found and first in (None, k) for k, found in enumerate(hands(program, step))]
+    return [passes and first in (None, k) for k, passes in enumerate(hands(program, step))]
 
 
 def ways(step: Sweeps) -> list[tuple[int, int]]:
-    """Of each flow of a step its part and that of the flow after it, and once more of the first where it is joined to
-    the last of the step before."""
+    """List for each flow of a step its part and the part of the flow after it.
+
+    The first flow is listed once more, for where it is merged with the last flow of the step before."""
     parts = [part for part, _ in step.schedule.flows]
     after = [*parts[1:], parts[1 % len(parts)]]
     return [*zip(parts, after, strict=True), (parts[0], parts[1 % len(parts)])]

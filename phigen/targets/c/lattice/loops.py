@@ -33,10 +33,10 @@ BLOCK = "own_slope"
 
 
 def site_block(program: Program, layout: Layout, relax: Kernel) -> Kernel:
-    """How a sweep follows y at the site itself: of each field the derivatives along all."""
+    """Return the kernel of the derivatives of a sweep along y at the site: for each field those along all fields."""
     places = layout.step.sites.places
-    own = {places[s][0]: s for s in relax.inputs["site"] if not any(places[s][1])}
-    slopes = [gradient(e, [own[f]])[0] if f in own else ZERO for e in relax.roots for f in program.coordinates]
+    at_site = {places[s][0]: s for s in relax.inputs["site"] if not any(places[s][1])}
+    slopes = [gradient(e, [at_site[f]])[0] if f in at_site else ZERO for e in relax.roots for f in program.coordinates]
     return replace(
         relax,
         name=BLOCK,
@@ -64,7 +64,7 @@ class Loop:
 
     @property
     def code(self) -> str:
-        """What loops that do the same have in common."""
+        """Arguments and body, which are equal for loops that do the same."""
         return self.arguments + self.body
 
     def text(self, program: Program, purposes: Iterable[str] = ()) -> str:
@@ -77,15 +77,15 @@ class Loop:
 
 
 def _together(purposes: Iterable[str]) -> Iterator[str]:
-    """What a loop is for, each said once: for which part of H what it does, or the same for which parts."""
-    found: dict[str, dict[str, None]] = {}
+    """Yield the purposes of a loop, with the parts of H that have the same purpose in one sentence."""
+    grouped: dict[str, dict[str, None]] = {}
     for purpose in purposes:
         part, _, manner = purpose.rpartition(": ")
         name = _PART.search(manner)
-        told = (f"{part}: {{}}", manner) if part or not name else (manner.replace(name[0], "{}"), name[0])
-        found.setdefault(told[0], {})[told[1]] = None
-    for text, own in found.items():
-        yield text.removeprefix(": ").replace("{}", ("; " if ": " in text else ", ").join(own))
+        text, entry = (f"{part}: {{}}", manner) if part or not name else (manner.replace(name[0], "{}"), name[0])
+        grouped.setdefault(text, {})[entry] = None
+    for text, entries in grouped.items():
+        yield text.removeprefix(": ").replace("{}", ("; " if ": " in text else ", ").join(entries))
 
 
 def has_ends(program: Program, kernels: Sequence[Kernel]) -> bool:
@@ -99,24 +99,24 @@ def weights_of(kernel: Kernel) -> list[str]:
 
 
 def in_loops(program: Program) -> dict[str, str]:
-    """What flows and stages call: versions for lanes, in short code only those that always have a value."""
+    """Return the functions that flows and stages call: versions for lanes, in short code only full-range ones."""
     return far_calls(program) if program.profile == "small" else _called(program, lane_calls(program))
 
 
 def far_calls(program: Program) -> dict[str, str]:
-    """What flows and stages call where arguments may be very large: libm where versions for lanes have no value."""
+    """Return the functions for arguments that may be very large: libm where versions for lanes have no value."""
     lanes = lane_calls(program)
     return _called(program, {**FUNCTIONS, **{f: lanes[f] for f in FULL_RANGE_FUNCTIONS if f in lanes}})
 
 
 def seen_calls(program: Program) -> dict[str, str]:
-    """What is called by that which is looked at now and then: libm, or functions of phigen's own."""
+    """Return the functions that observables call: libm, or functions that phigen defines."""
     return _called(program, FUNCTIONS)
 
 
 def _called(program: Program, calls: Mapping[str, str]) -> dict[str, str]:
-    own = {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS}
-    return own | dict(calls) | {f: own[f] for f in SPECIAL}
+    defined = {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS}
+    return defined | dict(calls) | {f: defined[f] for f in SPECIAL}
 
 
 def forms_of(program: Program, kernel: Kernel) -> Iterator[tuple[Kernel, str]]:

@@ -1,4 +1,4 @@
-"""What bonds, or pairs of sites, add up at a site, as loops in C."""
+"""Sums over the bonds of a site, or over its pairs with other sites, as loops in C."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from phigen.targets.c.loops import statements
 
 
 def partners(program: Program, layout: Layout) -> Iterator[str]:
-    """What bonds or pairs add to energies, and to what moves sites, from the parameters."""
-    own = layout.partners
-    for gather in () if layout.sums_up else (own.field, own.energy, own.varied, own.observed):
+    """Yield the loops that sum the terms of bonds or pairs in energies and updates of sites, from the parameters."""
+    sums = layout.partners
+    for gather in () if layout.sums_up else (sums.field, sums.energy, sums.varied, sums.observed):
         yield from (loop.text(program) for loop in gathering(program, layout, gather, "params"))
 
 
 def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> Iterator[Loop]:
-    """What all bonds, or pairs with other sites, add up at some sites, from ``coef`` or ``params``."""
+    """Yield the loops that sum over all bonds of a site, or its pairs with other sites, from ``coef`` or ``params``."""
     seen = source == "params" and gather in (layout.partners.energy, layout.partners.field, layout.partners.observed)
     calls = seen_calls(program) if seen else in_loops(program)
     for number, (ends, opposite) in enumerate(over_ends(gather)):
@@ -38,22 +38,22 @@ def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> 
 
 
 def told_of_bonds(program: Program, layout: Layout, ends: Ends, opposite: Set[str]) -> dict[str, str]:
-    """What short loops over bonds are told besides, with its type, so that one is for several parts of H.
+    """Return further arguments of short loops over bonds, with types, so that several parts of H share a loop.
 
-    That is where the parameters at bonds are, the sign of the direction of bonds, and whether the sites of the colour
-    that is chosen lie across them.
+    The arguments are the address of the parameters at bonds, the sign of the direction of bonds, and whether the sites
+    of the chosen colour are at the other end of the bonds.
     """
     if program.profile == "fast" or layout.step.adjoint or not layout.graph:
         return {}
-    told = {"at_bonds": "double *const *", "sign": "double "} if opposite else {}
+    arguments = {"at_bonds": "double *const *", "sign": "double "} if opposite else {}
     both = ends.chosen != "" and {"here", "there"} <= chosen_ends(layout.step)
-    return told | ({"across": "int "} if both else {})
+    return arguments | ({"across": "int "} if both else {})
 
 
 def bond_loop(
-    program: Program, layout: Layout, ends: Ends, oriented: Set[str], told: Collection[str] = ()
+    program: Program, layout: Layout, ends: Ends, oriented: Set[str], arguments: Collection[str] = ()
 ) -> row_loops.BondLoop:
-    """Return the function of one loop over bonds or pairs, which is ``told`` some of `told_of_bonds`."""
+    """Return one loop over bonds or pairs, which has some ``arguments`` of `told_of_bonds`."""
     built = temporaries(layout.loops(program).sums(ends))
-    at_bonds: ir.Value = ir.fixed("at_bonds") if "at_bonds" in told else AT_BONDS
-    return row_loops.BondLoop(built, frozenset(oriented), at_bonds, "sign" in told, "across" in told)
+    at_bonds: ir.Value = ir.fixed("at_bonds") if "at_bonds" in arguments else AT_BONDS
+    return row_loops.BondLoop(built, frozenset(oriented), at_bonds, "sign" in arguments, "across" in arguments)

@@ -44,23 +44,23 @@ def gathering_back(
     if ends.of_all:
         whole = paired(layout.step.sites.ends, ends.kernel, kernel, opposite)
         sums = [o for o in ends.kernel.outputs if summed]
-        found = [("a", ends, replace(whole, outputs=(*whole.outputs, *sums)))]
+        loops = [("a", ends, replace(whole, outputs=(*whole.outputs, *sums)))]
     else:
         turned = replace(ends, end=_OPPOSITE[ends.end], chosen=_CHOSEN[ends.chosen])
-        found = [("b", turned, _at_end(layout, kernel, "b")), ("a", ends, _at_end(layout, kernel, "a"))]
-    for end, seen, own in found:
-        if any(not e.is_zero for e in own.roots):
-            yield _loop(program, layout, seen, opposite, own, end, first)
+        loops = [("b", turned, _at_end(layout, kernel, "b")), ("a", ends, _at_end(layout, kernel, "a"))]
+    for end, seen, transposed in loops:
+        if any(not e.is_zero for e in transposed.roots):
+            yield _loop(program, layout, seen, opposite, transposed, end, first)
 
 
 def _at_end(layout: Layout, kernel: Kernel, end: str) -> Kernel:
-    """What belongs to the site at an end; what belongs to bonds, or to all of them, is left to b."""
+    """Restrict a kernel to the cotangents of the site at an end; those of bonds and shared values belong to b."""
     ends = layout.step.sites.ends
     outputs = []
     for o in kernel.outputs:
         names = kernel.inputs["site"] if o.name == "site_bar" else ()
-        kept = [ends[n][1] == end for n in names] if names else [end == "b"] * len(o.values)
-        values = tuple(e if keep else ZERO for e, keep in zip(o.values, kept, strict=True))
+        selected = [ends[n][1] == end for n in names] if names else [end == "b"] * len(o.values)
+        values = tuple(e if keep else ZERO for e, keep in zip(o.values, selected, strict=True))
         outputs.append(replace(o, values=values))
     return replace(kernel, outputs=tuple(outputs))
 

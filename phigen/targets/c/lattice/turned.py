@@ -18,20 +18,19 @@ MOST_FIELDS = 3
 
 
 def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """All orders of some fields but their own, first those that turn them round, which parts of H often share; none
-    where they are many."""
-    own = tuple(fields)
-    round_ = [own[k:] + own[:k] for k in range(1, len(own))]
-    found = dict.fromkeys([*round_, *permutations(own)]) if len(own) <= MOST_FIELDS else ()
-    return (order for order in found if order != own)
+    """Yield the other orders of some fields, cyclic ones first, which parts of H often share; none of many fields."""
+    original = tuple(fields)
+    round_ = [original[k:] + original[:k] for k in range(1, len(original))]
+    permuted = dict.fromkeys([*round_, *permutations(original)]) if len(original) <= MOST_FIELDS else ()
+    return (order for order in permuted if order != original)
 
 
 def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str]) -> dict[str, str]:
     """Increments of noise in an order of the fields: where each field has a source, that of its own is meant for it."""
     if len(sites.increments) != len(order):
         return {}
-    own = dict(zip(fields, sites.increments, strict=False))
-    return {own[f]: own[g] for f, g in zip(fields, order, strict=False)}
+    increments = dict(zip(fields, sites.increments, strict=False))
+    return {increments[f]: increments[g] for f, g in zip(fields, order, strict=False)}
 
 
 def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str, ...], float]]:
@@ -43,7 +42,7 @@ def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str
     if len(loops) != 1 or not loops[0][1]:
         return
     ends, opposite = loops[0]
-    own = tuple(sites.at_bonds)
+    original = tuple(sites.at_bonds)
     reversed_ = [
         ("", e + r)
         for e, r in zip(
@@ -51,16 +50,16 @@ def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str
         )
     ]
     sides = (1.0, -1.0) if decide_zero("", reversed_).verdict == PROVED else (1.0,)
-    for order in permutations(own) if len(own) <= MOST_FIELDS else (own,):
-        names = dict(zip(order, own, strict=True))
+    for order in permutations(original) if len(original) <= MOST_FIELDS else (original,):
+        names = dict(zip(order, original, strict=True))
         for side in sides:
-            if (order, side) != (own, 1.0):
+            if (order, side) != (original, 1.0):
                 changed = tuple(replace(e, kernel=_signed(_renamed(e.kernel, names), side)) for e in gather.ends)
-                yield replace(gather, ends=changed), () if order == own else order, side
+                yield replace(gather, ends=changed), () if order == original else order, side
 
 
 def _signed(kernel: Kernel, sign: float) -> Kernel:
-    """The kernel, or what has the opposite values."""
+    """Return the kernel, with the opposite values if the sign is negative."""
     values = tuple(-e if sign < 0 else e for e in kernel.roots)
     return replace(kernel, outputs=(Output(kernel.outputs[0].name, values),))
 
@@ -71,7 +70,7 @@ def turned(sites: Sites, fields: Sequence[str], order: Sequence[str], sweep: Swe
     None where it would read neighbours that no sweep reads.
     """
     into = dict(zip(order, fields, strict=True))
-    into |= {there: own for own, there in turned_increments(sites, fields, order).items()}
+    into |= {there: here for here, there in turned_increments(sites, fields, order).items()}
     known = {place: name for name, place in (*sites.places.items(), *sites.ends.items())}
     kernels = [sweep.kernel, *(sweep.gather.kernels if sweep.gather else ())]
     names: dict[str, str] = {}
