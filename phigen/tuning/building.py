@@ -79,7 +79,7 @@ class Refusal:
 Outcome = Built | Refusal
 
 
-def build(spec: Spec, system: System, setting: Setting) -> Built:
+def build(spec: Spec, system: System | None, setting: Setting) -> Built:
     """Generate and compile one candidate. Raises `PhigenError` as `compile_spec` and the compiler do."""
     start = time.perf_counter()
     return built(compile_spec(setting.applied(spec), system=system), setting, start)
@@ -102,7 +102,7 @@ def built(compilation: Compilation, setting: Setting, start: float) -> Built:
 
 
 def build_all(
-    spec: Spec, system: System, settings: Sequence[Setting], deadline: float
+    spec: Spec, system: System | None, settings: Sequence[Setting], deadline: float
 ) -> Iterator[tuple[Setting, Outcome]]:
     """The outcome of each setting, in the order in which they are done; what is not done at the deadline is ended.
 
@@ -145,7 +145,7 @@ def _received(pipe: Connection, seconds: float) -> Outcome:
     return outcome
 
 
-def _work(spec: Spec, system: System, setting: Setting, pipe: Connection) -> None:
+def _work(spec: Spec, system: System | None, setting: Setting, pipe: Connection) -> None:
     """The body of a process. Ended from outside it still unwinds: that ends the C compiler it may be waiting for."""
 
     def leave(*_: Any) -> None:

@@ -111,7 +111,7 @@ def compare(
     refused: list[Entry] = []
     fingerprints = {current_build.fingerprint}
     outcomes: dict[Setting, Outcome] = dict(
-        build_all(compilation.spec, compilation.system, settings, start + BUILDING * budget)
+        build_all(compilation.spec, compilation.known_system, settings, start + BUILDING * budget)
     )
     for setting in settings:
         outcome = outcomes[setting]

@@ -121,7 +121,7 @@ def tune(
 def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
     """Gains of monitors over the time of a scan; None where the speed of the motion varies little."""
     compilation, problem = tuner.compilation, tuner.problem
-    spec, system, setting = compilation.spec, compilation.system, current.setting
+    spec, setting = compilation.spec, current.setting
     if spec.monitor is not None or not problem.evens_out or setting is None:
         return None
     h = min(p.step for p in current.points)
@@ -132,9 +132,9 @@ def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
     if not is_uneven(lambda x: method.solver.vector_field(x, problem.parameters), states):
         return None
     tuner.note("trying monitors")
-    requested = settings(setting, current.order, list(candidates(system, problem.parameters, states)))
+    requested = settings(setting, current.order, list(candidates(compilation.system, problem.parameters, states)))
     deadline = time.perf_counter() + MONITORS * tuner.clock.budget
-    return compare(spec, system, requested, problem, states, tuner.piece, tuner.accuracy, deadline)
+    return compare(spec, compilation.system, requested, problem, states, tuner.piece, tuner.accuracy, deadline)
 
 
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:

@@ -137,7 +137,7 @@ class Tuner:
         affordable = self._affordable([s for s in settings if s not in self._made])
         if affordable:
             self.note(f"building {len(affordable)} more")
-        outcomes |= build_all(self.compilation.spec, self.compilation.system, affordable, until)
+        outcomes |= build_all(self.compilation.spec, self.compilation.known_system, affordable, until)
         for setting in (s for s in settings if s in outcomes):
             outcome = outcomes[setting]
             if isinstance(outcome, Refusal):
@@ -201,7 +201,7 @@ class Tuner:
         high = replace(setting, order=max(setting.order, 8), composition=direct(setting))
         others = [s for s in (Setting(SPLITTING, 8, "none", "auto"), high) if s != setting]
         if high != setting:
-            outcomes = build_all(self.compilation.spec, self.compilation.system, others, until)
+            outcomes = build_all(self.compilation.spec, self.compilation.known_system, others, until)
             self._made |= {s: outcome for s, outcome in outcomes if isinstance(outcome, Built)}
             known = [self._made[s] for s in others if s in self._made]
             method = problem.method(known[-1].solver()) if known else method

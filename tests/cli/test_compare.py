@@ -44,8 +44,10 @@ def test_numbers_are_those_of_the_methods(phigen, body, equal):
         if entry["poisson"]:
             assert entry["defect"] < 1e-12, title
             assert entry["casimirs"] < 1e-13, title
-    assert entries["RK4"]["defect"] > 1e-10
-    assert entries["RK4"]["casimirs"] > 1e-10
+    # Far above rounding; at equal work the step depends on the load of the machine, and errors are of its fifth power.
+    least = 1e-10 * min(1.0, (entries["RK4"]["step"] / 0.2) ** 5)
+    assert entries["RK4"]["defect"] > least
+    assert entries["RK4"]["casimirs"] > least
     solver = package.compile(body, order=2, scheme="splitting") if "splitting, order 2" in entries else None
     if solver and equal == "step":
         run = solver.run()

@@ -126,7 +126,7 @@ def test_page_of_a_splitting_shows_its_flows():
 def test_without_matplotlib_the_page_says_so_always_in_the_same_way(monkeypatch):
     monkeypatch.setattr(pages, "drawable", lambda: False)
     curve = trajectory(np.eye(3), compiled("rigid_body").system.coordinates)
-    run = SimpleNamespace(name="r", every=None, stride=1, description="")
+    run = SimpleNamespace(name="r", every=None, at=(), stride=1, description="")
     text = bare(compiled("rigid_body"), run=run, methods={"phigen": curve}, summaries=(SUMMARY,))
     assert Page(text).errors == []
     assert text == bare(compiled("rigid_body"), run=run, methods={"phigen": curve}, summaries=(SUMMARY,))
