@@ -36,8 +36,6 @@ static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT
     for (int i = 0; i < PHI_ELEMENT; ++i) factor[i] -= excess[i] + change[i];
 }
 
-enum { PHI_SIZE = PHI_COVECTOR - 1 }; /* where a covector tells a bound for the square of its size */
-
 /* By how many halvings P becomes so small that its exponential is a short sum. */
 static int phi_doublings(double square)
 {
@@ -53,7 +51,7 @@ static int phi_doublings(double square)
 static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[PHI_ELEMENT])
 {
     double small[PHI_COVECTOR], square[PHI_ELEMENT];
-    int doublings = phi_doublings(p[PHI_SIZE]);
+    int doublings = phi_doublings(p[PHI_COVECTOR - 1]); /* a bound for the square of the size of P */
     if (doublings == 0) {
         phi_exponential(p, element);
         return;
@@ -75,8 +73,8 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
     double p[PHI_RATE];
-    for (int i = 0; i < PHI_SIZE; ++i) p[i] = t * rate[i];
-    p[PHI_SIZE] = t * t * rate[PHI_SIZE];
+    for (int i = 0; i < PHI_COVECTOR - 1; ++i) p[i] = t * rate[i];
+    p[PHI_COVECTOR - 1] = t * t * rate[PHI_COVECTOR - 1];
     phi_matrix_exponential(p, element);
 }
 #endif

@@ -15,7 +15,7 @@ static void phi_take_stage(phi_lanes turns[PHI_ELEMENT] PHI_AND_INT_STAGE, doubl
 /* phi_matrix_exponential in all lanes. */
 static void phi_matrix_exponential_lanes(phi_lanes p[PHI_COVECTOR], phi_lanes element[PHI_ELEMENT])
 {
-    const int doublings = phi_doublings(phi_largest(p[PHI_SIZE]));
+    const int doublings = phi_doublings(phi_largest(p[PHI_COVECTOR - 1]));
     if (doublings == 0) {
         phi_exponential_lanes(p, element);
         return;
