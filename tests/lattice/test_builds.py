@@ -48,6 +48,13 @@ def expect_clean(compilation, folder, *compilers):
         run([tool(compiler), *language, *WARNINGS, "-fsyntax-only", "t.c"], folder)
 
 
+@pytest.mark.parametrize("profile", ["fast", "small"])
+def test_lattices_without_brackets_compile(profile, tmp_path):
+    text = PAIRS + "coordinates: [x]\npoisson: {matrix: [[0]]}\nhamiltonian: {sites: x}\n"
+    made = compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"), profile=profile)
+    expect_clean(made, tmp_path, "gcc")
+
+
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("lattice", LATTICES)
 def test_lattices_with_parts_that_have_no_use_compile(lattice, tmp_path):
