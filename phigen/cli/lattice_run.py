@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from phigen.cli.arguments import FILMS
 from phigen.cli.console import Console, counted, heading, out, out_json, table
@@ -51,6 +50,8 @@ def run_lattice(
 
     ``lyapunov`` asks for the largest Lyapunov exponent besides, in a second pass with a tangent vector.
     """
+    import numpy as np
+
     from phigen.api import chosen_target, compilation_of, lattice_solver_of
     from phigen.cli.endings import ended, timed
     from phigen.cli.energy_warning import energy_warning

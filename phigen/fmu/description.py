@@ -8,6 +8,7 @@ from __future__ import annotations
 import unicodedata
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from phigen._version import __version__
@@ -39,15 +40,19 @@ def model_description(
 ) -> str:
     """Return the text of ``modelDescription.xml`` for FMI 2 or 3; ``sources`` are the files to compile."""
     spec = compilation.spec
+    variables = [replace(v, unit=_plain(v.unit), description=_plain(v.description)) for v in variables]
     root = ET.Element("fmiModelDescription", fmiVersion=f"{version}.0", modelName=spec.name)
     root.set("guid" if version == 2 else "instantiationToken", token)
-    for key, text in {"description": spec.title or spec.description, "license": spec.license}.items():
+    for key, text in {
+        "description": _plain(spec.title) or _plain(spec.description),
+        "license": _plain(spec.license),
+    }.items():
         if text:
-            root.set(key, _plain(text))
+            root.set(key, text)
     root.set("generationTool", f"phigen {__version__}")
     root.set("variableNamingConvention", "structured")
     _co_simulation(root, compilation, version, sources)
-    units = dict.fromkeys(_plain(v.unit) for v in variables if v.unit)
+    units = dict.fromkeys(v.unit for v in variables if v.unit)
     if units:
         defined = ET.SubElement(root, "UnitDefinitions")
         for unit in units:
@@ -90,7 +95,7 @@ def _co_simulation(root: ET.Element, compilation: Compilation, version: int, sou
 
 
 def _experiment(root: ET.Element, compilation: Compilation) -> None:
-    """Add the default experiment: the first run of the spec.
+    """Add the default experiment: that of `first_run`.
 
     With a monitor steps are equal in τ. The physical time of the end is then unknown, and only the start is stated.
     """
@@ -127,14 +132,14 @@ def _variable_2(listed: ET.Element, variable: Variable) -> None:
 
 def _common(variable: Variable) -> dict[str, str]:
     attributes = {"name": variable.name, "valueReference": str(variable.number)}
-    attributes |= {"description": _plain(variable.description)} if variable.description else {}
+    attributes |= {"description": variable.description} if variable.description else {}
     attributes |= {"causality": variable.causality, "variability": variable.variability}
     return attributes | ({"initial": variable.initial} if variable.initial else {})
 
 
 def _values(element: ET.Element, variable: Variable) -> None:
     if variable.unit:
-        element.set("unit", _plain(variable.unit))
+        element.set("unit", variable.unit)
     if variable.positive:
         element.set("min", "0.0")
     if variable.start is not None:

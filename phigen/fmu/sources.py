@@ -49,7 +49,6 @@ def _model(compilation: Compilation, variables: Sequence[Variable], token: str) 
     struct = list(members(program).values())
     digits = literal if program.single else repr
     run, numbers = first_run(spec), first_numbers(compilation)
-    absent = {} if program.noise else {"SEED": numbers["END"]}  # a number that no variable has
     starts = [v.start for v in variables if v.start is not None]
     attitude = [v.start or 0.0 for v in variables[numbers["ATTITUDE"] : numbers["POSITION"]]]
     parameters = [v.start or 0.0 for v in variables[numbers["PARAMETER"] : numbers["STEP"]]]
@@ -61,7 +60,7 @@ def _model(compilation: Compilation, variables: Sequence[Variable], token: str) 
             "NAME": program.name,
             "real": "float" if program.single else "double",
             "token": token,
-            "numbers": list((numbers | absent).items()),
+            "numbers": list(numbers.items()),
             "most": max(1, len(program.casimirs), len(program.observed)),
             "before_last": list(enumerate(struct[:-1])),
             "last": struct[-1] if struct else "",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from phigen.errors import SpecError
@@ -45,9 +45,9 @@ class Variable:
 
 
 def first_run(spec: Spec) -> Run:
-    """Return the run that supplies the initial state, parameters and step of an FMU: the first of the spec.
+    """Return the run that supplies the initial state, parameters and step of an FMU: the first that goes forward.
 
-    Raises `SpecError` for lattices, and for a spec without runs.
+    Raises `SpecError` for lattices, and for a spec without such a run.
     """
     if spec.lattice:
         hint = "phigen show --expand SIZES prints a small lattice as an ordinary spec, of which there can be an FMU"
@@ -57,47 +57,48 @@ def first_run(spec: Spec) -> Run:
     if not spec.runs:
         message = f"an FMU of {spec.name} needs initial values and a step, and the spec has no runs"
         raise SpecError([spec.diagnostic(("name",), message, "runs: {NAME: {initial: …, step: …, steps: …}}")])
-    return next(iter(spec.runs.values()))
+    for run in spec.runs.values():
+        if run.step > 0:
+            return run
+    name, run = next(iter(spec.runs.items()))
+    message = f"an FMU of {spec.name} needs a run that goes forward in time, and the step of {name} is {run.step}"
+    hint = "communication steps of FMUs go forward: add a run with a positive step"
+    raise SpecError([spec.diagnostic(("runs", name, "step"), message, hint)])
 
 
 def variables_of(compilation: Compilation) -> tuple[Variable, ...]:
     """Return all variables in the order of their numbers, as in `first_numbers`."""
-    spec, program = compilation.spec, compilation.program
-    run = first_run(spec)
-    listed = [_time(spec), *_states(spec, run), *_parameters(spec, run), *_solver(program, run)]
-    listed += [*_attitude(program), *_results(program)]
+    listed = chain.from_iterable(_kinds(compilation).values())
     return tuple(replace(variable, number=k) for k, variable in enumerate(listed))
 
 
 def first_numbers(compilation: Compilation) -> dict[str, int]:
     """Return the number of the first variable of each kind. An absent kind has the number of the kind after it."""
-    program = compilation.program
-    attitude, element = _sizes_of_attitude(program)
-    counts = {
-        "TIME": 1,
-        "STATE": program.dimension,
-        "PARAMETER": len(program.parameters),
-        "STEP": 1,
-        "SEED": int(program.noise is not None),
-        "ATTITUDE": attitude,
-        "POSITION": element - attitude,
-        "ENERGY": 1,
-        "CASIMIR": len(program.casimirs),
-        "OBSERVABLE": len(program.observed),
-    }
     numbers, number = {}, 0
-    for kind, count in counts.items():
+    for kind, listed in _kinds(compilation).items():
         numbers[kind] = number
-        number += count
+        number += len(listed)
     return numbers | {"END": number}
 
 
-def _sizes_of_attitude(program: Program) -> tuple[int, int]:
-    """Return the number of entries of the attitude, and of attitude and position together; 0 and 0 without attitude."""
-    if not program.attitude:
-        return 0, 0
-    size = math.prod(program.attitude.shape)
-    return size, size + 3 * bool(program.attitude.group.translation)
+def _kinds(compilation: Compilation) -> dict[str, list[Variable]]:
+    """Return the variables of each kind, in the order of their numbers."""
+    spec, program = compilation.spec, compilation.program
+    run = first_run(spec)
+    return {
+        "TIME": [_time(spec)],
+        "STATE": list(_states(spec, run)),
+        "PARAMETER": list(_parameters(spec, run)),
+        "STEP": [_step(program, run)],
+        "SEED": list(_seed(program, run)),
+        "ATTITUDE": list(_attitude(program)),
+        "POSITION": list(_position(program)),
+        "ENERGY": [Variable("system.hamiltonian", "output", "continuous", description="the Hamiltonian")],
+        "CASIMIR": list(_casimirs(program)),
+        "OBSERVABLE": [
+            Variable(f"observables.{x}", "output", "continuous", description="observable") for x in program.observed
+        ],
+    }
 
 
 def _time(spec: Spec) -> Variable:
@@ -117,18 +118,21 @@ def _parameters(spec: Spec, run: Run) -> Iterator[Variable]:
         yield Variable(p.name, causality, variability, values[p.name], p.description, p.unit, bool(p.bound))
 
 
-def _solver(program: Program, run: Run) -> Iterator[Variable]:
+def _step(program: Program, run: Run) -> Variable:
     variable = "tau" if program.monitor else "time"
     size = f"size of a whole step in {variable}; communication steps may have any size"
     size = f"size of a whole step in {variable}; communication steps must be multiples of it" if program.noise else size
-    yield Variable("solver.step", "parameter", "fixed", float(run.step), size, positive=True)
+    return Variable("solver.step", "parameter", "fixed", float(run.step), size, positive=True)
+
+
+def _seed(program: Program, run: Run) -> Iterator[Variable]:
     if program.noise:
         seed = "seed of the random numbers"
         yield Variable("solver.seed", "parameter", "fixed", run.seed, seed, whole=True)
 
 
 def _attitude(program: Program) -> Iterator[Variable]:
-    """Yield the entries of the attitude, which starts as the identity, and of the position, which starts at 0."""
+    """Yield the entries of the attitude, which starts as the identity."""
     if not program.attitude:
         return
     rows = program.attitude.group.rows
@@ -137,15 +141,16 @@ def _attitude(program: Program) -> Iterator[Variable]:
     for k, name in enumerate(names):
         one = k % (rows + 1) == 0 if rows else k == 0
         yield Variable(f"attitude{name}", "output", "continuous", float(one), f"entry {shown}")
-    if program.attitude.group.translation:
+
+
+def _position(program: Program) -> Iterator[Variable]:
+    """Yield the position of a body that also moves, which starts at 0."""
+    if program.attitude and program.attitude.group.translation:
         for name in POSITION:
             yield Variable(f"position.{name}", "output", "continuous", 0.0, "position of the body in space")
 
 
-def _results(program: Program) -> Iterator[Variable]:
-    yield Variable("system.hamiltonian", "output", "continuous", description="the Hamiltonian")
+def _casimirs(program: Program) -> Iterator[Variable]:
     for name in program.casimirs:
         constancy = "" if name in program.pushed else ", constant along trajectories"
         yield Variable(f"casimirs.{name}", "output", "continuous", description=f"Casimir{constancy}")
-    for name in program.observed:
-        yield Variable(f"observables.{name}", "output", "continuous", description="observable")

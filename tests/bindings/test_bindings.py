@@ -17,9 +17,9 @@ from phigen.compiler import compile_proved, emit
 ROOT = Path(__file__).parents[2]
 MEX = Path(__file__).parent
 
-#: Names that languages keep for themselves, or cannot tell apart; a time, observables, kicks; no Casimirs.
+#: Name of a libc function; names that languages keep, or cannot tell apart; a time, observables, kicks; no Casimirs.
 AWKWARD = """phigen: 1
-name: awkward
+name: index
 title: "a title, */ and <b>"
 time: t
 coordinates: [q, p]

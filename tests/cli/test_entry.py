@@ -22,7 +22,9 @@ PHIGEN = [sys.executable, "-c", "from phigen.cli import main; main()"]
 
 
 @pytest.mark.thin(2)
-@pytest.mark.parametrize("args", [["--help"], ["--version"], ["build", "--help"], ["demo", "--help"], ["lst"]])
+@pytest.mark.parametrize(
+    "args", [["--help"], ["--version"], ["build", "--help"], ["demo", "--help"], ["run", "--help"], ["lst"]]
+)
 def test_help_imports_nothing_heavy(args):
     code = f"""
 import atexit, sys

@@ -35,6 +35,8 @@ int main(void)
 {
     bool event, terminate, early;
     double reached, at[2], x[2];
+    fmi3Int32 seed = 1;
+    fmi3ValueReference whole[1];
     fmi3FMUState copy = NULL, read = NULL;
     unsigned char bytes[1 << 15];
     size_t size;
@@ -47,6 +49,16 @@ int main(void)
     MUST(unit != NULL);
     MUST(PREFIXED(DoStep)(unit, 0.0, 0.1, true, &event, &terminate, &early, &reached) == fmi3Error); /* too early */
     MUST(PREFIXED(EnterInitializationMode)(unit, false, 0.0, 0.0, false, 0.0) == fmi3OK);
+    x[0] = -1.0; /* no start with it, and another value may be set after that */
+    MUST(PREFIXED(GetFloat64)(unit, parameter, 1, at, 1) == fmi3OK);
+    MUST(PREFIXED(SetFloat64)(unit, parameter, 1, x, 1) == fmi3OK);
+    MUST(PREFIXED(ExitInitializationMode)(unit) == fmi3Error);
+    MUST(PREFIXED(DoStep)(unit, 0.0, 0.1, true, &event, &terminate, &early, &reached) == fmi3Error);
+    MUST(PREFIXED(SetFloat64)(unit, parameter, 1, at, 1) == fmi3OK);
+    for (whole[0] = 0; whole[0] <= FMU(END); ++whole[0]) { /* a seed without noise */
+        MUST(PREFIXED(GetInt32)(unit, whole, 1, &seed, 1) == fmi3Error);
+        MUST(PREFIXED(SetInt32)(unit, whole, 1, &seed, 1) == fmi3Error);
+    }
     MUST(PREFIXED(ExitInitializationMode)(unit) == fmi3OK);
     MUST(PREFIXED(EnterStepMode)(unit) == fmi3OK);
     MUST(PREFIXED(DoStep)(unit, 0.0, 1.0, true, &event, &terminate, &early, &reached) == fmi3OK);
@@ -74,7 +86,13 @@ int main(void)
     MUST(PREFIXED(GetFloat64)(unit, first, 2, x, 2) == fmi3OK && memcmp(at, x, sizeof x) == 0);
     MUST(PREFIXED(FreeFMUState)(unit, &copy) == fmi3OK && copy == NULL && PREFIXED(FreeFMUState)(unit, &read) == fmi3OK);
     MUST(PREFIXED(EnterEventMode)(unit) == fmi3OK && PREFIXED(EnterStepMode)(unit) == fmi3OK);
-    MUST(PREFIXED(Terminate)(unit) == fmi3OK && PREFIXED(Reset)(unit) == fmi3OK);
+    MUST(PREFIXED(Terminate)(unit) == fmi3OK);
+    x[0] = 7.0;
+    MUST(PREFIXED(SetFloat64)(unit, parameter, 1, x, 1) == fmi3Error);
+    MUST(PREFIXED(GetFloat64)(unit, parameter, 1, x, 1) == fmi3OK && x[0] < 7.0); /* nor is it stored */
+    MUST(LAST_TIME(unit, fmi2LastSuccessfulTime, &reached) == fmi2OK && reached > 0.3);
+    MUST(PREFIXED(Reset)(unit) == fmi3OK);
+    MUST(LAST_TIME(unit, fmi2LastSuccessfulTime, &reached) == fmi2OK && fabs(reached) < 1e-9);
     PREFIXED(FreeInstance)(unit);
     puts("ok");
     return 0;

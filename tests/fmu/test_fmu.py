@@ -1,6 +1,8 @@
 """FMUs: valid descriptions, the bits of the C, any communication steps, states, events, and what is refused."""
 
 import os
+import re
+import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
 
@@ -100,6 +102,30 @@ def test_text_of_the_spec_arrives_as_it_is(body):
     assert of["I1"].unit == 'kg.m2 <&">'
     assert of["I1"].description == 'least & <first> "moment" */ of inertia ??/'
     assert (of["torque"].causality, of["I2"].variability, of["I3"].start) == ("input", "tunable", "5.0")
+
+
+BACKWARD = "back: {initial: [9, 9, 9], step: -0.1, steps: 10}"
+
+
+def test_description_takes_a_run_that_goes_forward_and_leaves_out_blank_units():
+    """The first run of the spec goes backward, and no communication step does."""
+    text = body_spec("body").replace("runs: {r:", f"runs: {{{BACKWARD}, r:")
+    text = text.replace("unit: kg.m2}", "unit: ' ', description: ' '}").replace("title: 'a body'", "title: ' '")
+    _, made = unit(text)
+    for description in made.descriptions.values():
+        root = ET.fromstring(description)
+        experiment = root.find("DefaultExperiment").attrib
+        assert [float(experiment[key]) for key in ("startTime", "stepSize", "stopTime")] == [0, 0.1, 10]
+        attributes = [value for element in root.iter() for value in element.attrib.values()]
+        assert "" not in attributes
+        assert [e.get("name") for e in root.iter("Unit")] == ['kg.m2 <&">']
+
+
+def test_spec_with_backward_runs_only_is_refused_at_the_step():
+    text = re.sub(r"runs: .*", f"runs: {{{BACKWARD}}}", body_spec("body"))
+    refused = r"\d+:\d+: error: an FMU of body needs a run that goes forward in time, and the step of back is -1/10"
+    with pytest.raises(phigen.SpecError, match=refused):
+        unit(text)
 
 
 def states_of_c(steps, folder):
@@ -214,6 +240,7 @@ def test_environment_in_c_under_sanitizers(tmp_path):
     for file, text in made.sources.items():
         (tmp_path / file).write_text(text, encoding="utf-8")
     defined = {"UNIT": '"body_fmi.c"', "TOKEN": "body_token", "STEP": "0.1", "FMU(kind)": "body_FMU_##kind"}
+    defined["LAST_TIME"] = "body_fmi2GetRealStatus"
     defined |= {"PREFIXED(name)": "body_fmi3##name", "FMI3_FUNCTION_PREFIX": "body_", "FMI2_FUNCTION_PREFIX": "body_"}
     options = [f"-D{name}={value}" for name, value in defined.items()]
     sanitised = ["-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover"]
@@ -234,6 +261,10 @@ def test_steps_equal_in_tau_meet_physical_times(tmp_path):
             instance.step(k * h, h)
             at = found.at([(k + 1) * h])[0]
             assert np.abs(np.array(instance.get(*names)) - at).max() < 1e-8
+    with running(paths[3], tmp_path / "still", start=1.0, values={"solver.step": 1e-30}) as instance:
+        with pytest.raises(Exception, match="discard"):  # 1 + 1e-30 is 1: the time stands still
+            instance.step(1.0, 0.1)
+        assert instance.get("time") == [1.0]
 
 
 @pytest.mark.slow

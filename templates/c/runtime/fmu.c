@@ -14,6 +14,8 @@
 /* A communication point is on the grid of whole steps if it is less than this part of a step away from it: times that
    are sums of step sizes are no multiples of them. */
 static const double phi_fmu_slack = 1e-9;
+/* Whole steps of one communication step, at most: their count fits a size_t on every machine. */
+static const double phi_fmu_most_steps = 1e9;
 
 typedef enum { PHI_INSTANTIATED, PHI_INITIALISING, PHI_STEPPING, PHI_AT_EVENT, PHI_TERMINATED } phi_fmu_mode;
 
@@ -112,14 +114,16 @@ static double phi_fmu_tolerance(const phi_fmu_state *f, double target)
 }
 
 #if PHI_MONITOR
-/* Make one whole step, of tau, if that ends at the target or before it. */
-static phi_status phi_fmu_whole_step(phi_fmu_state *f, double target, bool *made)
+/* Make one whole step, of tau, if that ends at the target or before it; `advanced` says whether one was made. */
+static phi_status phi_fmu_whole_step(phi_fmu_state *f, double target, bool *advanced)
 {
     phi_solver next = f->grid;
     const phi_status status = phi_step(&next, (phi_real)f->step);
-    *made = status == PHI_OK && phi_fmu_time(f, &next) <= target + phi_fmu_tolerance(f, target);
-    if (*made) f->grid = next;
-    return PHI_OK; /* a step that fails may lead beyond the target: a part of it is tried */
+    *advanced = status == PHI_OK && phi_fmu_time(f, &next) <= target + phi_fmu_tolerance(f, target);
+    if (!*advanced) return PHI_OK; /* a step that fails may lead beyond the target: a part of it is tried */
+    if (!(phi_fmu_time(f, &next) > phi_fmu_time(f, &f->grid))) return PHI_NO_CONVERGENCE; /* the time stands still */
+    f->grid = next;
+    return PHI_OK;
 }
 
 /* Stand at the target, a part of a step behind the grid: the part is found by Newton's iteration, as dt/dtau is known. */
@@ -141,11 +145,12 @@ static phi_status phi_fmu_part(phi_fmu_state *f, double target)
 /* Make all whole steps that end at the target or before it. */
 static phi_status phi_fmu_whole_steps(phi_fmu_state *f, double target)
 {
-    phi_status status;
-    bool made;
-    do status = phi_fmu_whole_step(f, target, &made);
-    while (status == PHI_OK && made);
-    return status;
+    bool advanced = true;
+    for (double count = 0.0; count <= phi_fmu_most_steps; ++count) {
+        const phi_status status = phi_fmu_whole_step(f, target, &advanced);
+        if (status != PHI_OK || !advanced) return status;
+    }
+    return PHI_BAD_ARGUMENT;
 }
 
 #else
@@ -153,16 +158,16 @@ static phi_status phi_fmu_whole_steps(phi_fmu_state *f, double target)
 static double phi_fmu_ahead(const phi_fmu_state *f, double target)
 {
     const double count = floor((target - phi_fmu_time(f, &f->grid) + phi_fmu_tolerance(f, target)) / f->step);
-    return count >= 0.0 && count <= 1e9 ? count : -1.0;
+    return count >= 0.0 && count <= phi_fmu_most_steps ? count : -1.0;
 }
 
-/* Make one whole step, if that ends at the target or before it. */
-static phi_status phi_fmu_whole_step(phi_fmu_state *f, double target, bool *made)
+/* Make one whole step, if that ends at the target or before it; `advanced` says whether one was made. */
+static phi_status phi_fmu_whole_step(phi_fmu_state *f, double target, bool *advanced)
 {
     const double count = phi_fmu_ahead(f, target);
-    *made = count >= 1.0;
+    *advanced = count >= 1.0;
     if (count < 0.0) return PHI_BAD_ARGUMENT;
-    return *made ? phi_step(&f->grid, (phi_real)f->step) : PHI_OK;
+    return *advanced ? phi_step(&f->grid, (phi_real)f->step) : PHI_OK;
 }
 
 /* Make all whole steps that end at the target or before it. */
@@ -231,16 +236,16 @@ static bool phi_fmu_get(const phi_fmu_state *f, uint32_t variable, double *value
     return true;
 }
 
-/* Set a variable: parameters at any time, what a run begins with before it begins. False where that is not allowed. */
+/* Set a variable: parameters until the end, initial values before the start. False where that is not allowed. */
 static bool phi_fmu_set(phi_fmu_state *f, uint32_t variable, double value)
 {
     const bool before = f->mode <= PHI_INITIALISING;
-    if (!isfinite(value)) return false;
+    if (!isfinite(value) || f->mode == PHI_TERMINATED) return false;
     if (variable >= PHI_FMU_PARAMETER && variable < PHI_FMU_STEP) {
         phi_real *parameter = phi_fmu_parameter(&f->now.params, variable - PHI_FMU_PARAMETER);
         f->changed |= *parameter < (phi_real)value || *parameter > (phi_real)value;
         *parameter = (phi_real)value;
-        return f->mode != PHI_TERMINATED;
+        return true;
     }
     if (!before) return false;
     if (variable >= PHI_FMU_STATE && variable < PHI_FMU_PARAMETER) f->now.x[variable - PHI_FMU_STATE] = (phi_real)value;
@@ -254,6 +259,33 @@ static bool phi_fmu_set(phi_fmu_state *f, uint32_t variable, double value)
         f->now.position[variable - PHI_FMU_POSITION] = (phi_real)value;
 #endif
     else return false;
+    return true;
+}
+
+/* The seed is the only variable with whole numbers; without noise there is none. */
+static bool phi_fmu_is_whole(uint32_t variable)
+{
+#if PHI_NOISE
+    return variable == PHI_FMU_SEED;
+#else
+    (void)variable;
+    return false;
+#endif
+}
+
+/* A variable with whole numbers: false where there is none of that number. */
+static bool phi_fmu_get_whole(const phi_fmu_state *f, uint32_t variable, int32_t *value)
+{
+    if (!phi_fmu_is_whole(variable)) return false;
+    *value = f->seed;
+    return true;
+}
+
+/* Set a variable with whole numbers before the start. False where that is not allowed. */
+static bool phi_fmu_set_whole(phi_fmu_state *f, uint32_t variable, int32_t value)
+{
+    if (!phi_fmu_is_whole(variable) || value < 0 || f->mode > PHI_INITIALISING) return false;
+    f->seed = value;
     return true;
 }
 
@@ -291,7 +323,8 @@ static bool phi_fmu_read(phi_fmu_state *f, const unsigned char *bytes, size_t co
 
 /* ---- Instances ---- */
 
-typedef void (*phi_fmu_logger)(void *instance, int error, const char *message);
+/* Reports to the environment why a call failed. */
+typedef void (*phi_fmu_logger)(void *instance, const char *message);
 
 typedef struct {
     phi_fmu_state state;
@@ -301,12 +334,11 @@ typedef struct {
     void (*callback)(void); /* the logger of the environment */
     void (*update)(void);   /* what hears of whole steps, or NULL */
     bool logging, may_return_early;
-    double reached; /* the last time that a step has reached */
 } phi_fmu;
 
-static void phi_fmu_say(phi_fmu *instance, int error, const char *message)
+static void phi_fmu_say(phi_fmu *instance, const char *message)
 {
-    if (instance->logging && instance->callback != NULL) instance->log(instance, error, message);
+    if (instance->logging && instance->callback != NULL) instance->log(instance, message);
 }
 
 /* NULL where there is no memory, or the token is that of another FMU. */
@@ -351,9 +383,9 @@ static phi_status phi_fmu_do_step(phi_fmu *instance, double target, phi_fmu_list
     phi_status status = f->changed ? phi_fmu_restart(f) : PHI_OK;
     bool ends = false;
     if (status == PHI_OK && listener == NULL) status = phi_fmu_whole_steps(f, target);
-    for (bool made = listener != NULL; made && !ends && status == PHI_OK;) {
-        status = phi_fmu_whole_step(f, target, &made);
-        if (status != PHI_OK || !made) break;
+    for (bool advanced = listener != NULL; advanced && !ends && status == PHI_OK;) {
+        status = phi_fmu_whole_step(f, target, &advanced);
+        if (status != PHI_OK || !advanced) break;
         f->now = f->grid;
         f->time = phi_fmu_time(f, &f->grid);
         ends = f->time < target - phi_fmu_tolerance(f, target) && listener(instance, f->time);
@@ -364,9 +396,8 @@ static phi_status phi_fmu_do_step(phi_fmu *instance, double target, phi_fmu_list
     }
     if (status != PHI_OK) {
         *f = before;
-        phi_fmu_say(instance, 1, phi_status_string(status));
+        phi_fmu_say(instance, phi_status_string(status));
     }
-    instance->reached = f->time;
     return status;
 }
 #include "fmu3.c"

@@ -36,12 +36,11 @@ typedef struct {
 /* The statuses of both versions have the same numbers. */
 static fmi2Status phi_fmi2_status(fmi3Status status) { return (fmi2Status)status; }
 
-static void phi_fmi2_log(void *of, int error, const char *message)
+static void phi_fmi2_log(void *of, const char *message)
 {
     phi_fmu *instance = (phi_fmu *)of;
     const fmi2CallbackLogger log = (fmi2CallbackLogger)instance->callback;
-    const fmi2Status status = error ? fmi2Error : fmi2OK;
-    log(instance->environment, instance->name, status, error ? "logStatusError" : "logEvents", "%s", message);
+    log(instance->environment, instance->name, fmi2Error, "logStatusError", "%s", message);
 }
 
 FMI3_SHARED const char *FMI2_NAME(GetTypesPlatform)(void) { return "default"; }
@@ -117,7 +116,7 @@ FMI2_SAME(DeSerializeFMUstate, DeserializeFMUState,
     (fmi2Component of, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state),
     (of, (const fmi3Byte *)bytes, size, state))
 
-/* What there is nothing of. */
+/* Types without variables, and derivatives: none can be got or set, and a call with none of them is no error. */
 #define FMI2_NONE(name, arguments) \
     FMI2_STATUS(name) arguments { return of != NULL && n == 0 ? fmi2OK : fmi2Error; }
 #if defined(__GNUC__)
@@ -162,7 +161,7 @@ FMI2_STATUS(GetStatus)(fmi2Component of, const fmi2StatusKind kind, fmi2Status *
 FMI2_STATUS(GetRealStatus)(fmi2Component of, const fmi2StatusKind kind, fmi2Real *value)
 {
     if (of == NULL || kind != fmi2LastSuccessfulTime) return fmi2Discard;
-    *value = ((phi_fmu *)of)->reached;
+    *value = phi_fmi3_state(of)->time;
     return fmi2OK;
 }
 

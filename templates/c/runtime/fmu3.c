@@ -52,26 +52,32 @@ typedef void (*fmi3UnlockPreemptionCallback)(void);
 
 FMI3_SHARED const char *FMI3_NAME(GetVersion)(void) { return "3.0"; }
 
-static void phi_fmi3_log(void *of, int error, const char *message)
+static void phi_fmi3_log(void *of, const char *message)
 {
     phi_fmu *instance = (phi_fmu *)of;
     const fmi3LogMessageCallback log = (fmi3LogMessageCallback)instance->callback;
-    log(instance->environment, error ? fmi3Error : fmi3OK, error ? "logStatusError" : "logEvents", message);
+    log(instance->environment, fmi3Error, "logStatusError", message);
 }
 
 static fmi3Status phi_fmi3_refuse(fmi3Instance of, const char *message)
 {
-    if (of != NULL) phi_fmu_say((phi_fmu *)of, 1, message);
+    if (of != NULL) phi_fmu_say((phi_fmu *)of, message);
     return fmi3Error;
 }
 
 static phi_fmu_state *phi_fmi3_state(fmi3Instance of) { return &((phi_fmu *)of)->state; }
 
+/* Refuse a call in any other mode than the one in which it is allowed. */
+static fmi3Status phi_fmi3_expect(fmi3Instance of, phi_fmu_mode mode)
+{
+    if (of != NULL && phi_fmi3_state(of)->mode == (int32_t)mode) return fmi3OK;
+    return phi_fmi3_refuse(of, "this call is not allowed in the mode of the FMU");
+}
+
 /* Change from one mode to the next. */
 static fmi3Status phi_fmi3_enter(fmi3Instance of, phi_fmu_mode from, phi_fmu_mode to)
 {
-    if (of == NULL || phi_fmi3_state(of)->mode != (int32_t)from)
-        return phi_fmi3_refuse(of, "this call is not allowed in the mode of the FMU");
+    if (phi_fmi3_expect(of, from) != fmi3OK) return fmi3Error;
     phi_fmi3_state(of)->mode = (int32_t)to;
     return fmi3OK;
 }
@@ -148,9 +154,10 @@ FMI3_STATUS(EnterInitializationMode)(fmi3Instance of, fmi3Boolean has_tolerance,
 
 FMI3_STATUS(ExitInitializationMode)(fmi3Instance of)
 {
-    if (phi_fmi3_enter(of, PHI_INITIALISING, PHI_STEPPING) != fmi3OK) return fmi3Error;
+    if (phi_fmi3_expect(of, PHI_INITIALISING) != fmi3OK) return fmi3Error;
     const phi_status status = phi_fmu_start(phi_fmi3_state(of));
-    return status == PHI_OK ? fmi3OK : phi_fmi3_refuse(of, phi_status_string(status));
+    if (status != PHI_OK) return phi_fmi3_refuse(of, phi_status_string(status)); /* other values may be set and tried */
+    return phi_fmi3_enter(of, PHI_INITIALISING, PHI_STEPPING);
 }
 
 FMI3_STATUS(EnterEventMode)(fmi3Instance of) { return phi_fmi3_enter(of, PHI_STEPPING, PHI_AT_EVENT); }
@@ -199,10 +206,8 @@ FMI3_STATUS(GetInt32)(fmi3Instance of, const fmi3ValueReference variables[], siz
     size_t value_count)
 {
     if (of == NULL || count != value_count) return fmi3Error;
-    for (size_t k = 0; k < count; ++k) {
-        if (variables[k] != (fmi3ValueReference)PHI_FMU_SEED) return phi_fmi3_refuse(of, "no such variable");
-        values[k] = phi_fmi3_state(of)->seed;
-    }
+    for (size_t k = 0; k < count; ++k)
+        if (!phi_fmu_get_whole(phi_fmi3_state(of), variables[k], &values[k])) return phi_fmi3_refuse(of, "no such variable");
     return fmi3OK;
 }
 
@@ -210,11 +215,9 @@ FMI3_STATUS(SetInt32)(fmi3Instance of, const fmi3ValueReference variables[], siz
     const fmi3Int32 values[], size_t value_count)
 {
     if (of == NULL || count != value_count) return fmi3Error;
-    for (size_t k = 0; k < count; ++k) {
-        if (variables[k] != (fmi3ValueReference)PHI_FMU_SEED || values[k] < 0 || phi_fmi3_state(of)->mode > PHI_INITIALISING)
+    for (size_t k = 0; k < count; ++k)
+        if (!phi_fmu_set_whole(phi_fmi3_state(of), variables[k], values[k]))
             return phi_fmi3_refuse(of, "the variable cannot be set now, or to this value");
-        phi_fmi3_state(of)->seed = values[k];
-    }
     return fmi3OK;
 }
 
@@ -252,7 +255,7 @@ FMI3_NONE(SetUInt64, const fmi3UInt64)
 FMI3_NONE(SetBoolean, const fmi3Boolean)
 FMI3_NONE(SetString, const fmi3String)
 
-/* What this FMU does not offer. */
+/* Functions for model exchange, scheduled execution, clocks, binary variables, arrays and derivatives: always refused. */
 #define FMI3_ABSENT(name, arguments) \
     FMI3_STATUS(name) arguments { return fmi3Error; }
 #if defined(__GNUC__)
@@ -386,8 +389,8 @@ FMI3_STATUS(DoStep)(fmi3Instance of, fmi3Float64 from, fmi3Float64 size, fmi3Boo
     *reached = instance->state.time;
     if (!phi_fmu_may_step(&instance->state, from, size)) return phi_fmi3_refuse(of, "a step from another time, or mode");
     status = phi_fmu_do_step(instance, from + size, instance->update == NULL ? NULL : phi_fmi3_listener);
-    *reached = instance->reached;
-    *early = status == PHI_OK && instance->reached < from + size;
+    *reached = instance->state.time;
+    *early = status == PHI_OK && *reached < from + size;
     return status == PHI_OK ? fmi3OK : fmi3Discard;
 }
 #endif
