@@ -73,20 +73,23 @@ def _differences(program: Program) -> int:
 
 def _gathered(layout: Layout) -> int:
     """Sums over bonds or pairs that are held for each site at once."""
-    own, swept = layout.partners, [sweep.gather for sweep in layout.step.sweeps if sweep.gather]
-    seen = () if layout.sums_up else own.gathers
+    partners, swept = layout.partners, [sweep.gather for sweep in layout.step.sweeps if sweep.gather]
+    seen = () if layout.sums_up else partners.gathers
     return max([1, *(len(g.names) for g in (*swept, *seen))])
 
 
 def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> int:
     """Arrays over the sites in the memory of a solver."""
-    own, stage = program.dimension, 0
+    dimension, stage = program.dimension, 0
     if layout.step.equation:
         stage = 2 if layout.slopes else 3  # y before and after a sweep, and varied
         stage += len(program.fractions) * _differences(program) * has["GUESSES"]
-        stage += has["BANDED"] + (LatticeNewtonPolicy().directions + 1 + (own + 1) * has["SITE_BLOCKS"]) * has["KRYLOV"]
-        stage = stage * own + has["KRYLOV"]  # one for sums over pieces
-    fields = own + 2 * own * has["COMPENSATED"]  # before a step, and what rounding leaves out
+        stage += (
+            has["BANDED"]
+            + (LatticeNewtonPolicy().directions + 1 + (dimension + 1) * has["SITE_BLOCKS"]) * has["KRYLOV"]
+        )
+        stage = stage * dimension + has["KRYLOV"]  # one for sums over pieces
+    fields = dimension + 2 * dimension * has["COMPENSATED"]  # before a step, and what rounding leaves out
     fields += bool(layout.step.sites.seams)  # and the kinds of sites
     return len(layout.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage
 
@@ -111,8 +114,8 @@ def _flows(step: Sweeps) -> list[tuple[int, int]]:
 
 def _by_flow(step: Sweeps, values: Sequence[float], joined: float) -> list[float]:
     """The values of the rows of the schedule for each flow, the last for those that are joined."""
-    found = [values[row] for _, row in _flows(step)]
-    return found if step.sites.increments else [*found[:-1], joined]
+    by_flow = [values[row] for _, row in _flows(step)]
+    return by_flow if step.sites.increments else [*by_flow[:-1], joined]
 
 
 def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
@@ -192,7 +195,7 @@ def _constants(
 
 
 def _tables_of_sites(program: Program, step: Sweeps, layout: Layout, has: Mapping[str, bool]) -> dict[str, object]:
-    """What is the same in all steps: the shape of the lattice, what kernels read, and what its sweeps do."""
+    """Tables that are the same in all steps: the shape of the lattice, the neighbours that kernels read, the sweeps."""
     sites, several = step.sites, len(step.sites.axes) > 1
     stages = [_braced(step.stage(k, program.coordinates)) for k in range(len(step.parts))] if has["BY_HAND"] else []
     return {
@@ -211,7 +214,7 @@ def _tables_of_sites(program: Program, step: Sweeps, layout: Layout, has: Mappin
 
 
 def _tables_of_flows(step: Sweeps) -> dict[str, object]:
-    """What differs from flow to flow."""
+    """Tables that differ from flow to flow."""
     schedule = step.schedule
     joined = schedule.times[schedule.flows[0][1]] + schedule.times[schedule.flows[-1][1]]
     multiples = _by_flow(step, schedule.multiples, schedule.multiples[0]) if schedule.multiples else ()

@@ -36,31 +36,31 @@ from phigen.targets.rendering import render
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     """All kernels as loops over sites, and which of them make which part of H."""
     layout = layout_of(program, step)
-    found = [
+    texts = [
         *functions.called(program, [step.equation.slope] if step.equation and not layout.slopes else ()),
         *functions.phi_lanes(program, set(rows.small_argument)),
     ]
-    found += functions.near_rows(program, [f for f in rows.small_argument if f not in SPECIAL])
+    texts += functions.near_rows(program, [f for f in rows.small_argument if f not in SPECIAL])
     if step.parts:
-        found += _parts(program, layout, rows, step.parts)
-        found += _parts(program, layout, None, step.tangents) if program.extras.tangent else []
-    found += partners(program, layout)
+        texts += _parts(program, layout, rows, step.parts)
+        texts += _parts(program, layout, None, step.tangents) if program.extras.tangent else []
+    texts += partners(program, layout)
     if step.equation:
         relax, end = step.equation.relax, step.equation.advance
         forms = call_forms(program, rows, [relax, end])
-        found += _of_equation(program, layout, relax, forms, end=[end], far=bool(rows.limited))
+        texts += _of_equation(program, layout, relax, forms, end=[end], far=bool(rows.limited))
     if step.equation and switches(program, step, layout)["SITE_BLOCKS"]:
-        found += _of_equation(
+        texts += _of_equation(
             program, layout, site_block(program, layout, step.equation.relax), {"": in_loops(program)}
         )
     for kernel in (step.equation.slope, *step.equation.tangents) if step.equation and layout.slopes else ():
-        found += _of_equation(program, layout, kernel, {"": in_loops(program)})
-    found += [seen_loop(program, layout, k) for k in program.observables.kernels if k.roots]
-    return "\n".join(found)
+        texts += _of_equation(program, layout, kernel, {"": in_loops(program)})
+    texts += [seen_loop(program, layout, k) for k in program.observables.kernels if k.roots]
+    return "\n".join(texts)
 
 
 def parameters(program: Program, step: Sweeps) -> str:
-    """What puts parameters at sites and bonds where loops read them."""
+    """Print the function that copies parameters at sites and bonds to the arrays that loops read."""
     layout, member = layout_of(program, step), members(program)
     sites = [p for p in program.parameters if p.at == "sites"]
     values = {
@@ -90,30 +90,30 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
     Without ``rows`` these are derivatives.
     """
     step = layout.step
-    made = [_forms_of_part(program, layout, rows, part) for part in parts]
-    alike = _alike(made)
+    parts_by_form = [_forms_of_part(program, layout, rows, part) for part in parts]
+    alike = _alike(parts_by_form)
     names: dict[str, str] = {}
     for code, same in alike.items():
         shared = same[0].loop.shared if len(same) > 1 and same[0].loop.shared not in names.values() else ""
         names[code] = shared or same[0].loop.name
         yield replace(same[0].loop, name=names[code]).text(program, [call.loop.purpose for call in same])
     near = rows is not None and bool(rows.limited)
-    unused, varied = ["far"] * (near and all(len(forms) == 1 for forms in made)), rows is None
+    unused, varied = ["far"] * (near and all(len(forms) == 1 for forms in parts_by_form)), rows is None
     has = switches(program, step, layout)
     threads = 0 if varied or has["SHARED"] else 512 if has["PAIRS"] else 4096
     flow, what = ("flow", "A flow") if step.by_colour else ("part", "The flow of a part of H")
     head = "tangent_rows" if varied else f"sweep_{'colour' if step.by_colour else 'part'}" if threads else "sweep_rows"
     cases: list[Case | str] = []
-    for k, forms in enumerate(made):
+    for k, forms in enumerate(parts_by_form):
         if varied or not _has_rows_of_its_own(program, layout):
             cases.append(_case(program, layout, k, parts[k], forms, names))
             continue
         called = [f"{program.name}_rows{k + 1}{form}" for form in sorted(forms)]
         for form in sorted(forms):
-            own = _case(program, layout, k, parts[k], {form: forms[form]}, names)
+            case = _case(program, layout, k, parts[k], {form: forms[form]}, names)
             title = f"The flow of H_{k + 1}" + ", for large arguments of functions" * (form == "_far")
             yield over_rows(
-                program, layout, [own], title=title, head=f"rows{k + 1}{form}", arguments="const double *coef"
+                program, layout, [case], title=title, head=f"rows{k + 1}{form}", arguments="const double *coef"
             )
         cases.append(f"{called[0] if len(called) == 1 else f'(far ? {called[0]} : {called[1]})'}(s, coef, first, end);")
     yield over_rows(
@@ -134,10 +134,10 @@ def _has_rows_of_its_own(program: Program, layout: Layout) -> bool:
     return program.profile == "fast" and len(layout.step.sites.axes) > 1
 
 
-def _alike(made: Sequence[dict[str, list[_Call]]]) -> dict[str, list[_Call]]:
+def _alike(parts_by_form: Sequence[dict[str, list[_Call]]]) -> dict[str, list[_Call]]:
     """The calls of all loops, by the code that is to be printed of them: those that another one can make call that."""
     alike: dict[str, list[_Call]] = {}
-    for forms in made:
+    for forms in parts_by_form:
         for called in forms.values():
             for k, call in sorted(enumerate(called), key=_place):
                 choices = [call, *call.others]
@@ -157,15 +157,15 @@ def _place(numbered: tuple[int, _Call]) -> tuple[str, bool]:
 def _forms_of_part(
     program: Program, layout: Layout, rows: Rows | None, part: Sequence[Sweep]
 ) -> dict[str, list[_Call]]:
-    """What is called for a piece of a row to make a part of H, in each form.
+    """Return the calls for a segment of a row that make the flow of a part of H, in each form.
 
     Short code has loops that also serve with the fields in another order.
     """
     forms = call_forms(program, rows, [sweep.kernel for sweep in part])
-    fields, found = program.coordinates, dict[str, list[_Call]]()
+    fields, calls_by_form = program.coordinates, dict[str, list[_Call]]()
     tried = [*orders(fields)] if program.profile == "small" and rows is not None else []
     for form, names in forms.items():
-        found[form] = []
+        calls_by_form[form] = []
         for sweep in part:
             calls = [*_calls(program, layout, sweep, form, names)]
             for order in (
@@ -176,8 +176,8 @@ def _forms_of_part(
                 for k, call in enumerate(again):
                     more = (replace(c, order=order) for c in (call, *call.others))
                     calls[k] = replace(calls[k], others=(*calls[k].others, *more))
-            found[form] += calls
-    return found
+            calls_by_form[form] += calls
+    return calls_by_form
 
 
 def _case(
@@ -203,7 +203,7 @@ def _case(
 
 
 def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[str]:
-    """What leaves out rows, and sites of them, that are not near all seams that the terms of a part begin on."""
+    """Yield the statements that skip rows and sites away from the seams at which the terms of a part begin."""
     window, last = max((s.window or 0 for s in part), default=0), len(layout.step.sites.axes) - 1
     rows = window & ~(1 << last)
     if rows:
@@ -218,7 +218,7 @@ MOST_ON_A_LINE = 2
 
 @dataclass(frozen=True)
 class Case:
-    """What is called for a piece of a row ``at``, after its ``setup``; whether there are sites beside open ends; the
+    """Calls for a segment of a row, after its ``setup``; whether there are sites beside open ends; the
     declarations of ``orders`` of the fields; which fields are ``moved``, and where these are."""
 
     calls: Sequence[str]
@@ -251,17 +251,17 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
     colour: int | None = 0
     window: int | None = 0
     for call in called:
-        told = list[str]()
+        assignments = list[str]()
         if call.window not in (window, None):
             window = call.window
-            told.append(f"row.window = {window}.0")
+            assignments.append(f"row.window = {window}.0")
         if call.colour not in (colour, None):
             colour = call.colour
-            told.append(f"row.swept = {colour}")
+            assignments.append(f"row.swept = {colour}")
         if call.order != order:
             order = call.order
-            told.append(f"row.x = {'_'.join(order) or 's->x'}")
-        yield from [f"{', '.join(told)};"] if told else []
+            assignments.append(f"row.x = {'_'.join(order) or 's->x'}")
+        yield from [f"{', '.join(assignments)};"] if assignments else []
         yield f"{program.name}_{names[call.loop.code]}({', '.join(['coef', at(program, call.sites), *call.told])});"
 
 
@@ -356,7 +356,7 @@ def _either(condition: str, first: Sequence[str], other: Sequence[str]) -> list[
 
 
 def _copied_ends(program: Program, layout: Layout, fields: Sequence[int | str], case: Case) -> list[str]:
-    """What copies the ends of a row of some fields that were changed."""
+    """Return the statements that copy the ends of a row of fields that were changed."""
     place, swept = layout.at(0, "row."), layout.swept("begin, stop" if case.beside else "row.from, row.to")
     return [f"{program.name}_ends({case.where}[{f}]{place}, s->length, {swept});" for f in fields if layout.halo]
 
@@ -375,14 +375,14 @@ def _of_equation(
     name, relaxing, adds = program.name, kernel.role is Role.RELAX, kernel.role is Role.FOLLOW
     varied = kernel.reads_variations
     gathers = over_ends(layout.gathered(kernel)) if kernel.inputs["gathered"] else ()
-    gathered = [f"{name}_{own.kernel.name}(&row);" for own, _ in gathers]
+    gathered = [f"{name}_{ends.kernel.name}(&row);" for ends, _ in gathers]
     lines = {}
     for form, calls in forms.items():
         both = list[list[str]]()
-        for made in (kernel, *end):
-            added = "+=" if adds or made in end else "="
+        for printed in (kernel, *end):
+            added = "+=" if adds or printed in end else "="
             loops = [
-                middle_loop(program, layout, one, form + more, calls, added) for one, more in forms_of(program, made)
+                middle_loop(program, layout, one, form + more, calls, added) for one, more in forms_of(program, printed)
             ]
             yield from (loop.text(program) for loop in loops)
             called = calls_over_sites(loops)
@@ -455,8 +455,8 @@ def over_rows(
 
 def _not_read(values: Mapping[str, Any]) -> list[str]:
     """The arguments of a function over rows that its body does not name."""
-    own = ["unit"] * values["alone"] + ["first", "end"] * values["several"]
-    arguments = ["s", *re.findall(r"(\w+)(?:,|$)", values["arguments"]), *own]
+    range_names = ["unit"] * values["alone"] + ["first", "end"] * values["several"]
+    arguments = ["s", *re.findall(r"(\w+)(?:,|$)", values["arguments"]), *range_names]
     named = " s flow part" if values["coloured"] else ""  # by the lines that find the colour of a flow
     text = "\n".join(values["body"]) + named
     return [name for name in arguments if not re.search(rf"\b{name}\b", text)]
@@ -471,14 +471,14 @@ def _over_pieces(
     """
     pieces = [case for case in cases if isinstance(case, Case)]
     ends = [_copied_ends(program, layout, case.moved, case) for case in pieces]
-    own, last = [[*case.calls] for case in pieces], list[str]()
+    statements, last = [[*case.calls] for case in pieces], list[str]()
     if layout.step.sites.open == (True,) and any(ends):
         (line,) = _copied_ends(program, layout, ["k"], pieces[0])
         last = [f"for (int k = 0; k < {program.name}_DIM; ++k) {line}"]
     else:
-        own = [[*lines, *copied] for lines, copied in zip(own, ends, strict=True)]
-    if len(own) > 1 and program.profile == "small":
-        calls = ["switch (part) {", *_cases(own, labels), "}", *last]
+        statements = [[*lines, *copied] for lines, copied in zip(statements, ends, strict=True)]
+    if len(statements) > 1 and program.profile == "small":
+        calls = ["switch (part) {", *_cases(statements, labels), "}", *last]
         setup = [*dict.fromkeys(line for case in pieces for line in case.setup)]
         return _piece(values, Case(calls, setup, any(case.beside for case in pieces)))
     whole = iter([replace(case, calls=[*case.calls, *copied]) for case, copied in zip(pieces, ends, strict=True)])
