@@ -447,7 +447,7 @@ def over_rows(
     body = ["/* the fields in other orders, in which loops that are for one order serve others */"] * bool(orders)
     body += [*orders, *_over_pieces(program, layout, values, cases, labels or range(1, 1 + len(cases)))]
     indented = [line if line.startswith("#") else f"    {line}" for line in body]
-    values |= {"coloured": False, "unused": (), "body": indented, **more}
+    values |= {"coloured": False, "unused": (), "body": indented, "counted": threads and indented, **more}
     if any(isinstance(case, Case) and not case.calls for case in cases):  # nothing moves, as where brackets are zero
         values["unused"] = _not_read(values)
     return render("c", "sweep_rows.c", values)
