@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 267560c5c40b9127330e4cc6dbdf7facf095510e2409aed48e1b8771ce7dca01
+ * body-sha256: 5d5ac04392c067a90f67cee138bc30de665262ee97c97b49f90df6c0b790302f
  */
 #include "food_web.h"
 #include <float.h>
@@ -85,20 +85,13 @@ typedef struct {
 #define food_web_EACH_SITE
 #endif
 
-/* Doubles from the beginning of a row of so many sites to that of the next. */
-static size_t food_web_width(size_t length)
-{
-    const size_t wide = (length + 7) / 8 * 8;
-    /* rows a multiple of a page apart would share lines of the cache */
-    return wide % 512 == 0 ? wide + 8 : wide;
-}
-
 /* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
     if (sizes == NULL || sizes[0] < food_web_least[0] || sizes[0] > most / 2) return 0;
-    *width = (ptrdiff_t)food_web_width(sizes[0]);
+    size_t wide = (sizes[0] + 7) / 8 * 8;
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share lines of the cache */
     return 1;
 }
 
@@ -131,8 +124,7 @@ static inline food_web_row food_web_piece_of(const food_web_solver *s, size_t un
     return row;
 }
 
-/* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
-#define food_web_ROUNDER 6755399441055744.0
+#define food_web_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
 
 /* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
 static inline double food_web_exp_parts(double u, double *power)
@@ -376,14 +368,6 @@ s->params.A = NULL;
 }
 
 /* ---- The solver ---- */
-/* Where all arrays are, in blocks of memory. */
-static void food_web_place_arrays(food_web_solver *s, double *memory, size_t block)
-{
-    for (size_t k = 0; k < food_web_ARRAYS; ++k, memory += block) s->x[k] = memory;
-    for (size_t k = 0; k < food_web_DIM; ++k, memory += block) s->before[k] = memory;
-    for (size_t k = 0; k < food_web_GATHERED; ++k, memory += block) s->gathered[k] = memory;
-}
-
 static void food_web_prepare_step(const food_web_params *params, double h, double *coef)
 {
     for (int k = 0; k < food_web_ROWS_OF_FLOWS; ++k)
@@ -420,7 +404,9 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = food_web_block(rows, width);
     food_web_connect(s, bonds, memory + food_web_RESERVED * block);
-    food_web_place_arrays(s, memory, block);
+    for (size_t k = 0; k < food_web_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < food_web_DIM; ++k, memory += block) s->before[k] = memory;
+    for (size_t k = 0; k < food_web_GATHERED; ++k, memory += block) s->gathered[k] = memory;
     for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->x[k], x0 + k * sites);
     food_web_put_parameters(s, &own);
     food_web_put_at_bonds(s, &own);

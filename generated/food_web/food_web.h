@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3fd8c9cf19aef0b09316d17d2132896870ddb9764a0de5b15f3f93ebf6362db3
+ * body-sha256: dedecfbf4da172e92dfd712601f7a6d9ac2beb638279c84b0adcd206100a6522
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -31,22 +31,19 @@ enum { food_web_BOND_ARRAYS = 1 };   /* parameters at bonds */
 typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food_web_NOT_FINITE,
     food_web_BAD_ARGUMENT } food_web_status;
 
-/* A solver and the trajectory that it computes. Initialise it by food_web_init. Its arrays lie in memory of
-   the caller, so a copy of the struct is not an independent solver. A field is stored in rows, which are all
-   sites along the last axis. Where steps read other sites, a row has a halo: copies of the sites of the other
-   end beside each end. Read all fields of the struct at any time, write to none of them. */
+/* A solver, initialised by food_web_init. Its arrays lie in memory of the caller: a copy of the struct is no
+   independent solver. A field lies in rows, all sites along the last axis, with a halo where steps read other
+   sites: copies of the other end beside each end. Only read the struct, at any time. */
 typedef struct {
     size_t sizes[food_web_AXES]; /* number of sites along each axis */
-    size_t sites, rows;          /* number of all sites, and of rows */
-    ptrdiff_t length, width;     /* sites of a row; doubles from the start of a row to that of the next */
-    /* the state: first site of each field, then of each parameter at sites, in rows */
-    double *x[food_web_ARRAYS];
-    double *before[food_web_DIM]; /* the fields at the start of the present steps, restored if a step fails */
+    size_t sites, rows; /* number of all sites, and of rows */
+    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
+    double *x[food_web_ARRAYS]; /* state: first site of fields, then of parameters at sites */
+    double *before[food_web_DIM]; /* fields before the present steps, restored if one fails */
     double *gathered[food_web_GATHERED]; /* for each site, sums over other sites */
-    /* for each site, index in other of its first bond that starts there, and that ends there */
-    int *bonds, *middle;
+    int *bonds, *middle; /* for each site, index in other of the first bond from it, and to it */
     int *other, *number; /* for each of these, the site at the other end, and the number of the bond */
-    double *at_bonds[food_web_BOND_ARRAYS]; /* for each of these, the values of the parameters at bonds */
+    double *at_bonds[food_web_BOND_ARRAYS]; /* for each of these, parameters at bonds */
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
@@ -61,29 +58,25 @@ typedef struct {
     double t_before_h;
 } food_web_solver;
 
-/* The bonds of a graph. Bond k connects the sites ends[2 * k] and ends[2 * k + 1], which are counted from
-   0. */
+/* The bonds of a graph. Bond k connects the sites ends[2 * k] and ends[2 * k + 1], counted from 0. */
 typedef struct {
     size_t count;
     const size_t *ends;
 } food_web_bonds;
 
-/* Return the number of bytes that food_web_init needs as memory for these sizes and number of bonds, 0 if
-   there are too many. */
+/* The bytes of memory that food_web_init needs for these sizes and so many bonds; 0 for too many. */
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds);
 
-/* Initialise *s with the state x0[field][site]. work is memory of food_web_work_size(sizes, bonds->count)
-   bytes, aligned as by malloc; the caller frees it after the last use of *s. bonds may be NULL if there are
-   none, params for the defaults; all arrays are copied. Returns food_web_BAD_ARGUMENT if sizes are not
-   admissible, if a bond does not connect two different sites, if x0 or a parameter is not finite, or if a
-   parameter that must be positive is not. */
+/* Initialise *s with the state x0[field][site]. work has food_web_work_size(sizes, bonds->count) bytes,
+   aligned as by malloc, and must outlive *s. bonds may be NULL if there are none, params for the defaults;
+   all arrays are copied. Returns food_web_BAD_ARGUMENT if sizes are not admissible, a bond does not connect
+   two different sites, x0 or a parameter is not finite, or one that must be positive is not. */
 food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     const size_t sizes[food_web_AXES], const food_web_bonds *bonds, const double *x0, void *work);
 
-/* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
-   step, and s->steps counts the successful ones. The last flow of a step is merged with the first of the
-   next, also of the next call, where steps consist of flows. With OpenMP, rows are updated in parallel, with
-   the same bits for any number of threads. */
+/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
+   s->steps counts the successful ones. Where steps consist of flows, the last is merged with the first of the
+   next step or call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 food_web_status food_web_step(food_web_solver *s, double h);
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 
@@ -92,7 +85,7 @@ void food_web_state(const food_web_solver *s, double *x);
 
 /* Save and restore a run with the same bits. food_web_saved writes x[field][site] and far. To restore, call
    food_web_init with the state, then food_web_resume with far, and with x if food_web_saved returned 1, else
-   NULL. With compensated steps x has room for two states: all fields, then the compensation term of each. */
+   NULL. With compensated steps x holds all fields, then their compensation terms. */
 int food_web_saved(const food_web_solver *s, double *x, size_t *far);
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t far);
 
@@ -105,8 +98,7 @@ void food_web_vector_field(const food_web_solver *s, double *out);
 
 const char *food_web_status_string(food_web_status status);
 
-/* For other languages, which cannot read the struct: its size in bytes, and its number of successful
-   steps. */
+/* For other languages: the size of the struct in bytes, and its number of successful steps. */
 size_t food_web_solver_size(void);
 size_t food_web_solver_steps_done(const food_web_solver *s);
 

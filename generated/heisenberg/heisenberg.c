@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 9cf9de244be0ef154506e2fa22600b7e78742b61162db7d9fe454028aa63b07e
+ * body-sha256: 76477fc9d1d87af8260c158f25ff72ef701e08ab39fd0d18ddcd97620ab379ac
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -97,14 +97,6 @@ static inline void heisenberg_ends(double *row, ptrdiff_t length, ptrdiff_t from
         for (ptrdiff_t k = 1; k <= heisenberg_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* Doubles from the beginning of a row of so many sites to that of the next. */
-static size_t heisenberg_width(size_t length)
-{
-    const size_t wide = heisenberg_LEAD + ((length + 7) / 8 * 8 + heisenberg_HALO + 7) / 8 * 8;
-    /* rows a multiple of a page apart would share lines of the cache */
-    return wide % 512 == 0 ? wide + 8 : wide;
-}
-
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *width)
 {
@@ -117,7 +109,8 @@ static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *w
         if (rows > most / sizes[a]) return 0;
         rows *= sizes[a];
     }
-    const size_t wide = heisenberg_width(sizes[heisenberg_AXES - 1]);
+    size_t wide = heisenberg_LEAD + ((sizes[heisenberg_AXES - 1] + 7) / 8 * 8 + heisenberg_HALO + 7) / 8 * 8;
+    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
     return rows > most / wide ? 0 : rows;
 }
@@ -186,8 +179,7 @@ static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrd
     return row;
 }
 
-/* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
-#define heisenberg_ROUNDER 6755399441055744.0
+#define heisenberg_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
 
 /* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
 static inline double heisenberg_sin_lane(double u)
@@ -616,13 +608,6 @@ s->params.B = NULL;
 }
 
 /* ---- The solver ---- */
-/* Where all arrays are, in blocks of memory. */
-static void heisenberg_place_arrays(heisenberg_solver *s, double *memory, size_t block)
-{
-    for (size_t k = 0; k < heisenberg_ARRAYS; ++k, memory += block) s->x[k] = memory;
-    for (size_t k = 0; k < heisenberg_DIM; ++k, memory += block) s->before[k] = memory;
-}
-
 static void heisenberg_prepare_step(const heisenberg_params *params, double h, double *coef)
 {
     for (int k = 0; k < heisenberg_ROWS_OF_FLOWS; ++k)
@@ -659,7 +644,8 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + heisenberg_LEAD;
     const size_t block = heisenberg_block(rows, width);
     heisenberg_find_all_lines(s, memory - heisenberg_LEAD + heisenberg_RESERVED * block);
-    heisenberg_place_arrays(s, memory, block);
+    for (size_t k = 0; k < heisenberg_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < heisenberg_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < heisenberg_DIM; ++k) heisenberg_put(s, s->x[k], x0 + k * sites);
     heisenberg_put_parameters(s, &own);
     return heisenberg_OK;

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4eae8c1a87d657c0d9fcaca4152c81c358734da8593605e85dacc2ea3a6b38ef
+ * body-sha256: 06002f68d0bfb79aed3bb94e74d4f31aa1376b4fcef765a820a4fd66b8235e31
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -29,18 +29,15 @@ enum { heisenberg_COEFFICIENTS = 18 }; /* numbers that are functions of params a
 typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,
     heisenberg_BAD_ARGUMENT } heisenberg_status;
 
-/* A solver and the trajectory that it computes. Initialise it by heisenberg_init. Its arrays lie in memory of
-   the caller, so a copy of the struct is not an independent solver. A field is stored in rows, which are all
-   sites along the last axis. Where steps read other sites, a row has a halo: copies of the sites of the other
-   end beside each end. Read all fields of the struct at any time, write to none of them. */
+/* A solver, initialised by heisenberg_init. Its arrays lie in memory of the caller: a copy of the struct is
+   no independent solver. A field lies in rows, all sites along the last axis, with a halo where steps read
+   other sites: copies of the other end beside each end. Only read the struct, at any time. */
 typedef struct {
     size_t sizes[heisenberg_AXES]; /* number of sites along each axis */
-    size_t sites, rows;            /* number of all sites, and of rows */
-    ptrdiff_t length, width;       /* sites of a row; doubles from the start of a row to that of the next */
-    /* the state: first site of each field, then of each parameter at sites, in rows */
-    double *x[heisenberg_ARRAYS];
-    /* the fields at the start of the present steps, restored if a step fails */
-    double *before[heisenberg_DIM];
+    size_t sites, rows; /* number of all sites, and of rows */
+    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
+    double *x[heisenberg_ARRAYS]; /* state: first site of fields, then of parameters at sites */
+    double *before[heisenberg_DIM]; /* fields before the present steps, restored if one fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
     size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
@@ -54,21 +51,19 @@ typedef struct {
     double t_before_h;
 } heisenberg_solver;
 
-/* Return the number of bytes that heisenberg_init needs as memory for these sizes, 0 for sizes that are not
-   admissible. */
+/* The bytes of memory that heisenberg_init needs for these sizes; 0 if they are not admissible. */
 size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES]);
 
-/* Initialise *s with the state x0[field][site], where the site index of the last axis varies fastest. work is
-   memory of heisenberg_work_size(sizes) bytes, aligned as by malloc; the caller frees it after the last use
-   of *s. params may be NULL for the defaults; its arrays are copied. Returns heisenberg_BAD_ARGUMENT if sizes
-   are not admissible, if x0 or a parameter is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with the state x0[field][site], the last axis fastest. work has heisenberg_work_size(sizes)
+   bytes, aligned as by malloc, and must outlive *s. params may be NULL for the defaults; its arrays are
+   copied. Returns heisenberg_BAD_ARGUMENT if sizes are not admissible, x0 or a parameter is not finite, or
+   one that must be positive is not. */
 heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params *params,
     const size_t sizes[heisenberg_AXES], const double *x0, void *work);
 
-/* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
-   step, and s->steps counts the successful ones. The last flow of a step is merged with the first of the
-   next, also of the next call, where steps consist of flows. With OpenMP, rows are updated in parallel, with
-   the same bits for any number of threads. */
+/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
+   s->steps counts the successful ones. Where steps consist of flows, the last is merged with the first of the
+   next step or call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps);
 
@@ -82,8 +77,7 @@ heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 
 /* Save and restore a run with the same bits. heisenberg_saved writes x[field][site] and far. To restore, call
    heisenberg_init with the state, then heisenberg_resume with far, and with x if heisenberg_saved returned 1,
-   else NULL. With compensated steps x has room for two states: all fields, then the compensation term of
-   each. */
+   else NULL. With compensated steps x holds all fields, then their compensation terms. */
 int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far);
 
@@ -125,8 +119,7 @@ int heisenberg_holds(const heisenberg_solver *s, size_t from, size_t to);
 
 const char *heisenberg_status_string(heisenberg_status status);
 
-/* For other languages, which cannot read the struct: its size in bytes, and its number of successful
-   steps. */
+/* For other languages: the size of the struct in bytes, and its number of successful steps. */
 size_t heisenberg_solver_size(void);
 size_t heisenberg_solver_steps_done(const heisenberg_solver *s);
 

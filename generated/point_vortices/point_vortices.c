@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 089cb33d2924900be6d52e3dc5b7ab3d3e3f4eec0159c45eb1d9e6da5e868c2b
+ * body-sha256: 840df6bd91b00b9710e55aa85c3ae58ffd8a394ee141dcfcb6d672abce762e3f
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -76,20 +76,13 @@ typedef struct {
 #define point_vortices_EACH_SITE
 #endif
 
-/* Doubles from the beginning of a row of so many sites to that of the next. */
-static size_t point_vortices_width(size_t length)
-{
-    const size_t wide = (length + 7) / 8 * 8;
-    /* rows a multiple of a page apart would share lines of the cache */
-    return wide % 512 == 0 ? wide + 8 : wide;
-}
-
 /* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
     if (sizes == NULL || sizes[0] < point_vortices_least[0] || sizes[0] > most / 2) return 0;
-    *width = (ptrdiff_t)point_vortices_width(sizes[0]);
+    size_t wide = (sizes[0] + 7) / 8 * 8;
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share lines of the cache */
     return 1;
 }
 
@@ -354,26 +347,6 @@ s->params.G = NULL;
 }
 
 /* ---- The solver ---- */
-/* Where all arrays are, in blocks of memory. */
-static void point_vortices_place_arrays(point_vortices_solver *s, double *memory, size_t block)
-{
-    for (size_t k = 0; k < point_vortices_ARRAYS; ++k, memory += block) s->x[k] = memory;
-    for (size_t k = 0; k < point_vortices_DIM; ++k, memory += block) s->before[k] = memory;
-    for (size_t k = 0; k < point_vortices_GATHERED; ++k, memory += block) s->gathered[k] = memory;
-    for (int k = 0; k < point_vortices_ARRAYS; ++k)
-        for (int side = 0; side < point_vortices_SIDES; ++side)
-            s->y[side][k] = k < point_vortices_DIM ? memory + (size_t)(point_vortices_SIDES * k + side)
-                * block : s->x[k];
-    memory += point_vortices_SIDES * point_vortices_DIM * block;
-    for (int stage = 0; stage < point_vortices_STAGES; ++stage)
-        for (int d = 0; d < point_vortices_DIFFERENCES; ++d)
-            for (int k = 0; k < point_vortices_DIM; ++k, memory += block)
-                s->guess[stage].difference[d][k] = memory;
-    for (int d = 0; d <= point_vortices_DIRECTIONS; ++d)
-        for (int k = 0; k < point_vortices_DIM; ++k, memory += block) s->space[d][k] = memory;
-    s->sums = memory;
-}
-
 static void point_vortices_prepare_step(const point_vortices_params *params, double h, double *coef)
 {
     for (int k = 0; k < point_vortices_ROWS_OF_FLOWS; ++k)
@@ -409,7 +382,21 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     s->params = own;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = point_vortices_block(rows, width);
-    point_vortices_place_arrays(s, memory, block);
+    for (size_t k = 0; k < point_vortices_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < point_vortices_DIM; ++k, memory += block) s->before[k] = memory;
+    for (size_t k = 0; k < point_vortices_GATHERED; ++k, memory += block) s->gathered[k] = memory;
+    for (int k = 0; k < point_vortices_ARRAYS; ++k)
+        for (int side = 0; side < point_vortices_SIDES; ++side)
+            s->y[side][k] = k < point_vortices_DIM ? memory + (size_t)(point_vortices_SIDES * k + side)
+                * block : s->x[k];
+    memory += point_vortices_SIDES * point_vortices_DIM * block;
+    for (int stage = 0; stage < point_vortices_STAGES; ++stage)
+        for (int d = 0; d < point_vortices_DIFFERENCES; ++d)
+            for (int k = 0; k < point_vortices_DIM; ++k, memory += block)
+                s->guess[stage].difference[d][k] = memory;
+    for (int d = 0; d <= point_vortices_DIRECTIONS; ++d)
+        for (int k = 0; k < point_vortices_DIM; ++k, memory += block) s->space[d][k] = memory;
+    s->sums = memory;
     for (size_t k = 0; k < point_vortices_DIM; ++k) point_vortices_put(s, s->x[k], x0 + k * sites);
     point_vortices_put_parameters(s, &own);
     return point_vortices_OK;

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0e63f3d8ffdc35f863a49df67f11ae3c9e3f24a96080ce08c5e7199db92e4217
+ * body-sha256: a8ae10a33291e4b4c52dba19ebd7bca8fd2095ff302fc5594b260f659aea219a
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -39,19 +39,15 @@ typedef struct {
     double *difference[point_vortices_DIFFERENCES][point_vortices_DIM];
 } point_vortices_guess;
 
-/* A solver and the trajectory that it computes. Initialise it by point_vortices_init. Its arrays lie in
-   memory of the caller, so a copy of the struct is not an independent solver. A field is stored in rows,
-   which are all sites along the last axis. Where steps read other sites, a row has a halo: copies of the
-   sites of the other end beside each end. Read all fields of the struct at any time, write to none of
-   them. */
+/* A solver, initialised by point_vortices_init. Its arrays lie in memory of the caller: a copy of the struct
+   is no independent solver. A field lies in rows, all sites along the last axis, with a halo where steps read
+   other sites: copies of the other end beside each end. Only read the struct, at any time. */
 typedef struct {
     size_t sizes[point_vortices_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    /* the state: first site of each field, then of each parameter at sites, in rows */
-    double *x[point_vortices_ARRAYS];
-    /* the fields at the start of the present steps, restored if a step fails */
-    double *before[point_vortices_DIM];
+    double *x[point_vortices_ARRAYS]; /* state: first site of fields, then of parameters at sites */
+    double *before[point_vortices_DIM]; /* fields before the present steps, restored if one fails */
     double *gathered[point_vortices_GATHERED]; /* for each site, sums over other sites */
     /* solution of a stage before and after a sweep, with the parameters at sites */
     double *y[2][point_vortices_ARRAYS];
@@ -71,22 +67,19 @@ typedef struct {
     double t_before_h;
 } point_vortices_solver;
 
-/* Return the number of bytes that point_vortices_init needs as memory for these sizes, 0 for sizes that are
-   not admissible. */
+/* The bytes of memory that point_vortices_init needs for these sizes; 0 if they are not admissible. */
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES]);
 
-/* Initialise *s with the state x0[field][site], where the site index of the last axis varies fastest. work is
-   memory of point_vortices_work_size(sizes) bytes, aligned as by malloc; the caller frees it after the last
-   use of *s. params may be NULL for the defaults; its arrays are copied. Returns point_vortices_BAD_ARGUMENT
-   if sizes are not admissible, if x0 or a parameter is not finite, or if a parameter that must be positive is
-   not. */
+/* Initialise *s with the state x0[field][site], the last axis fastest. work has
+   point_vortices_work_size(sizes) bytes, aligned as by malloc, and must outlive *s. params may be NULL for
+   the defaults; its arrays are copied. Returns point_vortices_BAD_ARGUMENT if sizes are not admissible, x0 or
+   a parameter is not finite, or one that must be positive is not. */
 point_vortices_status point_vortices_init(point_vortices_solver *s, const point_vortices_params *params,
     const size_t sizes[point_vortices_AXES], const double *x0, void *work);
 
-/* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
-   step, and s->steps counts the successful ones. The last flow of a step is merged with the first of the
-   next, also of the next call, where steps consist of flows. With OpenMP, rows are updated in parallel, with
-   the same bits for any number of threads. */
+/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
+   s->steps counts the successful ones. Where steps consist of flows, the last is merged with the first of the
+   next step or call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 point_vortices_status point_vortices_step(point_vortices_solver *s, double h);
 point_vortices_status point_vortices_integrate(point_vortices_solver *s, double h, size_t steps);
 
@@ -107,8 +100,7 @@ void point_vortices_vector_field(const point_vortices_solver *s, double *out);
 
 const char *point_vortices_status_string(point_vortices_status status);
 
-/* For other languages, which cannot read the struct: its size in bytes, and its number of successful
-   steps. */
+/* For other languages: the size of the struct in bytes, and its number of successful steps. */
 size_t point_vortices_solver_size(void);
 size_t point_vortices_solver_steps_done(const point_vortices_solver *s);
 

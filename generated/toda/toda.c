@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2f6a755703c35e4f689be331447bd24d186e688acb18d157e5550187672f02f6
+ * body-sha256: d7fe1e7a766ef0a6f129ecf1e9a7cec51546ad098b5e91acd58fb8d4d39c5101
  */
 #include "toda.h"
 #include <float.h>
@@ -86,20 +86,13 @@ static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 1; k <= toda_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* Doubles from the beginning of a row of so many sites to that of the next. */
-static size_t toda_width(size_t length)
-{
-    const size_t wide = toda_LEAD + ((length + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
-    /* rows a multiple of a page apart would share lines of the cache */
-    return wide % 512 == 0 ? wide + 8 : wide;
-}
-
 /* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / toda_RESERVED;
     if (sizes == NULL || sizes[0] < toda_least[0] || sizes[0] > most / 2) return 0;
-    *width = (ptrdiff_t)toda_width(sizes[0]);
+    size_t wide = toda_LEAD + ((sizes[0] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share lines of the cache */
     return 1;
 }
 
@@ -131,8 +124,7 @@ static inline toda_row toda_piece_of(const toda_solver *s, size_t unit)
     return row;
 }
 
-/* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
-#define toda_ROUNDER 6755399441055744.0
+#define toda_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
 
 /* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
 static inline double toda_exp_parts(double u, double *power)
@@ -280,13 +272,6 @@ static void toda_take(const toda_solver *s, double *const *fields, double *x)
 }
 
 /* ---- The solver ---- */
-/* Where all arrays are, in blocks of memory. */
-static void toda_place_arrays(toda_solver *s, double *memory, size_t block)
-{
-    for (size_t k = 0; k < toda_ARRAYS; ++k, memory += block) s->x[k] = memory;
-    for (size_t k = 0; k < toda_DIM; ++k, memory += block) s->before[k] = memory;
-}
-
 static void toda_prepare_step(const toda_params *params, double h, double *coef)
 {
     for (int k = 0; k < toda_ROWS_OF_FLOWS; ++k) toda_prepare(params, toda_times[k] * h, coef + k * toda_ROW);
@@ -320,7 +305,8 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     s->params = own;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
     const size_t block = toda_block(rows, width);
-    toda_place_arrays(s, memory, block);
+    for (size_t k = 0; k < toda_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < toda_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < toda_DIM; ++k) toda_put(s, s->x[k], x0 + k * sites);
     return toda_OK;
 }

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7423e0f549a8683edae5b8cb292f5a630fa0e22b6c1d5fe4b130d9d8eab5081a
+ * body-sha256: 8035ad692b1c7c17f07cd93fc4b380fafb98bf7e8446a946fd9e60196548dd58
  */
 #ifndef TODA_H
 #define TODA_H
@@ -28,17 +28,15 @@ enum { toda_COEFFICIENTS = 28 }; /* numbers that are functions of params and h *
 typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
     toda_BAD_ARGUMENT } toda_status;
 
-/* A solver and the trajectory that it computes. Initialise it by toda_init. Its arrays lie in memory of the
-   caller, so a copy of the struct is not an independent solver. A field is stored in rows, which are all
-   sites along the last axis. Where steps read other sites, a row has a halo: copies of the sites of the other
-   end beside each end. Read all fields of the struct at any time, write to none of them. */
+/* A solver, initialised by toda_init. Its arrays lie in memory of the caller: a copy of the struct is no
+   independent solver. A field lies in rows, all sites along the last axis, with a halo where steps read other
+   sites: copies of the other end beside each end. Only read the struct, at any time. */
 typedef struct {
     size_t sizes[toda_AXES]; /* number of sites along each axis */
-    size_t sites, rows;      /* number of all sites, and of rows */
+    size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    /* the state: first site of each field, then of each parameter at sites, in rows */
-    double *x[toda_ARRAYS];
-    double *before[toda_DIM]; /* the fields at the start of the present steps, restored if a step fails */
+    double *x[toda_ARRAYS]; /* state: first site of fields, then of parameters at sites */
+    double *before[toda_DIM]; /* fields before the present steps, restored if one fails */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
     size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
     size_t steps; /* number of successful steps since toda_init */
@@ -51,21 +49,19 @@ typedef struct {
     double t_before_h;
 } toda_solver;
 
-/* Return the number of bytes that toda_init needs as memory for these sizes, 0 for sizes that are not
-   admissible. */
+/* The bytes of memory that toda_init needs for these sizes; 0 if they are not admissible. */
 size_t toda_work_size(const size_t sizes[toda_AXES]);
 
-/* Initialise *s with the state x0[field][site], where the site index of the last axis varies fastest. work is
-   memory of toda_work_size(sizes) bytes, aligned as by malloc; the caller frees it after the last use of *s.
-   params may be NULL for the defaults; its arrays are copied. Returns toda_BAD_ARGUMENT if sizes are not
-   admissible, if x0 or a parameter is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with the state x0[field][site], the last axis fastest. work has toda_work_size(sizes) bytes,
+   aligned as by malloc, and must outlive *s. params may be NULL for the defaults; its arrays are copied.
+   Returns toda_BAD_ARGUMENT if sizes are not admissible, x0 or a parameter is not finite, or one that must be
+   positive is not. */
 toda_status toda_init(toda_solver *s, const toda_params *params, const size_t sizes[toda_AXES],
     const double *x0, void *work);
 
-/* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the
-   step, and s->steps counts the successful ones. The last flow of a step is merged with the first of the
-   next, also of the next call, where steps consist of flows. With OpenMP, rows are updated in parallel, with
-   the same bits for any number of threads. */
+/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
+   s->steps counts the successful ones. Where steps consist of flows, the last is merged with the first of the
+   next step or call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 toda_status toda_step(toda_solver *s, double h);
 toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 
@@ -74,7 +70,7 @@ void toda_state(const toda_solver *s, double *x);
 
 /* Save and restore a run with the same bits. toda_saved writes x[field][site] and far. To restore, call
    toda_init with the state, then toda_resume with far, and with x if toda_saved returned 1, else NULL. With
-   compensated steps x has room for two states: all fields, then the compensation term of each. */
+   compensated steps x holds all fields, then their compensation terms. */
 int toda_saved(const toda_solver *s, double *x, size_t *far);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far);
 
@@ -87,8 +83,7 @@ void toda_vector_field(const toda_solver *s, double *out);
 
 const char *toda_status_string(toda_status status);
 
-/* For other languages, which cannot read the struct: its size in bytes, and its number of successful
-   steps. */
+/* For other languages: the size of the struct in bytes, and its number of successful steps. */
 size_t toda_solver_size(void);
 size_t toda_solver_steps_done(const toda_solver *s);
 

@@ -81,6 +81,9 @@ VALUES = Choice(
     },
 )
 
+#: The time of a lattice after so many steps: counted from the last change of h, so that no rounding adds up.
+LATTICE_TIME = "s->t_before_h + (double)(steps - s->steps_before_h) * s->h"
+
 TIME = Choice(
     "H depends on the time, which functions of the model and starts of runs then receive.",
     ("TIMED",),
@@ -93,6 +96,7 @@ TIME = Choice(
         "INIT": ("phi_init_at", "phi_init"),
         "TAKE_T0": ("s->t = s->now = t0;", ""),
         "SET_TIME(s)": ("s->t = s->now =", "s->t ="),
+        "TIME_AFTER(s, steps)": (LATTICE_TIME, LATTICE_TIME),
     },
 )
 

@@ -26,17 +26,12 @@ LATTICE = (
     ),
     StateBlock(
         "x",
-        members=(
-            "double *x[PHI_ARRAYS];   "
-            " /* the state: first site of each field, then of each parameter at sites, in rows */",
-        ),
+        members=("double *x[PHI_ARRAYS];    /* state: first site of fields, then of parameters at sites */",),
         reset=("for (size_t k = 0; k < PHI_ARRAYS; ++k, memory += block) s->x[k] = memory;",),
     ),
     StateBlock(
         "before",
-        members=(
-            "double *before[PHI_DIM]; /* the fields at the start of the present steps, restored if a step fails */",
-        ),
+        members=("double *before[PHI_DIM]; /* fields before the present steps, restored if one fails */",),
         reset=("for (size_t k = 0; k < PHI_DIM; ++k, memory += block) s->before[k] = memory;",),
     ),
     StateBlock(
@@ -54,15 +49,14 @@ LATTICE = (
         "bonds",
         "GRAPH",
         (
-            "int *bonds, *middle;     "
-            " /* for each site, index in other of its first bond that starts there, and that ends there */",
+            "int *bonds, *middle;      /* for each site, index in other of the first bond from it, and to it */",
             "int *other, *number; /* for each of these, the site at the other end, and the number of the bond */",
         ),
     ),
     StateBlock(
         "at_bonds",
         "GRAPH && BOND_PARAMETERS",
-        ("double *at_bonds[PHI_BOND_ARRAYS]; /* for each of these, the values of the parameters at bonds */",),
+        ("double *at_bonds[PHI_BOND_ARRAYS]; /* for each of these, parameters at bonds */",),
     ),
     StateBlock(
         "colours",
@@ -204,8 +198,7 @@ LATTICE = (
         "noise",
         "NOISE",
         (
-            "uint64_t seed, first_step;"
-            " /* seed of the noise, and number of the first step after phi_init: see phi_set_noise */",
+            "uint64_t seed, first_step; /* seed of the noise, number of the first step after phi_init */",
             "uint32_t member;",
         ),
     ),

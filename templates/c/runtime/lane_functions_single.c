@@ -6,7 +6,7 @@
 #include <string.h>
 
 #if PHI_CALLS_EXP || PHI_CALLS_EXPM1 || PHI_CALLS_SIN || PHI_CALLS_COS
-#define PHI_ROUNDER 12582912.0f /* 1.5 2^23: a number added to it and taken off again is rounded to an integer */
+#define PHI_ROUNDER 12582912.0f /* 1.5 2^23: adding it rounds to an integer */
 
 #endif
 /* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */

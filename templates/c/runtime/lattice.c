@@ -71,12 +71,6 @@ static void phi_put_parameter(const phi_solver *s, double *rows, const double *v
 
 #include "parameters.h"
 /* ---- The solver ---- */
-/* Where all arrays are, in blocks of memory. */
-static void phi_place_arrays(phi_solver *s, double *memory, size_t block)
-{
-#include "state_placed.h"
-}
-
 static void phi_prepare_step(const phi_params *params, double h, double *coef)
 {
 #if PHI_KICKS
@@ -123,7 +117,7 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
     phi_find_all_lines(s, PHI_MEMORY_OF(memory) + PHI_RESERVED * block);
     phi_place_matrix(s, PHI_MEMORY_OF(memory) + PHI_RESERVED * block);
     phi_connect(s, bonds, PHI_MEMORY_OF(memory) + PHI_RESERVED * block);
-    phi_place_arrays(s, memory, block);
+#include "state_placed.h"
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->x[k], x0 + k * sites);
     phi_clear_carry(s);
     phi_put_kinds(s);
@@ -146,12 +140,6 @@ static phi_status phi_set_step(phi_solver *s, double h)
     s->steps_before_h = s->steps;
     s->prepared = 1;
     return PHI_OK;
-}
-
-/* The time after so many steps. */
-static double phi_time_after(const phi_solver *s, size_t steps)
-{
-    return s->t_before_h + (double)(steps - s->steps_before_h) * s->h;
 }
 
 #include "lattice_passed.c"

@@ -6,10 +6,9 @@
 
 #include "lattice_guess.h"
 
-/* A solver and the trajectory that it computes. Initialise it by phi_init. Its arrays lie in memory of the caller, so a
-   copy of the struct is not an independent solver. A field is stored in rows, which are all sites along the last axis. Where
-   steps read other sites, a row has a halo: copies of the sites of the other end beside each end. Read all fields of the
-   struct at any time, write to none of them. */
+/* A solver, initialised by phi_init. Its arrays lie in memory of the caller: a copy of the struct is no independent solver.
+   A field lies in rows, all sites along the last axis, with a halo where steps read other sites: copies of the other end
+   beside each end. Only read the struct, at any time. */
 typedef struct {
 #include "state_of_lattice.h"
 } phi_solver;
@@ -20,8 +19,8 @@ typedef struct {
 /* The same at the time t0; phi_init starts at the time 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, PHI_SIZES, const double *x0, double t0, void *work);
 
-/* Select the random numbers of the next steps. They are a function of the seed, the member of an ensemble, the number of
-   the step, which must be less than 2^48, and the site. phi_init sets the first three to 0. */
+/* Select the random numbers of the next steps, a function of the seed, the member of an ensemble, the number of the step,
+   less than 2^48, and the site. phi_init sets the first three to 0. */
 phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step);
 
 /* Declare that this lattice is a part of one with planes planes along the first axis, and that the first plane here is
@@ -32,10 +31,9 @@ phi_status phi_set_planes(phi_solver *s, size_t first, size_t planes);
    and before each step of caller-driven stepping. */
 phi_status phi_passed(phi_solver *s, double h, size_t steps);
 
-/* Make one step, or many, of size h, which may be negative. If a step fails, the state is that before the step, and
-   s->steps counts the successful ones.
-   The last flow of a step is merged with the first of the next, also of the next call, where steps consist of flows.
-   With OpenMP, rows are updated in parallel, with the same bits for any number of threads. */
+/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and s->steps counts
+   the successful ones. Where steps consist of flows, the last is merged with the first of the next step or call. OpenMP
+   updates rows in parallel, with the same bits for any number of threads. */
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
@@ -74,8 +72,8 @@ phi_status phi_set_state(phi_solver *s, const double *x);
 phi_status phi_kick(phi_solver *s, const double *change);
 
 /* Save and restore a run with the same bits. phi_saved writes x[field][site] and far. To restore, call phi_init with the
-   state, then phi_resume with far, and with x if phi_saved returned 1, else NULL. With compensated steps x has room for two
-   states: all fields, then the compensation term of each. */
+   state, then phi_resume with far, and with x if phi_saved returned 1, else NULL. With compensated steps x holds all fields,
+   then their compensation terms. */
 int phi_saved(const phi_solver *s, double *x, size_t *far);
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far);
 
@@ -96,7 +94,7 @@ void phi_observed_fields(const phi_solver *s, double *out);
 
 const char *phi_status_string(phi_status status);
 
-/* For other languages, which cannot read the struct: its size in bytes, and its number of successful steps. */
+/* For other languages: the size of the struct in bytes, and its number of successful steps. */
 size_t phi_solver_size(void);
 size_t phi_solver_steps_done(const phi_solver *s);
 #endif

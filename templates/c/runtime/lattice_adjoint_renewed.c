@@ -19,7 +19,7 @@ static void phi_add_up_step(const phi_solver *s, phi_transpose *g, size_t steps,
         const double middle = phi_moments[row];
         phi_renew(s, row, steps, coef);
 #endif
-        phi_refresh_adjoint(coef, phi_time_after(s, steps) + middle * s->h, own + PHI_PREPARED, early);
+        phi_refresh_adjoint(coef, PHI_TIME_AFTER(s, steps) + middle * s->h, own + PHI_PREPARED, early);
         for (int k = 0; k < PHI_PREPARED; ++k) to[k] += own[k] + early[k];
     }
 }

@@ -65,7 +65,7 @@ static phi_status phi_step_back(phi_solver *s, phi_transpose *g, size_t steps, d
     memcpy(x, s->x, sizeof x);
     PHI_EACH_STAGE_BACK {
 #if PHI_TIMED
-        s->now = phi_time_after(s, steps) + PHI_OF(phi_middles, stage) * s->h;
+        s->now = PHI_TIME_AFTER(s, steps) + PHI_OF(phi_middles, stage) * s->h;
 #endif
 #if PHI_RENEWED
         phi_refresh(PHI_ROW_OF(s->coef, stage), s->now, PHI_ROW_OF(s->coef, stage) + PHI_PREPARED);

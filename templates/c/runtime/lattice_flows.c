@@ -79,7 +79,7 @@ static void phi_steps(const phi_solver *s, size_t steps)
 #endif
 {
 #if PHI_NOISE
-    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+    for (size_t step = s->steps; step < s->steps + steps; ++step)
         for (int flow = 0; flow < PHI_FLOWS; ++flow) {
             if (flow == 0 || flow == PHI_FLOWS - (int)PHI_SOURCES) phi_draw(s, step, flow > 0);
 #if PHI_RENEWED
@@ -88,7 +88,6 @@ static void phi_steps(const phi_solver *s, size_t steps)
             phi_sweep_part(s, phi_flow_parts[flow], s->coef + flow * PHI_ROW PHI_AND_FAR(s->far > 0));
 #endif
         }
-    }
 #else
     if (steps == 0) phi_make_flow(s, s->steps - 1, PHI_FLOWS - 1);
 #if PHI_WAVES
@@ -215,10 +214,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         --s->steps;
     }
 #endif
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-#if PHI_TIMED
-    s->now = s->t;
-#endif
+    PHI_SET_TIME(s) PHI_TIME_AFTER(s, s->steps);
     return status;
 }
 #endif

@@ -7,6 +7,6 @@
 static void phi_renew(const phi_solver *s, int row, size_t steps, double coef[PHI_ROW])
 {
     memcpy(coef, s->coef + row * PHI_ROW, PHI_PREPARED * sizeof *coef);
-    phi_refresh(coef, phi_time_after(s, steps) + phi_moments[row] * s->h, coef + PHI_PREPARED);
+    phi_refresh(coef, PHI_TIME_AFTER(s, steps) + phi_moments[row] * s->h, coef + PHI_PREPARED);
 }
 #endif

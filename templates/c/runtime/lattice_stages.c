@@ -181,7 +181,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     for (; steps > 0 && status == PHI_OK; --steps) {
         status = phi_try(s);
         s->steps += status == PHI_OK;
-        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+        s->t = PHI_TIME_AFTER(s, s->steps);
     }
 #if PHI_TIMED
     s->now = s->t;

@@ -30,11 +30,7 @@ phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t c
         phi_copy(s->before, s->x, s);
         status = phi_carry(s);
         s->steps += status == PHI_OK;
-#if PHI_TIMED
-        s->t = s->now = phi_time_after(s, s->steps);
-#else
-        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-#endif
+        PHI_SET_TIME(s) PHI_TIME_AFTER(s, s->steps);
     }
     s->vectors = 0;
     if (status != PHI_OK) phi_copy(s->x, s->before, s);

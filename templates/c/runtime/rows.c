@@ -53,13 +53,6 @@ static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdi
 #endif
 }
 
-/* Doubles from the beginning of a row of so many sites to that of the next. */
-static size_t phi_width(size_t length)
-{
-    const size_t wide = PHI_WIDE((length + 7) / 8 * 8);
-    return wide % 512 == 0 ? wide + 8 : wide; /* rows a multiple of a page apart would share lines of the cache */
-}
-
 #include "rows_single.c"
 #include "rows_many.c"
 

@@ -15,7 +15,8 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
         if (rows > most / sizes[a]) return 0;
         rows *= sizes[a];
     }
-    const size_t wide = phi_width(sizes[PHI_LAST_AXIS]);
+    size_t wide = PHI_WIDE((sizes[PHI_LAST_AXIS] + 7) / 8 * 8);
+    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
     return rows > most / wide ? 0 : rows;
 }
