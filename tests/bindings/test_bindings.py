@@ -19,7 +19,7 @@ MEX = Path(__file__).parent
 
 #: Name of a libc function; names that languages keep, or cannot tell apart; a time, observables, kicks; no Casimirs.
 AWKWARD = """phigen: 1
-name: index
+name: div
 title: "a title, */ and <b>"
 time: t
 coordinates: [q, p]
