@@ -272,12 +272,12 @@ def _expect_names(system: System) -> None:
         for name in (*system.coordinates, *system.times, *system.parameter_names)
         if not re.fullmatch(IDENTIFIER, name)
     ]
-    taken = TIMED_ARGUMENTS if system.time else ARGUMENTS
-    wrong = [name for name in system.parameter_names if name in taken]
+    reserved_names = TIMED_ARGUMENTS if system.time else ARGUMENTS
+    wrong = [name for name in system.parameter_names if name in reserved_names]
     problems += [(f"a parameter cannot be called {name!r}", ARGUMENT_HINT) for name in wrong]
-    found = [Diagnostic(message, hint=hint) for message, hint in filter(None, problems)]
-    if found:
-        raise SpecError(found)
+    diagnostics = [Diagnostic(message, hint=hint) for message, hint in filter(None, problems)]
+    if diagnostics:
+        raise SpecError(diagnostics)
 
 
 _HINT = "lower-case letters, digits and _, starting with a letter, at most 31"

@@ -129,14 +129,14 @@ def compile_proved(
     Raises `CheckError` that names what is refuted, with the residual: no π that is not Poisson, no claimed Casimir
     that is none, no wrong bi-realisation reaches the output. Raises `SpecError` and `LimitError` as `compile_spec`.
     """
-    found = examine(spec, system=system, **options)
-    if found.refuted:
-        raise CheckError(refutation(found))
-    for warning in doubts(found):
+    examination = examine(spec, system=system, **options)
+    if examination.refuted:
+        raise CheckError(refutation(examination))
+    for warning in doubts(examination):
         warnings.warn(str(warning), PhigenWarning, stacklevel=3)
-    if found.compilation is None:
-        raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
-    return found.compilation
+    if examination.compilation is None:
+        raise examination.obstacle or AssertionError("an examination without compilation has an obstacle")
+    return examination.compilation
 
 
 def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
@@ -151,9 +151,9 @@ def _tell_of_lattice(spec: Spec) -> None:
         return
     from phigen.lattice.recognition import recognised_lattice
 
-    found = recognised_lattice(spec, least=SITES)
-    if found is not None and found.lattice is not None:
-        sites = spec.dimension // len(found.coordinates)
+    lattice_spec = recognised_lattice(spec, least=SITES)
+    if lattice_spec is not None and lattice_spec.lattice is not None:
+        sites = spec.dimension // len(lattice_spec.coordinates)
         message = f"{spec.name} is a lattice of {sites} like sites, written out"
         hint = f"phigen show --lattice {spec.file} prints a spec of one site, for any number of them"
         place = replace(spec.diagnostic(("coordinates",), message, hint), severity="warning")
@@ -234,13 +234,13 @@ def _split(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
     parts = clock.timed("splitting", lambda: _parts(spec, discretised.frozen))
     pushing = clock.timed("splitting", lambda: force_flows(source.frozen))
     parts = replace(parts, flows=(*parts.flows, *pushing))
-    monitor, wanted = logarithmic_of(spec, source, parts.flows), spec.wanted_order
+    monitor, order = logarithmic_of(spec, source, parts.flows), spec.wanted_order
     choice = clock.timed(
         "composition",
         lambda: (
-            plan_without_kicks(discretised, parts, wanted, composition_of(spec.composition, wanted), lambda: ())
+            plan_without_kicks(discretised, parts, order, composition_of(spec.composition, order), lambda: ())
             if monitor
-            else plan_splitting(discretised, parts, wanted, spec.composition)
+            else plan_splitting(discretised, parts, order, spec.composition)
         ),
     )
     group = _group(spec, source, "exponential")

@@ -111,7 +111,7 @@ class ToolchainError(PhigenError):
 
 
 class MissingPackageError(PhigenError):
-    """What was asked for needs a Python package that is not installed."""
+    """A Python package that a request needs is not installed."""
 
     exit_code = 2
 

@@ -45,18 +45,18 @@ def propagator(
     (coordinates, *sizes), parameters at sites have axes of theirs, and further arguments, such as ``bonds=``, are those
     of all its runs.
     """
-    made = Propagation(solver, h, steps, stride, t0, shared)
+    runs = Propagation(solver, h, steps, stride, t0, shared)
     shaped = partial(jax.pure_callback, vmap_method="broadcast_all")
 
     def called(x0: Any, parameters: Any) -> Any:
-        own, result = _Own(made, x0, parameters), jax.ShapeDtypeStruct(made.shape(x0.shape), x0.dtype)
-        return shaped(lambda x, p: made.run(x, own.aligned(p)).astype(x.dtype), result, x0, parameters)
+        batch, result = _Axes(runs, x0, parameters), jax.ShapeDtypeStruct(runs.shape(x0.shape), x0.dtype)
+        return shaped(lambda x, p: runs.run(x, batch.aligned(p)).astype(x.dtype), result, x0, parameters)
 
     def pulled(at: Any, cotangent: Any) -> Any:
-        own = _Own(made, *at)
+        batch = _Axes(runs, *at)
 
         def transposed(x0: Any, parameters: Any, bar: Any) -> Any:
-            x0_bar, bars = made.transposed(x0, own.aligned(parameters), bar)
+            x0_bar, bars = runs.transposed(x0, batch.aligned(parameters), bar)
             shapes = {name: np.shape(value) for name, value in parameters.items()}
             return x0_bar.astype(x0.dtype), {name: bars[name].reshape(s).astype(x0.dtype) for name, s in shapes.items()}
 
@@ -64,16 +64,16 @@ def propagator(
         return shaped(transposed, result, *at, cotangent)
 
     def moved(at: Any, directions: Any) -> Any:
-        own, (x0, parameters), (along, changes) = _Own(made, *at), at, directions
-        if made.axes > 1:
+        batch, (x0, parameters), (along, changes) = _Axes(runs, *at), at, directions
+        if runs.axes > 1:
             return shaped(
-                made.jacobian, jax.ShapeDtypeStruct(made.shape(x0.shape), x0.dtype), *at
+                runs.jacobian, jax.ShapeDtypeStruct(runs.shape(x0.shape), x0.dtype), *at
             )  # which refuses them
-        states = made.shape(x0.shape)
+        states = runs.shape(x0.shape)
 
         def jacobian(x: Any, p: Any) -> Any:
-            found = made.jacobian(x, own.aligned(p))
-            return jax.tree.map(lambda v: v.astype(x.dtype), found)
+            slopes = runs.jacobian(x, batch.aligned(p))
+            return jax.tree.map(lambda v: v.astype(x.dtype), slopes)
 
         by = {name: jax.ShapeDtypeStruct(states, x0.dtype) for name in parameters}
         by_x0, by = shaped(jacobian, (jax.ShapeDtypeStruct((*states, states[-1]), x0.dtype), by), x0, parameters)
@@ -88,25 +88,25 @@ def propagator(
         at = _derived_once(at)
         if forward:
             return moved(at, directions)
-        return _linear(lambda v: moved(at, v), lambda bar: pulled(at, bar), directions, made.shape(at[0].shape))
+        return _linear(lambda v: moved(at, v), lambda bar: pulled(at, bar), directions, runs.shape(at[0].shape))
 
     run = jax.custom_jvp(called)
     run.defjvp(lambda at, directions: (run(*at), derived(at, directions)))
 
     def propagate(x0: Any, parameters: Mapping[str, Any] | None = None) -> Any:
         x = _real(x0, "x0")
-        given = {
+        arrays = {
             name: _real(value, f"parameter {name!r}").astype(x.dtype) for name, value in (parameters or {}).items()
         }
-        made.expect(x.shape, {name: value.shape for name, value in given.items()})
-        return run(x, given)
+        runs.expect(x.shape, {name: value.shape for name, value in arrays.items()})
+        return run(x, arrays)
 
     return propagate
 
 
-def _real(given: Any, what: str) -> Any:
+def _real(value: Any, what: str) -> Any:
     """An array of real numbers of a precision of its own, of that of JAX if it has none."""
-    array = jnp.asarray(given)
+    array = jnp.asarray(value)
     if jnp.iscomplexobj(array):
         raise TypeError(f"{what} must be real")
     return array.astype(jnp.result_type(float, array))
@@ -140,20 +140,20 @@ def _derived_twice(*_: Any) -> Any:
     raise TypeError("second derivatives of runs are not offered: a derivative of phigen.jax is differentiated")
 
 
-class _Own:
-    """What arguments of a function are, to tell the axes that `vmap` puts before theirs."""
+class _Axes:
+    """Numbers of axes of the arguments of a function, from which those that `vmap` puts before them follow."""
 
-    def __init__(self, made: Propagation, x0: Any, parameters: Mapping[str, Any]) -> None:
-        self._leading = x0.ndim - made.axes
+    def __init__(self, runs: Propagation, x0: Any, parameters: Mapping[str, Any]) -> None:
+        self._leading = x0.ndim - runs.axes
         self._axes = {name: value.ndim for name, value in parameters.items()}
-        self._sites = {name: made.axes_of(name) for name in parameters}
+        self._sites = {name: runs.axes_of(name) for name in parameters}
 
     def aligned(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """The parameters with axes of length 1 where states have more of their own."""
-        found = {}
+        aligned = {}
         for name, value in parameters.items():
-            array, own = np.asarray(value), self._axes[name]
-            before = array.ndim - own
-            missing = self._leading + self._sites[name] - own
-            found[name] = array.reshape(array.shape[:before] + (1,) * missing + array.shape[before:])
-        return found
+            array, axes = np.asarray(value), self._axes[name]
+            before = array.ndim - axes
+            missing = self._leading + self._sites[name] - axes
+            aligned[name] = array.reshape(array.shape[:before] + (1,) * missing + array.shape[before:])
+        return aligned

@@ -134,31 +134,33 @@ class DistributedLattice:
         domain = _Domain(self, whole, x0, h, arrays, begin, draws)
         marks = row_steps(steps, stride)
         shape = (len(marks), len(self.solver.coordinates), *whole)
-        kept = _Kept(domain, Path(checkpoints), [h, steps, stride, begin, *astuple(draws)]) if checkpoints else None
-        energy = kept.restored() if kept else []
+        checkpoint = (
+            _Kept(domain, Path(checkpoints), [h, steps, stride, begin, *astuple(draws)]) if checkpoints else None
+        )
+        energy = checkpoint.restored() if checkpoint else []
         frames = _Frames(domain, Path(output) if output else None, shape, new=not energy)
         try:
             for k in range(len(energy), len(marks)):
                 domain.advance(int(marks[k]) - domain.steps)
                 frames.put(k)
                 energy.append(domain.energy())
-                if kept and k:
-                    kept.save(energy)
+                if checkpoint and k:
+                    checkpoint.save(energy)
                 if progress:
                     progress(int(marks[k]))
         except StepError:  # on all processes; the run cannot be gone on with
             frames.close()
             frames.discard()
-            if kept:
-                kept.remove()
+            if checkpoint:
+                checkpoint.remove()
             raise
         except BaseException:
             frames.close()
             raise
         frames.close()
         frames.finish()
-        if kept:
-            kept.remove()
+        if checkpoint:
+            checkpoint.remove()
         t = np.asarray(begin + h * marks, dtype=np.float64)
         return DistributedRun(t, np.array(energy), frames.array, domain.planes, steps, domain.waiting)
 
@@ -225,16 +227,16 @@ class _Domain:
         ahead = None if is_open and rank == count - 1 else (rank + 1) % count
         return [behind, ahead]
 
-    def _cut(self, given: Given, first: int, end: int, axis: int) -> Floats:
+    def _cut(self, values: Given, first: int, end: int, axis: int) -> Floats:
         """The planes first..end of an array, or of a function of planes; periodic beyond the ends."""
         size = self.sizes[0]
-        if not callable(given):
-            return np.take(np.asarray(given, dtype=np.float64), np.arange(first, end) % size, axis)
-        pieces = [given(max(first, 0), min(end, size))]
+        if not callable(values):
+            return np.take(np.asarray(values, dtype=np.float64), np.arange(first, end) % size, axis)
+        pieces = [values(max(first, 0), min(end, size))]
         if first < 0:
-            pieces.insert(0, given(size + first, size))
+            pieces.insert(0, values(size + first, size))
         if end > size:
-            pieces.append(given(0, end - size))
+            pieces.append(values(0, end - size))
         return np.concatenate([np.asarray(piece, dtype=np.float64) for piece in pieces], axis)
 
     def _local(self, value: Any, first: int, end: int, name: str) -> Any:
@@ -302,9 +304,9 @@ class _Domain:
         """One sweep over all own planes: the inner ones while those beside are on their way."""
         stage, (first, end) = self.stages[number], self.own
         way = 1 if far or self.far else 0
-        wanted = stage.read & self.dirty
-        if wanted:
-            on_their_way = self._asked(wanted)
+        stale = stage.read & self.dirty
+        if stale:
+            on_their_way = self._asked(stale)
             inner = first + stage.behind, end - stage.ahead
             if inner[0] < inner[1]:
                 self.session.sweep(number, way, *inner)
@@ -314,7 +316,7 @@ class _Domain:
                 self.session.sweep(number, way, *piece)
         else:
             self.session.sweep(number, way, first, end)
-        self.dirty = (self.dirty & ~wanted) | stage.changed
+        self.dirty = (self.dirty & ~stale) | stage.changed
 
     def _asked(self, fields: int) -> list[tuple[Any, int, tuple[int, int], Floats]]:
         """Send what the neighbours read of some fields, and ask for theirs."""
@@ -508,12 +510,12 @@ class _Kept:
         text = domain.comm.bcast(self._text() if domain.comm.rank == 0 else None)
         if not text:
             return []
-        found = json.loads(text)
-        if found["identity"] != self.identity:
+        saved = json.loads(text)
+        if saved["identity"] != self.identity:
             raise ValueError(f"{self.path} was kept by another run; remove it to begin anew")
-        energy = [float(e) for e in found["energy"]]
+        energy = [float(e) for e in saved["energy"]]
         shared = _Shared(domain, self._file(len(energy)), (domain.fields, *domain.sizes), new=False)
-        domain.restore(shared.read(), found["steps"], found["far"], found["open"])
+        domain.restore(shared.read(), saved["steps"], saved["far"], saved["open"])
         shared.close()
         return energy
 

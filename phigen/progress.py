@@ -1,4 +1,4 @@
-"""What is being done right now: stages by name, one within the other, for whoever watches.
+"""Progress of the compiler: stages by name, one within the other, for whoever watches.
 
 The compiler says where it is by ``with stage("Jacobi identity", total=n) as progress: … progress.done = k``. By default
 nobody watches, and a stage costs a microsecond. The command line shows them, see `phigen.cli.display`.
@@ -36,7 +36,7 @@ class Stage:
 
     @property
     def seconds(self) -> float:
-        """How long it took, once it is over."""
+        """Duration in seconds, once the stage is over."""
         return self._end - self.began
 
     def __str__(self) -> str:

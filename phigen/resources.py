@@ -38,26 +38,26 @@ def bundled_name(file: str) -> str | None:
     return path.stem if path.is_absolute() and bundled().get(path.stem) == path else None
 
 
-def file_of(given: str) -> str:
+def file_of(source: str) -> str:
     """The path itself if there is such a file, or none of the bundled specs has that name; else that of the spec."""
     try:
-        there = Path(given).is_file()
+        there = Path(source).is_file()
     except OSError:  # too long for a name
         there = False
-    return given if there else str(bundled().get(given, given))
+    return source if there else str(bundled().get(source, source))
 
 
-def missing(given: str) -> Diagnostic:
+def missing(source: str) -> Diagnostic:
     """The error for a text that names neither a file nor a bundled spec, with what may have been meant."""
-    also = "" if set(given) & {"/", "."} else ", and no bundled spec has that name"
-    return Diagnostic(f"there is no file {given!r}{also}", hint=suggestion(given))
+    also = "" if set(source) & {"/", "."} else ", and no bundled spec has that name"
+    return Diagnostic(f"there is no file {source!r}{also}", hint=suggestion(source))
 
 
-def suggestion(given: str) -> str:
+def suggestion(source: str) -> str:
     """The hint for a spec that was not found: a bundled one or a file of nearly that name, or how to find one."""
     from difflib import get_close_matches
 
-    path, names = Path(given), bundled()
+    path, names = Path(source), bundled()
     if path.stem in names:
         return f"did you mean {path.stem!r}? The bundled spec of that name needs neither folder nor suffix"
     beside = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []

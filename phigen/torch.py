@@ -36,12 +36,12 @@ def propagator(
     exact to round-off, and ask for a solver compiled with ``adjoint=True``. Of a lattice DIM is (coordinates, *sizes);
     further arguments, such as ``bonds=``, are those of all its runs. Raises `StepError`.
     """
-    made = Propagation(solver, h, steps, stride, t0, shared)
+    runs = Propagation(solver, h, steps, stride, t0, shared)
 
     def propagate(x0: Any, parameters: Mapping[str, Any] | None = None) -> Any:
-        given = {name: torch.as_tensor(v, dtype=x0.dtype, device=x0.device) for name, v in (parameters or {}).items()}
-        made.expect(tuple(x0.shape), {name: tuple(value.shape) for name, value in given.items()})
-        return _Run.apply(made, tuple(given), x0, *given.values())
+        tensors = {name: torch.as_tensor(v, dtype=x0.dtype, device=x0.device) for name, v in (parameters or {}).items()}
+        runs.expect(tuple(x0.shape), {name: tuple(value.shape) for name, value in tensors.items()})
+        return _Run.apply(runs, tuple(tensors), x0, *tensors.values())
 
     return propagate
 
@@ -50,23 +50,23 @@ class _Run(torch.autograd.Function):  # type: ignore[misc]
     """The run, and its transpose."""
 
     @staticmethod
-    def forward(made: Propagation, names: tuple[str, ...], x0: Any, *values: Any) -> Any:
+    def forward(runs: Propagation, names: tuple[str, ...], x0: Any, *values: Any) -> Any:
         parameters = dict(zip(names, map(_numbers, values), strict=True))
-        return torch.as_tensor(made.run(_numbers(x0), parameters), dtype=x0.dtype, device=x0.device)
+        return torch.as_tensor(runs.run(_numbers(x0), parameters), dtype=x0.dtype, device=x0.device)
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
-        ctx.made, ctx.names, *given = inputs
-        ctx.save_for_backward(*given)
+        ctx.runs, ctx.names, *tensors = inputs
+        ctx.save_for_backward(*tensors)
 
     @staticmethod
     @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
     def backward(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
         x0, *values = ctx.saved_tensors
         parameters = dict(zip(ctx.names, map(_numbers, values), strict=True))
-        x0_bar, bars = ctx.made.transposed(_numbers(x0), parameters, _numbers(cotangent))
-        own = [torch.as_tensor(bars[name], dtype=x0.dtype, device=x0.device) for name in ctx.names]
-        return None, None, torch.as_tensor(x0_bar, dtype=x0.dtype, device=x0.device), *own
+        x0_bar, bars = ctx.runs.transposed(_numbers(x0), parameters, _numbers(cotangent))
+        parameter_bars = [torch.as_tensor(bars[name], dtype=x0.dtype, device=x0.device) for name in ctx.names]
+        return None, None, torch.as_tensor(x0_bar, dtype=x0.dtype, device=x0.device), *parameter_bars
 
 
 def _numbers(tensor: Any) -> Any:

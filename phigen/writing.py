@@ -104,9 +104,9 @@ def _make_folder(folder: Path, undone: ExitStack) -> None:
     while not folder.exists() and folder != folder.parent:
         missing.append(folder)
         folder = folder.parent
-    for made in reversed(missing):
-        made.mkdir(exist_ok=True)
-        undone.callback(_remove_folder, made)
+    for new_folder in reversed(missing):
+        new_folder.mkdir(exist_ok=True)
+        undone.callback(_remove_folder, new_folder)
 
 
 def _remove_folder(folder: Path) -> None:

@@ -43,8 +43,11 @@ from phigen.targets.rendering import render
 
 @dataclass(frozen=True)
 class Back:
-    """How a part, or a kernel, goes back: its loops, what is called for each piece of a row in the first and in the
-    second go, how many arrays of values are handed, and the fields that are undone."""
+    """The reverse pass of a part, or of a kernel: its ``loops``, and the calls for each row segment in two traversals.
+
+    ``handed`` is the number of arrays that sites pass to other sites, ``undone`` has the fields that the inverse flow
+    recomputes.
+    """
 
     loops: tuple[Loop, ...]
     first: tuple[str, ...]
@@ -74,27 +77,27 @@ class _Pulled:
 def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str:
     """The loops, and which of them go back through which part, or kernel of the equation of a stage."""
     layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
-    found = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
-    found += [function(program, adjoint.refresh)] if adjoint.refresh else []
+    texts = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
+    texts += [function(program, adjoint.refresh)] if adjoint.refresh else []
     if step.equation:
         parts = [*_of_equation(program, layout, rows, kernels)]
         setups: list[tuple[str, ...]] = [_SETUP_OF_STAGES] * len(parts)
     else:
         parts = [*_of_parts(program, layout, rows, kernels)]
         chosen = [bool(step.by_colour and step.by_colour[k]) for k in range(len(step.parts))]
-        setups = [(*_SETUP, *["row.chosen = colour;"] * own) for own in chosen]
+        setups = [(*_SETUP, *["row.chosen = colour;"] * is_chosen) for is_chosen in chosen]
         if takes(program, step):
             find = _givers(program)[:1] if givers(step) else []
             setups = [(*_SETUP, *_SETUP_OF_TAKING, *find)] * len(parts)
     loops = {loop.name: loop for part in parts for loop in part.loops}
-    found += [loop.text(program) for loop in loops.values()]
+    texts += [loop.text(program) for loop in loops.values()]
     back = [
         Case(p.first, setup, _has_ends(p.first), moved=p.undone, where="x")
         for p, setup in zip(parts, setups, strict=True)
     ]
     title = "How a kernel goes back" if step.equation else "How a part goes back"
     far = bool(rows.limited)
-    found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1)), far=far))
+    texts.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1)), far=far))
     where = _givers(program) if givers(step) else []
     left_out = {_VARIED, *_SETUP_OF_TAKING, *where}
     hand = {
@@ -104,8 +107,8 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
     }
     if takes(program, step):
         hand = dict([*hand.items()][:1])
-    found += [_over(program, layout, "What sites are handed", "hand_rows", hand, far=far)] if hand else []
-    return "\n".join([_tables(program, step, parts, adjoint.steps), *found, _added(program, step, layout)])
+    texts += [_over(program, layout, "What sites are handed", "hand_rows", hand, far=far)] if hand else []
+    return "\n".join([_tables(program, step, parts, adjoint.steps), *texts, _added(program, step, layout)])
 
 
 _SETUP = ("row.x = x;", "row.bar = bar;", "row.handed = handed;")
@@ -124,29 +127,30 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
     undone, back = can_recompute_fields(program, layout.step), transposes(program, layout.step)
     around = {
         layout.bar(program.coordinates[sweep.moved[int(s.key[0])]])
-        for part, own in zip(layout.step.parts, back, strict=True)
-        for sweep, kernel in zip(part, own, strict=True)
+        for part, part_kernels in zip(layout.step.parts, back, strict=True)
+        for sweep, kernel in zip(part, part_kernels, strict=True)
         for s in kernel.inputs.get(AROUND, ())
         if isinstance(s, Symbol)
     }
     taking, alone = takes(program, layout.step), [(k, k) for k in range(len(back))]
     for k, after in dict.fromkeys(ways(layout.step)) if taking else alone:
         pulled = list[_Pulled]()
-        taken = tuple(h for kernel in back[after] for h in handed_by(layout, kernel, 0)) if taking else ()
+        received = tuple(h for kernel in back[after] for h in handed_by(layout, kernel, 0)) if taking else ()
         for sweep, kernel in zip(layout.step.parts[k], back[k], strict=True):
             bars = tuple(layout.bar(program.coordinates[i]) for i in sweep.moved)
             seeds = Seeds("change_bar", bars, sweep.colour)
             ends = tuple(_ends_back(sweep.gather, kernels))
             moved = sweep.moved if undone else ()
             alike = len(ends) == 1 and ends[0][0].of_all
-            own, undo = (alike and apart(kernel)) or (kernel, None)
-            before = tuple(_gathered(program, layout, sweep)) if _reads_sums(own) else ()
+            transposed, undo = (alike and apart(kernel)) or (kernel, None)
+            before = tuple(_gathered(program, layout, sweep)) if _reads_sums(transposed) else ()
             before += (f"row.window = {first_kind(layout, sweep)}.0;",) if sweep.window is not None else ()
-            if taken:
-                own = replace(own, name=f"{own.name}_after{after + 1}")
-            pulled.append(_Pulled(own, seeds, sweep.gather, ends, before, moved, undo, taken, beside_seams(sweep)))
-        told = f"the sweeps of H_{k + 1} have changed"
-        both = _back(program, layout, rows, f"hand{k + 1}", told, pulled, apart=handed_apart(program, layout.step)[k])
+            if received:
+                transposed = replace(transposed, name=f"{transposed.name}_after{after + 1}")
+            sites = beside_seams(sweep)
+            pulled.append(_Pulled(transposed, seeds, sweep.gather, ends, before, moved, undo, received, sites))
+        origin = f"the sweeps of H_{k + 1} have changed"
+        both = _back(program, layout, rows, f"hand{k + 1}", origin, pulled, apart=handed_apart(program, layout.step)[k])
         along = [pair for kernel in back[k] for pair in kernel.along("site")]
         written = {layout.bar(layout.step.sites.places[s][0]) for s, e in along if not e.is_zero}
         place = f"{layout.at(0, 'row.')}, s->length, {layout.swept()}"
@@ -157,14 +161,14 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
 def _of_equation(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
     """The two goes of each kernel that a stage is gone back through by; in the first one what is gathered is found."""
     fields, gather = program.coordinates, layout.partners.field
-    found = [restricted(layout, fields, kernels[own + BACK], wanted, name) for name, own, wanted in KERNELS]
-    summed = any(map(_reads_sums, found))
-    for number, (kernel, (name, _, wanted)) in enumerate(zip(found, KERNELS, strict=True)):
+    transposed = [restricted(layout, fields, kernels[of + BACK], outputs, name) for name, of, outputs in KERNELS]
+    summed = any(map(_reads_sums, transposed))
+    for number, (kernel, (name, _, outputs)) in enumerate(zip(transposed, KERNELS, strict=True)):
         seed = next(array for array in kernel.inputs if array.endswith("_bar"))
         seeds = Seeds(seed)
         read = gather if kernel.inputs["gathered"] else None
         ends = tuple(
-            (e, opposite, restricted(layout, fields, back, wanted, f"{e.kernel.name}_{name}"))
+            (e, opposite, restricted(layout, fields, back, outputs, f"{e.kernel.name}_{name}"))
             for e, opposite, back in _ends_back(read, kernels)
         )
         before = (f"{program.name}_{e.kernel.name}(&row);" for e, _ in over_ends(gather))
@@ -184,7 +188,7 @@ def _back(
 ) -> Back:
     """The two goes of some kernels, of which the second is ``name``, where it is ``apart`` from the next first one."""
     loops, first, second = list[Loop](), list[str](), list[str]()
-    beside, given = list[Handed](), 0
+    beside, arrays = list[Handed](), 0
 
     def called(loop: Loop, sites: str = "") -> str:
         source, sums = ("coef, ", "sums") if "*coef" in loop.arguments else ("", "numbers")
@@ -194,26 +198,26 @@ def _back(
         """The calls of a kernel, in each form, whose loops are listed."""
         lines, sums = {}, one.gather.names if one.gather else ()
         for far, calls in call_forms(program, rows, [kernel]).items():
-            own = [
-                first_loop(program, layout, k, form + far, one.seeds, sums, listed, given, calls, moved, one.taken)
+            forms = [
+                first_loop(program, layout, k, form + far, one.seeds, sums, listed, arrays, calls, moved, one.taken)
                 for k, form in forms_of(program, kernel)
             ]
-            whole = [(call.loop, call.sites) for call in calls_over_sites(own)]
-            lines[far] = [called(*call) for call in [(own[0], sites) for sites in one.sites] or whole]
-            loops.extend(own)
+            whole = [(call.loop, call.sites) for call in calls_over_sites(forms)]
+            lines[far] = [called(*call) for call in [(forms[0], sites) for sites in one.sites] or whole]
+            loops.extend(forms)
         return either(lines)
 
     for one in pulled:
-        listed = handed_by(layout, one.kernel, given)
-        given = max([given, *(h.array + 1 for h in listed)])
+        listed = handed_by(layout, one.kernel, arrays)
+        arrays = max([arrays, *(h.array + 1 for h in listed)])
         fields = [program.coordinates[f] for f in one.undone]
         first += [*one.before, *(_cleared(layout, listed) if one.sites else ())]
         first += over_sites(one, one.kernel, listed, () if one.undo else fields)
-        bonds = [loop for e in one.ends for loop in gathering_back(program, layout, *e, given, summed=bool(one.undo))]
+        bonds = [loop for e in one.ends for loop in gathering_back(program, layout, *e, arrays, summed=bool(one.undo))]
         loops += bonds
         second += map(called, bonds)
         second += over_sites(one, one.undo, (), fields) if one.undo else []
-        given += len(one.gather.names) if one.gather else 0
+        arrays += len(one.gather.names) if one.gather else 0
         beside += listed
     swept = layout.swept("begin, stop" if _has_ends(first) else "row.from, row.to")
     first += copied_ends(program, layout, beside, swept)
@@ -222,11 +226,11 @@ def _back(
         second.append(f"{program.name}_{loop.name}(&row);")
         loops.append(loop)
     undone = sorted({f for one in pulled for f in one.undone})
-    return Back(tuple(loops), tuple(first), tuple(second), given, tuple(undone))
+    return Back(tuple(loops), tuple(first), tuple(second), arrays, tuple(undone))
 
 
 def _cleared(layout: Layout, handed: Sequence[Handed]) -> Iterator[str]:
-    """What sites hand to others is nothing where loops leave them out."""
+    """Set the arrays that sites pass to others to zero where loops leave these sites out."""
     for array in sorted({h.array for h in handed}):
         place = f"row.handed[{array}]{layout.at(0, 'row.')} + begin"
         yield f"memset({place}, 0, (size_t)(stop - begin) * sizeof **row.handed);"
@@ -267,8 +271,8 @@ def _over(
         if head == "back_rows":
             arguments = f"const double *coef, {'int far, ' * far}double *const *v, double *const *bar, double *sums"
     elif whole:
-        given = ", double *const *given" * (takes(program, layout.step) and head == "back_rows")
-        arguments = f"const double *coef, {'int far, ' * far}{arguments}{given}, double *sums"
+        received = ", double *const *given" * (takes(program, layout.step) and head == "back_rows")
+        arguments = f"const double *coef, {'int far, ' * far}{arguments}{received}, double *sums"
     arguments = f"int {'flow' if coloured else 'part'}, {arguments}"
     unused = ["part"] * (len(cases) == 1 and not coloured)
     calls = [call for case in cases.values() for call in case.calls]
@@ -290,8 +294,8 @@ def _over(
 
 def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iterable[Kernel]) -> str:
     read = _read(step, kernels)
-    kept = [{f for sweep in part for f in sweep.moved if program.coordinates[f] in read} for part in step.parts]
-    rows = [", ".join(str(int(f in own)) for f in range(program.dimension)) for own in kept]
+    stored = [{f for sweep in part for f in sweep.moved if program.coordinates[f] in read} for part in step.parts]
+    rows = [", ".join(str(int(f in fields)) for f in range(program.dimension)) for fields in stored]
     ways_of = ways(step) if takes(program, step) else []
     values = {
         "NAME": program.name,
@@ -317,7 +321,7 @@ def _read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
 
 
 def _sums(program: Program, step: Sweeps) -> str:
-    """How many sums there are of each piece of a row."""
+    """The number of sums of each row segment, in C."""
     if step.equation and step.partners:
         return f"(int){program.name}_COEFFICIENTS + {program.name}_NUMBERS"
     return f"{program.name}_COEFFICIENTS"
@@ -332,7 +336,7 @@ def _givers(program: Program) -> list[str]:
 
 
 def _added(program: Program, step: Sweeps, layout: Layout) -> str:
-    """How the derivatives along parameters are added to those of the caller."""
+    """The function that adds the derivatives along parameters to those of the caller."""
     member = members(program)
     numbers = [(member[p.name], place) for place, p in enumerate(p for p in program.parameters if p.at == "all")]
     sites = [(member[p], layout.bar(p)) for p in step.sites.parameters]
