@@ -369,20 +369,11 @@ class Gauss(_Staged):
         return _present((self.prepare, self.slope, self.change, self.frame, *varied, *self.transposed))
 
 
-@dataclass(frozen=True)
-class Splitting(_Staged):
-    """The exact flows of the parts of H, one after another as the ``schedule`` lists them.
+class _Scheduled(_Staged):
+    """A step of flows that follow a schedule."""
 
-    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the
-    method; ``tangents`` are the Jacobians of the increments of the flows, if the tangent map was requested.
-    """
-
-    flows: tuple[Kernel, ...]
     schedule: Schedule
     composition: str
-    tangents: tuple[Kernel, ...] = ()
-
-    kind = SPLITTING
 
     @property
     def flow_schedule(self) -> Schedule:
@@ -398,6 +389,22 @@ class Splitting(_Staged):
     def coefficients(self) -> int:
         """Coefficients of one step, in all rows."""
         return self.row * len(self.schedule.times)
+
+
+@dataclass(frozen=True)
+class Splitting(_Scheduled):
+    """The exact flows of the parts of H, one after another as the ``schedule`` lists them.
+
+    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the
+    method; ``tangents`` are the Jacobians of the increments of the flows, if the tangent map was requested.
+    """
+
+    flows: tuple[Kernel, ...]
+    schedule: Schedule
+    composition: str
+    tangents: tuple[Kernel, ...] = ()
+
+    kind = SPLITTING
 
     @property
     def flow_kernels(self) -> tuple[Kernel, ...]:
@@ -565,7 +572,7 @@ class Equation:
 
 
 @dataclass(frozen=True)
-class Sweeps(_Staged):
+class Sweeps(_Scheduled):
     """A step of a lattice, by sweeps over its sites.
 
     In a splitting each of the ``parts`` is a list of sweeps, which may run in any order, and the ``schedule`` lists
@@ -589,21 +596,6 @@ class Sweeps(_Staged):
     equation: Equation | None = None
 
     kind = SWEEPS
-
-    @property
-    def flow_schedule(self) -> Schedule:
-        """The schedule."""
-        return self.schedule
-
-    @property
-    def method_name(self) -> str:
-        """The name of the composition."""
-        return self.composition
-
-    @property
-    def coefficients(self) -> int:
-        """Coefficients of one step, in all rows."""
-        return self.row * len(self.schedule.times)
 
     @property
     def swept(self) -> Sweeps:
