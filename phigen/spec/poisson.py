@@ -268,6 +268,9 @@ def _product(entries: list[Mapping[str, Any] | None], declared: Declarations) ->
     seen: dict[str, Scalar] = {}
     blocks: list[tuple[tuple[str, ...], PoissonForm | None]] = []
     for i, block in enumerate(entries):
+        if "coordinates" not in (block or {}):  # reported where blocks are read
+            blocks.append(((), None))
+            continue
         nodes = [node for node in (block or {}).get("coordinates", ()) if node is not None]
         for node in nodes:
             if declared.coordinate(node) is not None and node.text in seen:
@@ -278,7 +281,7 @@ def _product(entries: list[Mapping[str, Any] | None], declared: Declarations) ->
         inner = declared.inside((*declared.within, "product", i), names, message)
         blocks.append((names, poisson_form(block or {}, inner)))
     missing = [c for c in declared.coordinates if c not in seen]
-    if missing and not declared.incomplete:
+    if missing and all(names for names, _ in blocks) and not declared.incomplete:
         return _fail(
             declared, ("product",), f"product: {missing[0]!r} is in no block", "every coordinate belongs to one block"
         )
