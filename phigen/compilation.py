@@ -23,7 +23,7 @@ from phigen.scheme.order import Order
 from phigen.scheme.program import Program
 from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec.model import Spec
-from phigen.splitting.parts import Splitting
+from phigen.splitting.parts import SplitHamiltonian
 from phigen.symbolic.expression import Expression
 
 if TYPE_CHECKING:
@@ -296,7 +296,7 @@ class CompiledSeries(_CompiledSystem):
 class CompiledSplitting(_CompiledSystem):
     """A step by the exact flows of the parts of H."""
 
-    splitting: Splitting
+    splitting: SplitHamiltonian
 
     @property
     def symmetric(self) -> bool:

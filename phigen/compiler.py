@@ -1,7 +1,7 @@
 """The pipeline, on one screen.
 
     spec file ─► Spec ─► System ─► BiRealisation ─► Gauged ─► Discretisation ─► Program ─► source files
-                            │   └─► Splitting ──────────────────────────────────┘  │
+                            │   └─► SplitHamiltonian ───────────────────────────┘  │
                             └───────────────────────► Examination ◄────────────────┘
 
 Each stage is a function from one frozen dataclass to the next; `Compilation` keeps what each of them made and the
@@ -40,7 +40,7 @@ from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
 from phigen.spec.model import Overrides, Spec
 from phigen.splitting.forces import force_flows
-from phigen.splitting.parts import Splitting, split
+from phigen.splitting.parts import SplitHamiltonian, split
 
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
@@ -257,7 +257,7 @@ def _split(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
     )  # fmt: skip
 
 
-def _parts(spec: Spec, system: System) -> Splitting:
+def _parts(spec: Spec, system: System) -> SplitHamiltonian:
     """The parts of H. A monitor takes T and V, and a composition that is named composes two parts."""
     if spec.monitor:
         return replace(split(system, motions=False), small=None)

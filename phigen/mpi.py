@@ -28,7 +28,7 @@ from phigen.errors import MissingPackageError, StepError
 from phigen.reading import opened
 from phigen.runtime import arguments
 from phigen.runtime.arguments import Beginning
-from phigen.runtime.c_lattice import CLattice, CLatticeSession, Stage
+from phigen.runtime.c_lattice import CLattice, CLatticeSession, SweepStage
 from phigen.runtime.checkpoint import objection, objection_to_frames
 from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
@@ -179,7 +179,7 @@ class _Domain:
         draws: Draws,
     ) -> None:
         self.lattice, self.comm, self.sizes, self.h = lattice, lattice.comm, sizes, h
-        self.stages: list[Stage] = lattice.stages
+        self.stages: list[SweepStage] = lattice.stages
         self.noisy = bool(lattice.solver.interface.noise)
         self.joined = len(self.stages) - (not self.noisy)
         self.last = max(1, self.joined - 1)

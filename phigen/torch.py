@@ -41,12 +41,12 @@ def propagator(
     def propagate(x0: Any, parameters: Mapping[str, Any] | None = None) -> Any:
         tensors = {name: torch.as_tensor(v, dtype=x0.dtype, device=x0.device) for name, v in (parameters or {}).items()}
         runs.expect(tuple(x0.shape), {name: tuple(value.shape) for name, value in tensors.items()})
-        return _Run.apply(runs, tuple(tensors), x0, *tensors.values())
+        return _DifferentiableRun.apply(runs, tuple(tensors), x0, *tensors.values())
 
     return propagate
 
 
-class _Run(torch.autograd.Function):  # type: ignore[misc]
+class _DifferentiableRun(torch.autograd.Function):  # type: ignore[misc]
     """The run, and its transpose."""
 
     @staticmethod

@@ -16,7 +16,7 @@ from phigen.errors import CheckError, SpecError
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
     from phigen.proofs.examination import Examination
-    from phigen.proofs.independent import Comparison
+    from phigen.proofs.independent import Agreement
     from phigen.spec.model import Spec
     from phigen.symbolic.verdict import Statement
 
@@ -95,7 +95,7 @@ def _compared(
     collector: Collector,
     *,
     shown: bool,
-) -> list[Comparison]:
+) -> list[Agreement]:
     """Compare with the second derivation; each comparison is shown as soon as it is known."""
     from phigen.proofs.independent import SECONDS, compare
     from phigen.symbolic.verdict import REFUTED
@@ -206,5 +206,5 @@ def _described_statement(s: Statement) -> dict[str, object]:
     return {"name": s.name, "verdict": s.verdict, "detail": s.detail, "residual": s.residual, **failing}
 
 
-def _described_comparison(c: Comparison) -> dict[str, object]:
+def _described_comparison(c: Agreement) -> dict[str, object]:
     return {"term": c.term, **_described_statement(c.statement), "seconds": {"phigen": c.compiler, "sympy": c.sympy}}

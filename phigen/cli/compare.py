@@ -16,7 +16,7 @@ from phigen.errors import SpecError
 
 if TYPE_CHECKING:
     from phigen.spec.model import Run, Spec
-    from phigen.tuning.comparison import Comparison, Entry
+    from phigen.tuning.comparison import ComparedMethod, Comparison
 
 
 @click.command("compare")
@@ -121,7 +121,7 @@ def _print(comparison: Comparison, spec: Spec, run: Run) -> None:
         out(f"  Not measured, since {reason}{more}: {titles}.")
 
 
-def _row(entry: Entry) -> list[str]:
+def _row(entry: ComparedMethod) -> list[str]:
     errors = (entry.error, entry.casimirs, entry.orbit, entry.defect)
     numbers = ["–" if e is None else f"{e:.1e}" if e else "0" for e in errors]
     title = f"{entry.title} *" if entry.own else entry.title

@@ -31,7 +31,7 @@ class Experiment:
 
     ``end`` is where it ends between two steps, ``times`` those of the states that are stored in place of a stride,
     beside the first and the last.
-    ``past`` is a finished run (`phigen.cli.past.Past`) that it goes on with, ``first`` an attitude at its start.
+    ``past`` is a finished run (`phigen.cli.past.StoredRows`) that it goes on with, ``first`` an attitude at its start.
     """
 
     run: Run
@@ -39,7 +39,7 @@ class Experiment:
     parameters: Mapping[str, Any]
     end: End | None = None
     times: tuple[float, ...] | None = None
-    past: Any = None  # a `Past`
+    past: Any = None  # `StoredRows`
     first: Floats | None = None
 
     @property

@@ -14,14 +14,14 @@ from phigen.cli.generation import Options, generate
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
-    from phigen.fmu.archive import Unit
+    from phigen.fmu.archive import MockupUnit
 
 #: The folders of `phigen.fmu.platforms.PLATFORMS`, which the command line knows without importing what makes FMUs.
 _SYSTEMS, _MACHINES = ("linux", "windows", "darwin"), ("x86_64", "aarch64")
 PLATFORMS = tuple(f"{machine}-{system}" for system in _SYSTEMS for machine in _MACHINES)
 
 
-def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str, Unit]:
+def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str, MockupUnit]:
     """Return the FMU of each system by its name. Raises `SpecError` for all systems of which there is none."""
     from phigen.fmu.archive import unit_of
 
@@ -33,7 +33,7 @@ def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str,
     return units
 
 
-def write_unit(console: Console, folder: Path, unit: Unit, platforms: Sequence[str]) -> None:
+def write_unit(console: Console, folder: Path, unit: MockupUnit, platforms: Sequence[str]) -> None:
     """Compile an FMU and write it to a folder, once for FMI 3.0 and once for 2.0. Raises `ToolchainError`."""
     from phigen.fmu.archive import archive, binaries
     from phigen.fmu.platforms import compilers

@@ -17,7 +17,7 @@ from phigen.runtime.arguments import Beginning
 from phigen.runtime.interface import Draws, Floats, LatticeInterface
 from phigen.runtime.lattice_course import ObservedCourse
 from phigen.runtime.lattice_frames import state_columns
-from phigen.runtime.lattice_rows import Past, Plan, strided, timed
+from phigen.runtime.lattice_rows import IntegrationPlan, Past, strided, timed
 from phigen.runtime.lattice_series import key_of
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class LatticeExperiment(Experiment):
         """An expression of the run as a function of observables."""
         return solver.function(expression, self.parameters)
 
-    def plan(self, solver: LatticeSolver) -> Plan:
+    def plan(self, solver: LatticeSolver) -> IntegrationPlan:
         """The integration that it asks for."""
         at, run = self.beginning(solver), self.run
         if self.times is None:
@@ -66,7 +66,7 @@ class LatticeExperiment(Experiment):
         else:
             rows = timed(at.h, run.steps, self.spans, self.end)
         section, transforms = solver.section_of(run, at.values), solver.transforms_of(run)
-        return Plan(at, rows, self.begin, section=section, transforms=transforms, past=self.past)
+        return IntegrationPlan(at, rows, self.begin, section=section, transforms=transforms, past=self.past)
 
 
 def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) -> tuple[Run, Start]:

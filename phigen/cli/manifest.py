@@ -34,7 +34,7 @@ _ABOUT = (
 
 
 @dataclass(frozen=True)
-class Entry:
+class ManifestEntry:
     """One vendored solver. ``spec_file`` is relative to the folder, or names a bundled spec; None if it is far.
 
     ``files`` maps names to the sha256 of their bytes.
@@ -93,7 +93,7 @@ def relative(spec_file: str, folder: Path) -> str | None:
     return Path(os.path.relpath(source, target)).as_posix()
 
 
-def text_of(entries: Mapping[str, Entry], builds: Collection[str] = ()) -> str:
+def text_of(entries: Mapping[str, ManifestEntry], builds: Collection[str] = ()) -> str:
     """The manifest as JSON; ``builds`` are the build systems that have files in the folder."""
     solvers = {name: entry.described() for name, entry in sorted(entries.items())}
     build_files = {"build_files": sorted(builds)} if builds else {}
@@ -101,7 +101,7 @@ def text_of(entries: Mapping[str, Entry], builds: Collection[str] = ()) -> str:
     return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
 
 
-def read(folder: Path) -> tuple[dict[str, Entry], tuple[str, ...]]:
+def read(folder: Path) -> tuple[dict[str, ManifestEntry], tuple[str, ...]]:
     """The entries of a folder's manifest and its build systems, none if there is no manifest.
 
     Raises `CheckError` if it is damaged.
@@ -125,7 +125,7 @@ def read(folder: Path) -> tuple[dict[str, Entry], tuple[str, ...]]:
         raise _damaged(path, what) from None
 
 
-def _entry(name: str, part: Mapping[str, Any]) -> Entry:
+def _entry(name: str, part: Mapping[str, Any]) -> ManifestEntry:
     spec, options = part["spec"], dict(part["options"])
     lines: list[str] = _list_of_texts(spec["text"])
     text, spec_file = "\n".join(lines), spec.get("file")
@@ -138,7 +138,9 @@ def _entry(name: str, part: Mapping[str, Any]) -> Entry:
     for file in files:
         if file not in {f"{name}{suffix}" for suffix in suffixes()}:
             raise ValueError(f"{name}: {file!r} is not a file of that solver")
-    return Entry(name, _options(name, options), spec_file, text, str(part["license"]), files, str(part["phigen"]))
+    return ManifestEntry(
+        name, _options(name, options), spec_file, text, str(part["license"]), files, str(part["phigen"])
+    )
 
 
 def _options(name: str, raw: dict[str, Any]) -> Options:

@@ -25,7 +25,7 @@ _EQUAL = 1e-9
 
 
 @dataclass(frozen=True)
-class Past:
+class StoredRows:
     """The rows of a finished run, as they are in its file, by the names of their columns."""
 
     columns: tuple[str, ...]
@@ -58,7 +58,7 @@ def recorded_columns(names: Interface, record: Sequence[str]) -> list[Column]:
     return [column for column in columns_of(names) if column.key in keys]
 
 
-def past_of(path: Path, names: Interface, option: str) -> Past:
+def past_of(path: Path, names: Interface, option: str) -> StoredRows:
     """Read the rows of a file that a run has written."""
     try:
         past = _of_npz(path, names) if path.suffix.lower() == ".npz" else _of_csv(path)
@@ -71,7 +71,7 @@ def past_of(path: Path, names: Interface, option: str) -> Past:
     raise click.BadParameter(f"{path} has no rows", param_hint=option)
 
 
-def _expect_rows(past: Past, needed: Sequence[str]) -> None:
+def _expect_rows(past: StoredRows, needed: Sequence[str]) -> None:
     """`ValueError` for rows that no run has written, `KeyError` for a column that is needed and not there."""
     if past.rows.dtype != np.float64 or past.rows.ndim != 2 or past.rows.shape[1] != len(past.columns):
         raise ValueError(f"it has {len(past.columns)} names of columns, and rows of another length")
@@ -81,15 +81,15 @@ def _expect_rows(past: Past, needed: Sequence[str]) -> None:
         raise ValueError("its last state is not finite")
 
 
-def _of_csv(path: Path) -> Past:
+def _of_csv(path: Path) -> StoredRows:
     with opened_text(path) as file:
         header = tuple(file.readline().strip().split(","))
         begin = file.readline()
         rows = np.loadtxt(chain([begin], file), delimiter=",", ndmin=2) if begin.strip() else np.zeros((0, len(header)))
-    return Past(header, rows)
+    return StoredRows(header, rows)
 
 
-def _of_npz(path: Path, names: Interface) -> Past:
+def _of_npz(path: Path, names: Interface) -> StoredRows:
     with opened(path) as file, np.load(file, allow_pickle=False) as stored:
         stored_columns = [(column, stored[column.key]) for column in columns_of(names) if column.key in stored]
     for column, values in stored_columns:
@@ -97,10 +97,10 @@ def _of_npz(path: Path, names: Interface) -> Past:
         if values.dtype.kind not in "fiu" or not values.ndim or values.shape != shape:
             raise ValueError(f"{column.key} is not an array of {len(column.names)} real numbers in each row")
     header = tuple(name for column, _ in stored_columns for name in column.names)
-    return Past(header, np.column_stack([values for _, values in stored_columns]).astype(np.float64))
+    return StoredRows(header, np.column_stack([values for _, values in stored_columns]).astype(np.float64))
 
 
-def started_from(experiment: Experiment, past: Past, solver: Solver) -> Experiment:
+def started_from(experiment: Experiment, past: StoredRows, solver: Solver) -> Experiment:
     """The experiment from the last state of another run, with its time where there is one, and its attitude."""
     names = solver.interface
     _, *columns = columns_of(names)

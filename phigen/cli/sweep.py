@@ -20,7 +20,7 @@ from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.sources import load_one
 
 if TYPE_CHECKING:
-    from phigen.spec.model import Spec, Sweep
+    from phigen.spec.model import Spec, SweepSettings
 
 
 @click.command("sweep")
@@ -69,7 +69,7 @@ def command(
     """
     from phigen.cli.energy_warning import sweep_warning
     from phigen.progress import stage
-    from phigen.sweeping.sweep import Setting, made
+    from phigen.sweeping.sweep import SweepSetting, made
 
     if scheduler and workers:
         raise click.UsageError("--workers counts processes of this machine: it does not go with --scheduler")
@@ -84,7 +84,7 @@ def command(
     if shown and shown not in sweep.keep:
         stored = ", ".join(sweep.keep)
         raise click.BadParameter(f"{shown!r} is not stored; the sweep stores {stored}", param_hint="--show")
-    setting = Setting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme, profile)
+    setting = SweepSetting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme, profile)
     with console.watching(), stage(f"sweep {sweep.name}") as progress:
 
         def started(members: int) -> None:
@@ -111,7 +111,7 @@ def command(
         console.note(f"wrote {plot}")
 
 
-def _sweep_of(spec: Spec, name: str | None) -> Sweep:
+def _sweep_of(spec: Spec, name: str | None) -> SweepSettings:
     """The sweep of that name, the first by default."""
     from phigen.errors import Diagnostic, SpecError
 

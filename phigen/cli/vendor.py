@@ -19,7 +19,7 @@ from phigen.cli.completion import specs
 from phigen.cli.console import Console, counted, indented, mend, pass_console, verbosity
 from phigen.cli.failures import Collector
 from phigen.cli.generation import Options, files_of, output_options
-from phigen.cli.manifest import Entry
+from phigen.cli.manifest import ManifestEntry
 from phigen.cli.sources import SUFFIXES, as_given, load_all
 from phigen.errors import CheckError
 from phigen.registry import suffixes
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Order:
+class VendorRequest:
     """One solver to vendor or to check: its spec, from where, and the options.
 
     ``found`` is false if the text of the spec comes from the manifest, because its file is not there.
@@ -47,16 +47,16 @@ class Order:
 class VendoredSolver:
     """Files that belong in the folder for one order."""
 
-    order: Order
+    order: VendorRequest
     compilation: Compilation
     files: Mapping[str, str]
 
     @property
-    def entry(self) -> Entry:
+    def entry(self) -> ManifestEntry:
         """Its entry of the manifest."""
         spec, order = self.order.spec, self.order
         files = {file: manifest.sha256(text) for file, text in self.files.items()}
-        return Entry(spec.name, order.options, order.spec_file, spec.source, spec.license, files, __version__)
+        return ManifestEntry(spec.name, order.options, order.spec_file, spec.source, spec.license, files, __version__)
 
 
 @click.command("vendor")
@@ -152,21 +152,21 @@ def _from_specs(
     spec_files: Sequence[str],
     folder: Path,
     options: Options,
-    entries: Mapping[str, Entry],
+    entries: Mapping[str, ManifestEntry],
     checking: bool,
     collector: Collector,
-) -> list[Order]:
+) -> list[VendorRequest]:
     """The orders of the command line. A check without options is about those of the manifest."""
     orders = []
     for spec in load_all(spec_files, collector) if spec_files else []:
         known = entries.get(spec.name)
         chosen = known.options if checking and known and not options.words else options
         origin = resources.bundled_name(spec.file) or manifest.relative(spec.file, folder)
-        orders.append(Order(spec, origin, chosen))
+        orders.append(VendorRequest(spec, origin, chosen))
     return orders
 
 
-def _from_manifest(folder: Path, entries: Mapping[str, Entry], collector: Collector) -> list[Order]:
+def _from_manifest(folder: Path, entries: Mapping[str, ManifestEntry], collector: Collector) -> list[VendorRequest]:
     """The orders of all that is in the folder, from the specs where they are, else from the manifest's copies."""
     from phigen import spec as specs
 
@@ -176,16 +176,16 @@ def _from_manifest(folder: Path, entries: Mapping[str, Entry], collector: Collec
             path = _path_of_spec(folder, entry)
             if path is None:
                 copy = specs.loads(entry.spec_text, f"{folder / manifest.FILE}({name})")
-                orders.append(Order(copy, entry.spec_file, entry.options, found=False))
+                orders.append(VendorRequest(copy, entry.spec_file, entry.options, found=False))
                 continue
             spec = specs.load(path)
             if spec.name != name:
                 raise CheckError(f"{path} is the spec of {spec.name} now; {name} in {folder} was made from it")
-            orders.append(Order(spec, entry.spec_file, entry.options))
+            orders.append(VendorRequest(spec, entry.spec_file, entry.options))
     return orders
 
 
-def _path_of_spec(folder: Path, entry: Entry) -> Path | None:
+def _path_of_spec(folder: Path, entry: ManifestEntry) -> Path | None:
     """The file of a spec, as seen from the working directory, or the bundled one, if it is there."""
     if entry.spec_file is None:
         return None
@@ -195,7 +195,7 @@ def _path_of_spec(folder: Path, entry: Entry) -> Path | None:
     return path if path.is_file() else None
 
 
-def _made(order: Order, collector: Collector) -> VendoredSolver | None:
+def _made(order: VendorRequest, collector: Collector) -> VendoredSolver | None:
     options = order.options
     with collector.collecting():
         compilation = options.compiled(order.spec)
@@ -209,7 +209,7 @@ def _made(order: Order, collector: Collector) -> VendoredSolver | None:
 def _write(
     console: Console,
     folder: Path,
-    entries: dict[str, Entry],
+    entries: dict[str, ManifestEntry],
     vendored: Sequence[VendoredSolver],
     builds: Sequence[str],
     force: bool,
@@ -244,7 +244,7 @@ def _write(
             console.note(f"{folder}: wrote {change.path.name}")
 
 
-def _obstacle(change: Change, known: Entry | None) -> str:
+def _obstacle(change: Change, known: ManifestEntry | None) -> str:
     """Why a file must not be touched. The manifest knows of edits in headers too, which the checksums do not cover."""
     if change.obstacle or change.before is None or change.before == change.after:
         return change.obstacle
@@ -268,7 +268,7 @@ def _done(folder: Path, vendored: VendoredSolver, changes: Sequence[Change]) -> 
 
 
 @dataclass(frozen=True)
-class Problem:
+class VendorProblem:
     """One file that is not as it should be: its path, what is wrong, and the command that mends it."""
 
     path: Path
@@ -277,8 +277,8 @@ class Problem:
 
 
 def _problems(
-    folder: Path, entries: Mapping[str, Entry], vendored: VendoredSolver, spec_files: Sequence[str]
-) -> Iterator[Problem]:
+    folder: Path, entries: Mapping[str, ManifestEntry], vendored: VendoredSolver, spec_files: Sequence[str]
+) -> Iterator[VendorProblem]:
     """Problems with the files of one solver."""
     order = vendored.order
     words = [as_given(order.spec), str(folder), *order.options.words] if spec_files else [str(folder)]
@@ -287,10 +287,10 @@ def _problems(
         path = folder / file
         what, edited = _complaint(path, known, vendored)
         if what:
-            yield Problem(path, what, shlex.join(["phigen", "vendor", *words, *(["--force"] if edited else [])]))
+            yield VendorProblem(path, what, shlex.join(["phigen", "vendor", *words, *(["--force"] if edited else [])]))
 
 
-def _complaint(path: Path, known: Entry | None, vendored: VendoredSolver) -> tuple[str, bool]:
+def _complaint(path: Path, known: ManifestEntry | None, vendored: VendoredSolver) -> tuple[str, bool]:
     """Problem with a file, empty if there is none; and whether the file was edited by hand."""
     content = path.read_bytes() if path.is_file() else None
     stated, expected = known.files.get(path.name) if known else None, vendored.files.get(path.name)
@@ -307,7 +307,7 @@ def _complaint(path: Path, known: Entry | None, vendored: VendoredSolver) -> tup
     return ("" if content == expected.encode() else f"stale: {_cause(known, vendored)}"), False
 
 
-def _cause(known: Entry | None, vendored: VendoredSolver) -> str:
+def _cause(known: ManifestEntry | None, vendored: VendoredSolver) -> str:
     """Why phigen makes something else now."""
     causes = []
     if known and known.spec_text != vendored.order.spec.source:
@@ -319,7 +319,7 @@ def _cause(known: Entry | None, vendored: VendoredSolver) -> str:
     return "; ".join(causes) or "phigen makes something else of its spec"
 
 
-def _wrong_builds(folder: Path, entries: Mapping[str, Entry], builds: Sequence[str]) -> Iterator[Problem]:
+def _wrong_builds(folder: Path, entries: Mapping[str, ManifestEntry], builds: Sequence[str]) -> Iterator[VendorProblem]:
     """Files of build systems that are not as the manifest wants them."""
     from phigen.cli.outputs import Change, read
 
@@ -328,10 +328,10 @@ def _wrong_builds(folder: Path, entries: Mapping[str, Entry], builds: Sequence[s
         if change.state != "unchanged":
             what = "missing" if change.before is None else "edited by hand" if change.obstacle else "stale"
             force = ["--force"] if change.obstacle else []
-            yield Problem(change.path, what, shlex.join(["phigen", "vendor", str(folder), *force]))
+            yield VendorProblem(change.path, what, shlex.join(["phigen", "vendor", str(folder), *force]))
 
 
-def _extra(folder: Path, entries: Mapping[str, Entry]) -> Iterator[Problem]:
+def _extra(folder: Path, entries: Mapping[str, ManifestEntry]) -> Iterator[VendorProblem]:
     """Generated files that the manifest does not know; others are the user's."""
     from phigen.cli.outputs import read
     from phigen.targets.header import split
@@ -339,10 +339,10 @@ def _extra(folder: Path, entries: Mapping[str, Entry]) -> Iterator[Problem]:
     known = {file for entry in entries.values() for file in entry.files} | {file for file, _ in FILES.values()}
     for path in sorted(folder.iterdir()):
         if path.suffix in suffixes() and path.is_file() and path.name not in known and split(read(path) or "")[0]:
-            yield Problem(path, "extra: generated, but not in the manifest", shlex.join(["rm", str(path)]))
+            yield VendorProblem(path, "extra: generated, but not in the manifest", shlex.join(["rm", str(path)]))
 
 
-def _judge(folder: Path, problems: Sequence[Problem]) -> None:
+def _judge(folder: Path, problems: Sequence[VendorProblem]) -> None:
     """Raise CheckError that lists the problems and how to mend them."""
     if not problems:
         return

@@ -8,7 +8,7 @@ from typing import Any
 
 from phigen.drawing.error_curves import LINES
 from phigen.drawing.palette import MARK, SERIES
-from phigen.study.precision import Curve, Study
+from phigen.study.precision import PrecisionCurve, Study
 
 _MARKERS = "osD^vX"
 
@@ -39,7 +39,7 @@ def draw_conserved(axes: Any, study: Study) -> None:
     _finish(axes)
 
 
-def label(curve: Curve) -> str:
+def label(curve: PrecisionCurve) -> str:
     """The method and its stated order."""
     return f"{curve.label} (order {curve.order})"
 
@@ -51,7 +51,7 @@ def _draw(axes: Any, place: int, x: Sequence[float], y: Sequence[float], text: s
     )  # fmt: skip
 
 
-def _draw_slope(axes: Any, curve: Curve) -> None:
+def _draw_slope(axes: Any, curve: PrecisionCurve) -> None:
     good = [p for p in curve.points if 1e-12 < p.error < 1e-2]
     if len(good) > 1 and math.isfinite(curve.slope):
         ends, scale = [good[0].step, good[-1].step], 2.0 * good[-1].error / good[-1].step ** curve.order

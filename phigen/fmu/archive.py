@@ -26,7 +26,7 @@ _FILE, _PROGRAM = 0o100644 << 16, 0o100755 << 16
 
 
 @dataclass(frozen=True)
-class Unit:
+class MockupUnit:
     """An FMU: texts of its ``sources``, ``descriptions`` by version of FMI, and the ``build`` description of 3.0."""
 
     name: str
@@ -35,7 +35,7 @@ class Unit:
     build: str
 
 
-def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> Unit:
+def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> MockupUnit:
     """Return the FMU of a system; ``solver`` maps the names of its C header and source to their texts.
 
     Raises `SpecError` for lattices, and for a spec without runs.
@@ -45,10 +45,10 @@ def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> Unit:
     sources = {**solver, f"{name}_fmi.c": layer(compilation, variables, token)}
     compiled = [file for file in sources if file.endswith(".c")]
     descriptions = {v: model_description(compilation, variables, token, v, compiled) for v in (2, 3)}
-    return Unit(name, sources, descriptions, build_description(name, compiled))
+    return MockupUnit(name, sources, descriptions, build_description(name, compiled))
 
 
-def binaries(unit: Unit, platforms: Collection[str] = ()) -> dict[str, bytes]:
+def binaries(unit: MockupUnit, platforms: Collection[str] = ()) -> dict[str, bytes]:
     """Return the bytes of the shared library for each platform in ``platforms``; if empty, for each with a compiler.
 
     Raises `ToolchainError` if a compilation fails, or if a platform in ``platforms`` has no compiler.
@@ -71,7 +71,7 @@ def binaries(unit: Unit, platforms: Collection[str] = ()) -> dict[str, bytes]:
     return libraries
 
 
-def archive(unit: Unit, version: int, libraries: Mapping[str, bytes]) -> bytes:
+def archive(unit: MockupUnit, version: int, libraries: Mapping[str, bytes]) -> bytes:
     """Return the bytes of the FMU for FMI 2 or 3."""
     contents: dict[str, bytes] = {"modelDescription.xml": unit.descriptions[version].encode()}
     for platform, library in libraries.items():

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from phigen.gauss.realisation import Group, Realisation
+from phigen.gauss.realisation import AlgebraBlock, Realisation
 from phigen.gauss.star_algebra import StarAlgebra, Vector, combined
 from phigen.geometry.field import Scalar
 from phigen.geometry.system import System, hamiltonian_vector_field
@@ -61,7 +61,7 @@ class StageMap:
 
 def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) -> StageMap:
     """Return the points of a system in terms of the unknowns of a step; ``pace`` multiplies ∇H and covector forces."""
-    plain = tuple(i for part in realisation.parts if not isinstance(part, Group) for i in part.indices)
+    plain = tuple(i for part in realisation.parts if not isinstance(part, AlgebraBlock) for i in part.indices)
     if realisation.exact:
         plain = tuple(i for i in plain if any(not e.is_zero for e in system.poisson[i]))
     if not (plain or realisation.groups or system.times):
@@ -82,7 +82,7 @@ def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) 
     return StageMap(system, realisation, unknowns, plain, tuple(starts), tuple(change), pace)
 
 
-def _values(system: System, group: Group) -> list[Expression]:
+def _values(system: System, group: AlgebraBlock) -> list[Expression]:
     """Return the values of the elements E_a of a Lie algebra at the start of a step."""
     coordinates = [symbol(system.coordinates[i]) + s for i, s in zip(group.indices, group.shift, strict=True)]
     return [*coordinates, *([ONE] if group.central else [])]
@@ -110,7 +110,7 @@ class _Scaled:
     combination: list[Vector]
 
 
-def _scaled(group: Group, x: Sequence[Expression]) -> _Scaled:
+def _scaled(group: AlgebraBlock, x: Sequence[Expression]) -> _Scaled:
     algebra = group.algebra
     one = algebra.field.one
 
@@ -127,7 +127,7 @@ def _scaled(group: Group, x: Sequence[Expression]) -> _Scaled:
     )
 
 
-def _momentum_change(group: Group, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
+def _momentum_change(group: AlgebraBlock, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
     """Return x̃(G E_a G*) − x_a for G = 1 + w: 2x̃(wE_a) + x̃(wE_a w*), as E_a is skew."""
     algebra, scaled = group.algebra, _scaled(group, x)
     left = _functional_times(algebra, scaled, w)
@@ -135,7 +135,7 @@ def _momentum_change(group: Group, x: Sequence[Expression], w: Sequence[Expressi
     return [_combined(algebra, parts, at_frame) for parts in scaled.combination]
 
 
-def _momentum(group: Group, x: Sequence[Expression], g: Sequence[Expression]) -> list[Expression]:
+def _momentum(group: AlgebraBlock, x: Sequence[Expression], g: Sequence[Expression]) -> list[Expression]:
     """Return x̃(G E_a G*) for a group element G."""
     algebra, scaled = group.algebra, _scaled(group, x)
     left = _functional_times(algebra, scaled, g)
@@ -218,7 +218,7 @@ def _element(
     ]
 
 
-def _group_element(points: StageMap, group: Group, first: int) -> list[Expression]:
+def _group_element(points: StageMap, group: AlgebraBlock, first: int) -> list[Expression]:
     """Return G = 1 + w, with the unknowns w from the index ``first`` on."""
     algebra = group.algebra
     return [

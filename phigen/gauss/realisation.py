@@ -34,7 +34,7 @@ class Plain:
 
 
 @dataclass(frozen=True)
-class Group:
+class AlgebraBlock:
     """Coordinates (indices) with the brackets of a Lie algebra: x_i + ``shift`` is a momentum map of a star algebra.
 
     If ``central``, the last basis element of the Lie algebra has no coordinate: its value is 1.
@@ -47,7 +47,7 @@ class Group:
     central: bool = False
 
 
-Part = Plain | Group
+Part = Plain | AlgebraBlock
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,9 @@ class Realisation:
     exact: bool
 
     @property
-    def groups(self) -> tuple[Group, ...]:
+    def groups(self) -> tuple[AlgebraBlock, ...]:
         """The parts with the brackets of a Lie algebra."""
-        return tuple(part for part in self.parts if isinstance(part, Group))
+        return tuple(part for part in self.parts if isinstance(part, AlgebraBlock))
 
     @property
     def label(self) -> str:
@@ -94,7 +94,7 @@ def _joined(parts: Sequence[Part]) -> Iterator[Part]:
     plain = [i for part in parts if isinstance(part, Plain) for i in part.indices]
     if plain:
         yield Plain(tuple(sorted(plain)))
-    yield from (part for part in parts if isinstance(part, Group))
+    yield from (part for part in parts if isinstance(part, AlgebraBlock))
 
 
 def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
@@ -129,7 +129,7 @@ def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | N
     algebra = star_algebra(lie)
     if algebra is None:
         return None
-    return Group(tuple(indices), algebra, lie, tuple(shift or [ZERO] * last), central)
+    return AlgebraBlock(tuple(indices), algebra, lie, tuple(shift or [ZERO] * last), central)
 
 
 def star_algebra(lie: LieAlgebra) -> StarAlgebra | None:

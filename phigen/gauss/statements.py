@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from phigen.gauss.kernels import StageMap, at_unknowns, stage_map, vector_field
-from phigen.gauss.realisation import Group, Realisation
+from phigen.gauss.realisation import AlgebraBlock, Realisation
 from phigen.gauss.star_algebra import difference
 from phigen.gauss.tableau import Tableau
 from phigen.geometry.system import System
@@ -94,7 +94,7 @@ def _brackets(system: System, realisation: Realisation) -> Statement:
     return decide_zero(name, residuals, system.positive)
 
 
-def _lie_poisson(system: System, group: Group) -> dict[tuple[int, int], Expression]:
+def _lie_poisson(system: System, group: AlgebraBlock) -> dict[tuple[int, int], Expression]:
     values = [symbol(system.coordinates[i]) + s for i, s in zip(group.indices, group.shift, strict=True)]
     values += [symbol(system.coordinates[0]) ** 0] if group.central else []
     brackets = {}
@@ -104,7 +104,7 @@ def _lie_poisson(system: System, group: Group) -> dict[tuple[int, int], Expressi
     return brackets
 
 
-def _momentum_map(system: System, group: Group) -> Statement:
+def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
     """Decide that J is a quadratic momentum map on a star algebra."""
     listed = ", ".join(system.coordinates[i] for i in group.indices)
     algebra = group.algebra

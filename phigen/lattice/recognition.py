@@ -23,7 +23,7 @@ from phigen.geometry.shapes import Matrix
 from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import Expansion
 from phigen.spec import limits
-from phigen.spec.model import Lattice, LatticeRun, MatrixForm, Parameter, Run, Spec, Values
+from phigen.spec.model import Lattice, LatticeRunSettings, MatrixForm, Parameter, Run, Spec, Values
 from phigen.spec.names import SPEC_FUNCTIONS
 from phigen.symbolic.expression import ONE, ZERO, Expression, mul, neg, substitute, symbol, symbols_of, total
 from phigen.symbolic.expression import product as product_of
@@ -388,6 +388,6 @@ def _run(spec: Spec, run: Run, names: _SiteNames) -> Run:
             arrays.setdefault(stem, {})[site] = run.parameters.get(p.name, p.value)
     listed = {stem: Values(listed=tuple(v[s] for s in sorted(v))) for stem, v in arrays.items()}
     numbers = {n: v for n, v in run.parameters.items() if n not in names.sites}
-    lattice = LatticeRun(names.sizes, state, (), listed)
+    lattice = LatticeRunSettings(names.sizes, state, (), listed)
     none: dict[str, Any] = {"exact": {}, "section": None, "stop": None}  # of lattices they are about observables
     return replace(run, initial=(), parameters=numbers, lattice=lattice, **none)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from phigen.errors import SpecError
 from phigen.lattice.array_files import bonds_in, values_in
 from phigen.runtime.memory import expect_room
-from phigen.spec.model import LatticeRun, Run, Spec, Values
+from phigen.spec.model import LatticeRunSettings, Run, Spec, Values
 from phigen.symbolic.arrays import evaluate
 
 Floats = NDArray[np.float64]
@@ -121,7 +121,7 @@ class _Reader:
         drawn = np.random.default_rng(values.seed).normal(size=shape)
         return np.asarray(float(values.scale) * drawn / np.sqrt((drawn**2).sum(axis=0)))
 
-    def _bonds(self, lattice_run: LatticeRun) -> tuple[Bonds, dict[str, Floats]]:
+    def _bonds(self, lattice_run: LatticeRunSettings) -> tuple[Bonds, dict[str, Floats]]:
         if not isinstance(lattice_run.bonds, str):
             return np.array(lattice_run.bonds, dtype=np.int64).reshape(-1, 2), {}
         if not lattice_run.bonds:

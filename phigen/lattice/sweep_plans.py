@@ -42,7 +42,7 @@ from phigen.lattice.site_transposes import transposed
 from phigen.lattice.variations import along, with_variations
 from phigen.scheme.alternation import Alternation, Schedule, with_clock
 from phigen.scheme.alternation import schedule as alternating
-from phigen.scheme.choosing import Choice, is_dated, planned, with_carrier
+from phigen.scheme.choosing import ScheduledMethod, is_dated, planned, with_carrier
 from phigen.scheme.forces import forced_lines
 from phigen.scheme.gathering import staged
 from phigen.scheme.kernel import Kernel, Output, Role
@@ -56,7 +56,7 @@ from phigen.scheme.steps import Ends, Gather, Partners, Seam, Sites, Sweep, Swee
 from phigen.spec.model import Spec, SpecForces
 from phigen.splitting.flow import Flow
 from phigen.splitting.kicks import Kick
-from phigen.splitting.parts import Splitting
+from phigen.splitting.parts import SplitHamiltonian
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.neighbours import steps
 
@@ -68,7 +68,7 @@ class SplittingPlan:
     """The parts of H of a lattice, the method, and the flows of ``noise``."""
 
     parts: CellSplitting
-    choice: Choice
+    choice: ScheduledMethod
     noise: tuple[CellFlow, ...] = ()
     since: str = ""  # reason for more colours than the fewest
 
@@ -178,7 +178,7 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
     noise = tuple(noise_flows(cell, parts.colouring, search, spec))
     flows = (*parts.flows, *forces)
     requested = spec.wanted_order, spec.composition
-    choice = planned(spec, Splitting(flows), *requested, lambda: () if cell.forces else _kicks(cell, parts))
+    choice = planned(spec, SplitHamiltonian(flows), *requested, lambda: () if cell.forces else _kicks(cell, parts))
     coloured = any(flow.by_colour for flow in flows)
     if coloured and noise:
         message = "scheme splitting: noise is not offered where parts are those of one colour of a graph"
@@ -188,7 +188,7 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
     return SplittingPlan(parts, _with_seams(choice, parts.colouring), noise, since)
 
 
-def _with_seams(choice: Choice, colouring: Colouring) -> Choice:
+def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMethod:
     """Return the choice with the flows of terms on boundary seams added.
 
     These flows follow the flow of the other terms of their part; in the last part they precede it.

@@ -54,7 +54,7 @@ class Factor:
     base: str
     index: str = ""
     tail: str = ""
-    terms: tuple[Term, ...] = ()
+    terms: tuple[FractionTerm, ...] = ()
     word: bool = False
     raised: bool = False
     key: tuple[Any, ...] = ()
@@ -79,7 +79,7 @@ class Factor:
 
 
 @dataclass(frozen=True)
-class Term:
+class FractionTerm:
     """coefficient · above / below."""
 
     coefficient: Fraction
@@ -97,7 +97,7 @@ class Term:
         return f"<mfrac>{above}{_product(bottom, self.below)}</mfrac>" if self.below or bottom != 1 else above
 
 
-Sum = tuple[Term, ...]
+Sum = tuple[FractionTerm, ...]
 
 
 def terms_of(e: Expression) -> Sum:
@@ -107,9 +107,9 @@ def terms_of(e: Expression) -> Sum:
 
 def terms_of_formula(formula: Formula) -> Sum:
     """The terms of a formula, its divisor left out."""
-    terms: list[Term] = []
+    terms: list[FractionTerm] = []
     for c, monomial in formula.terms:
-        terms += _times((Term(c),), *(_power(terms_of(base), exponent) for base, exponent in monomial))
+        terms += _times((FractionTerm(c),), *(_power(terms_of(base), exponent) for base, exponent in monomial))
     shown = _positive_first(terms) if len(terms) <= FEW else tuple(terms)
     return (*shown, *_one(Factor(_DOTS))) if formula.hidden else shown
 
@@ -119,7 +119,7 @@ def expression(e: Expression) -> str:
     return summed(terms_of(e))
 
 
-def summed(terms: Sequence[Term]) -> str:
+def summed(terms: Sequence[FractionTerm]) -> str:
     """A sum."""
     if not terms:
         return number(Fraction(0))
@@ -138,7 +138,7 @@ def pieces(e: Expression | Formula) -> list[str]:
     if isinstance(e, Expression):
         return _pieces(terms_of(e))
     terms = terms_of_formula(e)
-    return _pieces(terms if e.divisor == 1 else _times((Term(Fraction(1, e.divisor)),), terms))
+    return _pieces(terms if e.divisor == 1 else _times((FractionTerm(Fraction(1, e.divisor)),), terms))
 
 
 def math(markup: str) -> str:
@@ -202,7 +202,7 @@ def bracket(a: str, b: str) -> str:
 def _visit(node: Expression, args: list[Sum]) -> Sum:
     match node.op:
         case "number":
-            return (Term(node.value),) if node.value else ()
+            return (FractionTerm(node.value),) if node.value else ()
         case "symbol":
             return _one(_name(node.value))
         case "pi" | "E":
@@ -236,7 +236,7 @@ def _power(base: Sum, exponent: Fraction) -> Sum:
         below = _single(_power(base, -exponent))
         if below.coefficient == 0:  # as somebody wrote it
             return _one(Factor("<mfrac><mn>1</mn><mn>0</mn></mfrac>"))
-        return (Term(1 / below.coefficient, below.below, below.above),)
+        return (FractionTerm(1 / below.coefficient, below.below, below.above),)
     if exponent == 1 or not base:
         return base
     if exponent == Fraction(1, 2):
@@ -249,12 +249,12 @@ def _power(base: Sum, exponent: Fraction) -> Sum:
 
 
 def _times(*factors: Sum) -> Sum:
-    result = Term(Fraction(1))
+    result = FractionTerm(Fraction(1))
     for terms in factors:
         t = _single(terms)
-        result = Term(result.coefficient * t.coefficient, result.above + t.above, result.below + t.below)
+        result = FractionTerm(result.coefficient * t.coefficient, result.above + t.above, result.below + t.below)
     above, below = (_collected(sorted(fs, key=lambda f: _key([f]))) for fs in (result.above, result.below))
-    return _bounded((Term(result.coefficient, above, below),)) if result.coefficient else ()
+    return _bounded((FractionTerm(result.coefficient, above, below),)) if result.coefficient else ()
 
 
 def _collected(factors: Sequence[Factor]) -> tuple[Factor, ...]:
@@ -264,11 +264,11 @@ def _collected(factors: Sequence[Factor]) -> tuple[Factor, ...]:
     return tuple(powers.get(f, f) for f, n in counts.items() for _ in range(1 if f in powers else n))
 
 
-def _single(terms: Sum) -> Term:
+def _single(terms: Sum) -> FractionTerm:
     """The sum as one term, in parentheses if it has several."""
     if len(terms) == 1:
         return terms[0]
-    return Term(Fraction(1), (_enclosed(terms),)) if terms else Term(Fraction(0))
+    return FractionTerm(Fraction(1), (_enclosed(terms),)) if terms else FractionTerm(Fraction(0))
 
 
 def _base(terms: Sum) -> Factor:
@@ -292,14 +292,14 @@ def _sorted(terms: Sum) -> Sum:
     for t in terms:
         sums[t.above, t.below] = sums.get((t.above, t.below), Fraction(0)) + t.coefficient
     constant = sums.pop(((), ()), Fraction(0))
-    nonzero = [Term(c, above, below) for (above, below), c in sums.items() if c]
+    nonzero = [FractionTerm(c, above, below) for (above, below), c in sums.items() if c]
     rest = sorted(nonzero, key=lambda t: _key((*t.above, *t.below)))
     if constant > 0:
-        return _bounded((Term(constant), *rest))
-    return _bounded(_positive_first([*rest, Term(constant)] if constant else rest))
+        return _bounded((FractionTerm(constant), *rest))
+    return _bounded(_positive_first([*rest, FractionTerm(constant)] if constant else rest))
 
 
-def _positive_first(terms: list[Term]) -> Sum:
+def _positive_first(terms: list[FractionTerm]) -> Sum:
     """The first positive term moved to the front: b − a rather than −a + b."""
     place = next((i for i, t in enumerate(terms) if t.coefficient > 0), 0)
     return (*terms[place : place + 1], *terms[:place], *terms[place + 1 :])
@@ -320,7 +320,7 @@ def _negated(terms: Sum) -> Sum:
 
 
 def _one(factor: Factor) -> Sum:
-    return (Term(Fraction(1), (factor,)),)
+    return (FractionTerm(Fraction(1), (factor,)),)
 
 
 def exponential(number: str) -> tuple[str, list[str]]:
@@ -371,15 +371,15 @@ def _pieces(terms: Sum) -> list[str]:
     if inner is None:
         return [summed(terms[:1]), *(f'<mo form="infix">{_sign(t)}</mo>{t.magnitude}' for t in terms[1:])]
     factor = replace(terms[0], above=tuple(f for f in terms[0].above if f is not inner))
-    if factor == Term(Fraction(1)):
+    if factor == FractionTerm(Fraction(1)):
         return _pieces(inner.terms)
-    scale = "" if factor in (Term(Fraction(1)), Term(Fraction(-1))) else factor.magnitude + _TIMES
+    scale = "" if factor in (FractionTerm(Fraction(1)), FractionTerm(Fraction(-1))) else factor.magnitude + _TIMES
     minus = "<mo>−</mo>" if factor.coefficient < 0 else ""
     first, *middle, last = _pieces(inner.terms)
     return [f'{minus}{scale}<mo stretchy="false">(</mo>{first}', *middle, f'{last}<mo stretchy="false">)</mo>']
 
 
-def _sign(term: Term) -> str:
+def _sign(term: FractionTerm) -> str:
     return "−" if term.coefficient < 0 else "+"
 
 

@@ -45,7 +45,7 @@ Pair = tuple[str, Any, Any]
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Agreement:
     """Whether both derivations agree on S_``term``, or where it is None on ∇S_h or on α and β.
 
     ``sympy`` and ``compiler`` are the seconds that they took for S_1 … S_term; of what is there already, there is only
@@ -71,7 +71,7 @@ class OutOfTimeError(BaseException):
     """The time limit is reached. Not an `Exception`, so that no handler in between catches it."""
 
 
-def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Comparison]:
+def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Agreement]:
     """S_1 … S_terms, by default those of the method, then ∇S_h, α and β: each when it is derived.
 
     ∇S_h, as the program has it, is compared if it needs no further S_i.
@@ -174,7 +174,7 @@ class _Derivation:
         """The number of S_i derived so far."""
         return len(self._found)
 
-    def compared(self, step: str) -> Comparison:
+    def compared(self, step: str) -> Agreement:
         """The comparison of the next S_i, or of the gradient or the maps."""
         if step == GRADIENT:
             return self._gradient()
@@ -182,7 +182,7 @@ class _Derivation:
             return self._ends() if self._are_ends() else self._axioms()
         return self._term(self.reached + 1)
 
-    def _term(self, i: int) -> Comparison:
+    def _term(self, i: int) -> Agreement:
         compilation = self._compilation
         start = time.perf_counter()
         mine = next(self._mine)
@@ -195,9 +195,9 @@ class _Derivation:
         pair = ("", self._dictionary.expression(theirs), mine)
         statement = decide(f"S_{i}", [pair], self._positive, f"{size} term{'s' * (size != 1)}")
         self._found.append(mine)
-        return Comparison(statement, i, self._taken, end - middle)
+        return Agreement(statement, i, self._taken, end - middle)
 
-    def _gradient(self) -> Comparison:
+    def _gradient(self) -> Agreement:
         """∇S_h of one stage, coefficients written out."""
         scheme, h = self._compilation.scheme, self._dictionary.step
         start = time.perf_counter()
@@ -210,7 +210,7 @@ class _Derivation:
             terms = (h**i * derivative(s, c) for i, s in enumerate(self._found[: scheme.terms], 1))
             pairs.append((f"along {c}", self._dictionary.expression(theirs), factor * (sum(terms) + pushes[c])))
         statement = decide(GRADIENT, pairs, self._positive, f"as the program has it: {scheme.generating.form}")
-        return Comparison(statement, None, time.perf_counter() - start)
+        return Agreement(statement, None, time.perf_counter() - start)
 
     def _pushes(self) -> dict[Any, Any]:
         """Terms of p besides ∇S_h, by coordinate: hζ of forces, ΔW σ∇g of noise."""
@@ -238,7 +238,7 @@ class _Derivation:
             for x, e in zip(self._dictionary.coordinates, maps, strict=True)
         ]
 
-    def _ends(self) -> Comparison:
+    def _ends(self) -> Agreement:
         coordinates, d = self._compilation.system.coordinates, self._degree
         start = time.perf_counter()
         pairs = self._at_origin()
@@ -248,15 +248,15 @@ class _Derivation:
                 pairs += [(f"{name}_{c}", theirs.get(mu, sympy.S.Zero), mine.get(mu, sympy.S.Zero)) for mu in every]
         name = f"α and β up to degree {d} in p"
         statement = decide(name, pairs, self._positive, "from the path ṁ = π(m)p about its mean")
-        return Comparison(statement, None, time.perf_counter() - start)
+        return Agreement(statement, None, time.perf_counter() - start)
 
-    def _axioms(self) -> Comparison:
+    def _axioms(self) -> Agreement:
         d, x, p = self._degree, self._dictionary.coordinates, self._dictionary.covector
         start = time.perf_counter()
         residuals = defects(self._poisson, self._alpha(d), self._beta(d), x, p, d)
         rest = [*self._at_origin(), *((label, r, sympy.S.Zero) for label, r in residuals)]
         statement = decide(f"axioms of α and β up to degree {d - 1} in p", rest, self._positive, "")
-        return Comparison(statement, None, time.perf_counter() - start)
+        return Agreement(statement, None, time.perf_counter() - start)
 
 
 def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: str) -> Statement:

@@ -21,7 +21,7 @@ from phigen.symbolic.verdict import UNDECIDED, Statement, decide_elements
 EXACT_PATH = "steps follow the exact path, for which Karasev's theorem is the proof"
 
 
-class _Parts:
+class _HomogeneousParts:
     """The homogeneous parts in p, up to a degree, of expressions in x and p; and brackets of them."""
 
     def __init__(self, system: System, expressions: Sequence[Expression], degree: int) -> None:
@@ -69,7 +69,7 @@ def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterato
     titles = "{α_i, α_j} = π_ij∘α", "{β_i, β_j} = −π_ij∘β", "{α_i, β_j} = 0"
     suffix = f": all terms up to degree {degree - 1} in p"
     try:
-        parts = _Parts(system, [*maps, *pulled], degree)
+        parts = _HomogeneousParts(system, [*maps, *pulled], degree)
     except OverflowError:
         beyond = EXACT_PATH if realisation.path else "not checked"
         for title in titles:

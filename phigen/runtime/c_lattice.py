@@ -89,7 +89,7 @@ MAX_TAPE_BYTES = 1 << 26
 _UPDATES_PER_CALL = 1 << 26
 
 
-class Stage(ctypes.Structure):
+class SweepStage(ctypes.Structure):
     """One sweep of a step, with the data that it reads and writes.
 
     ``behind`` and ``ahead`` are the numbers of planes that it reads before and after the planes it sweeps. ``read`` and
@@ -340,7 +340,7 @@ class CLattice:
         most = getattr(self._library, "omp_get_max_threads", None)  # of the OpenMP that it is linked with
         return int(most()) if most else 1
 
-    def stages(self) -> list[Stage]:
+    def stages(self) -> list[SweepStage]:
         """Return the sweeps of a step in order, and, without noise, the last and the first merged into one.
 
         Raises `ValueError` if the C has no caller-driven stepping.
@@ -350,7 +350,7 @@ class CLattice:
                 f"{self.interface.name} has no caller-driven stepping: that needs a split lattice on a grid, "
                 "without a seam, compiled with profile fast"
             )
-        sweeps = [Stage() for _ in range(self._c.stages() + (not self.interface.noise))]
+        sweeps = [SweepStage() for _ in range(self._c.stages() + (not self.interface.noise))]
         for k, stage in enumerate(sweeps):
             self._c.describe(k, ctypes.addressof(stage))
         return sweeps

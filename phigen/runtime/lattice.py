@@ -38,7 +38,7 @@ from phigen.runtime.lattice_frames import (
     stream_path,
     write_whole,
 )
-from phigen.runtime.lattice_rows import Crossed, Plan, strided, timed
+from phigen.runtime.lattice_rows import Crossed, IntegrationPlan, strided, timed
 from phigen.runtime.lattice_run import LatticeRun
 from phigen.runtime.lattice_series import LatticeSeries, NumberRows, expect_table, recordable
 from phigen.runtime.live import LiveLattice
@@ -397,7 +397,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         where: Any = {"output": output, "checkpoints": checkpoints, "resume": resume, "progress": progress}
         return self.framed(plan, **where)
 
-    def _planned(self, at: Beginning, steps: int | None, stride: int, until: float | None, retry: int) -> Plan:
+    def _planned(
+        self, at: Beginning, steps: int | None, stride: int, until: float | None, retry: int
+    ) -> IntegrationPlan:
         """The plan of an integration for a number of steps, or until a time."""
         if (steps is None) == (until is None):
             many = "needs the number of steps, or the time until which to integrate"
@@ -406,17 +408,19 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         if retry:
             arguments.expect_no_noise("retry", self.interface)
         if until is None:
-            return Plan(at, strided(at.h, arguments.count(steps or 0, "steps", 0), stride), at.t0, retry)
+            return IntegrationPlan(at, strided(at.h, arguments.count(steps or 0, "steps", 0), stride), at.t0, retry)
         end = ending.at_time(ObservedCourse.begun(self, at, retry), at.h, arguments.end(until, at.t0, at.h))
-        return Plan(at, strided(at.h, end.steps, stride, end), at.t0, retry)
+        return IntegrationPlan(at, strided(at.h, end.steps, stride, end), at.t0, retry)
 
-    def carried_out(self, plan: Plan, of: Sequence[str] = (), **where: Any) -> LatticeTrajectory | LatticeSeries:
+    def carried_out(
+        self, plan: IntegrationPlan, of: Sequence[str] = (), **where: Any
+    ) -> LatticeTrajectory | LatticeSeries:
         """`numbered` where numbers ``of`` the lattice are to be recorded in place of states, else `framed`."""
         return self.numbered(plan, of, **where) if of else self.framed(plan, **where)
 
     def framed(
         self,
-        plan: Plan,
+        plan: IntegrationPlan,
         *,
         output: str | Path | None = None,
         checkpoints: str | Path | None = None,
@@ -524,7 +528,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         of = chosen.record if chosen.records_numbers else ()
         return self.carried_out(plan, of, output=output, checkpoints=checkpoints, progress=progress)
 
-    def _plan_of(self, run: Run, at: Beginning, retry: int) -> Plan:
+    def _plan_of(self, run: Run, at: Beginning, retry: int) -> IntegrationPlan:
         """The plan of a run of the spec, from a start that has been checked."""
         if retry or run.is_timed:
             arguments.expect_no_noise("retry" if retry else "every", self.interface)
@@ -536,7 +540,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         if run.is_timed:
             span = at.h * run.steps if end is None else end.span
             rows = timed(at.h, run.steps, runs.spans_of_run(run, span), end)
-        return Plan(at, rows, at.t0, retry, self.section_of(run, at.values), self.transforms_of(run))
+        return IntegrationPlan(at, rows, at.t0, retry, self.section_of(run, at.values), self.transforms_of(run))
 
     def function(self, expression: Expression, values: Mapping[str, Any]) -> Function:
         """An expression in observables, parameters and the time as a function of observables (rows, observables)."""
@@ -597,7 +601,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
     def numbered(
         self,
-        plan: Plan,
+        plan: IntegrationPlan,
         of: Sequence[str],
         *,
         output: str | Path | None = None,
@@ -986,7 +990,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         there = ", ".join(f"{f} = {float(x[(k, *site)])!r}" for k, f in enumerate(self.coordinates))
         return f"since H is not finite at the start: at the site ({', '.join(map(str, site))}), where {there}"
 
-    def _trajectory(self, t: Floats, x: Floats, rows: FrameRows, steps: int, plan: Plan) -> LatticeTrajectory:
+    def _trajectory(
+        self, t: Floats, x: Floats, rows: FrameRows, steps: int, plan: IntegrationPlan
+    ) -> LatticeTrajectory:
         at, axes = plan.at, self.interface.axes
         observed = np.array(rows.observed).reshape(len(t), len(self.interface.observables))
         energy = np.array(rows.energy)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Rows:
+class RowSteps:
     """Rows after ``whole`` steps each (rows,), and a further step of the size ``part`` (rows,), 0 for none.
 
     The first is the start. With an ``end``, that makes the last row.
@@ -48,18 +48,18 @@ class Rows:
         return [*rows, *([] if not self.part.any() else [float(self.part.sum()), float(self.part[-1])])]
 
 
-def strided(h: float, steps: int, stride: int, end: End | None = None) -> Rows:
+def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSteps:
     """Return rows at every ``stride``-th of ``steps`` steps and the last, or up to an end with a part of a step."""
     if end is None or not end.part:
         whole = row_steps(steps if end is None else end.steps, stride)
-        return Rows(whole, np.zeros(len(whole)), end)
+        return RowSteps(whole, np.zeros(len(whole)), end)
     whole = np.append(np.arange(0, end.steps + 1, stride, dtype=np.int64), end.steps)
     part = np.zeros(len(whole))
     part[-1] = end.span - end.steps * h
-    return Rows(whole, part, end)
+    return RowSteps(whole, part, end)
 
 
-def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) -> Rows:
+def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) -> RowSteps:
     """Return rows at times ``spans`` after the start, and at the end: after ``steps`` steps, or where ``end`` is."""
     last = h * steps if end is None else end.span
     inner = [span for span in spans if abs(last - span) > EQUAL * abs(last)]
@@ -68,7 +68,7 @@ def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) 
     part = np.where(np.abs(left) > EQUAL * np.abs(inner), left, 0.0)
     tail = strided(h, steps, max(1, steps if end is None else end.steps), end)
     whole = [0, *whole, int(tail.whole[-1])]
-    return Rows(np.array(whole, dtype=np.int64), np.array([0.0, *part, tail.part[-1]]), end)
+    return RowSteps(np.array(whole, dtype=np.int64), np.array([0.0, *part, tail.part[-1]]), end)
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Past:
 
 
 @dataclass(frozen=True)
-class Plan:
+class IntegrationPlan:
     """An integration: where it begins, its rows, and in how many halvings a failing step may be made.
 
     ``begin`` is the time of its start, which `Beginning` has only where H depends on the time. ``transforms`` are made
@@ -105,7 +105,7 @@ class Plan:
     """
 
     at: Beginning
-    rows: Rows
+    rows: RowSteps
     begin: float = 0.0
     retry: int = 0
     section: Crossed | None = None

@@ -16,7 +16,7 @@ from phigen.runtime.crossings import BLOCK, CrossingFinder
 from phigen.runtime.interface import Floats, Progress
 from phigen.runtime.lattice_course import ObservedCourse
 from phigen.runtime.lattice_frames import identity_of
-from phigen.runtime.lattice_rows import Past, Plan
+from phigen.runtime.lattice_rows import IntegrationPlan, Past
 
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
@@ -52,7 +52,7 @@ class LatticeRun:
     """One integration: ``rows`` stores its rows, of which ``count`` are complete, ``crossings`` those of a section."""
 
     solver: LatticeSolver
-    plan: Plan
+    plan: IntegrationPlan
     rows: Sink
     crossings: Sink
     checkpoints: Path | None

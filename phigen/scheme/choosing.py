@@ -23,7 +23,7 @@ from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.order import Order
 from phigen.splitting.flow import Flow
 from phigen.splitting.kicks import Kick, kicks
-from phigen.splitting.parts import Splitting
+from phigen.splitting.parts import SplitHamiltonian
 from phigen.splitting.statements import bracket
 from phigen.symbolic.expression import gradient, symbols_of
 from phigen.symbolic.verdict import PROVED, decide_zero
@@ -35,7 +35,7 @@ FLOW_LATENCY = 12
 
 
 @dataclass(frozen=True)
-class Choice:
+class ScheduledMethod:
     """A method with the flows in the order of its steps, including modified kicks; ``why`` is for the user.
 
     Where H depends on the time, the time advances with the flow ``carrier``, or by itself if no flow has that number.
@@ -43,7 +43,7 @@ class Choice:
 
     order: Order
     method: Alternation | Nystrom
-    splitting: Splitting
+    splitting: SplitHamiltonian
     why: str = ""
     carrier: int | None = None
 
@@ -68,7 +68,7 @@ class Host(Protocol):
         ...
 
 
-def plan(system: System, splitting: Splitting, requested: int, composition: str) -> Choice:
+def plan(system: System, splitting: SplitHamiltonian, requested: int, composition: str) -> ScheduledMethod:
     """Return the method that gives an order; odd orders round up.
 
     Raises `SpecError` for orders that the composition lacks, and for parts that it does not apply to.
@@ -84,12 +84,12 @@ def plan(system: System, splitting: Splitting, requested: int, composition: str)
     return with_carrier(choice, system.time)
 
 
-def _unsuited(system: System, splitting: Splitting, small: int) -> bool:
+def _unsuited(system: System, splitting: SplitHamiltonian, small: int) -> bool:
     """Whether there are forces, or A depends on the time; the conjugate of the time must belong to A."""
     return len(splitting.flows) != 2 or (bool(system.time) and is_dated(splitting.flows[1 - small], system.time))
 
 
-def _kicks_in_time(system: System, splitting: Splitting) -> list[Kick]:
+def _kicks_in_time(system: System, splitting: SplitHamiltonian) -> list[Kick]:
     """Return the parts that can be V beside T + e: T does not depend on the time, and V commutes with ∂V/∂t."""
     kicks_found = []
     for kick in kicks(system.frozen, splitting):
@@ -100,7 +100,7 @@ def _kicks_in_time(system: System, splitting: Splitting) -> list[Kick]:
     return kicks_found
 
 
-def with_carrier(choice: Choice, time: str) -> Choice:
+def with_carrier(choice: ScheduledMethod, time: str) -> ScheduledMethod:
     """Return the choice with the flow that carries the time: the first or last, independent of the time.
 
     Else the time advances by itself, in place of a last part.
@@ -116,7 +116,7 @@ def with_carrier(choice: Choice, time: str) -> Choice:
     if not free:
         return replace(choice, carrier=len(flows))
     ordered = (free[0], *(flow for flow in flows if flow is not free[0]))
-    return replace(choice, splitting=Splitting(ordered), carrier=0)
+    return replace(choice, splitting=SplitHamiltonian(ordered), carrier=0)
 
 
 def is_dated(flow: Flow, time: str) -> bool:
@@ -125,8 +125,8 @@ def is_dated(flow: Flow, time: str) -> bool:
 
 
 def planned(
-    system: Host, splitting: Splitting, requested: int, composition: str, kicks_of: Callable[[], Sequence[Kick]]
-) -> Choice:
+    system: Host, splitting: SplitHamiltonian, requested: int, composition: str, kicks_of: Callable[[], Sequence[Kick]]
+) -> ScheduledMethod:
     """Return the method as `plan` does; ``kicks_of`` returns the parts that can be V."""
     even = requested + requested % 2
     note = "" if even == requested else f"order {requested} was asked for; a symmetric method has even order"
@@ -149,10 +149,10 @@ def planned(
         raise _not_applicable(system, splitting, composition, kicks_of)
     recommended = alternation.find(composition, even)
     assert recommended is not None
-    return Choice(order, recommended, arranged(splitting))
+    return ScheduledMethod(order, recommended, arranged(splitting))
 
 
-def _near_integrable(splitting: Splitting, order: Order, method: NearIntegrable) -> Choice:
+def _near_integrable(splitting: SplitHamiltonian, order: Order, method: NearIntegrable) -> ScheduledMethod:
     """Return the choice of a method for H = A + εB, with the flow of A first.
 
     Between correctors, which begin and end with a flow of A, a step is a flow of B and one of A.
@@ -161,12 +161,12 @@ def _near_integrable(splitting: Splitting, order: Order, method: NearIntegrable)
     large, small = splitting.flows[1 - splitting.small], splitting.flows[splitting.small]
     if isinstance(method, Corrected):
         why = f"H_1 is small, of size ε: errors {method.errors}"
-        return Choice(order, method, Splitting((small, large), small=0), why)
+        return ScheduledMethod(order, method, SplitHamiltonian((small, large), small=0), why)
     why = f"H_2 is small, of size ε: errors {method.errors}"
-    return Choice(order, method, Splitting((large, small), small=1), why)
+    return ScheduledMethod(order, method, SplitHamiltonian((large, small), small=1), why)
 
 
-def _nothing_small(system: Host, splitting: Splitting, composition: str) -> SpecError:
+def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) -> SpecError:
     """Return the error for a method for near-integrable systems that does not apply."""
     count = len(splitting.flows)
     situation = "none is known to be small" if count == 2 else f"here {'is one' if count == 1 else f'are {count}'}"
@@ -175,9 +175,9 @@ def _nothing_small(system: Host, splitting: Splitting, composition: str) -> Spec
     return SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
 
 
-def chosen(splitting: Splitting, order: Order, method: Nystrom, kick: Kick) -> Choice:
+def chosen(splitting: SplitHamiltonian, order: Order, method: Nystrom, kick: Kick) -> ScheduledMethod:
     """Return the choice of a method of Nyström type."""
-    return Choice(order, method, _arranged(splitting, method, kick), _why(method))
+    return ScheduledMethod(order, method, _arranged(splitting, method, kick), _why(method))
 
 
 def orders(composition: str) -> list[int]:
@@ -187,13 +187,13 @@ def orders(composition: str) -> list[int]:
     return nystrom.orders(composition) if composition in nystrom.NAMES else alternation.orders(composition)
 
 
-def arranged(splitting: Splitting) -> Splitting:
+def arranged(splitting: SplitHamiltonian) -> SplitHamiltonian:
     """Return the parts in the order in which an alternation is cheapest: the costliest last.
 
     In each stage the last part has one flow, as has the first, with one more in the step; the others have two.
     """
     by_cost = sorted(splitting.flows, key=lambda flow: cost(flow.increment))
-    return Splitting((*by_cost[-2:-1], *by_cost[:-2], *by_cost[-1:]))
+    return SplitHamiltonian((*by_cost[-2:-1], *by_cost[:-2], *by_cost[-1:]))
 
 
 def _applicable(kicks_of: Callable[[], Sequence[Kick]], order: int, name: str) -> Iterator[tuple[Nystrom, Kick]]:
@@ -204,7 +204,7 @@ def _applicable(kicks_of: Callable[[], Sequence[Kick]], order: int, name: str) -
                 yield method, kick
 
 
-def _price(splitting: Splitting, method: Nystrom, kick: Kick) -> float:
+def _price(splitting: SplitHamiltonian, method: Nystrom, kick: Kick) -> float:
     """Return the cost of a step times error^{1/order}, proportional to the cost of a time at a given accuracy."""
     first, last = (_cost(flow) for flow in _arranged(splitting, method, kick).flows)
     step = (method.stages + 1) * first + method.stages * last
@@ -215,11 +215,11 @@ def _cost(flow: Flow) -> int:
     return cost(flow.increment) + FLOW_LATENCY * flow.moving
 
 
-def _arranged(splitting: Splitting, method: Nystrom, kick: Kick) -> Splitting:
+def _arranged(splitting: SplitHamiltonian, method: Nystrom, kick: Kick) -> SplitHamiltonian:
     """Return T and V in the order of the method."""
     drift, plain = splitting.flows[1 - kick.part], splitting.flows[kick.part]
     kicking = kick.modified if method.multiples and kick.modified else plain
-    return Splitting((kicking, drift), 0) if method.kicks_first else Splitting((drift, kicking), 1)
+    return SplitHamiltonian((kicking, drift), 0) if method.kicks_first else SplitHamiltonian((drift, kicking), 1)
 
 
 def _why(method: Nystrom) -> str:
@@ -238,7 +238,7 @@ def _no_order(system: Host, composition: str, known: Sequence[int], order: int) 
 
 
 def _not_applicable(
-    system: Host, splitting: Splitting, composition: str, kicks_of: Callable[[], Sequence[Kick]]
+    system: Host, splitting: SplitHamiltonian, composition: str, kicks_of: Callable[[], Sequence[Kick]]
 ) -> SpecError:
     """Return the error for a method for kicks that does not apply."""
     count = len(splitting.flows)

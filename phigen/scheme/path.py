@@ -97,7 +97,7 @@ def build_slopes(system: System, coefficients: Coefficients, along: Sequence[str
     tensor = coefficients.hoist([e for row in system.poisson for e in row])
     by_coefficient = [derivatives(flow, c) for c in along]
     sources = [by_coefficient[u][i] for i in range(n) for u in range(len(along))]
-    return _Builder(system.coordinates).slopes(_chains([*flow, *jacobian, *tensor, *sources]))
+    return _PathBuilder(system.coordinates).slopes(_chains([*flow, *jacobian, *tensor, *sources]))
 
 
 def used_by_path(system: System, coefficients: Coefficients) -> list[str]:
@@ -113,7 +113,7 @@ def _flow(system: System, coefficients: Coefficients) -> list[Expression]:
 
 def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Recurrences:
     """Return the recurrences of ṁ = flow(m, p), where p stays constant along the path."""
-    return _Builder(coordinates).path(_chains(flow))
+    return _PathBuilder(coordinates).path(_chains(flow))
 
 
 def _chains(roots: Sequence[Expression]) -> list[Expression]:
@@ -129,7 +129,7 @@ def _chains(roots: Sequence[Expression]) -> list[Expression]:
     return fold(roots, visit)
 
 
-class _Builder:
+class _PathBuilder:
     def __init__(self, coordinates: Sequence[str]) -> None:
         self.coordinates = tuple(coordinates)
         self.series = [NodeSeries(symbol(c)) for c in coordinates]

@@ -11,7 +11,7 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
 from phigen.scheme.adjoint import completed, explicit_adjoint, level_adjoint
 from phigen.scheme.alternation import Schedule
-from phigen.scheme.choosing import Choice
+from phigen.scheme.choosing import ScheduledMethod
 from phigen.scheme.discretisation import expect_few
 from phigen.scheme.forces import force_facts
 from phigen.scheme.gathering import staged
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 def build_splitting(
     system: System,
-    choice: Choice,
+    choice: ScheduledMethod,
     gauge: Gauge,
     spec: Spec,
     *,
@@ -143,7 +143,7 @@ def _step(
     return coefficients.settled(step)
 
 
-def facts(choice: Choice, step: Splitting, sources: int = 0) -> list[str]:
+def facts(choice: ScheduledMethod, step: Splitting, sources: int = 0) -> list[str]:
     """Return the lines of the header on the method; the first parts are ``sources`` of noise."""
     count, flows, method = len(step.flows) - sources, len(step.schedule.flows) - 2 * sources, choice.method
     further = f", {len(step.schedule.begin)} more before and after a run" * bool(step.schedule.begin)
@@ -159,7 +159,7 @@ def facts(choice: Choice, step: Splitting, sources: int = 0) -> list[str]:
     ]
 
 
-def _clock(choice: Choice) -> str:
+def _clock(choice: ScheduledMethod) -> str:
     """Return the line of the header on the time; empty without a time."""
     if choice.carrier is None:
         return ""

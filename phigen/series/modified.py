@@ -59,13 +59,13 @@ def modified_series(
     generating = polynomial_series(
         hamiltonian, alpha, coordinates, symbols, min(terms, power + 1), symmetric=symmetric, times=times
     )
-    recursion = _Recursion(generating, alpha, coordinates, times)
+    recursion = _ModifiedRecursion(generating, alpha, coordinates, times)
     for r in range(1, power + 2):
         recursion.advance(r, vanishing=symmetric and r % 2 == 0)
     return ModifiedSeries(generating.tower, tuple(recursion.terms))
 
 
-class _Recursion:
+class _ModifiedRecursion:
     """The state of the recursion: H_0 … H_{r−1}, and the slopes of s_1 … s_r along the coordinates."""
 
     def __init__(

@@ -12,7 +12,7 @@ from fractions import Fraction
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
-from phigen.spec.grammar import CONSTANTS, Scope, constant, names_in, parse
+from phigen.spec.grammar import CONSTANTS, AllowedNames, constant, names_in, parse
 from phigen.spec.indices import Indices
 from phigen.spec.kinds import Reader
 from phigen.spec.model import Lattice, Parameter
@@ -24,7 +24,7 @@ from phigen.symbolic.expression import Expression, symbol, symbols_of
 from phigen.symbolic.neighbours import ENDS, Neighbours, Offset
 
 Raw = Mapping[str, Any]
-NOTHING = Scope({})
+NOTHING = AllowedNames({})
 RENAME = "choose another name"
 
 
@@ -92,7 +92,7 @@ class Declarations:
         at_bonds = {n: bonds.get(n, why) for n, why in self._at_bonds(names).items()}
         return Indices(neighbours, varying, {**same, **at_bonds}, ends)
 
-    def bond_scope(self, *, dated: bool = False) -> Scope:
+    def bond_scope(self, *, dated: bool = False) -> AllowedNames:
         """For brackets along bonds and, ``dated``, densities of bonds and pairs: sites are the ends a and b."""
         scope = self.dated_scope() if dated else self.scope()
         names = scope.names
@@ -103,13 +103,13 @@ class Declarations:
         others = {n: e for n, e in names.items() if n not in local}
         others |= {n: symbol(n) for n, p in self.parameters.items() if p.at == "bonds"}
         refused = self.refused | self._counters() | ends | ({} if dated else self._timeless())
-        return Scope(others, refused, open=self.incomplete, indices=indices)
+        return AllowedNames(others, refused, open=self.incomplete, indices=indices)
 
-    def site_numbers(self) -> Scope:
+    def site_numbers(self) -> AllowedNames:
         """For values at sites: the indices, counted from 0, and the sizes."""
         indices = self.lattice.indices if self.lattice and self.relation != "graph" else ()
         names = {n: symbol(n) for i in indices for n in (i, f"N_{i}")}
-        return Scope(names, self.numbers().refused)
+        return AllowedNames(names, self.numbers().refused)
 
     def neighbour(self, node: Scalar, ends: tuple[str, ...] = ()) -> tuple[str, Offset] | None:
         """The coordinate that a key names, and its offset."""
@@ -117,10 +117,10 @@ class Declarations:
             index = self.coordinate(node)
             return None if index is None else (self.coordinates[index], self.neighbours.origin)
         known = {c: symbol(c) for c in self.coordinates}
-        scope = Scope({}, {c: (f"{c!r} has no end", f"write {c}[a] or {c}[b]") for c in known})
+        scope = AllowedNames({}, {c: (f"{c!r} has no end", f"write {c}[a] or {c}[b]") for c in known})
         if self.lattice is not None:
             refused = {n: (f"{n!r} is not a coordinate", "") for n in (*self.parameters, *self.definitions)}
-            scope = Scope(known, open=self.incomplete, indices=Indices(self.neighbours, known, refused, ends))
+            scope = AllowedNames(known, open=self.incomplete, indices=Indices(self.neighbours, known, refused, ends))
         value = self.formula(node, scope)
         if value is None or value.op != "symbol" or self.lattice is None:
             return None
@@ -128,16 +128,16 @@ class Declarations:
 
     # --- scopes
 
-    def scope(self, extra: Mapping[str, Expression] | None = None) -> Scope:
+    def scope(self, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
         """Everything declared but the time: for functions on phase space, of a lattice for densities of sites."""
         names = {n: symbol(n) for n in (*self.coordinates, *self.parameters)}
         names |= {n: e for n, e in self.definitions.items() if n not in self.dated} | dict(extra or {})
         bonds = self._at_bonds(names)
         known = {n: e for n, e in names.items() if n not in bonds}
         refused = self._timeless() | self.refused | self._counters() | bonds
-        return Scope(known, refused, open=self.incomplete, indices=self.indices(known))
+        return AllowedNames(known, refused, open=self.incomplete, indices=self.indices(known))
 
-    def dated_scope(self) -> Scope:
+    def dated_scope(self) -> AllowedNames:
         """Everything declared: for functions on phase space that may depend on the time."""
         scope = self.scope()
         dated = {n: self.definitions[n] for n in self.dated} | ({self.time: symbol(self.time)} if self.time else {})
@@ -153,7 +153,7 @@ class Declarations:
         refused = {n: (f"this must not depend on the time, as {n!r} does", hint) for n in sorted(self.dated)}
         return refused | ({self.time: (f"this must not depend on the time {self.time!r}", hint)} if self.time else {})
 
-    def constants(self, what: str, extra: Mapping[str, Expression] | None = None) -> Scope:
+    def constants(self, what: str, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
         """Parameters and what depends on them alone; ``what`` says for what in the message about others."""
         names = {n: symbol(n) for n in self.parameters}
         names |= {n: e for n, e in self.definitions.items() if n not in self.varying | self.dated}
@@ -162,9 +162,9 @@ class Declarations:
         refused = self._timeless()
         refused |= {n: (f"{what} must not depend on the coordinate {n!r}", "") for n in self.coordinates}
         refused |= {n: (f"{what} must not depend on coordinates, as {n!r} does", "") for n in self.varying} | bonds
-        return Scope(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
+        return AllowedNames(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
 
-    def dated_constants(self, what: str) -> Scope:
+    def dated_constants(self, what: str) -> AllowedNames:
         """The same and the time."""
         scope = self.constants(what)
         dated = {n: self.definitions[n] for n in self.dated - self.varying}
@@ -172,10 +172,10 @@ class Declarations:
         refused = {n: why for n, why in scope.refused.items() if n not in dated}
         return replace(scope, names={**scope.names, **dated}, refused=refused)
 
-    def numbers(self) -> Scope:
+    def numbers(self) -> AllowedNames:
         """No declared name at all: for defaults and initial values."""
         declared = (*self.coordinates, *self.parameters, *self.definitions, *filter(None, [self.time]))
-        return Scope({}, {n: (f"expected a number; {n!r} is not constant", "") for n in declared})
+        return AllowedNames({}, {n: (f"expected a number; {n!r} is not constant", "") for n in declared})
 
     def inside(self, within: tuple[Any, ...], coordinates: tuple[str, ...], message: str) -> Declarations:
         """Declarations for a structure with coordinates of its own; ``message`` begins the refusal of other names."""
@@ -191,7 +191,7 @@ class Declarations:
 
     # --- values
 
-    def formula(self, node: Scalar | None, scope: Scope) -> Expression | None:
+    def formula(self, node: Scalar | None, scope: AllowedNames) -> Expression | None:
         """The expression in a scalar, or ``None`` after reporting its errors at their columns."""
         if node is None:
             return None
@@ -203,7 +203,7 @@ class Declarations:
             return report(f"{node.text} is not a finite number", 0)
         return parse(node.text, scope, report)
 
-    def number(self, node: Scalar | None, scope: Scope = NOTHING) -> Fraction | None:
+    def number(self, node: Scalar | None, scope: AllowedNames = NOTHING) -> Fraction | None:
         """The value of a constant expression."""
         expression = self.formula(node, scope)
         if node is None or expression is None:
@@ -300,7 +300,7 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
         *raw.get("definitions", {}),
     } - {*CONSTANTS}
     why = "the value of a parameter is a number"
-    numbers = Scope({}, {n: (why, f"what depends on {n!r} can be a definition") for n in others})
+    numbers = AllowedNames({}, {n: (why, f"what depends on {n!r} can be a definition") for n in others})
     for name, (key, value) in raw.get("parameters", {}).items():
         if not declared.declare(key, "parameter"):
             continue

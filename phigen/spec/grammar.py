@@ -57,7 +57,7 @@ class Report(Protocol):
 
 
 @dataclass(frozen=True)
-class Scope:
+class AllowedNames:
     """The names an expression may use.
 
     ``refused`` holds names that exist but not here, each with the message that says why and a hint.
@@ -165,7 +165,7 @@ def names_in(source: str) -> list[str]:
     return [t.text for t in listed or [] if t.kind == "name"]
 
 
-def parse(source: str, scope: Scope, report: Report) -> Expression | None:
+def parse(source: str, scope: AllowedNames, report: Report) -> Expression | None:
     """The expression that a text stands for; ``None`` after errors, which went to ``report``.
 
     A syntax error ends the reading; unknown names and undefined values are all reported.
@@ -192,7 +192,7 @@ class Parser:
 
     nothing = symbol(Symbol("unknown", ""))  # stands for what has an error
 
-    def __init__(self, source_tokens: list[Token], scope: Scope, report: Report) -> None:
+    def __init__(self, source_tokens: list[Token], scope: AllowedNames, report: Report) -> None:
         self.tokens, self.scope, self.report = source_tokens, scope, report
         self.position = self.depth = self.nodes = 0
         self.unknown: set[str] = set()

@@ -99,7 +99,7 @@ class Text(Kind):
 
 
 @dataclass(frozen=True)
-class Name(Kind):
+class ShapedText(Kind):
     """A text of a certain shape; the ``example`` is told where something else stands in its place."""
 
     pattern: str
@@ -133,7 +133,7 @@ class Name(Kind):
 
 
 @dataclass(frozen=True)
-class Choice(Kind):
+class OneOf(Kind):
     """One of some words."""
 
     words: tuple[str, ...]
@@ -200,7 +200,7 @@ class Boolean(Kind):
 
 
 @dataclass(frozen=True)
-class Formula(Kind):
+class ExpressionText(Kind):
     """The text of an expression; parsed later. ``constant`` ones use no names."""
 
     constant: bool = False
@@ -233,7 +233,7 @@ class ListOf(Kind):
     expected = "a list"
 
     def read(self, node: Node, path: Path, reader: Reader) -> list[Any] | None:
-        if isinstance(node, MappingNode) and isinstance(self.item, Name):
+        if isinstance(node, MappingNode) and isinstance(self.item, ShapedText):
             self.mismatch(node, path, reader, _LISTS)
             # What uses the names is right.
             node = SequenceNode(node.location, [key for key, _ in node.entries.values()])
@@ -258,7 +258,7 @@ class ListOf(Kind):
 class MapOf(Kind):
     """A mapping from names of the user's to values of one kind; reads as name → (key, value)."""
 
-    key: Name
+    key: ShapedText
     value: Kind
     least: int = 0
     expected = "a mapping"
@@ -292,7 +292,7 @@ class MapOf(Kind):
 
 
 @dataclass(frozen=True)
-class Field:
+class RecordKey:
     """A key of a record."""
 
     key: str
@@ -312,7 +312,7 @@ class Record(Kind):
     """
 
     what: str
-    fields: tuple[Field, ...]
+    fields: tuple[RecordKey, ...]
     one: tuple[str, ...] = ()
     exactly: bool = False
     some: bool = False

@@ -11,9 +11,9 @@ from typing import Any
 
 from phigen.spec import limits
 from phigen.spec.declarations import Declarations, Raw
-from phigen.spec.grammar import Scope
+from phigen.spec.grammar import AllowedNames
 from phigen.spec.indices import Indices
-from phigen.spec.model import Lattice, LatticeRun, Values
+from phigen.spec.model import Lattice, LatticeRunSettings, Values
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.spectra import correlation_of, spectrum_of
 from phigen.spec.values import values
@@ -74,7 +74,7 @@ _ABSENT_IN_RUNS = {
 }
 
 
-def scope_of_numbers(declared: Declarations, observables: Iterable[str], fields: Iterable[str]) -> Scope:
+def scope_of_numbers(declared: Declarations, observables: Iterable[str], fields: Iterable[str]) -> AllowedNames:
     """The names of numbers of a whole lattice: for sections and stops of runs.
 
     They are ``observables`` that are reduced to one number, parameters with one value, and the time. ``fields`` are
@@ -91,7 +91,7 @@ def scope_of_numbers(declared: Declarations, observables: Iterable[str], fields:
     return replace(scope, names=names, refused={**scope.refused, **refused}, indices=indices)
 
 
-def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRun | None:
+def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRunSettings | None:
     """Read the sizes, bonds, initial state and array parameters of a run."""
     if declared.lattice is None:
         for key in ("sizes", "bonds", "spectrum", "correlation"):
@@ -102,7 +102,7 @@ def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRun | 
         if key in raw:
             _fail(name, key, f"{key} is not available for lattices", declared, hint)
     sizes = _sizes(name, raw, declared)
-    return LatticeRun(
+    return LatticeRunSettings(
         sizes,
         _state(name, raw.get("initial"), declared),
         _bonds(name, raw, declared),

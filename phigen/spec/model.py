@@ -247,7 +247,7 @@ class Run:
     stop: Expression | None = None  # it ends where this passes through 0
     record: tuple[str, ...] = ()  # columns of the output: state, energy, Casimirs, observables; all by default
     description: str = ""
-    lattice: LatticeRun | None = None
+    lattice: LatticeRunSettings | None = None
 
     @property
     def is_timed(self) -> bool:
@@ -280,7 +280,7 @@ class CorrelationChoice:
 
 
 @dataclass(frozen=True)
-class LatticeRun:
+class LatticeRunSettings:
     """Further settings of a run of a lattice.
 
     ``sizes`` are those of the axes; where there are none, the number of sites. ``state`` has initial values by field,
@@ -333,7 +333,7 @@ class Statistic:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweepSettings:
     """A run for many values: a grid of axes, or so many ``random`` members, or those in a ``file``.
 
     ``keep`` (`phigen.spec.names.KEPT`, and statistics of observables) says what is stored of each, and ``frames`` that
@@ -451,7 +451,7 @@ class Spec:
     reconstruct: str = ""  # quaternion, matrix: the attitude beside the state
     targets: tuple[str, ...] = DEFAULT
     runs: Mapping[str, Run] = field(default_factory=dict)
-    sweeps: Mapping[str, Sweep] = field(default_factory=dict)
+    sweeps: Mapping[str, SweepSettings] = field(default_factory=dict)
     lattice: Lattice | None = None
     title: str = ""
     description: str = ""

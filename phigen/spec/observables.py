@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from phigen.spec.declarations import Declarations
-from phigen.spec.grammar import Scope
+from phigen.spec.grammar import AllowedNames
 from phigen.spec.model import Reduction
 from phigen.spec.names import ADDITIVE, REDUCTIONS
 from phigen.spec.yaml_source import Scalar
@@ -43,7 +43,7 @@ def observables(
     return values, reductions
 
 
-def _scope(reduction: Reduction | None, declared: Declarations) -> Scope:
+def _scope(reduction: Reduction | None, declared: Declarations) -> AllowedNames:
     """Return the names that an observable may use."""
     of_bonds = reduction is not None and reduction.over != "sites"
     scope = declared.bond_scope(dated=True) if of_bonds else declared.dated_scope()

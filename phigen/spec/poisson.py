@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from phigen.spec.declarations import Declarations
-from phigen.spec.grammar import Scope
+from phigen.spec.grammar import AllowedNames
 from phigen.spec.model import (
     CanonicalForm,
     LieAlgebraForm,
@@ -102,7 +102,7 @@ def _fail(declared: Declarations, path: tuple[Any, ...], message: str, hint: str
 
 
 def _entries(
-    rows: Rows, path: tuple[Any, ...], declared: Declarations, scope: Scope, size: int
+    rows: Rows, path: tuple[Any, ...], declared: Declarations, scope: AllowedNames, size: int
 ) -> tuple[tuple[Expression, ...], ...] | None:
     """A size×size matrix of expressions; errors name the row."""
     what, before = ".".join(str(p) for p in path if isinstance(p, str)), len(declared.reader.problems.found)

@@ -9,7 +9,7 @@ from typing import Any
 
 from phigen.spec import limits
 from phigen.spec.declarations import Declarations
-from phigen.spec.grammar import Scope
+from phigen.spec.grammar import AllowedNames
 from phigen.spec.lattice import run_of_lattice
 from phigen.spec.model import AverageChoice, Run, Values
 from phigen.spec.problems import counted, did_you_mean, one_of, shown
@@ -25,7 +25,7 @@ NEAR_INTEGER = Fraction(1, 10**9)
 
 
 def run(
-    name: str, raw: Mapping[str, Any], declared: Declarations, recordable: Mapping[str, str], watched: Scope
+    name: str, raw: Mapping[str, Any], declared: Declarations, recordable: Mapping[str, str], watched: AllowedNames
 ) -> Run:
     """The run of that name. After errors, which are reported, some of its values are stand-ins.
 
@@ -142,7 +142,9 @@ def _average(raw: Mapping[str, Any] | None, declared: Declarations) -> AverageCh
     return AverageChoice(declared.number(raw.get("after"), declared.numbers()), raw.get("blocks"))
 
 
-def _crossed(name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: Scope) -> Expression | None:
+def _crossed(
+    name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: AllowedNames
+) -> Expression | None:
     """An expression whose zeros are looked for along the run, so that it has to change."""
     section = declared.formula(raw.get(key), scope)
     constant = {n for n, p in declared.parameters.items() if p.at == "all"}
@@ -244,7 +246,7 @@ def _initial(name: str, raw: Any, declared: Declarations) -> tuple[Fraction, ...
     return tuple(declared.number(node, scope) or Fraction(0) for node in raw)
 
 
-def _single(node: Any, scope: Scope, key: Scalar, declared: Declarations) -> Fraction | None:
+def _single(node: Any, scope: AllowedNames, key: Scalar, declared: Declarations) -> Fraction | None:
     """The number where an ordinary spec has one, and a lattice may have an array."""
     if node is None or isinstance(node, Scalar):
         return declared.number(node, scope)
@@ -291,7 +293,7 @@ def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declaratio
     hints = {c: (scope.refused[c][0], f"initial values are written x0_{c}") for c in declared.coordinates}
     # A coordinate t is no obstacle: an exact solution is about the time.
     refused = {n: why for n, why in {**scope.refused, **hints}.items() if n not in symbols}
-    scope = Scope(scope.names, refused, scope.open)
+    scope = AllowedNames(scope.names, refused, scope.open)
     values = {}
     for name, (key, node) in raw.items():
         expression = declared.formula(node, scope)

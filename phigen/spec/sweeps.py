@@ -9,7 +9,7 @@ from typing import Any
 from phigen.spec import limits
 from phigen.spec.declarations import Declarations
 from phigen.spec.kinds import Integer, Kind, Text
-from phigen.spec.model import Axis, Run, Statistic, Sweep
+from phigen.spec.model import Axis, Run, Statistic, SweepSettings
 from phigen.spec.names import KEPT, STATISTICS, SWEEP_NAMES
 from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.runs import whole, without_repetition
@@ -31,7 +31,7 @@ def sweep(
     observables: Collection[str] = (),
     *,
     monitored: bool,
-) -> Sweep:
+) -> SweepSettings:
     """The sweep of that name. After errors, which are reported, some of its values are stand-ins."""
     place = ("sweeps", name)
     run = raw["run"].text if raw.get("run") else next(iter(runs), "")
@@ -45,7 +45,7 @@ def sweep(
             words[key] = _WORDS[key].read(value, (key,), declared.reader)
         elif value is not None:
             axes += _axis(node, value, declared)
-    result = Sweep(
+    result = SweepSettings(
         name=name,
         run=run,
         over=tuple(axes),
@@ -81,7 +81,7 @@ def _kept(
     return without_repetition(words, (*place, "keep"), declared) if nodes is not None else ("final",)
 
 
-def end_of_its_own(sweep: Sweep, run: Run, *, monitored: bool) -> str:
+def end_of_its_own(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
     """Refusal of a run that does not end, for all members, with its last whole step; otherwise empty."""
     said = f"all members of a sweep make the same number of whole steps; the run {run.name} ends"
     if run.stop is not None:
@@ -153,7 +153,7 @@ def _draws(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
 
 
 def _expect_sense(
-    sweep: Sweep, run: Run | None, place: tuple[Any, ...], declared: Declarations, *, incomplete: bool
+    sweep: SweepSettings, run: Run | None, place: tuple[Any, ...], declared: Declarations, *, incomplete: bool
 ) -> None:
     grid = [axis for axis in sweep.over if axis.size]
     drawn = [axis for axis in sweep.over if not axis.size]

@@ -11,7 +11,7 @@ from phigen.registry import DEFAULT
 from phigen.spec import limits
 from phigen.spec.declarations import Declarations, declare
 from phigen.spec.fields import SPEC
-from phigen.spec.grammar import Scope
+from phigen.spec.grammar import AllowedNames
 from phigen.spec.kinds import Reader
 from phigen.spec.lattice import casimirs as read_casimirs
 from phigen.spec.lattice import densities, scope_of_numbers, with_kinds
@@ -223,7 +223,7 @@ def _name(node: Scalar | None, declared: Declarations) -> str:
 
 
 def _formulas(
-    raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations, scope: Scope | None = None
+    raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations, scope: AllowedNames | None = None
 ) -> dict[str, Expression]:
     scope = scope or declared.scope()
     values = {name: declared.formula(node, scope) for name, (_, node) in raw.items()}

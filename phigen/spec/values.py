@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from phigen.spec.kinds import Choice, Formula, Integer, Kind
+from phigen.spec.kinds import ExpressionText, Integer, Kind, OneOf
 from phigen.spec.model import Values
 from phigen.spec.problems import did_you_mean, shown
 from phigen.spec.yaml_source import Scalar
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 DISTRIBUTIONS = ("normal", "uniform", "sphere")
 FILES = (".npy", ".csv")
 _RANDOM: Mapping[str, Kind] = {
-    "random": Choice(DISTRIBUTIONS),
+    "random": OneOf(DISTRIBUTIONS),
     "seed": Integer(0, 10**9 - 1),
-    "scale": Formula(constant=True),
-    "mean": Formula(),
+    "scale": ExpressionText(constant=True),
+    "mean": ExpressionText(),
 }
 RANDOM_KEYS = tuple(_RANDOM)
 _WHOLE_SPHERE = "initial: {random: sphere}"

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from phigen.geometry.system import System
 from phigen.splitting.flow import Flow, NoFlowError, Term, flow_of
-from phigen.splitting.parts import Splitting
+from phigen.splitting.parts import SplitHamiltonian
 from phigen.splitting.ring import KICK, Ring, ring_of
 from phigen.splitting.terms import hamiltonian_terms
 from phigen.symbolic.expression import symbol
@@ -36,7 +36,7 @@ class Kick:
     modified: Flow | None
 
 
-def kicks(system: System, splitting: Splitting) -> tuple[Kick, ...]:
+def kicks(system: System, splitting: SplitHamiltonian) -> tuple[Kick, ...]:
     """Return the parts that can be V, proved; none unless there are two parts."""
     if len(splitting.flows) != 2:
         return ()

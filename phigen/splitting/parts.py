@@ -24,7 +24,7 @@ MAX_COMPANIONS = 3
 
 
 @dataclass(frozen=True)
-class Splitting:
+class SplitHamiltonian:
     """The flows of the parts of H, in the order of a step.
 
     ``kick`` is the index of the part V if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`); then a
@@ -37,7 +37,7 @@ class Splitting:
     small: int | None = None
 
 
-def split(system: System, *, motions: bool = True) -> Splitting:
+def split(system: System, *, motions: bool = True) -> SplitHamiltonian:
     """Return H as a sum of parts with elementary flows: as few as possible, among these with the most invariants.
 
     Kepler motions are single terms if ``motions``. A near-integrable H is split in its two parts. Raises `SpecError`,
@@ -49,7 +49,7 @@ def split(system: System, *, motions: bool = True) -> Splitting:
     terms = terms_of(ring, listed) or [Term(system.hamiltonian, ring.tower.convert(system.hamiltonian))]
     invariants = _invariants(system, ring)
     refused: NoFlowError | None = None
-    best: Splitting | None = None
+    best: SplitHamiltonian | None = None
     least: tuple[float, ...] = (inf, inf, inf)
     conflicts = Conflicts(ring)
     for candidate in _candidates(system, conflicts, terms, motions=motions):
@@ -61,14 +61,14 @@ def split(system: System, *, motions: bool = True) -> Splitting:
         if rank >= least:
             continue
         try:
-            best, least = Splitting(tuple(flow_of(ring, part) for part in parts), small=small), rank
+            best, least = SplitHamiltonian(tuple(flow_of(ring, part) for part in parts), small=small), rank
         except NoFlowError as error:
             refused = refused or error
         if best and best.small is not None:
             break  # two parts, one of them small: no other grouping is better
     if best is None:
         raise _refusal(system, refused)
-    return best if best.small is not None else Splitting(tuple(_whole(ring, _merged(ring, list(best.flows)))))
+    return best if best.small is not None else SplitHamiltonian(tuple(_whole(ring, _merged(ring, list(best.flows)))))
 
 
 def _invariants(system: System, ring: Ring) -> list[Poly]:

@@ -12,7 +12,7 @@ from dataclasses import replace
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.splitting.flow import Flow, composed
 from phigen.splitting.kepler import KeplerMotion, identities
-from phigen.splitting.parts import Splitting
+from phigen.splitting.parts import SplitHamiltonian
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.expression import (
     ONE,
@@ -31,7 +31,7 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.verdict import Statement, decide_zero
 
 
-def check(system: System, splitting: Splitting, noise: Sequence[tuple[str, Flow]] = ()) -> Iterator[Statement]:
+def check(system: System, splitting: SplitHamiltonian, noise: Sequence[tuple[str, Flow]] = ()) -> Iterator[Statement]:
     """Yield the statements, those on flows in the order of the parts; H includes the gauge.
 
     ``noise`` are flows of sources by their names.
@@ -57,7 +57,7 @@ def check(system: System, splitting: Splitting, noise: Sequence[tuple[str, Flow]
             yield decide_zero(f"{{{name}, ∂{name}/∂{time}}} = 0", [("", rate)], system.positive)
 
 
-def _exponential_statements(system: System, splitting: Splitting) -> Iterator[Statement]:
+def _exponential_statements(system: System, splitting: SplitHamiltonian) -> Iterator[Statement]:
     """Yield the comparison of matrix exponentials with enclosures of the exact values."""
     values = {p.name: float(p.value) for p in system.parameters}
     for k, flow in enumerate(splitting.flows, 1):
@@ -80,7 +80,7 @@ def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> St
     return decide_zero("πζ + f = " + " + ".join(name for name, _ in parts), residuals, system.positive)
 
 
-def _kick_statements(system: System, splitting: Splitting, plain: Sequence[Expression]) -> Iterator[Statement]:
+def _kick_statements(system: System, splitting: SplitHamiltonian, plain: Sequence[Expression]) -> Iterator[Statement]:
     """Yield {V, {V, {V, T}}} = 0, and that {V, {V, T}} is the factor of κ."""
     assert splitting.kick is not None
     v, t = plain[splitting.kick], plain[1 - splitting.kick]

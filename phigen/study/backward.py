@@ -35,7 +35,7 @@ class NotOfferedError(ValueError):
 
 
 @dataclass(frozen=True)
-class Modified:
+class ModifiedHamiltonian:
     """The terms of H̃ = Σ h^j terms[j], with values of all symbols but coordinates.
 
     With m corrections these are the first powers[m] terms. ``hamiltonian`` is H, whose unit errors are in.
@@ -68,7 +68,7 @@ class Modified:
         return changes
 
 
-def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: Floats | None) -> Modified:
+def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: Floats | None) -> ModifiedHamiltonian:
     """The modified Hamiltonian of a method with `CORRECTIONS` corrections. Raises `NotOfferedError`."""
     system, order = compilation.system, compilation.order
     if compilation.is_composed:
@@ -99,7 +99,7 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
     values = dict(parameters)
     if gauge is not None and compilation.gauge is not None:
         values |= dict(zip(compilation.gauge.symbols, np.ravel(gauge).tolist(), strict=True))
-    return Modified(
+    return ModifiedHamiltonian(
         tuple(map(series.tower.expression, series.terms)),
         tuple(powers(order, CORRECTIONS + 1, symmetric=compilation.symmetric)),
         system.hamiltonian,
@@ -108,7 +108,7 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
     )
 
 
-def observed_powers(hamiltonian: Modified, method: Method, x: Floats, h: float) -> list[float]:
+def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> list[float]:
     """The powers of the step that the changes of H̃ with 0, 1, … corrections shrink like; infinity at rounding.
 
     Steps are doubled from the run's step ``h`` until the changes stand out from rounding.
@@ -149,7 +149,7 @@ class Constancy:
     changes: Floats
 
 
-def constancy(hamiltonian: Modified, method: Method, x: Floats, h: float) -> Constancy:
+def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> Constancy:
     """Measure the changes of H̃ at the largest steps that show an order, which may be larger than the run's.
 
     Raises `StepError`, and `NotOfferedError` if H itself changes by rounding only.

@@ -27,7 +27,7 @@ ROUNDING, SMALL = 2.0**-52, 1e-6
 
 
 @dataclass(frozen=True)
-class Point:
+class PrecisionPoint:
     """Errors at the end, relative: of the solution and of the Casimirs; and the seconds of the fastest repetition."""
 
     step: float
@@ -38,12 +38,12 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Curve:
+class PrecisionCurve:
     """All points of one method, from the largest step; ``slope`` is the observed order, NaN if none can be told."""
 
     label: str
     order: int
-    points: tuple[Point, ...]
+    points: tuple[PrecisionPoint, ...]
     slope: float
 
     def seconds_for(self, tolerance: float) -> float:
@@ -67,7 +67,7 @@ class Study:
     set_up: float
     language: str
     rounds: int
-    curves: tuple[Curve, ...]
+    curves: tuple[PrecisionCurve, ...]
     clock: str = "t"
 
     @property
@@ -105,10 +105,10 @@ def study(
     curves = []
     for label, of_steps in states.items():
         points = tuple(
-            Point(h * span / n, n, errors[label][n], casimirs(x) if casimirs else math.nan, seconds[label, n])
+            PrecisionPoint(h * span / n, n, errors[label][n], casimirs(x) if casimirs else math.nan, seconds[label, n])
             for n, x in of_steps.items()
         )
-        curves.append(Curve(label, orders[label], points, slopes[label]))
+        curves.append(PrecisionCurve(label, orders[label], points, slopes[label]))
     reference = "the closed form" if solution else "DOP853 at small steps"
     return Study(h * span, span, floor, reference, seconds["", 0], race.language, rounds, tuple(curves), race.clock)
 

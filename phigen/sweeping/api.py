@@ -19,7 +19,7 @@ from phigen.api import _spec_of
 from phigen.geometry.system import System
 from phigen.runtime import arguments
 from phigen.spec import limits
-from phigen.spec.model import Axis, Run, Spec, Statistic, Sweep
+from phigen.spec.model import Axis, Run, Spec, Statistic, SweepSettings
 from phigen.spec.names import KEPT, STATISTICS, SWEEP_NAMES
 from phigen.spec.runs import with_step
 from phigen.spec.sweeps import end_of_its_own
@@ -63,7 +63,7 @@ def sweep(
     dask, distributed, xarray or zarr, ``phigen.errors.FileError`` and `PhigenError`.
     """
     from phigen.sweeping.store import imported
-    from phigen.sweeping.sweep import Setting, made
+    from phigen.sweeping.sweep import SweepSetting, made
 
     xarray = imported("xarray")
     spec = _spec(source)
@@ -71,7 +71,7 @@ def sweep(
     chosen = _sweep_of(spec, name, base, over, keep, frames)
 
     def make(path: Path) -> None:
-        setting = Setting(path, scheduler, workers, target, order, scheme, profile)
+        setting = SweepSetting(path, scheduler, workers, target, order, scheme, profile)
         made(spec, chosen, base, setting, lambda members: None, progress or (lambda members, failed: None))
 
     if output is not None:
@@ -144,13 +144,13 @@ def _sweep_of(
     over: Mapping[str, Any] | None,
     keep: Sequence[str] | None,
     frames: int | None,
-) -> Sweep:
+) -> SweepSettings:
     if name is not None and name not in spec.sweeps:
         raise ValueError(f"there is no sweep {name!r}; the spec has {', '.join(spec.sweeps) or 'none'}")
     sweep = spec.sweeps[name] if name else next(iter(spec.sweeps.values()), None)
     if sweep is None and over is None:
         raise TypeError("the spec has no sweeps: over is needed")
-    sweep = sweep or Sweep("sweep", run.name)
+    sweep = sweep or SweepSettings("sweep", run.name)
     changes: dict[str, Any] = {"run": run.name}
     if over is not None:
         words = _words(over, spec)

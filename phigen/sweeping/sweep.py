@@ -21,7 +21,7 @@ from phigen.reading import opened_text
 from phigen.runtime.interface import BackendError, Draws, Floats
 from phigen.runtime.members import Members
 from phigen.runtime.memory import expect_room
-from phigen.spec.model import Run, Spec, Sweep
+from phigen.spec.model import Run, Spec, SweepSettings
 from phigen.spec.names import KEPT
 from phigen.spec.problems import did_you_mean
 from phigen.study.conservation import LARGE_ENERGY_ERROR
@@ -40,7 +40,7 @@ _LEAST, _MOST = 32, 1 << 17
 
 
 @dataclass(frozen=True)
-class Setting:
+class SweepSetting:
     """Setting of a computation: the store, the workers, the solver."""
 
     output: Path
@@ -65,7 +65,12 @@ class Outcome:
 
 
 def made(
-    spec: Spec, sweep: Sweep, run: Run, setting: Setting, started: Callable[[int], None], tell: cluster.Tell
+    spec: Spec,
+    sweep: SweepSettings,
+    run: Run,
+    setting: SweepSetting,
+    started: Callable[[int], None],
+    tell: cluster.Tell,
 ) -> Outcome:
     """Make what the store lacks of a sweep; ``started`` is told how many members that is.
 
@@ -109,7 +114,7 @@ def made(
     return Outcome(int(counts[0]), int(counts[1]), plan.size, dims, compilation.order.order, energy)
 
 
-def _expect_names(varied: Iterable[str], spec: Spec, sweep: Sweep) -> None:
+def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> None:
     """`SpecError` for a name under which the store has something else."""
     for name in varied:
         if name in (*store.OWN, *KEPT, *sweep.keep):
@@ -122,7 +127,7 @@ def _with_ensembles(spec: Spec) -> Spec:
     return replace(spec, extras=replace(spec.extras, without=spec.extras.without - {"ensemble", "members"}))
 
 
-def _expect_room_for_axes(sweep: Sweep, spec: Spec) -> None:
+def _expect_room_for_axes(sweep: SweepSettings, spec: Spec) -> None:
     """`LimitError` where the values along a dimension do not fit into memory; they are made with one copy."""
     for axis in sweep.over:
         place = spec.diagnostic(("sweeps", sweep.name, "over", axis.name), "").location
@@ -133,7 +138,7 @@ def _members_of(plan: Plan, number: int) -> int:
     return int(np.prod([part.stop - part.start for part in plan.region(number)]))
 
 
-def _plan(spec: Spec, sweep: Sweep, run: Run, columns: Mapping[str, int], target: str) -> Plan:
+def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int], target: str) -> Plan:
     """The sweep in numbers, without chunks."""
     return Plan(
         name=sweep.name,
@@ -219,7 +224,7 @@ def _seconds_of_a_member(job: store.Job) -> float:
     return seconds * (1 + counted) + ("lyapunov" in plan.keep) * _TANGENT * plan.steps
 
 
-def _listed(sweep: Sweep, spec: Spec) -> dict[str, Floats]:
+def _listed(sweep: SweepSettings, spec: Spec) -> dict[str, Floats]:
     """The columns of a file of members, by their names. Raises `SpecError`, at the place of the file in the spec."""
     path = Path(spec.file).parent / sweep.file
 

@@ -32,7 +32,7 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 
 
-class Ring(Protocol):
+class RingOperations(Protocol):
     """Operations of a ring of coefficients besides + and −."""
 
     @property
@@ -119,7 +119,7 @@ class Taylor:
     Polynomials that become too large, one of them or all together, raise `OverflowError`.
     """
 
-    def __init__(self, roots: Sequence[Expression], ring: Ring, variable_symbols: Sequence[str]) -> None:
+    def __init__(self, roots: Sequence[Expression], ring: RingOperations, variable_symbols: Sequence[str]) -> None:
         self.ring = ring
         self.order = closure(roots)
         self.moving = set(variable_symbols)

@@ -14,7 +14,7 @@ from phigen.targets.names import Scope
 
 
 @dataclass(frozen=True)
-class Store:
+class StoreStatement:
     """The statement ``array[index] = value``."""
 
     array: str
@@ -27,7 +27,7 @@ class Code:
     """A lowered kernel: assignments in order, then stores of its outputs; ``used`` are the input symbols it reads."""
 
     assignments: tuple[Assignment, ...]
-    stores: tuple[Store, ...]
+    stores: tuple[StoreStatement, ...]
     used: frozenset[str]
     cleared: tuple[tuple[str, int], ...] = ()  # arrays that are set to zero before, with their sizes
 
@@ -46,7 +46,7 @@ def lower(kernel: Kernel) -> Code:
     names = {id(e): name for (name, _), e in zip(kernel.named, expanded[len(roots) :], strict=True) if e.args}
     assignments, trees = assign(expanded[: len(roots)], names)
     places = [(o.name, i) for o in kernel.outputs for i in range(len(o.values))]
-    stores = tuple(Store(a, i, t) for (a, i), t in zip(places, trees, strict=True))
+    stores = tuple(StoreStatement(a, i, t) for (a, i), t in zip(places, trees, strict=True))
     nodes = topological(expanded[: len(roots)])
     return Code(tuple(assignments), stores, frozenset(e.value for e in nodes if e.op == "symbol"))
 
@@ -100,10 +100,10 @@ def parts(code: Code, size: int) -> list[Code]:
     if len(code.assignments) + len(code.stores) <= size:
         return [code]
     position = {a.target: k for k, a in enumerate(code.assignments)}
-    ready: dict[int, list[Store]] = {}
+    ready: dict[int, list[StoreStatement]] = {}
     for s in code.stores:
         ready.setdefault(max((position.get(n, 0) for n in _reads([s.value])), default=0), []).append(s)
-    statements: list[Assignment | Store] = [] if code.assignments else list(code.stores)
+    statements: list[Assignment | StoreStatement] = [] if code.assignments else list(code.stores)
     for k, a in enumerate(code.assignments):
         statements += [a, *ready.get(k, [])]
     chunks = [statements[i : i + size] for i in range(0, len(statements), size)]
@@ -120,7 +120,7 @@ def _reads(values: Sequence[Expression]) -> list[str]:
     return [e.value for e in topological(values) if e.op == "symbol"]
 
 
-def _renamed(chunk: Sequence[Assignment | Store], names: dict[str, str]) -> Code:
+def _renamed(chunk: Sequence[Assignment | StoreStatement], names: dict[str, str]) -> Code:
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if e.op == "symbol":
             return symbol(names.get(e.value, e.value))
@@ -132,5 +132,5 @@ def _renamed(chunk: Sequence[Assignment | Store], names: dict[str, str]) -> Code
         if isinstance(s, Assignment):
             assignments.append(Assignment(names.get(s.target, s.target), v))
         else:
-            stores.append(Store(s.array, s.index, v))
+            stores.append(StoreStatement(s.array, s.index, v))
     return Code(tuple(assignments), tuple(stores), frozenset(_reads(values)))

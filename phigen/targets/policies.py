@@ -24,7 +24,7 @@ def policies_of(program: Program) -> dict[str, Policy]:
 
 
 @dataclass(frozen=True)
-class Spelling:
+class PolicySpelling:
     """Spelling of constants in a language: powers of two with a negative exponent, and all constants of a policy."""
 
     power: str
@@ -64,6 +64,6 @@ def _python(constants: list[tuple[PolicyConstant, str]]) -> str:
     return "\n".join(f"{c.name} = {value}  # {c.about}" for c, value in constants)
 
 
-C = Spelling("0x1p{}", _c)
-JAVASCRIPT = Spelling("2 ** {}", _js)
-PYTHON = Spelling("2.0**{}", _python)
+C = PolicySpelling("0x1p{}", _c)
+JAVASCRIPT = PolicySpelling("2 ** {}", _js)
+PYTHON = PolicySpelling("2.0**{}", _python)

@@ -19,7 +19,7 @@ from phigen.study.methods import Method as Step
 from phigen.study.methods import of_classical, of_solver
 from phigen.symbolic.arrays import Floats
 from phigen.tuning.building import Built, Outcome, build_all, built
-from phigen.tuning.problem import Classical, Method, Problem, steps_in
+from phigen.tuning.problem import Classical, CompiledMethod, Problem, steps_in
 from phigen.tuning.references import orbit_error
 from phigen.tuning.settings import Setting, own_setting
 from phigen.tuning.timing import nanoseconds_per_step
@@ -38,7 +38,7 @@ Notify = Callable[[str], object]
 
 
 @dataclass(frozen=True)
-class Entry:
+class ComparedMethod:
     """One method of a comparison; ``refusal`` says why there are no numbers, "" if there are.
 
     ``error`` of the energy and ``casimirs`` are the largest on the way, ``orbit`` is the distance from the solution at
@@ -69,7 +69,7 @@ class Entry:
 class Comparison:
     """All methods on one run; ``equal`` is ``step`` or ``work``, ``unit`` the kind of unit of energy errors."""
 
-    entries: tuple[Entry, ...]
+    entries: tuple[ComparedMethod, ...]
     horizon: float
     equal: str
     unit: str
@@ -82,7 +82,7 @@ class _Candidate:
 
     title: str
     order: int
-    method: Method
+    method: CompiledMethod
     step: Step | None = None
     poisson: bool = False
     own: bool = False
@@ -108,7 +108,7 @@ def compare(
     candidates = [_of_build(current_build, problem, is_current=True)]
     settings = [s for s in dict.fromkeys(_settings(problem, current, orders)) if s != current]
     note(f"building {len(settings)} more")
-    refused: list[Entry] = []
+    refused: list[ComparedMethod] = []
     fingerprints = {current_build.fingerprint}
     outcomes: dict[Setting, Outcome] = dict(
         build_all(compilation.spec, compilation.known_system, settings, start + BUILDING * budget)
@@ -117,7 +117,9 @@ def compare(
         outcome = outcomes[setting]
         if not isinstance(outcome, Built):
             refused += (
-                [] if outcome.inapplicable else [Entry(setting.described(), setting.order, refusal=outcome.reason)]
+                []
+                if outcome.inapplicable
+                else [ComparedMethod(setting.described(), setting.order, refusal=outcome.reason)]
             )
         elif outcome.fingerprint not in fingerprints:
             fingerprints.add(outcome.fingerprint)
@@ -157,9 +159,11 @@ def _of_build(build: Built, problem: Problem, *, is_current: bool = False) -> _C
     return _Candidate(title, build.order, problem.method(backend), step, build.exact, is_current)
 
 
-def _measured(candidate: _Candidate, problem: Problem, h: float, exact: Method | None, seconds: float) -> Entry:
+def _measured(
+    candidate: _Candidate, problem: Problem, h: float, exact: CompiledMethod | None, seconds: float
+) -> ComparedMethod:
     """Measure a method at a step over the whole run."""
-    unmeasured = Entry(candidate.title, candidate.order, poisson=candidate.poisson, own=candidate.own)
+    unmeasured = ComparedMethod(candidate.title, candidate.order, poisson=candidate.poisson, own=candidate.own)
     if not math.isfinite(h):
         return replace(unmeasured, refusal="a step cannot be made")
     steps = steps_in(problem.horizon, h)

@@ -149,7 +149,7 @@ class SystemProblem(Problem):
             return None
 
 
-class Method(Protocol):
+class CompiledMethod(Protocol):
     """A compiled method, started from the problem's initial state."""
 
     def rows(self, h: float, steps: int, stride: int) -> Floats | None:

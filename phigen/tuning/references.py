@@ -10,7 +10,7 @@ import numpy as np
 
 from phigen.errors import CheckError
 from phigen.symbolic.arrays import Floats
-from phigen.tuning.problem import Method
+from phigen.tuning.problem import CompiledMethod
 from phigen.tuning.trials import MARKS
 
 #: Steps are halved until that changes no more than this part of the accuracy.
@@ -29,7 +29,7 @@ class Reference:
     ``uncertainty`` is the distance of the other method, relative to the largest coordinate.
     """
 
-    method: Method
+    method: CompiledMethod
     step: float
     uncertainty: float
     clock: str = "t"
@@ -47,7 +47,13 @@ class Reference:
 
 
 def agreed(
-    first: Method, second: Method, step: float, span: float, accuracy: float, seconds: float, clock: str = "t"
+    first: CompiledMethod,
+    second: CompiledMethod,
+    step: float,
+    span: float,
+    accuracy: float,
+    seconds: float,
+    clock: str = "t",
 ) -> Reference:
     """The reference over a time span by the first method, confirmed by the second.
 
@@ -75,7 +81,7 @@ def agreed(
     return Reference(first, h, difference, clock)
 
 
-def orbit_error(states: Floats, spacing: float, other: Method, step: float, seconds: float) -> float | None:
+def orbit_error(states: Floats, spacing: float, other: CompiledMethod, step: float, seconds: float) -> float | None:
     """The distance of states (rows, DIM) at multiples of a spacing from those of another method at small steps.
 
     Relative to the largest coordinate; None if the other method does not know the orbit that well in so many seconds.
@@ -94,7 +100,7 @@ def distance(states: Floats, others: Floats) -> float:
 
 
 def _converged(
-    method: Method, step: float, spacing: float, count: int, accuracy: float, until: float
+    method: CompiledMethod, step: float, spacing: float, count: int, accuracy: float, until: float
 ) -> tuple[Floats, float, float] | None:
     """States at a step where halving it changes nothing that counts, or no less than before; the step; that change."""
     last: Floats | None = None

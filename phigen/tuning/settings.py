@@ -11,7 +11,7 @@ from phigen.geometry.system import System
 from phigen.scheme import choosing
 from phigen.scheme.composition import COMPOSITIONS
 from phigen.spec import limits
-from phigen.spec.grammar import Scope, parse
+from phigen.spec.grammar import AllowedNames, parse
 from phigen.spec.model import BirealisationChoice, Spec
 from phigen.spec.names import BIREALISATIONS, LOGARITHMIC
 from phigen.splitting.parts import split as split_in_parts
@@ -125,7 +125,7 @@ def monitor_of(written: str, spec: Spec) -> str | Expression:
     if written == LOGARITHMIC:
         return LOGARITHMIC
     names = (*spec.coordinates, *(p.name for p in spec.parameters))
-    expression = parse(written, Scope({n: symbol(n) for n in names}), lambda *_, **__: None)
+    expression = parse(written, AllowedNames({n: symbol(n) for n in names}), lambda *_, **__: None)
     if expression is None:
         raise ValueError(f"{written!r} is no monitor")
     return expression

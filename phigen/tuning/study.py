@@ -17,7 +17,7 @@ from phigen.tuning.search import Curve
 from phigen.tuning.settings import Setting
 from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import Point
-from phigen.tuning.tuner import Clock, Notify, Tuner
+from phigen.tuning.tuner import Notify, TimeBudget, Tuner
 
 #: The share of the budget that one confirming run may take, how many times as much if it must, the attempts at a step.
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
@@ -98,7 +98,7 @@ def tune(
     reference. Takes about ``budget`` seconds at most. Raises `StepError` if the spec's own setting cannot make even
     small steps, `CheckError` if there is no reference, `ToolchainError` without a C compiler.
     """
-    clock = Clock(budget)
+    clock = TimeBudget(budget)
     tuner = Tuner(compilation, problem, accuracy, clock, note)
     current = tuner.start(measure)
     finished = tuner.search(current)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 
 from phigen.runtime.interface import BackendError
-from phigen.tuning.problem import Method
+from phigen.tuning.problem import CompiledMethod
 
 #: The least duration of a measurement of time, in seconds.
 LEAST_SECONDS = 2e-3
@@ -15,7 +15,7 @@ LEAST_SECONDS = 2e-3
 FEW_STEPS, PART_STEPS, TIMED_STEPS = 64, 4096, 32_768
 
 
-def nanoseconds_per_step(method: Method, h: float, steps: int) -> float:
+def nanoseconds_per_step(method: CompiledMethod, h: float, steps: int) -> float:
     """CPU time on this thread of one of the steps of a run, the fastest of some; NaN if they cannot be made.
 
     Without what is done once, such as choosing a gauge, and without the call from Python.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from phigen.symbolic.arrays import Floats
-from phigen.tuning.problem import Method, Problem, steps_in
+from phigen.tuning.problem import CompiledMethod, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
 #: Times at which an orbit is compared.
@@ -47,7 +47,7 @@ class Point:
 Solution = Callable[[float, int], Floats]
 
 #: Measures a method at a step over a time; None if a step cannot be made.
-Measure = Callable[[Method, float, float], Point | None]
+Measure = Callable[[CompiledMethod, float, float], Point | None]
 
 
 def marks(span: float, h: float) -> tuple[int, int]:
@@ -64,7 +64,7 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
     """
     unit = problem.unit
 
-    def measure(method: Method, h: float, span: float) -> Point | None:
+    def measure(method: CompiledMethod, h: float, span: float) -> Point | None:
         steps = steps_in(span, h)
         stride = max(1, steps // problem.most_rows)
         states = method.rows(h, steps, stride)
@@ -95,7 +95,7 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
     ``bounded``, unless it was seen to grow faster, as rounding does; that of others at least linearly.
     """
 
-    def measure(method: Method, h: float, span: float) -> Point | None:
+    def measure(method: CompiledMethod, h: float, span: float) -> Point | None:
         stride, count = marks(span, h)
         states = method.rows(h, stride * count, stride)
         if states is None:

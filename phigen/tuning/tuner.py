@@ -12,7 +12,7 @@ from phigen.errors import CheckError, StepError
 from phigen.study import race
 from phigen.tuning import search
 from phigen.tuning.building import Built, Outcome, Refusal, build_all, built
-from phigen.tuning.problem import Candidate, Classical, Method, Problem, steps_in
+from phigen.tuning.problem import Candidate, Classical, CompiledMethod, Problem, steps_in
 from phigen.tuning.references import Reference, agreed, orbit_error
 from phigen.tuning.scales import scales
 from phigen.tuning.search import Curve
@@ -30,7 +30,7 @@ PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
 Notify = Callable[[str], object]
 
 
-class Clock:
+class TimeBudget:
     """The budget of time."""
 
     def __init__(self, budget: float) -> None:
@@ -57,14 +57,14 @@ class Tuner:
         compilation: Compilation,
         problem: Problem,
         accuracy: float,
-        clock: Clock,
+        clock: TimeBudget,
         note: Notify = lambda text: None,
     ) -> None:
         self.compilation, self.problem, self.accuracy = compilation, problem, accuracy
         self.clock, self.note = clock, note
         self.tried: dict[Setting, Curve] = {}
         self.refused: dict[Setting, str] = {}
-        self.methods: dict[Setting | str, Method] = {}
+        self.methods: dict[Setting | str, CompiledMethod] = {}
         self.measures: Mapping[bool, Measure] = {
             is_bounded: energy_measure(problem, bounded=is_bounded) for is_bounded in (True, False)
         }
@@ -103,7 +103,7 @@ class Tuner:
             proposed = search.proposals(self.tried, list(self.refused), self.accuracy)
         return not proposed
 
-    def add(self, build: Built, method: Method, worth: float) -> Curve:
+    def add(self, build: Built, method: CompiledMethod, worth: float) -> Curve:
         """Scan a candidate."""
         setting = build.setting
         self._known[build.fingerprint] = setting
@@ -177,7 +177,7 @@ class Tuner:
                 affordable.append(setting)
         return affordable
 
-    def _scanned(self, method: Method, order: int, worth: float, *, bounded: bool) -> tuple[Point, ...]:
+    def _scanned(self, method: CompiledMethod, order: int, worth: float, *, bounded: bool) -> tuple[Point, ...]:
         until = time.perf_counter() + min(SCANNING * self.clock.budget, max(self.clock.left(0.9), 0.0))
         measure, piece = self.measures[bounded], self.piece
         return search.scan(
@@ -215,7 +215,7 @@ class Tuner:
         if self.piece < 0.99 * problem.horizon:
             _expect_linear(self.measures[True], method, problem, self.piece)
 
-    def _reference(self, method: Method) -> Reference:
+    def _reference(self, method: CompiledMethod) -> Reference:
         """The reference over the piece, which becomes shorter where rounding or chaos do not allow so much."""
         problem, other, seconds = self.problem, self._classical("dop853"), REFERRING * self.clock.budget
         step, clock = problem.step, problem.clock
@@ -243,7 +243,7 @@ def _unreachable(method: Candidate, problem: Problem) -> StepError:
     )  # fmt: skip
 
 
-def _expect_linear(measure: Measure, method: Method, problem: Problem, piece: float) -> None:
+def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, piece: float) -> None:
     """Raise CheckError if the error of the orbit grows too fast to say anything about a longer run."""
     h, clock = problem.step, problem.clock
     for _ in range(12):

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from phigen.spec.grammar import Scope, constant, parse
+from phigen.spec.grammar import AllowedNames, constant, parse
 from phigen.spec.names import SPEC_FUNCTIONS
 from phigen.symbolic.expression import (
     EULER,
@@ -31,11 +31,11 @@ from phigen.symbolic.expression import (
 )
 
 NAMES = ("x", "y", "lambda")
-SCOPE = Scope({name: symbol(name) for name in NAMES})
+SCOPE = AllowedNames({name: symbol(name) for name in NAMES})
 X, Y = symbol("x"), symbol("y")
 
 
-def parsed(source: str, scope: Scope = SCOPE) -> Expression:
+def parsed(source: str, scope: AllowedNames = SCOPE) -> Expression:
     errors: list[str] = []
     result = parse(source, scope, lambda message, index, hint="", *, limit=False: errors.append(message))
     assert not errors, errors
@@ -75,7 +75,7 @@ def test_expression_means(source: str, expected: Expression) -> None:
 
 
 def test_declared_names_win_over_constants() -> None:
-    scope = Scope({"pi": symbol("pi"), "E": symbol("E")})
+    scope = AllowedNames({"pi": symbol("pi"), "E": symbol("E")})
     assert parsed("pi*E", scope) is mul(symbol("pi"), symbol("E"))
 
 

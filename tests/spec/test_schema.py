@@ -12,7 +12,7 @@ from spec.text_pairs import cases, complete
 from phigen.errors import SpecError
 from phigen.spec import loads, schema, starter
 from phigen.spec.fields import SPEC
-from phigen.spec.kinds import Either, Field, Kind, ListOf, MapOf, Record
+from phigen.spec.kinds import Either, Kind, ListOf, MapOf, Record, RecordKey
 from phigen.spec.names import MEANT
 
 
@@ -69,7 +69,7 @@ def test_what_the_schema_refuses_the_validator_refuses(fragment: str) -> None:
         loads(text)
 
 
-def fields_below(kind: Kind) -> list[Field]:
+def fields_below(kind: Kind) -> list[RecordKey]:
     """Every field of the table."""
     match kind:
         case Record():

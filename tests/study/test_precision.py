@@ -8,7 +8,7 @@ from support import compiled, solver
 
 from phigen.drawing import figures
 from phigen.study import classical, precision, race
-from phigen.study.precision import Curve, Point, Study
+from phigen.study.precision import PrecisionCurve, PrecisionPoint, Study
 
 START, PARAMETERS = np.array([1.0, 0.5, 0.8]), {"I1": 2.0, "I2": 1.0, "I3": 0.7}
 
@@ -116,8 +116,11 @@ def test_time_is_that_of_the_fastest_repetition(monkeypatch):
 
 def study(casimirs=1e-16):
     curves = [
-        Curve(
-            label, order, tuple(Point(h, round(1 / h), h**order, casimirs, 1e-6 / h) for h in (0.1, 0.05, 0.025)), order
+        PrecisionCurve(
+            label,
+            order,
+            tuple(PrecisionPoint(h, round(1 / h), h**order, casimirs, 1e-6 / h) for h in (0.1, 0.05, 0.025)),
+            order,
         )
         for label, order in (("phigen", 4), ("rk4", 4), ("dop853", 8))
     ]

@@ -16,7 +16,7 @@ import phigen
 from phigen import spec as specs
 from phigen.api import compilation_of
 from phigen.errors import FileError, SpecError
-from phigen.spec.model import Axis, Sweep
+from phigen.spec.model import Axis, SweepSettings
 from phigen.spec.sweeps import end_of_its_own
 from phigen.study.lyapunov import spectrum
 from phigen.sweeping import api, store
@@ -322,7 +322,7 @@ def test_a_scheduler_that_goes_away_is_told(spec, tmp_path, small_chunks, monkey
 def test_another_step_leaves_a_run_as_long_as_it_is_in_time(end, steps):
     run = api._run_of(specs.loads(BODY.replace("steps: 60", end)), None, None, None, 0.05, None, None)
     assert run.steps == steps
-    assert end_of_its_own(Sweep("s", run.name), run, monitored=False) == ""
+    assert end_of_its_own(SweepSettings("s", run.name), run, monitored=False) == ""
 
 
 def test_a_step_that_does_not_divide_a_duration_is_refused(spec):

@@ -14,7 +14,7 @@ from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import Expression, topological
 from phigen.symbolic.symbols import TEMPORARY, WORK, Symbol, kind_of
 from phigen.targets.c.layout import comment
-from phigen.targets.code import Code, Store, bound, lower, parts, with_zeros_first
+from phigen.targets.code import Code, StoreStatement, bound, lower, parts, with_zeros_first
 from phigen.targets.header import plain, sentence
 from phigen.targets.language import Language
 from phigen.targets.names import Scope, identifiers
@@ -275,7 +275,7 @@ def _bound(program: Program, kernel: Kernel, form: Form, code: Code, scope: Scop
 
 
 def _statements(
-    kernel: Kernel, form: Form, code: Code, stores: Sequence[Store], scope: Scope, show: Printer
+    kernel: Kernel, form: Form, code: Code, stores: Sequence[StoreStatement], scope: Scope, show: Printer
 ) -> Iterator[str]:
     """Assignments and stores; those of a kernel with several outputs under headings."""
     order = {a.target: k for k, a in enumerate(code.assignments)}
