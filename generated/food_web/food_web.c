@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 5d5ac04392c067a90f67cee138bc30de665262ee97c97b49f90df6c0b790302f
+ * body-sha256: 09b68cbdae5a4a1aaa24ea37560a5857800ea7e9c2a85bd8ba716fcf56774734
  */
 #include "food_web.h"
 #include <float.h>
@@ -513,23 +513,22 @@ food_web_status food_web_step(food_web_solver *s, double h) { return food_web_in
 
 void food_web_state(const food_web_solver *s, double *x) { food_web_take(s, s->x, x); }
 
-int food_web_saved(const food_web_solver *s, double *x, size_t *far)
+size_t food_web_saved(const food_web_solver *s, double *x, size_t *far)
 {
     *far = s->far;
     if (!s->open) return 0;
     food_web_take(s, s->before, x);
-    return 1;
+    return food_web_DIM;
 }
 
-food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t far)
+food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields, size_t far)
 {
-    if (s == NULL || (x != NULL && !food_web_finite(x, food_web_DIM * s->sites)))
-        return food_web_BAD_ARGUMENT;
+    if (s == NULL || (fields != 0 && fields != food_web_DIM)) return food_web_BAD_ARGUMENT;
+    if (fields > 0 && (x == NULL || !food_web_finite(x, fields * s->sites))) return food_web_BAD_ARGUMENT;
     if (food_web_set_step(s, h) != food_web_OK) return food_web_BAD_ARGUMENT;
     s->far = far;
-    if (x == NULL) return food_web_OK;
-    for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->before[k], x + k * s->sites);
-    s->open = 1;
+    for (size_t k = 0; k < fields; ++k) food_web_put(s, s->before[k], x + k * s->sites);
+    s->open = fields > 0;
     return food_web_OK;
 }
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: dedecfbf4da172e92dfd712601f7a6d9ac2beb638279c84b0adcd206100a6522
+ * body-sha256: f8f68187abc6b8dac362dcf46a60721dcdc5e62eb9db7ed07db0246078901839
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -83,11 +83,11 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void food_web_state(const food_web_solver *s, double *x);
 
-/* Save and restore a run with the same bits. food_web_saved writes x[field][site] and far. To restore, call
-   food_web_init with the state, then food_web_resume with far, and with x if food_web_saved returned 1, else
-   NULL. With compensated steps x holds all fields, then their compensation terms. */
-int food_web_saved(const food_web_solver *s, double *x, size_t *far);
-food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t far);
+/* Save and restore a run with the same bits. food_web_saved writes x[field][site] and far, and returns the
+   number of fields: at most as many as the state has, with compensated steps three times as many. To restore,
+   call food_web_init with the state, then food_web_resume with what food_web_saved wrote and returned. */
+size_t food_web_saved(const food_web_solver *s, double *x, size_t *far);
+food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields, size_t far);
 
 /* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the
    Casimirs; the right-hand side out[field][site] of the equations of motion. */

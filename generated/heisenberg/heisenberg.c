@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 76477fc9d1d87af8260c158f25ff72ef701e08ab39fd0d18ddcd97620ab379ac
+ * body-sha256: ae6113712f08aaebf6987174582b05bf6575168696ddd6731722869ba9fb93fa
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -882,23 +882,23 @@ heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change)
     return heisenberg_move(s, change, 1.0);
 }
 
-int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far)
+size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far)
 {
     *far = s->far;
     if (!s->open) return 0;
     heisenberg_take(s, s->before, x);
-    return 1;
+    return heisenberg_DIM;
 }
 
-heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far)
+heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
+    size_t far)
 {
-    if (s == NULL || (x != NULL && !heisenberg_finite(x, heisenberg_DIM * s->sites)))
-        return heisenberg_BAD_ARGUMENT;
+    if (s == NULL || (fields != 0 && fields != heisenberg_DIM)) return heisenberg_BAD_ARGUMENT;
+    if (fields > 0 && (x == NULL || !heisenberg_finite(x, fields * s->sites))) return heisenberg_BAD_ARGUMENT;
     if (heisenberg_set_step(s, h) != heisenberg_OK) return heisenberg_BAD_ARGUMENT;
     s->far = far;
-    if (x == NULL) return heisenberg_OK;
-    for (size_t k = 0; k < heisenberg_DIM; ++k) heisenberg_put(s, s->before[k], x + k * s->sites);
-    s->open = 1;
+    for (size_t k = 0; k < fields; ++k) heisenberg_put(s, s->before[k], x + k * s->sites);
+    s->open = fields > 0;
     return heisenberg_OK;
 }
 

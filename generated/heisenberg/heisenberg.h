@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 06002f68d0bfb79aed3bb94e74d4f31aa1376b4fcef765a820a4fd66b8235e31
+ * body-sha256: b4ae3dcc7de09b7bffcdd0b26f92824909ad43fad141298739e919cd19d6e21e
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -75,11 +75,13 @@ void heisenberg_state(const heisenberg_solver *s, double *x);
 heisenberg_status heisenberg_set_state(heisenberg_solver *s, const double *x);
 heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 
-/* Save and restore a run with the same bits. heisenberg_saved writes x[field][site] and far. To restore, call
-   heisenberg_init with the state, then heisenberg_resume with far, and with x if heisenberg_saved returned 1,
-   else NULL. With compensated steps x holds all fields, then their compensation terms. */
-int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
-heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far);
+/* Save and restore a run with the same bits. heisenberg_saved writes x[field][site] and far, and returns the
+   number of fields: at most as many as the state has, with compensated steps three times as many. To restore,
+   call heisenberg_init with the state, then heisenberg_resume with what heisenberg_saved wrote and
+   returned. */
+size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
+heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
+    size_t far);
 
 /* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the
    Casimirs; the right-hand side out[field][site] of the equations of motion. */

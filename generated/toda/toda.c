@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: d7fe1e7a766ef0a6f129ecf1e9a7cec51546ad098b5e91acd58fb8d4d39c5101
+ * body-sha256: 79811642b7b5794cc7eb2ed1dc7cb4ae4691cf1f225be543bafefee7ca52c78f
  */
 #include "toda.h"
 #include <float.h>
@@ -402,22 +402,22 @@ toda_status toda_step(toda_solver *s, double h) { return toda_integrate(s, h, 1)
 
 void toda_state(const toda_solver *s, double *x) { toda_take(s, s->x, x); }
 
-int toda_saved(const toda_solver *s, double *x, size_t *far)
+size_t toda_saved(const toda_solver *s, double *x, size_t *far)
 {
     *far = s->far;
     if (!s->open) return 0;
     toda_take(s, s->before, x);
-    return 1;
+    return toda_DIM;
 }
 
-toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far)
+toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t far)
 {
-    if (s == NULL || (x != NULL && !toda_finite(x, toda_DIM * s->sites))) return toda_BAD_ARGUMENT;
+    if (s == NULL || (fields != 0 && fields != toda_DIM)) return toda_BAD_ARGUMENT;
+    if (fields > 0 && (x == NULL || !toda_finite(x, fields * s->sites))) return toda_BAD_ARGUMENT;
     if (toda_set_step(s, h) != toda_OK) return toda_BAD_ARGUMENT;
     s->far = far;
-    if (x == NULL) return toda_OK;
-    for (size_t k = 0; k < toda_DIM; ++k) toda_put(s, s->before[k], x + k * s->sites);
-    s->open = 1;
+    for (size_t k = 0; k < fields; ++k) toda_put(s, s->before[k], x + k * s->sites);
+    s->open = fields > 0;
     return toda_OK;
 }
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8035ad692b1c7c17f07cd93fc4b380fafb98bf7e8446a946fd9e60196548dd58
+ * body-sha256: 272fff7333baea15486c01a08549ccbb47c518e723b2ac6fb5deda862cf9b8cb
  */
 #ifndef TODA_H
 #define TODA_H
@@ -68,11 +68,11 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void toda_state(const toda_solver *s, double *x);
 
-/* Save and restore a run with the same bits. toda_saved writes x[field][site] and far. To restore, call
-   toda_init with the state, then toda_resume with far, and with x if toda_saved returned 1, else NULL. With
-   compensated steps x holds all fields, then their compensation terms. */
-int toda_saved(const toda_solver *s, double *x, size_t *far);
-toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far);
+/* Save and restore a run with the same bits. toda_saved writes x[field][site] and far, and returns the number
+   of fields: at most as many as the state has, with compensated steps three times as many. To restore, call
+   toda_init with the state, then toda_resume with what toda_saved wrote and returned. */
+size_t toda_saved(const toda_solver *s, double *x, size_t *far);
+toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t far);
 
 /* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the
    Casimirs; the right-hand side out[field][site] of the equations of motion. */

@@ -57,8 +57,8 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "trail_size": (_SIZE, (_POINTER, _SIZE)),
     "pullback": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, *(_POINTER,) * 5, _SIZE)),
     "ask": (None, (_POINTER, _POINTER)),
-    "saved": (_INT, (_POINTER, _POINTER, _POINTER)),
-    "resume": (_INT, (_POINTER, _DOUBLE, _POINTER, _SIZE)),
+    "saved": (_SIZE, (_POINTER, _POINTER, _POINTER)),
+    "resume": (_INT, (_POINTER, _DOUBLE, _POINTER, _SIZE, _SIZE)),
     "stages": (_SIZE, ()),
     "describe": (_INT, (_SIZE, _POINTER)),
     "begin": (_INT, (_POINTER, _DOUBLE)),
@@ -124,7 +124,8 @@ class CLatticeSession:
         self._real: Any = np.float32 if interface.single else np.float64
         self._casimirs = len(interface.casimirs)
         self._observed = len(interface.observables), len(interface.observed_fields)
-        self._saved_states = 2 if interface.compensated else 1  # the state, and its compensation terms
+        # the fields before the last flow of a step, and the compensation terms of the fields now and then
+        self._saved_states = 3 if interface.compensated else 1
         self._dear = interface.dear
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
@@ -241,8 +242,8 @@ class CLatticeSession:
             return {}
         x = np.empty((self._saved_states * self._shape[0], *self._shape[1:]), self._real)
         far = np.zeros(1, dtype=np.uintp)
-        is_open = self._c.saved(self._address, x.ctypes.data, far.ctypes.data)
-        return {"before": x, "far": far} if is_open else {"far": far}
+        fields = self._c.saved(self._address, x.ctypes.data, far.ctypes.data)
+        return {"before": x[:fields].copy(), "far": far} if fields else {"far": far}
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
         """Continue after ``steps`` steps of size h, from the result of `saved`."""
@@ -252,8 +253,8 @@ class CLatticeSession:
             self._before = steps
         if "far" in arrays:
             x = np.ascontiguousarray(arrays["before"], dtype=self._real) if "before" in arrays else None
-            before = x.ctypes.data if x is not None else None
-            self._expect_done(self._c.resume(self._address, h, before, int(arrays["far"][0])))
+            before, fields = (None, 0) if x is None else (x.ctypes.data, len(x))
+            self._expect_done(self._c.resume(self._address, h, before, fields, int(arrays["far"][0])))
 
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes). Raises `BackendError` if it is not finite."""

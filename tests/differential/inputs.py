@@ -108,7 +108,7 @@ def as_cpp(compilation: Compilation, *, lattice: bool) -> None:
     """The C compiles and links as C++, with OpenMP where it uses that, and refuses a null pointer."""
     name, sources = compilation.program.name, emit(compilation.program, "c", COMMAND)
     resumed = f"{name}_resume(" in sources[f"{name}.h"]
-    call = f"{name}_resume(nullptr, 0.1, nullptr, 0)" if resumed else f"{name}_integrate(nullptr, 0.1, 1)"
+    call = f"{name}_resume(nullptr, 0.1, nullptr, 0, 0)" if resumed else f"{name}_integrate(nullptr, 0.1, 1)"
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         write(folder, sources)

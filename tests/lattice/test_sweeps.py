@@ -424,6 +424,37 @@ def test_compensated_sums_keep_lengths_of_spins_and_the_bits_of_runs_in_pieces()
     np.testing.assert_allclose(found.step(x, 0.05), solver("xxz", 2).step(x, 0.05), rtol=0, atol=1e-15)
 
 
+#: Systems whose steps end with all their flows done, of one part and with noise; and one whose last flow is open.
+COMPENSATED = {
+    "rotors": """
+lattice: {axes: [i]}
+coordinates: [x, y, z]
+poisson: {lie_algebra: {name: so(3)}}
+parameters: {B: {value: 1 + i/N_i, at: sites}}
+hamiltonian: B*z
+""",
+    "kicked": """
+lattice: {axes: [i]}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + (q[i+1] - q)**2/2
+noise: {bath: {hamiltonian: q, amplitude: 0.1}}
+""",
+    "xxz": TEXTS["xxz"],
+}
+
+
+@pytest.mark.parametrize("name", COMPENSATED)
+@pytest.mark.parametrize("step", [0.05, 0.02])
+def test_copies_of_sessions_have_the_compensation_terms(name: str, step: float) -> None:
+    text = f"phigen: 1\nname: rounding\norder: 2\nsolver: {{compensated: true}}\n{COMPENSATED[name]}"
+    found = lattice_solver_of(compile_spec(specs.loads(text)), "c")
+    x = np.random.default_rng(3).normal(size=(len(found.interface.coordinates), 16))
+    session = found.session(x).step(0.05, 400)
+    other = session.copy()
+    assert np.array_equal(other.step(step, 40).x, session.step(step, 40).x)
+
+
 @pytest.mark.parametrize("asked", ["scheme: series", "adjoint: true"])
 def test_sums_that_cannot_be_compensated_are_refused(asked: str) -> None:
     text = f"phigen: 1\nname: rounding\n{asked}\nsolver: {{compensated: true}}\n{TEXTS['xxz']}"

@@ -83,8 +83,9 @@ CONDITIONS = {
     "lattice_passed.c": "TIMED || NOISE",
     "lattice_pieces.c": "SERIES",
     "lattice_renewed.c": "RENEWED && !SERIES",
-    "lattice_saved.c": "!SERIES && !NOISE",
-    "lattice_saved_noise.c": "!SERIES && NEAR && NOISE",
+    "lattice_saved.c": "!SERIES && !NOISE && !COMPENSATED",
+    "lattice_saved_compensated.c": "!SERIES && COMPENSATED",
+    "lattice_saved_noise.c": "!SERIES && NEAR && NOISE && !COMPENSATED",
     "lattice_seams.c": "SEAMS",
     "lattice_share.c": "SHARED",
     "lattice_shares.c": "SHARES",
@@ -148,10 +149,8 @@ CALLS = {
     "phi_place": "!ONE_ROW",
     "phi_place_matrix": "BANDED",
     "phi_put_at_bonds": "GRAPH && BOND_PARAMETERS",
-    "phi_put_carry": "COMPENSATED",
     "phi_put_kinds": "SEAMS",
     "phi_put_parameters": "SITE_PARAMETERS",
-    "phi_take_carry": "COMPENSATED",
 }
 
 

@@ -253,12 +253,6 @@ JOINED = Choice(
     {"NOT_OPEN(s)": ("", "s->open = 0;")},
 )
 
-CARRY = Choice(
-    "What rounding has left out of the fields of a lattice goes with them.",
-    ("COMPENSATED",),
-    {"SAVED_FIELDS": ("2 * PHI_DIM", "PHI_DIM")},
-)
-
 FAR = Choice(
     "Whether arguments of functions may be large, where functions have another form for them.",
     ("NEAR",),
@@ -294,7 +288,6 @@ ALL = (
     TABLES,
     MATRIX,
     JOINED,
-    CARRY,
     FAR,
     PREDICTORS,
 )

@@ -178,6 +178,7 @@ void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
 #include "lattice_adjoint.c"
 
 #include "lattice_saved.c"
+#include "lattice_saved_compensated.c"
 #include "lattice_saved_noise.c"
 
 /* ---- What is seen at sites ---- */

@@ -71,11 +71,11 @@ void phi_state(const phi_solver *s, double *x);
 phi_status phi_set_state(phi_solver *s, const double *x);
 phi_status phi_kick(phi_solver *s, const double *change);
 
-/* Save and restore a run with the same bits. phi_saved writes x[field][site] and far. To restore, call phi_init with the
-   state, then phi_resume with far, and with x if phi_saved returned 1, else NULL. With compensated steps x holds all fields,
-   then their compensation terms. */
-int phi_saved(const phi_solver *s, double *x, size_t *far);
-phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far);
+/* Save and restore a run with the same bits. phi_saved writes x[field][site] and far, and returns the number of fields: at
+   most as many as the state has, with compensated steps three times as many. To restore, call phi_init with the state, then
+   phi_resume with what phi_saved wrote and returned. */
+size_t phi_saved(const phi_solver *s, double *x, size_t *far);
+phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t far);
 
 /* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the Casimirs; the
    right-hand side out[field][site] of the equations of motion. */

@@ -17,12 +17,4 @@ static void phi_copy_carry(const phi_solver *s, double *const *to)
     for (size_t k = 0; k < PHI_DIM; ++k)
         memcpy(PHI_MEMORY_OF(s->carry[into + k]), PHI_MEMORY_OF(s->carry[PHI_DIM - into + k]), block);
 }
-
-/* What rounding has left out of the fields before, at sites, and back. */
-static void phi_take_carry(const phi_solver *s, double *x) { phi_take(s, s->carry + PHI_DIM, x); }
-
-static void phi_put_carry(const phi_solver *s, const double *x)
-{
-    for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->carry[PHI_DIM + k], x + k * s->sites);
-}
 #endif
