@@ -11,7 +11,7 @@ from phigen.symbolic.expression import symbols_of
 def blocks(coordinates: Sequence[str], poisson: Matrix) -> list[list[int]]:
     """The finest partition into groups with {x_i, x_j} = 0 between them and brackets of their own coordinates only.
 
-    Indices from 0, sorted; a coordinate that nothing depends on and that commutes with all is a group by itself.
+    Indices from 0, sorted; a coordinate that commutes with all others and occurs in no bracket is a group by itself.
     """
     index = {c: i for i, c in enumerate(coordinates)}
     part = list(range(len(coordinates)))

@@ -1,9 +1,9 @@
-"""Casimir functions that the form of a Poisson tensor gives.
+"""Casimir functions found from the form of a Poisson tensor.
 
 Sources, in this order: the Casimirs of a Nambu bracket; the kernel of a constant π (linear functions); the
 kernel of A for a log-canonical π (monomials x^u); polynomials of growing degree, by linear algebra; traces of
 powers tr X^m on the dual of a matrix algebra with a non-degenerate trace form. Functions that depend on
-declared or earlier ones are dropped. Nothing here is trusted: `phigen.geometry.checks` proves each.
+declared or earlier ones are dropped. `phigen.geometry.checks` proves each of them.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def found_casimirs(
 ) -> tuple[dict[str, Expression], tuple[str, ...]]:
     """Casimirs independent of the declared ones, under names C1, C2, … that are not taken; and notes.
 
-    The search ends when as many are known as the corank of π allows. Notes say what was left out.
+    The search ends when their number is the corank of π. Notes say what was left out.
     """
     slopes = [gradient(c, coordinates) for c in declared.values()]
     ranks = generic_ranks([poisson, slopes])

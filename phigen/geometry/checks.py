@@ -136,7 +136,7 @@ def _temperature(
 
 def _ratio(above: Expression, below: Expression) -> Expression:
     """A quotient with common factors cancelled."""
-    for _ in range(2):  # squares of roots are seen for what they are in the second ring
+    for _ in range(2):  # squares of roots are recognised in the second ring only
         tower = Tower(symbols_of(above, below), [above, below])
         a, b = (tower.simplified(e) for e in tower.convert_all([above, below]))
         common = a.gcd(b)

@@ -14,7 +14,7 @@ from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_zero, 
 #: Points that are tried, and the factors by which they are tried: near 0, around 1 and far off.
 POINTS = 64
 SCALES = (Fraction(1), Fraction(1, 32), Fraction(30))
-#: A larger magnitude excludes that a value is 0: rounding of a zero in disguise stays far below.
+#: A value above this magnitude is not 0: the rounding of an expression that vanishes stays far below.
 _CLEARLY = 1e-6
 
 Point = Mapping[str, float]

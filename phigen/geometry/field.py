@@ -69,8 +69,8 @@ class Field(Arithmetic[Scalar]):
     """The smallest field Q(symbols) that holds the given expressions.
 
     A function of parameters (``sqrt(l)``, ``pi``) is one more independent symbol: relations between such
-    functions are not used, so an element that is zero only by one of them is taken for non-zero. Nothing
-    rests on this but which algebraic structure is found; what is built from it is proved in a `Tower`.
+    functions are not used, so an element that is zero only by one of them is taken for non-zero. This
+    affects only which algebraic structure is found; what is built from it is proved in a `Tower`.
     """
 
     def __init__(self, expressions: Iterable[Expression] = ()) -> None:

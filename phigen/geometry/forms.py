@@ -1,4 +1,4 @@
-"""From the forms of a spec to the Poisson tensor π_ij = {x_i, x_j}."""
+"""The Poisson tensor π_ij = {x_i, x_j} of a form in a spec."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAl
 
 
 def algebra_of_form(form: PoissonForm, coordinates: Sequence[str]) -> LieAlgebra | None:
-    """The Lie algebra of a ``lie_algebra`` form, its sign taken in; None for the other forms.
+    """The Lie algebra of a ``lie_algebra`` form, multiplied by its sign; None for the other forms.
 
     Raises `SpecError` for an unknown family, a dimension other than the number of coordinates, and what
     `phigen.geometry.matrix_algebras` refuses.

@@ -1,4 +1,4 @@
-"""Direct sums of Lie algebras that the basis hides, such as so(4) = so(3) ⊕ so(3) in its usual basis.
+"""Direct sums of Lie algebras in a basis that mixes the summands, such as so(4) = so(3) ⊕ so(3).
 
 The projections onto the summands commute with every ad_X, so they lie in the centroid, the linear maps T with
 T[X, Y] = [TX, Y]. A primary decomposition of the centroid's elements over Q finds them.

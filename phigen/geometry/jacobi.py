@@ -41,7 +41,7 @@ def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
                 for a in sorted(index[s] for s in tower.names_in(entry) if s in index):
                     slope = tower.derivative(entry, names[a])
                     for k, other in rows[a].items() if slope != 0 else ():
-                        if k not in (i, j) and (i < j < k or j < k < i or k < i < j):  # one of the cyclic order
+                        if k not in (i, j) and (i < j < k or j < k < i or k < i < j):  # a cyclic permutation
                             at = (min(i, j, k), i + j + k - min(i, j, k) - max(i, j, k), max(i, j, k))
                             sums[at] = sums.get(at, tower.zero) + tower.product(slope, other)
     for (i, j, k), residual in sorted(sums.items(), key=lambda item: item[0]):

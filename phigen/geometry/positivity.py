@@ -10,7 +10,7 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement
 
-#: Signs that the form of an expression shows, of real values; None for no such.
+#: Signs of real values that follow from the form of an expression; None if none follows.
 POSITIVE, NOT_NEGATIVE = "positive", "not negative"
 _ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIVE, "E": POSITIVE}
 
@@ -87,7 +87,7 @@ def sign_of(e: Expression, positive: Collection[str]) -> str | None:
             exponent = Fraction(e.value)
             even = exponent.denominator % 2 == 0 or exponent.numerator % 2 == 0
             sign = args[0] or (NOT_NEGATIVE if even else None)
-            return POSITIVE if sign and exponent < 0 else sign  # 1/0 is no value
+            return POSITIVE if sign and exponent < 0 else sign  # 1/0 has no value
         return _ALWAYS.get(e.op)
 
     (result,) = fold([e], visit)

@@ -1,4 +1,4 @@
-"""Between sympy and `Expression`: systems built in Python from sympy and given back to it, formulas for LaTeX.
+"""Conversion between sympy and `Expression`: systems built from sympy objects, systems as sympy objects, LaTeX.
 
 Only modules that need sympy import this one, since that takes a quarter of a second.
 """

@@ -1,4 +1,4 @@
-"""Gauss collocation, for reading: the order, the equations of a step, and its unknowns."""
+"""Formulas of Gauss collocation: the order, the equations of a step, and its unknowns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The parts of a splitting and their flows, for reading."""
+"""Formulas of a splitting: its parts and their flows."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class Generating:
 
 
 def series_formulas(compilation: CompiledSeries, most: int | None) -> Generating:
-    """The generating function of a series, as far as it can be written out; at most so many terms of each are shown."""
+    """The generating function of a series, as far as it can be written out; ``most`` bounds the terms shown of each."""
     plan = compilation.stage
     pushed = compilation.system.forces or compilation.system.noise
     more = not pushed and plan is compilation.order and plan.order <= _MODIFIED_UP_TO
@@ -55,7 +55,7 @@ def series_formulas(compilation: CompiledSeries, most: int | None) -> Generating
     listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
     known = len(series.terms)
     leading = of_polynomial(series.tower, -series.terms[plan.order], most) if more and known > plan.order else None
-    following = known + 1 + (compilation.symmetric and known % 2 == 1)  # the next that does not vanish
+    following = known + 1 + (compilation.symmetric and known % 2 == 1)  # index of the next term that does not vanish
     return Generating(listed, leading, following if known < plan.terms else None)
 
 

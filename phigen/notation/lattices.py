@@ -27,7 +27,7 @@ def described(cell: Cell) -> str:
 
 
 def brackets(cell: Cell) -> list[tuple[str, Expression]]:
-    """The brackets that are not 0, in one order: of fields of a site first, then with neighbours."""
+    """The brackets that are not 0, {a, b} or {b, a}: those of fields of one site first, then with neighbours."""
     entries: list[tuple[str, Expression]] = []
     seen: set[tuple[str, str]] = set()
     for (f, other), value in (*cell.bracket.items(), *cell.bond_bracket.items()):

@@ -61,13 +61,13 @@ class Factor:
 
     @property
     def markup(self) -> str:
-        """The factor among others."""
+        """The markup of the factor in a product."""
         base = f"<msub>{self.base}{self.index}</msub>" if self.index else self.base
         return _row(base + self.tail) if self.tail else base
 
     @property
     def alone(self) -> str:
-        """The factor where nothing stands beside it: a sum loses its parentheses."""
+        """The markup of the factor alone: a sum loses its parentheses."""
         return summed(self.terms) if self.terms else self.markup
 
     def power(self, exponent: str) -> Factor:
@@ -234,7 +234,7 @@ def _called(function: str, args: Sequence[Sum]) -> Sum:
 def _power(base: Sum, exponent: Fraction) -> Sum:
     if exponent < 0:
         below = _single(_power(base, -exponent))
-        if below.coefficient == 0:  # as somebody wrote it
+        if below.coefficient == 0:  # as the user wrote it
             return _one(Factor("<mfrac><mn>1</mn><mn>0</mn></mfrac>"))
         return (FractionTerm(1 / below.coefficient, below.below, below.above),)
     if exponent == 1 or not base:

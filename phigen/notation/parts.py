@@ -17,7 +17,7 @@ SMALL, WORTH = 3, 4
 #: Names are used if they shorten the whole to this fraction.
 WORTH_NAMES = 0.75
 
-#: Expressions with fewer leaves are written as they stand, or expanded where that is shorter.
+#: Expressions with fewer leaves get no names for shared parts.
 SHORT = 40
 
 #: The name of a shared part in a text.

@@ -1,4 +1,4 @@
-"""Casimirs of log-canonical structures as logarithms of products of powers, their usual form."""
+"""Casimirs of log-canonical structures in their usual form: logarithms of products of powers."""
 
 from __future__ import annotations
 

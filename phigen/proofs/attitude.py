@@ -1,9 +1,9 @@
 """Statements on attitudes: a step conserves the momentum in the other frame, and rotates with the velocity ∇H.
 
 With x the momenta in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, so that the momentum in space is constant; with x those
-in space g₁ = τ g₀, and that in the body is. Any element with this property would do as well with one more that fixes x,
-such as what a Casimir turns: so a second statement is about the rate, which for h → 0 must be ∇H with all Casimirs that
-were taken from it.
+in space g₁ = τ g₀, and that in the body is. An element times a rotation that fixes x
+has this property too. So a second statement is about the rate of rotation: for h → 0 it must be ∇H, the Casimirs that
+the gauge subtracted included.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def check(compilation: Compilation) -> Iterator[Statement]:
 def _series_statements(attitude: Attitude, compilation: CompiledSeries) -> Iterator[Statement]:
     """Statements on the element of an implicit or explicit step, and on its gradient."""
     system, group, chart = compilation.system, attitude.group, compilation.realisation
-    # A covector is in the p that moves x, and not in that of the element.
+    # The p of the coordinates contains the covector force, the p of the group element does not.
     pushed = system.forces is not None and any(not z.is_zero for z in system.forces.covector)
     if group.matrices:
         yield from _matrix_statements(system, chart, attitude)

@@ -35,8 +35,8 @@ class Examination:
     """The statements proved or refuted about a spec.
 
     ``compilation`` is None if there is none; ``obstacle`` then has the reason. An obstacle is not a refutation: no
-    bi-realisation of the catalogue may apply to a perfectly good Poisson tensor. ``unexamined`` names what rests on
-    something refuted, and would only repeat that; it is empty if everything was examined.
+    bi-realisation of the catalogue may apply to a perfectly good Poisson tensor. ``unexamined`` names the groups
+    that were skipped since they depend on a refuted statement; it is empty if everything was examined.
     """
 
     spec: Spec
@@ -57,7 +57,7 @@ class Examination:
 
     @property
     def mistakes(self) -> list[tuple[str, Statement]]:
-        """The statements that are false with their groups, without those that may follow from one before.
+        """The false statements with their groups, without those that may follow from an earlier false one.
 
         Casimirs and invariants stand for themselves. The axioms of a bi-realisation, and the flows of a splitting, are
         about the same few formulas: the first that fails says what is wrong.

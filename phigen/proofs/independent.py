@@ -48,8 +48,8 @@ Pair = tuple[str, Any, Any]
 class Agreement:
     """Whether both derivations agree on S_``term``, or where it is None on ∇S_h or on α and β.
 
-    ``sympy`` and ``compiler`` are the seconds that they took for S_1 … S_term; of what is there already, there is only
-    the former.
+    ``sympy`` and ``compiler`` are the seconds that they took for S_1 … S_term; of terms derived before, only
+    the seconds of sympy are known.
     """
 
     statement: Statement
@@ -204,7 +204,7 @@ class _Derivation:
         slope = scheme.generating.coefficients.written_out(scheme.generating.slope)
         pairs: list[Pair] = []
         pushes, monitor = self._pushes(), self._compilation.monitor
-        # With forces the series is that of H, and g a factor of all.
+        # With forces the series is that of H, and g multiplies all terms.
         factor = self._dictionary.expression(monitor) if monitor and self._compilation.system.forces else 1
         for c, theirs in zip(self._dictionary.coordinates, slope, strict=True):
             terms = (h**i * derivative(s, c) for i, s in enumerate(self._found[: scheme.terms], 1))

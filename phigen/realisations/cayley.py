@@ -83,7 +83,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def closed_representation(algebra: LieAlgebra) -> Representation | None:
-    """The representation of the whole algebra that `closed_product` uses; None if it is none, or one for each part."""
+    """The representation of the whole algebra that `closed_product` uses; None without one for all parts."""
     declared = [algebra.representation] if algebra.representation else []
     if not declared and len(indecomposable_parts(algebra)) > 1:
         return None

@@ -77,7 +77,7 @@ def _parts(algebra: LieAlgebra) -> list[list[int]]:
 
 
 def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
-    """An ideal spanned by basis elements: as a whole, or by summands that the basis hides."""
+    """The closed form on an ideal spanned by basis elements: as a whole, or by summands in another basis."""
     whole = _closed(ideal, x, p)
     if whole is not None:
         return whole
@@ -182,7 +182,7 @@ def _semisimple(tower: Tower, matrix: Sequence[Vector], x: Vector, root: Poly) -
 
 
 def _vanish(tower: Tower, vector: Sequence[Expression]) -> bool:
-    with suppress(DomainError):  # at a point first: where it does not vanish, its expansion may be larger than memory
+    with suppress(DomainError):  # At a point first: the expansion of an element ≠ 0 may be too large.
         if any(evaluate_exactly(vector, sample_point(symbols_of(*vector), (), 0))):
             return False
     return all(tower.is_zero(v) for v in tower.convert_all(vector))

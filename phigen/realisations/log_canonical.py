@@ -19,7 +19,7 @@ KIND = "log-canonical"
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     """The bi-realisation of a log-canonical π, symmetric and global; raises `SpecError` for any other π.
 
-    The increment is −2 x_j sinh(½u_j), without a function that would cancel at small u_j.
+    The increment is −2 x_j sinh(½u_j), written without cancellation at small u_j.
     """
     if not isinstance(system.shape, LogCanonical):
         raise refuse(f"birealisation {KIND} needs {{x_i, x_j}} = a_ij x_i x_j; this π is {system.shape}", "try auto")

@@ -40,7 +40,7 @@ class MatrixFunction(Arithmetic[Matrix]):
             return self._argument
         if all(self._is_scalar(a) for a in args) and node.op not in ("add", "sub", "neg", "mul"):
             return self._scaled(rebuild(node, [a[0][0] for a in args]))
-        match node.op:  # lists know no arithmetic
+        match node.op:  # lists have no arithmetic
             case "add":
                 return _entrywise(add, args[0], args[1])
             case "sub":

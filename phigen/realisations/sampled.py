@@ -31,7 +31,7 @@ def is_large(system: System, realisation: BiRealisation) -> bool:
     maps = [*realisation.alpha, *realisation.beta]
     if not is_rational(*maps, *(e for row in system.poisson for e in row)):
         return False
-    # Each term of α_i meets the derivatives of α_j along one pair (x_k, p_k) of n, for all i and j.
+    # Estimate: each term of α_i is multiplied by the derivatives of α_j along one of n pairs (x_k, p_k), for all i, j.
     sizes = sum(len(topological([e])) for e in realisation.alpha)
     return 2 * sizes**2 // system.dimension > limits.PROOF_PRODUCTS
 

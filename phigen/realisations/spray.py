@@ -37,7 +37,7 @@ from phigen.symbolic.verdict import PROVED
 KIND = "spray"
 REFERENCE = f"{PAPER}, section on Poisson sprays; M. Crainic, I. Mărcuţ, J. Symplectic Geom. 9 (2011)"
 
-#: A Lie series is taken for nilpotent if it ends within this number of terms.
+#: A Lie series counts as finite if it ends within this number of terms.
 LONGEST = 8
 #: A search for a closed form gives up at polynomials with more terms than this.
 SEARCHED_TERMS = 500
@@ -110,7 +110,7 @@ def _differences(space: Cotangent, alpha: GradedFunction) -> tuple[Expression, E
 
 
 def _terminating(system: System, spray: Spray) -> BiRealisation | None:
-    """A nilpotent flow whose series for α ends too; the axioms prove that what was found is all of it."""
+    """A nilpotent flow whose series for α ends too; the axioms prove that the series is complete."""
     coordinates = [spray.space.tower.variable(c) for c in system.coordinates]
     if any(_finite_series(spray, x) is None for x in coordinates):
         return None

@@ -228,7 +228,7 @@ def ensemble(
     """Return the members of an ensemble from the arguments of `Solver.ensemble`, checked."""
     per_member: dict[str, Any] = {name: v for name, v in {**(mapped or {}), **more}.items() if np.ndim(v) > 0}
     if t0 is not None and np.ndim(t0) > 0 and not interface.time:
-        per_member["t0"] = t0  # without a time, t0 can only be the name of a parameter
+        per_member["t0"] = t0  # without a time, t0 can only be a parameter
     several: list[Any] = [v for v in (h, t0, *per_member.values()) if v is not None and np.ndim(v) > 0]
     if np.ndim(X0) == 1 and several:
         start = np.tile(state(X0, "X0", interface), (len(several[0]), 1))

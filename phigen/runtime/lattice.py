@@ -400,7 +400,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def _planned(
         self, at: Beginning, steps: int | None, stride: int, until: float | None, retry: int
     ) -> IntegrationPlan:
-        """The plan of an integration for a number of steps, or until a time."""
+        """Return the plan of an integration over a number of steps, or until a time."""
         if (steps is None) == (until is None):
             many = "needs the number of steps, or the time until which to integrate"
             raise TypeError(f"integrate {many if steps is None else 'takes either steps or until, not both'}")
@@ -471,9 +471,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return trajectory
 
     def _expect_place(self, run: LatticeRun, output: str | Path | None, frames: Frames | None, *, resume: bool) -> None:
-        """Refuse to overwrite what an interrupted run left, and to go on with a complete one. Raises `ValueError`.
+        """Refuse to overwrite files of an interrupted run, and to continue a complete one. Raises `ValueError`.
 
-        A run that goes on with a finished one is to write its file again.
+        A run that continues a finished one rewrites the file of that run.
         """
         if run.checkpoints:
             target = Path(output) if output and run.plan.past is None else None

@@ -1,4 +1,4 @@
-"""Lattices on their way as courses that branch: what ends, rows between steps, sections and retries are made of."""
+"""Courses of lattices: sessions that can be copied, for ends and rows between steps, sections and retries."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 
 class LatticeCourse:
-    """A lattice on its way (`phigen.runtime.session.Followed`), whose state has the shape (coordinates, *sizes).
+    """A lattice being integrated (`phigen.runtime.session.Followed`); its state is (coordinates, *sizes).
 
-    Steps of a branch, and of a course that goes on from `saved`, have the bits of those of one integration. The solver
-    of a branch is made when it is needed: sections take a branch at every step, and need few of them.
+    Steps of a branch, and of a course restored from `saved`, have the same bits as those of one integration. The
+    session of a branch is made on its first use: sections branch at every step, and use few of the branches.
     """
 
     def __init__(self, solver: LatticeSolver, at: Beginning) -> None:
@@ -35,7 +35,7 @@ class LatticeCourse:
     def sites(self) -> LatticeSession:
         """The session."""
         if self._sites is None:
-            # counted from where the size of the step was set: with the same times and random numbers
+            # counted from the last change of the step size, so that times and random numbers are the same
             arrays, clock, counted = self._arrays, self._clock, self._before
             draws = replace(self.at.draws, step=self.at.draws.step + counted)
             begin = Beginning(np.asarray(arrays["state"]), clock.h, self.at.values, clock.t, draws)
@@ -47,7 +47,7 @@ class LatticeCourse:
 
     @property
     def steps(self) -> int:
-        """Good steps since the start."""
+        """The number of successful steps since the start."""
         return int(self._arrays["counts"][1]) if self._sites is None else self._before + self.sites.steps
 
     @property
@@ -68,8 +68,8 @@ class LatticeCourse:
         return np.empty(0)
 
     def advance(self, h: float, steps: int) -> None:
-        """Make so many steps."""
-        sites = self.sites  # begins with the step size so far
+        """Make ``steps`` steps of size ``h``."""
+        sites = self.sites  # starts with the previous step size
         self._clock.set_step(h, self.steps)
         sites.advance(h, steps)
 
@@ -78,11 +78,11 @@ class LatticeCourse:
         return LatticeCourse.restored(self.solver, self.at, self.saved())
 
     def place(self, x: Floats) -> None:
-        """Stand at ``x`` (coordinates, *sizes), with all else as it is; raises `BackendError` if it is not finite."""
+        """Replace the state by ``x`` (coordinates, *sizes), and nothing else; raises `BackendError` if not finite."""
         self.sites.place(x)
 
     def kick(self, change: Floats) -> None:
-        """Move the state by ``change`` (coordinates, *sizes), else as `place`."""
+        """Add ``change`` (coordinates, *sizes) to the state; else as `place`."""
         self.sites.kick(change)
 
     def saved(self) -> dict[str, Any]:
@@ -111,7 +111,7 @@ class LatticeCourse:
 
 
 class ObservedCourse(Retrying):
-    """A lattice as sections, stops and rows see it: its `state` are the observables of the spec, one number each.
+    """A course whose `state` is the observables of the spec (observables,), for sections, stops and rows.
 
     Failing steps are made in parts, as `Retrying` does.
     """
@@ -132,7 +132,7 @@ class ObservedCourse(Retrying):
 
     @classmethod
     def begun(cls, solver: LatticeSolver, at: Beginning, retry: int = 0) -> ObservedCourse:
-        """The course at its start."""
+        """Return a new course at its start."""
         return cls(cast("Followed", LatticeCourse(solver, at)), retry)
 
     @classmethod

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 #: Suffixes of files that frames can be written to one by one, and of those that are written at the end.
 STREAMS = (".npy", ".npz")
 WHOLE = (".csv", ".zarr")
-#: Columns of a table of states at most: programs that read tables show some hundred.
+#: Largest number of columns of a table of states: spreadsheets show some hundred.
 MAX_COLUMNS = 1000
 
 
@@ -79,7 +79,7 @@ class FrameRows:
 
 
 class GrowingFrames:
-    """Frames in memory whose number is not known before."""
+    """Frames in memory, whose number need not be known in advance."""
 
     path: Path | None = None
 
@@ -113,7 +113,7 @@ class GrowingFrames:
 
 
 def identity_of(solver: LatticeSolver, at: Beginning, rows: Sequence[int | float]) -> dict[str, Any]:
-    """Return all that decides an integration with such ``rows``, described in plain data, as plain data."""
+    """Return all facts that determine an integration with ``rows``, a description of them, as plain data."""
     arrays = {name: np.asarray(value) for name, value in at.values.items() if np.ndim(value)}
     numbers = {name: float(value) for name, value in at.values.items() if not np.ndim(value)}
     hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": at.x}.items()}
@@ -165,7 +165,7 @@ class Frames:
             self.array[:count] = frames
         elif self._part is not None:
             try:
-                with opened(self._part):  # refuses pipes, on which open_memmap would wait
+                with opened(self._part):  # refuses pipes, for which open_memmap would block
                     self._array = np.lib.format.open_memmap(self._part, "r+")
             except (OSError, ValueError) as error:
                 raise MismatchError(
@@ -198,7 +198,7 @@ class Frames:
 
 
 def stream_path(path: str | Path) -> Path | None:
-    """The path of a file that frames can go to one by one, None for a table. Raises `ValueError` for any other."""
+    """The path of a file to which frames are written one by one, None for a table. Raises `ValueError` for others."""
     target = Path(path)
     if target.suffix in WHOLE:
         return None
@@ -236,7 +236,7 @@ def write_whole(path: Path, trajectory: LatticeTrajectory) -> None:
 
 
 def expect_store(path: Path) -> None:
-    """Raise `ValueError` where a Zarr store would replace what is none."""
+    """Raise `ValueError` if a Zarr store would replace something that is not a Zarr store."""
     if path.exists() and not any((path / name).is_file() for name in ("zarr.json", ".zgroup")):
         raise ValueError(f"{path} is there, and is no Zarr store")
 

@@ -1,4 +1,4 @@
-"""Where the rows of an integration of a lattice are, and all else that a run asks for beside its start."""
+"""Plans of integrations of lattices: the times of rows, retries, sections, and a finished run to continue."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RowSteps:
-    """Rows after ``whole`` steps each (rows,), and a further step of the size ``part`` (rows,), 0 for none.
+    """Rows after ``whole`` steps (rows,) and a further step of size ``part`` (rows,), 0 for none.
 
     The first is the start. With an ``end``, that makes the last row.
     """
@@ -43,7 +43,7 @@ class RowSteps:
         return np.asarray(begin + (h * self.whole + self.part), dtype=np.float64)
 
     def described(self) -> list[int | float]:
-        """Plain data that tells these rows from others."""
+        """Plain data that identifies these rows."""
         rows = [len(self), self.steps, int(self.whole[min(1, len(self) - 1)])]
         return [*rows, *([] if not self.part.any() else [float(self.part.sum()), float(self.part[-1])])]
 
@@ -82,7 +82,7 @@ class Crossed:
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """A finished run that another goes on with: its rows ``t`` (rows,), ``energy`` and observables, and its states.
+    """A finished run that another continues: its rows ``t`` (rows,), ``energy`` and observables, and its states.
 
     ``x`` (rows, coordinates, *sizes) are those of all rows, None where numbers alone were recorded; ``first`` and
     ``last`` are the states at its ends. ``columns`` are numbers by name, (rows,). It made ``steps`` steps.
@@ -98,7 +98,7 @@ class Past:
 
 @dataclass(frozen=True)
 class IntegrationPlan:
-    """An integration: where it begins, its rows, and in how many halvings a failing step may be made.
+    """An integration: its start, its rows, and the number of halvings allowed for a failing step.
 
     ``begin`` is the time of its start, which `Beginning` has only where H depends on the time. ``transforms`` are made
     of its frames.

@@ -1,4 +1,4 @@
-"""The loop of every integration of a lattice: rows at steps and between them, sections, checkpoints, a past."""
+"""The loop of every integration of a lattice: rows at and between steps, sections, checkpoints, continued runs."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from phigen.runtime.lattice_rows import IntegrationPlan, Past
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
-#: Numbers in the states of the steps between which crossings are looked for at a time: 32 MB of them.
+#: Largest number of values in the states of a block of steps that is searched for crossings: 32 MB.
 MOST_FOLLOWED = 1 << 22
 
 
 class Sink(Protocol):
-    """Where rows go. ``seconds`` is the time between two checkpoints."""
+    """Storage of rows. ``seconds`` is the time between two checkpoints."""
 
     seconds: float
 
     def see(self, sites: LatticeSession) -> None:
-        """Take in the row where a session stands."""
+        """Store the present state of a session as the next row."""
         ...
 
     def begin(self, past: Past) -> None:
-        """Take in the rows of a finished run."""
+        """Store the rows of a finished run that this one continues."""
         ...
 
     def saved(self) -> dict[str, Any]:
-        """Arrays for `restore`, beside what is in files."""
+        """Arrays for `restore`, without those that are in files."""
         ...
 
     def restore(self, arrays: Mapping[str, Any]) -> None:
-        """Stand after the rows that were there when it was saved; raises `MismatchError`."""
+        """Restore the rows that were stored when the checkpoint was saved; raises `MismatchError`."""
         ...
 
 
@@ -63,7 +63,7 @@ class LatticeRun:
     last: Any = None  # the session at the latest row
 
     def make(self, progress: Progress | None) -> None:
-        """Make all rows that are left. Raises `BackendError`."""
+        """Make all remaining rows. Raises `BackendError`."""
         self._begin()
         rows, saved = self.plan.rows, time.monotonic()
         for k in range(self.count, len(rows)):
@@ -79,11 +79,11 @@ class LatticeRun:
 
     @property
     def times(self) -> Floats:
-        """The times of the rows that are made."""
+        """The times of the complete rows."""
         return self.plan.times[: self.count + (len(self.plan.past.t) - 1 if self.plan.past else 0)]
 
     def _begin(self) -> None:
-        """Stand at the start, with its row, or where the checkpoint stands."""
+        """Store the first row, or restore the checkpoint."""
         plan, arrays = self.plan, self._loaded()
         if arrays:
             self.course = ObservedCourse.restored(self.solver, plan.at, plan.retry, arrays)
@@ -103,7 +103,7 @@ class LatticeRun:
         self.count = 1
 
     def _finder(self, arrays: Mapping[str, Any]) -> CrossingFinder[ObservedCourse]:
-        """The finder of the crossings of the section, in the state that was saved."""
+        """The finder of the crossings of the section, restored from ``arrays``."""
         plan, section = self.plan, self.plan.section
         assert section
         block = max(1, min(BLOCK, MOST_FOLLOWED // plan.at.x.size))
@@ -116,7 +116,7 @@ class LatticeRun:
         return finder
 
     def _advance(self, steps: int) -> None:
-        """Make whole steps, and take in the crossings of the section on the way."""
+        """Make whole steps, and store the crossings of the section among them."""
         course, h = self.course, self.plan.at.h
         if self.finder is None:
             course.advance(h, steps)
@@ -125,7 +125,7 @@ class LatticeRun:
             self._cross(crossings)
 
     def _cross(self, crossings: list[tuple[float, Floats]]) -> None:
-        """Take in crossings, at the first of the places where the finder has solvers."""
+        """Store crossings with the states of the finder's sessions at them."""
         assert self.finder
         for (t, _), (_, there) in zip(crossings, self.finder.places, strict=False):
             self.crossed.append(t)

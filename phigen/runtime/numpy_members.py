@@ -79,7 +79,7 @@ class MemberBatch:
             self._running = True
 
     def _end_run(self) -> None:
-        """Follow those after steps. Members that they lead nowhere failed, and are as before the run."""
+        """Follow those after steps. Members for which a flow has no solution fail, in their state before the run."""
         if not self._running:
             return
         x, carry = self._state()
@@ -89,7 +89,7 @@ class MemberBatch:
             self._leave(dict.fromkeys(lost.tolist(), "NOT_FINITE"))
 
     def _state(self) -> tuple[Floats, Floats]:
-        """The states of those who are left, and the compensation terms, inside a run too."""
+        """The states of the remaining members and their compensation terms; inside a run, those of its inner steps."""
         if not self._running:
             return self.x, self._carry
         end: tuple[Floats, Floats] = self._module._followed(self._module.END, self._stages[0], self.x, self._carry)

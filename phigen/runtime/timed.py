@@ -126,7 +126,7 @@ def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C
             chunk = min(chunk, stride - done % stride)
             copy = session.branch()
             copy.advance(h, chunk)
-            if (span - copy.time()) * np.sign(span) < 0:  # beyond the end
+            if (span - copy.time()) * np.sign(span) < 0:  # the copy is past the end
                 chunk, growing = chunk // 2, False
                 continue
             session, done = copy, done + chunk

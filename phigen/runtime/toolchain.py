@@ -266,7 +266,7 @@ def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tupl
         return 126, f"it could not be started: {error.strerror or error}"
     with process:
         listener = threading.Thread(target=listen, args=(process.stdout,), daemon=True)
-        # A thread that waits hears of the end at once; `wait(timeout)` asks every twentieth of a second.
+        # A waiting thread returns at once when the process ends; `wait(timeout)` polls every twentieth of a second.
         waiter = threading.Thread(target=process.wait, daemon=True)
         listener.start()
         waiter.start()
@@ -275,7 +275,7 @@ def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tupl
             if waiter.is_alive():
                 raise subprocess.TimeoutExpired(command, timeout)
             listener.join(_GRACE)
-        finally:  # a keyboard interrupt too: the new session does not hear the terminal's
+        finally:  # on a keyboard interrupt too: processes of the new session do not receive the terminal's
             if waiter.is_alive() or listener.is_alive():
                 with contextlib.suppress(ProcessLookupError):
                     os.killpg(process.pid, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""Transposes of sums over bonds or pairs of sites, as a site collects them from each: both as a and as b.
+"""Transposes of sums over bonds or pairs of sites, collected at each site from its bonds, as their end a and as b.
 
 Often the sums of b are those of a up to a sign, as are forces between two sites. The contribution to the site as b is
 then its contribution as a, for the cotangents of the other site: a product of the Hessian of the pair's energy with

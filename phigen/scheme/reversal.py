@@ -1,6 +1,6 @@
 """Flows over the time −h, written term by term: terms odd in h change their sign, and even terms stay.
 
-The inverse of a flow so shares the sines, exponentials and forces that the transpose of the flow reads.
+So the inverse of a flow shares the sines, exponentials and forces with the transpose of the flow.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From the flows of the parts of H to a program: kernels, and the schedule of a step."""
+"""Programs of splittings: kernels of the flows of the parts of H, and the schedule of a step."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Inverse sweeps of lattices: the fields before a flow, computed from those after it by the flow over the time −h.
 
-Sums over bonds or pairs are not computed twice either: they read no field that the sweep updates. A damping force
+Sums over bonds or pairs are computed once: they read no field that the sweep updates. A damping force
 that adds a multiple of a field to the field itself is inverted by division; for other damping there is no inverse.
 """
 

@@ -8,11 +8,11 @@ The S_i of the paper (section 4, step 1) carry a further factor i!. In a symmetr
 β(x, p) = α(x, −p), every S_i of even index vanishes; that is used, and `residual` proves it on demand.
 
 For H(τ, x) adjoin the time τ and its conjugate e, {τ, e} = 1, in the midpoint realisation, and take H + e. Its
-generating function is t e + S_t(τ, x), from which e has gone:
+generating function is t e + S_t(τ, x), where S_t does not contain e:
 
     ∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t,    S_0 = 0,
 
-where τ is the time in the middle of the step. So in the series the time is one more symbol that moves, and
+where τ is the time in the middle of the step. So the time is one more variable of the series, and
 
     (i+1) S_{i+1} = coefficient of t^i in H(τ − t/2, α(x, ∇(S_1 t + … + S_i t^i))) + ½ ∂_τ S_i t^i.
 """
@@ -34,10 +34,10 @@ from phigen.symbolic.symbols import momentum
 from phigen.symbolic.taylor import ExpressionRing, Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
 
-#: A gradient ∇S_i with more monomials is of no use: with the Hessian it takes 4.3 to 10 operations for each, measured.
+#: Most monomials of a gradient ∇S_i: with the Hessian it takes 4.3 to 10 operations for each, measured.
 MOST_SLOPES = limits.OPERATIONS // 4
 
-#: From S_i on, i at least this, the size of later terms is foreseen: it grows like a power of i, which is measured.
+#: Index i from which the sizes of S_1 … S_i predict those of later terms: they grow like a power of i.
 FORESEEN = 7
 
 
@@ -57,7 +57,7 @@ def composed(hamiltonian: Expression, coordinates: Sequence[str], alpha: Sequenc
 def series_tower(
     target: Expression, coordinates: Sequence[str], parameters: Sequence[str], times: Sequence[str] = ()
 ) -> Tower:
-    """The smallest tower that holds the series of H∘α: what is left of its nodes at p = 0.
+    """The smallest tower that holds the series of H∘α, built from the nodes of H∘α at p = 0.
 
     ``times`` is the symbol of the time, if there is one; it is among the ``parameters``.
     """
@@ -96,9 +96,9 @@ def graph_series(
 
 
 class HamiltonJacobi:
-    """S_1, S_2, … of one Hamiltonian in one bi-realisation, computed as far as they are asked for, and once.
+    """S_1, S_2, … of one Hamiltonian in one bi-realisation, each computed once, when it is first needed.
 
-    ``alpha`` gives the source map to the degree in p that so many terms need, for now for S_1 … S_most: see `reach`.
+    ``alpha`` gives the source map to the degree in p that S_1 … S_most need: see `reach`.
     ``static`` are the parameters and the other symbols of the tower, ``times`` the symbol of the time, if there is one.
     """
 
@@ -209,7 +209,7 @@ class _Recursion:
         self._sizes: dict[int, int] = {}  # i → monomials of ∇S_i
 
     def first(self, terms: int) -> tuple[Any, ...]:
-        """S_1 … S_terms. An `OverflowError` is final: what is asked for beyond the last good term raises it again."""
+        """S_1 … S_terms. An `OverflowError` is final: every later request beyond the last good term raises it again."""
         while len(self._found) < terms:
             if self._overflow:
                 raise self._overflow
@@ -227,7 +227,7 @@ class _Recursion:
         return tuple(self._found)
 
     def _expect_small(self, terms: int) -> None:
-        """Raise `OverflowError` if the sizes so far say that ∇S_terms will be of no use."""
+        """Raise `OverflowError` if the sizes so far predict that ∇S_terms will be too large to evaluate."""
         *_, before, last = [0, 0, *self._sizes]
         if last < FORESEEN or before == 0:
             return

@@ -1,4 +1,4 @@
-"""Backward error analysis: the Hamiltonian whose exact flow a step is, and the one that depends on time.
+"""Backward error analysis: the modified Hamiltonian, whose exact flow is the step.
 
 The map of step h is the time-h flow of a formal series H̃_h = H_0 + h H_1 + h² H_2 + …, H_0 = H. It is found from this:
 the full Hamilton–Jacobi transform of H̃_h at time h is the truncated S_h = h S_1 + … + h^k S_k of the method. With the

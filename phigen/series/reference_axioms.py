@@ -1,4 +1,4 @@
-"""The axioms of a bi-realisation, up to a degree in p, decided a second time by sympy.
+"""The axioms of a bi-realisation, up to a degree in p, proved a second time by sympy.
 
 With α = x + Σ_μ a_μ(x) p^μ, β likewise, and {x_i, p_j} = δ_ij, the parts of degree m < d of
 

@@ -1,6 +1,6 @@
 """Polynomials in functions, by sympy: the arithmetic of the second derivation, and its proofs that an expression is 0.
 
-A *function* is what does not expand: x, a parameter, exp(x), sin(x), π, and of powers 1/b, b^{1/q} and b^{cx}. Powers
+A *function* is a factor of monomials: x, a parameter, exp(x), sin(x), π, and of powers 1/b, b^{1/q} and b^{cx}. Powers
 whose exponent is a sum make products, and so do tan u = sin u/cos u, tanh u = sinh u/cosh u and |u| = u sign u.
 """
 
@@ -104,7 +104,7 @@ class Functions:
 
     def vanishes(self, element: Any) -> bool:
         """True proves that the element is 0 where it is defined; False, only that the relations do not make it 0."""
-        for f in reversed(self._generators):  # what a relation refers to is listed before
+        for f in reversed(self._generators):  # a relation refers to earlier generators only
             relation = _relation(f)
             if relation is None:
                 continue

@@ -24,7 +24,7 @@ class Arithmetic(Generic[T]):
         raise NotImplementedError
 
     def variable(self, name: str) -> T:
-        """The value of a symbol."""
+        """The value of the symbol ``name``."""
         raise NotImplementedError
 
     def product(self, a: T, b: T) -> T:
@@ -59,9 +59,9 @@ class Arithmetic(Generic[T]):
         return self.function(node.op, args)
 
     def values(self, roots: Sequence[Expression], known: Mapping[int, T] = NOTHING) -> list[T]:
-        """The values of expressions; what they share is computed once, and kept for as long as it is needed.
+        """The values of expressions. A shared node is computed once; its value is dropped after its last use.
 
-        ``known`` are those of some nodes, by their ``id``: nothing below them is looked at.
+        ``known`` maps the ``id`` of nodes to values that are known already: nodes below them are not visited.
         """
         order = topological(roots, known)
         uses = Counter(id(a) for node in order for a in node.args)

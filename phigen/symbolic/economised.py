@@ -1,4 +1,4 @@
-"""Power series cut short by Chebyshev polynomials, in exact arithmetic: the same digits with fewer terms."""
+"""Chebyshev economisation of power series in exact arithmetic: the same accuracy with fewer terms."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fractions import Fraction
 def economised(
     coefficients: Sequence[Fraction], radius: Fraction, terms: int, *, symmetric: bool = False
 ) -> list[Fraction]:
-    """Σ c_k z^k for 0 ≤ z ≤ radius, or −radius ≤ z ≤ radius if ``symmetric``, with so many ``terms``.
+    """Σ c_k z^k for 0 ≤ z ≤ radius, or −radius ≤ z ≤ radius if ``symmetric``, with ``terms`` coefficients.
 
     By Lanczos' method (C. Lanczos, Applied Analysis, 1956): the highest power is replaced, one after the other, by what
     the Chebyshev polynomial of its degree leaves of it.

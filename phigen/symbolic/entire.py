@@ -6,7 +6,7 @@
 - ``exprel``(s) = (e^s − 1)/s
 - ``sinroot1``, ``arcroot1`` and ``exprel1`` are the derivatives of sinroot, arcroot and exprel, for tangent maps
 
-All are of phigen's own, and not accepted in a spec.
+They are internal to phigen: a spec cannot use them.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ class Expression:
     args: tuple[Expression, ...]
     value: Any
     depth: int
-    _digest: bytes  # empty until it is asked for, which few are
+    _digest: bytes  # computed on demand, empty before
 
     def __add__(self, other: Expression | Number) -> Expression:
         return add(self, as_expression(other))
@@ -124,7 +124,7 @@ class Expression:
 
 
 class _Reference(ref[Expression]):
-    """A node in the table of nodes, which it leaves when it dies."""
+    """Weak reference to a node, whose finaliser removes the node from the table."""
 
     __slots__ = ("key",)
 
@@ -163,7 +163,7 @@ def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
 
 
 def _ordered(a: Expression, b: Expression) -> tuple[Expression, Expression]:
-    """The two in the order in which terms and factors stand, the same in every process."""
+    """Two terms or factors in canonical order, which is the same in every process."""
     first, second = _place(a), _place(b)
     if first == second:
         first, second = a.digest, b.digest
@@ -176,7 +176,7 @@ def _place(e: Expression) -> Any:
 
 
 def raw(op: str, args: tuple[Expression, ...], value: Any = None) -> Expression:
-    """A node as it stands, without simplification: for lowering, where a form has been decided."""
+    """A node without simplification, for lowering passes that have chosen its form."""
     return _node(op, args, value)
 
 

@@ -147,7 +147,7 @@ _LISTED = (
         ),
         inline=True,
     ),
-    Function(  # 1/a where a > 0, else 0: what it multiplies vanishes there, or may stay as it is
+    Function(  # 1/a where a > 0, else 0: its factor vanishes there, or need not change
         "inv0",
         own=True,
         slopes=lambda call, f, a: (-(f**2),),
@@ -276,7 +276,7 @@ _LISTED = (
         written=_languages("fabs", "np.abs", "Math.abs"),
         inline=True,
     ),
-    Function(  # made by differentiating abs
+    Function(  # the derivative of abs
         "sign",
         own=True,
         slopes=lambda call, f, a: (0,),
@@ -287,7 +287,7 @@ _LISTED = (
         inline=True,
         letters="sgn",
     ),
-    Function(  # b where a > 0, else c: piecewise observables, which nobody differentiates
+    Function(  # b where a > 0, else c: for observables, which are not differentiated
         "choose",
         arity=3,
         own=True,

@@ -1,4 +1,4 @@
-"""From a sparse polynomial to an expression with few operations (greedy nested Horner form)."""
+"""Greedy nested Horner form: an expression with few operations from a sparse polynomial."""
 
 from __future__ import annotations
 

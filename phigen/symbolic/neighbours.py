@@ -1,4 +1,4 @@
-"""Symbols of what has a value at every site of a lattice, and where: ``x[i+1]``, ``x[i-1,j+2]``, ``x[a]``.
+"""Symbols of values at sites of a lattice, with an offset: ``x[i+1]``, ``x[i-1,j+2]``, ``x[a]``.
 
 On a grid the offset is steps along axes, in their order, zeros left out; ``x`` alone is x at the site itself. Where
 there are no axes, it is an end, a or b, of a bond or a pair. These are ordinary symbols, told apart by their text:
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import Symbol
 
-#: Where a site is, from another: steps along the axes of a grid; an end, ``("a",)`` or ``("b",)``, of a bond or a pair;
+#: Offset of a site from another: steps along the axes of a grid; an end, ``("a",)`` or ``("b",)``, of a bond or a pair;
 #: ``()`` for the site itself where there are no axes.
 Offset = tuple[int, ...] | tuple[str, ...]
-#: What has a value at sites, and where.
+#: The name of a field or other value at sites, and the offset of the site.
 Place = tuple[str, Offset]
 ENDS = ("a", "b")
 
@@ -73,14 +73,14 @@ class Neighbours:
         return {n: self.place(n) for n in symbols_of(*expressions) if n.partition("[")[0] in self.names}
 
     def shifted(self, expressions: Sequence[Expression], offset: Offset) -> list[Expression]:
-        """The expressions as they are at the site that lies so far away on a grid."""
+        """The expressions at the site with an offset on a grid."""
         if not any(offset):
             return list(expressions)
         moved = {name: symbol(self.at(base, plus(o, offset))) for name, (base, o) in self.places(*expressions).items()}
         return substitute(expressions, moved)
 
     def on(self, expression: Expression, end: str) -> Expression:
-        """The density of a site as it is at one end of a bond or a pair."""
+        """The density of a site at one end of a bond or a pair."""
         moved = {name: symbol(self.at(base, (end,))) for name, (base, _) in self.places(expression).items()}
         return substitute([expression], moved)[0]
 
@@ -96,5 +96,5 @@ def plus(a: Offset, b: Offset) -> tuple[int, ...]:
 
 
 def minus(a: Offset) -> tuple[int, ...]:
-    """The way back."""
+    """The opposite offset, −a."""
     return tuple(-o for o in steps(a))

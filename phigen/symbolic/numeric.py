@@ -56,7 +56,7 @@ def evaluate_with_scale(
 ) -> list[tuple[Any, Any]]:
     """Pairs (value, scale) of mpmath numbers; scale is the largest magnitude met below the root, at least 1.
 
-    A value that is tiny against its scale may be nothing but rounding error.
+    A value far below its scale may be rounding error only.
     """
     context = _mpmath_context(digits)
 

@@ -22,13 +22,13 @@ from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import MOMENTUM, Symbol, kind_of, plain
 from phigen.symbolic.tower import Poly, Tower, rational
 
-#: Terms of a formula that are shown unless all are asked for.
+#: Number of terms of a formula that are shown by default.
 SHOWN = 8
 
 #: Names of φ and its derivatives for readers, as text.
 _GREEK = {name: FUNCTIONS[name].letters.replace("′", "'").replace("″", "''") for name in SPECIAL}
 
-#: Functions of phigen's own in which flows are written, as they are known.
+#: The internal functions in which flows are written, by functions that readers know.
 UNFAMILIAR = {
     "cosroot": "cosroot(s) = cos √s",
     "sinroot": "sinroot(s) = sin(√s)/√s",

@@ -1,7 +1,7 @@
 """The function φ of the exponential bi-realisation, and its first two derivatives.
 
-φ(s) = (1 − w cot w)/s with w = √s/2, analytic through s = 0 and for s < 0 (where cot becomes coth); poles at
-s = 4π²n². It is the even part of z/(1 − e^{−z}) in disguise: (z/2) coth(z/2) = 1 + z² φ(−z²).
+φ(s) = (1 − w cot w)/s with w = √s/2, analytic at s = 0 and for s < 0 (where cot becomes coth); poles at
+s = 4π²n². It comes from the even part of z/(1 − e^{−z}): (z/2) coth(z/2) = 1 + z² φ(−z²).
 
 - φ(s) = Σ a_n sⁿ with a_n = |B_{2n+2}|/(2n+2)!
 - sφ' = 1/8 − (3/2)φ + ½sφ² (Riccati), hence (n + 3/2) a_n = ½ Σ_{i+j=n−1} a_i a_j, a_0 = 1/12

@@ -88,7 +88,7 @@ def kind_of(name: str) -> str | None:
 def plain(name: str) -> str:
     """A name for readers: ``p_x1`` for the momentum of x1, as in specs, λ_C for the gauge of C, ``h`` for the step.
 
-    What formulas share is σ_1, σ_2, …
+    Shared sub-expressions are named σ_1, σ_2, …
     """
     if not isinstance(name, Symbol):
         return name

@@ -137,7 +137,7 @@ class Taylor:
         for done, e in enumerate(self.order, 1):
             coefficients = self.series[id(e)]
             coefficients.append(self._coefficient(e, len(coefficients), inputs))
-            if e.op in ("add", "sub", "neg"):  # sums of sums are kept too, and may be longer than all products
+            if e.op in ("add", "sub", "neg"):  # sums are stored too, and may be longer than all products
                 self._count(coefficients[-1])
             if running:
                 running.done = done
@@ -202,7 +202,7 @@ class Taylor:
             for j in range(1, i + 1)
             if not (zero(a[j]) or zero(powers[i - j]))
         ]
-        # Of a base that does not move, the ring may have the power and not the reciprocal.
+        # For a constant base the ring may hold this power but not the reciprocal.
         return self.ring.combine(terms) * self.ring.power(a[0], -1) if terms else self._zero
 
     def _integer_power(self, a: list[Any], n: int, i: int) -> Any:

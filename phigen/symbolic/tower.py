@@ -38,7 +38,7 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 from phigen.symbolic.symbols import Symbol
 
-#: From so many generators on an element is first evaluated at a point: its numerator takes minutes for seven roots.
+#: From `MANY_GENERATORS` on an element is first evaluated at a point: its numerator takes minutes for seven roots.
 #: What cancels leaves less than `ROUNDING` of the sum of the magnitudes of its terms.
 MANY_GENERATORS, ROUNDING = 5, 1e-9
 
@@ -109,7 +109,7 @@ class Tower(Arithmetic[Poly]):
         return tuple(self._index)
 
     def _set_context(self, spare: int = 0) -> None:
-        """Make the ring of all names, and of so many to come, and take the generators into it."""
+        """Make the ring of all names and ``spare`` further ones, and convert the generators to it."""
         self._room = max(len(self._index) + spare, 1)
         self.context = fmpq_mpoly_ctx.get([f"v{i}" for i in range(self._room)], Ordering.degrevlex)
         self.gens = self.context.gens()
@@ -154,7 +154,7 @@ class Tower(Arithmetic[Poly]):
                 self._grow(missing)
 
     def _grow(self, missing: _MissingError) -> None:
-        # The root of q, found after 1/q, stands for 1/q from now on: what contained that is to be looked at again.
+        # The root of q, found after 1/q, replaces 1/q from now on: elements with 1/q are converted again.
         late = missing.kind == "root" and missing.inverse
         if late and any(g.kind == "reciprocal" for g in self.generators):
             self._renamed = True
@@ -363,7 +363,7 @@ class Tower(Arithmetic[Poly]):
 
     def derivative(self, element: Poly, name: str) -> Poly:
         """Total derivative with respect to one of `variables`, through the generators."""
-        result = element.derivative(self._index[name]) + 0  # a copy, without the room for as many terms as before
+        result = element.derivative(self._index[name]) + 0  # a copy, which frees the memory of terms that have gone
         degrees = element.degrees()
         for g in self.generators:
             k = self._index[g.name]

@@ -18,7 +18,7 @@ from typing import Any
 #: The name of the function; its arguments are t, r, η, β, μ and |q × q̇|².
 ANOMALY = "anomaly"
 
-#: Steps of the iteration after which there is no value: halving a bracket takes 53, and growing one up to 1,000.
+#: Iterations after which the function has no value: halving a bracket takes 53, growing one up to 1,000.
 MOST_ITERATIONS = 100
 
 #: A motion is radial where |q × q̇|² is below this part of η² + |μ|r: the products have ten units of rounding.

@@ -1,4 +1,4 @@
-"""Statements that were proved, refuted, or only checked at points; and how to decide that something is zero."""
+"""Statements that were proved, refuted, or only checked at points; decision whether expressions vanish."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DIGITS = 60
 #: A value below 10**-ZERO_DIGITS of its scale counts as zero; rounding stays 15 digits below that.
 ZERO_DIGITS = 40
 _ATTEMPTS = 64
-#: Failing parts that a refutation lists: all that anybody reads, and bounded memory for those of large structures.
+#: Failing parts that a refutation lists; it bounds the memory for large structures.
 MOST_LISTED = 1000
 
 
