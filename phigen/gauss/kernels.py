@@ -232,13 +232,15 @@ def vector_field(
     at: Mapping[str, Expression],
     weight: Expression = ONE,
     hold: Callable[[Expression], Expression] | None = None,
+    slopes: Sequence[Expression] | None = None,
 ) -> list[Expression]:
     """Return the derivatives of the unknowns at a stage, with these values of the coordinates, times a weight.
 
-    ``hold`` receives each component of the velocities in Lie algebras, and returns its replacement.
+    ``hold`` receives each component of the velocities in Lie algebras, and returns its replacement. ``slopes`` stand
+    for ∇H, where H is not that of the system.
     """
     system, realisation = points.system, points.realisation
-    slopes = gradient(system.hamiltonian, system.coordinates)
+    slopes = gradient(system.hamiltonian, system.coordinates) if slopes is None else slopes
     if system.forces:
         slopes = [s + z for s, z in zip(slopes, system.forces.covector, strict=True)]
     slopes = [points.pace * s for s in slopes]

@@ -17,10 +17,10 @@ Floats = NDArray[np.float64]
 
 
 class Arrays(Arithmetic[Any]):
-    """Arrays of doubles, with the functions of NumPy."""
+    """Arrays, with the functions of NumPy, or of another ``library`` that has the same ones."""
 
-    def __init__(self, values: Mapping[str, Any]) -> None:
-        self._values = values
+    def __init__(self, values: Mapping[str, Any], library: Any = np) -> None:
+        self._values, self._library = values, library
 
     def constant(self, value: Fraction) -> Any:
         """The nearest double."""
@@ -32,15 +32,15 @@ class Arrays(Arithmetic[Any]):
 
     def power(self, base: Any, exponent: Fraction) -> Any:
         """An array to a rational power."""
-        return np.power(base, float(exponent))
+        return self._library.power(base, float(exponent))
 
     def function(self, name: str, args: list[Any]) -> Any:
-        """A function that NumPy has."""
+        """A function that the library has."""
         if not args:
             return np.pi if name == "pi" else np.e
         if name == "choose":
-            return np.where(args[0] > 0, args[1], args[2])
-        return getattr(np, FUNCTIONS[name].written["numpy"].removeprefix("np."))(*args)
+            return self._library.where(args[0] > 0, args[1], args[2])
+        return getattr(self._library, FUNCTIONS[name].written["numpy"].removeprefix("np."))(*args)
 
 
 def evaluate(roots: Sequence[Expression], values: Mapping[str, Any]) -> list[Floats]:

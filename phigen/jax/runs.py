@@ -1,4 +1,4 @@
-"""Runs of solvers as functions of JAX: with derivatives, under `jit` and `vmap`. Needs jax.
+"""Runs of solvers as functions of JAX: with derivatives, under `jit` and `vmap`.
 
 The solver runs on the CPU, in double precision, as a callback. Derivatives are those of `Solver.pullback`; second ones
 are not offered.
@@ -10,18 +10,13 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+import jax
 import numpy as np
+from jax import numpy as jnp
 
-from phigen.errors import MissingPackageError
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.propagation import Propagation
 from phigen.runtime.solver import Solver
-
-try:
-    import jax
-    from jax import numpy as jnp
-except ImportError as error:
-    raise MissingPackageError("phigen.jax needs jax\n  hint: pip install jax") from error
 
 
 def propagator(

@@ -1,0 +1,16 @@
+"""Runs as functions of JAX, with derivatives, under `jit` and `vmap`. Needs jax.
+
+`propagator` calls a compiled solver. `flow` takes the bracket of a system, and any function of JAX as H.
+"""
+
+from phigen.errors import MissingPackageError
+
+try:
+    import jax as _jax  # noqa: F401
+except ImportError as error:
+    raise MissingPackageError("phigen.jax needs jax\n  hint: pip install jax") from error
+
+from phigen.jax.flows import flow
+from phigen.jax.runs import propagator
+
+__all__ = ["flow", "propagator"]

@@ -1,0 +1,238 @@
+"""Gauss collocation in JAX: the step of a bracket with any function as H.
+
+The unknowns, the sweeps and the predictor are those of `phigen.gauss`. The stages of a step are the solution of an
+equation, and JAX differentiates them as such: tangents and cotangents solve its linearisation, and its transpose, by
+sweeps of their own. So derivatives are those of the step, exact to round-off, and the sweeps themselves are not
+differentiated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import jax
+import numpy as np
+from jax import numpy as jnp
+
+from phigen.gauss.kernels import StageMap, at_unknowns, frame_kernel, vector_field
+from phigen.gauss.tableau import DOUBLE, SINGLE, Tableau, tableau
+from phigen.scheme.policies import GaussAdjointPolicy, GaussPolicy
+from phigen.scheme.staging import Coefficients
+from phigen.symbolic.arrays import Arrays
+from phigen.symbolic.expression import Expression, symbol
+from phigen.symbolic.symbols import Symbol
+
+#: The kind of symbols of the components of ∇H.
+GRADIENT = "gradient"
+
+#: Largest number of sweeps in the solve of a step, or of its linearisation: those of a step of a spec.
+MAX_SWEEPS = 100
+
+#: Thresholds of the sweeps of a step, and of those of linear equations, in double precision.
+POLICY, LINEAR_POLICY = GaussPolicy(), GaussAdjointPolicy()
+
+#: The state of a run between two steps: x, its compensation term, and the moves of the last step as seen from x.
+Carry = tuple[Any, Any, Any]
+
+
+class _Traced(Arrays):
+    """Arrays of JAX."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        super().__init__(values, jnp)
+
+    def power(self, base: Any, exponent: Fraction) -> Any:
+        """Return an array to a rational power, with products and roots where these do."""
+        if exponent.denominator == 1:
+            return base ** int(exponent)
+        return jnp.sqrt(base) ** exponent.numerator if exponent.denominator == 2 else super().power(base, exponent)
+
+
+def rounding_of(dtype: Any) -> float:
+    """Return the unit of rounding of a floating-point type in that of double precision."""
+    return float(jnp.finfo(dtype).eps) / float(np.finfo(np.float64).eps)
+
+
+def tableau_of(dtype: Any, stages: int) -> Tableau:
+    """Return the coefficients of a method; types shorter than double precision take those of single precision."""
+    return tableau(stages, DOUBLE if rounding_of(dtype) == 1 else SINGLE)
+
+
+@dataclass(frozen=True, eq=False)
+class Collocation:
+    """A step of size ``h`` by a method with this number of ``stages``.
+
+    ``points`` are those of a system whose H is not used: ``slope`` is ∇H as a function of x and further arguments.
+    """
+
+    points: StageMap
+    slope: Callable[..., Any]
+    h: float
+    stages: int
+
+    @cached_property
+    def _places(self) -> list[Expression]:
+        at = at_unknowns(self.points)
+        return [at[c] for c in self.points.system.coordinates]
+
+    @cached_property
+    def _derivatives(self) -> list[Expression]:
+        slopes = [symbol(s) for s in self._slope_symbols]
+        return vector_field(self.points, at_unknowns(self.points), slopes=slopes)
+
+    @property
+    def _slope_symbols(self) -> tuple[str, ...]:
+        return tuple(Symbol(GRADIENT, k) for k in range(self.points.system.dimension))
+
+    @cached_property
+    def _seen(self) -> tuple[Sequence[str], Sequence[Expression]] | None:
+        kernel = frame_kernel(self.points, Coefficients(()))
+        return None if kernel is None else (kernel.inputs["k"], kernel.outputs[0].values)
+
+    def _values(self, x: Any, z: Any, parameters: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the values of symbols: coordinates of the start, unknowns (arrays over stages), parameters."""
+        return {
+            **parameters,
+            **dict(zip(self.points.system.coordinates, x, strict=True)),
+            **dict(zip(self.points.unknowns, z, strict=True)),
+        }
+
+    def start(self, x: Any) -> Carry:
+        """Return the state of a run at its start, where nothing is predicted."""
+        return x, jnp.zeros_like(x), jnp.zeros((len(self.points.unknowns), self.stages), x.dtype)
+
+    def moves(self, table: Tableau, x: Any, moves: Any, arguments: Any, parameters: Mapping[str, Any]) -> Any:
+        """Return h b_j times the derivatives of the unknowns at all stages (unknowns, stages), at these moves."""
+        z = moves @ jnp.asarray(table.mixing, x.dtype).T
+        values = self._values(x, z, parameters)
+        places = _stacked(_Traced(values).values(self._places), self.stages, x.dtype)
+        slopes = jax.vmap(lambda at: self.slope(at, *arguments))(places.T).T
+        values |= dict(zip(self._slope_symbols, slopes, strict=True))
+        weights = self.h * jnp.asarray(table.weights, x.dtype)
+        return weights * _stacked(_Traced(values).values(self._derivatives), self.stages, x.dtype)
+
+    def advance(self, carry: Carry, arguments: Any, parameters: Mapping[str, Any]) -> Carry:
+        """Return the state of a run after a step; x is not a number if the step failed."""
+        x, compensation, seen = carry
+        table, unit = tableau_of(x.dtype, self.stages), rounding_of(x.dtype)
+
+        def rest(moves: Any) -> Any:
+            return self.moves(table, x, moves, arguments, parameters) - moves
+
+        guess = seen @ jnp.asarray(table.prediction, x.dtype).T @ _inverse_mixing(table, x.dtype)
+        moves = jax.lax.custom_root(
+            rest,
+            jax.lax.stop_gradient(guess),
+            lambda equation, start: _solved(equation, start, self._scale(x), unit),
+            lambda linear, side: _solved_linear(linear, side, unit),
+        )
+        end = jnp.sum(moves, axis=1)
+        change = _stacked(_Traced(self._values(x, end, parameters)).values(self.points.change), None, x.dtype)
+        change = change + jax.lax.stop_gradient(compensation)
+        following = x + change
+        lost = jax.lax.stop_gradient(change - (following - x))
+        return following, lost, jax.lax.stop_gradient(self._from_the_end(end, moves, parameters))
+
+    def _scale(self, x: Any) -> Any:
+        """Return the sizes of the unknowns (unknowns, 1): of coordinates that of x, of group elements 1."""
+        size = jnp.sqrt(jnp.sum(x**2))
+        size = jnp.where(size > 0, size, 1)
+        plain = len(self.points.moved)
+        ones = jnp.ones(len(self.points.unknowns) - plain, x.dtype)
+        return jnp.concatenate([jnp.broadcast_to(size, (plain,)), ones])[:, None]
+
+    def _from_the_end(self, end: Any, moves: Any, parameters: Mapping[str, Any]) -> Any:
+        """Return the moves of a step in the frame of its end."""
+        if self._seen is None:
+            return moves
+        symbols, roots = self._seen
+        values = {**parameters, **dict(zip(symbols, moves, strict=True))}
+        values |= dict(zip(self.points.unknowns, end, strict=True))
+        return _stacked(_Traced(values).values(roots), self.stages, moves.dtype)
+
+
+def _stacked(values: Sequence[Any], stages: int | None, dtype: Any) -> Any:
+    """Return values, each an array over the stages or one number for all, as the rows of an array."""
+    shape = () if stages is None else (stages,)
+    return jnp.stack([jnp.broadcast_to(jnp.asarray(v, dtype), shape) for v in values])
+
+
+def _inverse_mixing(table: Tableau, dtype: Any) -> Any:
+    """Return the transpose of μ⁻¹, which gives the moves that a prediction of the unknowns at the stages comes from."""
+    return jnp.asarray(np.linalg.inv(np.array(table.mixing)).T, dtype)
+
+
+def _largest(change: Any, scale: Any) -> Any:
+    """Return the largest size at any stage."""
+    return jnp.sqrt(jnp.max(jnp.sum((change / scale) ** 2, axis=0)))
+
+
+def _solved(equation: Callable[[Any], Any], start: Any, scale: Any, unit: float) -> Any:
+    """Return the zero L of F(L) − L, given as ``equation``, by sweeps L ← F(L); not a number if they do not converge.
+
+    Sweeps that diverge from ``start`` begin once more at 0.
+    """
+    solved, rounding, near = (unit * v for v in (POLICY.solved, POLICY.rounding, POLICY.nearly_rounding))
+    stages, infinity = start.shape[1], jnp.asarray(jnp.inf, start.dtype)
+
+    def goes_on(state: tuple[Any, ...]) -> Any:
+        return (state[1] < MAX_SWEEPS) & ~state[-1]
+
+    def swept(state: tuple[Any, ...]) -> tuple[Any, ...]:
+        moves, sweep, before, rate, rising, rises, again, _ = state
+        change = equation(moves)
+        size = _largest(change, scale)
+        contraction = size / jnp.maximum(before, jnp.finfo(size.dtype).tiny)
+        counts = (contraction > 0) & (contraction < 1) & (size > near)
+        rate = jnp.where(counts, 0.7 * rate + 0.3 * contraction, rate)
+        slow = (contraction >= 1) | (contraction > jnp.maximum(1.5 * rate, POLICY.stalled))
+        rises = rises + ((contraction >= 1) & (size <= near))
+        done = (rate * size <= solved) | (slow & (size <= rounding)) | (rises > 1)
+        rising = jnp.where(contraction >= 1, rising + 1, 0)
+        lost = ~done & (~jnp.isfinite(size) | (rising >= POLICY.most_rising + stages))
+        anew = lost & again
+        moves = jnp.where(anew, 0, jnp.where(lost, jnp.nan, moves + change))
+        before = jnp.where(anew, infinity, size)
+        rate = jnp.where(anew, 0.5, rate)
+        rising, rises, sweep = (jnp.where(anew, 0, v) for v in (rising, rises, sweep + 1))
+        return moves, sweep, before, rate, rising, rises, again & ~anew, done | (lost & ~anew)
+
+    none, half = jnp.asarray(0), jnp.asarray(0.5, start.dtype)
+    state = (start, none, infinity, half, none, none, jnp.any(start != 0), jnp.asarray(False))
+    moves, *_, ended = jax.lax.while_loop(goes_on, swept, state)
+    return jnp.where(ended, moves, jnp.nan)
+
+
+def _solved_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
+    """Return the solution of (F′ − 1) L = side, where F′ − 1 is ``linear``; JAX transposes it by the same sweeps."""
+    return jax.lax.custom_linear_solve(
+        linear, side, lambda f, b: _swept_linear(f, b, unit), lambda f, b: _swept_linear(f, b, unit)
+    )
+
+
+def _swept_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
+    """Return the same by sweeps L ← F′L − side."""
+    solved, rounding = unit * LINEAR_POLICY.adjoint_solved, unit * LINEAR_POLICY.adjoint_rounding
+    floor = jnp.finfo(side.dtype).tiny
+
+    def goes_on(state: tuple[Any, ...]) -> Any:
+        return (state[1] < MAX_SWEEPS) & ~state[-1]
+
+    def swept(state: tuple[Any, ...]) -> tuple[Any, ...]:
+        moves, sweep, before, stalls, _ = state
+        change = linear(moves) - side
+        following = moves + change
+        size, largest = jnp.max(jnp.abs(change)), jnp.max(jnp.abs(following)) + floor
+        rate = size / jnp.maximum(before, floor)
+        stalls = stalls + ((rate > LINEAR_POLICY.adjoint_stalled) & (size <= rounding * largest))
+        done = (stalls > 1) | ((sweep > 0) & (size * rate <= solved * largest)) | ~jnp.isfinite(size)
+        return following, sweep + 1, size, stalls, done
+
+    none = jnp.asarray(0)
+    state = (-side, none, jnp.asarray(jnp.inf, side.dtype), none, jnp.asarray(False))
+    moves, *_, ended = jax.lax.while_loop(goes_on, swept, state)
+    return jnp.where(ended, moves, jnp.nan)

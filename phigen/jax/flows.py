@@ -1,0 +1,165 @@
+"""Flows of a bracket with any function of JAX as H, by steps that are Poisson maps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import jax
+import numpy as np
+from jax import numpy as jnp
+
+from phigen.api import load
+from phigen.errors import CheckError, Diagnostic, SpecError
+from phigen.gauss import statements as gauss_statements
+from phigen.gauss.kernels import stage_map
+from phigen.gauss.realisation import Realisation, collective, direct
+from phigen.gauss.tableau import MOST_STAGES, tableau
+from phigen.geometry.system import System, system_from_spec, system_of_lattice
+from phigen.jax.collocation import Collocation
+from phigen.proofs import statements
+from phigen.runtime import arguments
+from phigen.runtime.interface import row_steps
+from phigen.spec.model import Spec
+from phigen.symbolic.verdict import REFUTED
+
+if TYPE_CHECKING:
+    from phigen.lattice.lattice_system import LatticeSystem
+
+#: Hint where no exact Poisson map is known.
+TRUNCATION_HINT = 'structure="to truncation" takes every bracket; its steps are no Poisson maps'
+
+
+def flow(
+    system: str | PathLike[str] | Spec | System | LatticeSystem,
+    hamiltonian: Callable[..., Any],
+    h: float,
+    steps: int,
+    *,
+    order: int = 4,
+    stride: int | None = None,
+    structure: str = "exact",
+) -> Callable[..., Any]:
+    """The run of ẋ = π∇H as ``f(x0, *arguments, **parameters)``, with π of a system, and H a function of JAX.
+
+    ``hamiltonian(x, *arguments)`` returns a number; x is (DIM,), and arguments are arrays or trees of arrays, such as
+    the weights of a network. The H of the system, and its runs, are not used. ``parameters`` are those in π, by name;
+    what is not passed has its default. f returns the last state, of the shape (…, DIM) of x0, with a ``stride`` all
+    rows of `Solver.integrate`, (…, rows, DIM). Steps are those of ``scheme: gauss`` of this order: Poisson maps, for
+    any H and step size, if the bracket is constant or that of a Lie algebra that phigen knows; ``structure="to
+    truncation"`` takes every bracket, and is no Poisson map. All of f is in JAX, in the precision of x0: it runs under
+    `jit` and `vmap`, on every device of XLA, and has derivatives in both modes, which solve the linearised equations of
+    a step. A step that fails, since h is too large, gives NaN from there on. H should be smooth: the order rests on its
+    derivatives. Raises `SpecError` for brackets without exact steps, and `CheckError` if π is not a Poisson tensor.
+    """
+    arguments.step_size(h)
+    arguments.count(steps, "steps", 0)
+    if stride is not None:
+        arguments.count(stride, "stride", 1)
+    if order not in range(2, 2 * MOST_STAGES + 1, 2):
+        raise ValueError(f"order must be even, from 2 to {2 * MOST_STAGES}, not {order!r}")
+    bracket = _system_of(system)
+    realisation = _realised(bracket, structure)
+    _expect_proved(bracket, realisation, order // 2)
+    slope = jax.grad(hamiltonian)
+    method = Collocation(stage_map(bracket, realisation), slope, float(h), order // 2)
+    return _run_of(method, bracket, steps, stride)
+
+
+def _run_of(method: Collocation, bracket: System, steps: int, stride: int | None) -> Callable[..., Any]:
+    defaults = {p.name: float(p.value) for p in bracket.parameters}
+    counts = np.diff(row_steps(steps, stride or max(1, steps)))
+    whole = int(np.sum(counts == counts[0])) if len(counts) else 0
+
+    def rows(x0: Any, arguments: Any, parameters: Mapping[str, Any]) -> Any:
+        def advanced(carry: Any, count: int) -> Any:
+            return jax.lax.scan(lambda c, _: (method.advance(c, arguments, parameters), None), carry, None, count)[0]
+
+        def row(carry: Any, _: None) -> tuple[Any, Any]:
+            carry = advanced(carry, int(counts[0]))
+            return carry, carry[0]
+
+        carry, listed = method.start(x0), x0[None]
+        if whole:
+            carry, following = jax.lax.scan(row, carry, None, whole)
+            listed = jnp.concatenate([listed, following])
+        if whole < len(counts):
+            listed = jnp.concatenate([listed, advanced(carry, int(counts[-1]))[0][None]])
+        return listed if stride else listed[-1]
+
+    def batched(x: Any, arguments: Any, values: Mapping[str, Any]) -> Any:
+        members: Callable[..., Any] = lambda x: rows(x, arguments, values)  # noqa: E731
+        for _ in x.shape[:-1]:
+            members = jax.vmap(members)
+        return members(x)
+
+    compiled: Callable[..., Any] = jax.jit(batched)
+
+    def run(x0: Any, *arguments: Any, **parameters: Any) -> Any:
+        x = _state(x0, bracket)
+        unknown = parameters.keys() - defaults.keys()
+        if unknown:
+            raise TypeError(f"unknown parameter {min(unknown)!r}; those of {bracket.name} are {', '.join(defaults)}")
+        values = {name: jnp.asarray(v, x.dtype) for name, v in (defaults | parameters).items()}
+        # Trees with other leaves, such as functions, are not arguments of `jit`.
+        of_arrays = all(
+            isinstance(leaf, jax.Array | np.ndarray | np.number | float) for leaf in jax.tree.leaves(arguments)
+        )
+        return (compiled if of_arrays else batched)(x, arguments, values)
+
+    return run
+
+
+def _state(x0: Any, bracket: System) -> Any:
+    """Return x0 as an array of real numbers of a precision of its own, of that of JAX if it has none."""
+    x = jnp.asarray(x0)
+    if jnp.iscomplexobj(x):
+        raise TypeError("x0 must be real")
+    if not x.ndim or x.shape[-1] != bracket.dimension:
+        raise ValueError(f"x0 must have shape (…, {bracket.dimension}), not {x.shape}")
+    return x.astype(jnp.result_type(float, x))
+
+
+def _system_of(source: str | PathLike[str] | Spec | System | LatticeSystem) -> System:
+    """Return the system of a source. Raises `SpecError` if its motion is not that of π and H alone."""
+    system = load(source) if isinstance(source, str | PathLike) else source
+    system = system_from_spec(system) if isinstance(system, Spec) else system
+    if not isinstance(system, System):
+        raise system_of_lattice(system.spec)
+    problems = [
+        Diagnostic(f"phigen.jax.flow: {message}", system.locations.get((key,)), hint)
+        for key, message, hint in _refused(system)
+    ]
+    if problems:
+        raise SpecError(problems)
+    return system
+
+
+def _refused(system: System) -> Iterator[tuple[str, str, str]]:
+    if system.time:
+        yield "time", "H does not depend on the time", "remove time"
+    if system.forces:
+        yield "forces", "forces are not offered", "remove forces, or phigen.jax.propagator"
+    if system.noise:
+        yield "noise", "noise is not offered", "remove noise"
+
+
+def _realised(system: System, structure: str) -> Realisation:
+    if structure not in ("exact", "to truncation"):
+        raise ValueError(f"structure must be 'exact' or 'to truncation', not {structure!r}")
+    realisation = direct(system) if structure == "to truncation" else collective(system)
+    if realisation is None:
+        message = f"phigen.jax.flow: no exact Poisson map is known for this bracket ({system.shape})"
+        raise SpecError([Diagnostic(message, system.locations.get(("poisson",)), TRUNCATION_HINT)])
+    return realisation
+
+
+def _expect_proved(system: System, realisation: Realisation, stages: int) -> None:
+    """Raise `CheckError` if π is not a Poisson tensor, or the step is not what it should be."""
+    listed = [s for group in statements.tensor(system).values() for s in group]
+    if not any(s.verdict == REFUTED for s in listed):
+        listed += gauss_statements.check(system, system, realisation, tableau(stages))
+    refuted = [f"{s.name}: refuted{f', {s.residual}' if s.residual else ''}" for s in listed if s.verdict == REFUTED]
+    if refuted:
+        raise CheckError("\n".join(f"{system.name}: {text}" for text in refuted))
