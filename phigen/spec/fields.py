@@ -82,12 +82,11 @@ CANONICAL = Record(
     ),
     example="{q: [x, y], p: [px, py]}",
 )
+ALGEBRA_NAME = ShapedText(r"[a-zA-Z]+\([0-9]+\)", "the name of a Lie algebra", f"write {FAMILY_HELP}")
 LIE_ALGEBRA = Record(
     "lie_algebra",
     (
-        RecordKey(
-            "name", ShapedText(r"[a-zA-Z]+\([0-9]+\)", "the name of a Lie algebra", f"write {FAMILY_HELP}"), FAMILY_HELP
-        ),
+        RecordKey("name", ALGEBRA_NAME, FAMILY_HELP),
         RecordKey("matrices", ListOf(MATRIX, least=1), "square matrices E_1, …, E_n that span the algebra"),
         RecordKey(
             "structure_constants",
@@ -108,7 +107,10 @@ _FORMS: dict[str, tuple[Kind, str]] = {
     ),
     "canonical": (CANONICAL, "{q_i, p_i} = 1"),
     "log_canonical": (MATRIX, "the n×n matrix a of {x_i, x_j} = a_ij x_i x_j"),
-    "lie_algebra": (LIE_ALGEBRA, "the Lie–Poisson structure {x_i, x_j} = ± Σ c_ij^k x_k"),
+    "lie_algebra": (
+        Either({Mapping: LIE_ALGEBRA, Scalar: ALGEBRA_NAME}),
+        "the Lie–Poisson structure {x_i, x_j} = ± Σ c_ij^k x_k",
+    ),
     "nambu": (ListOf(FORMULA), "n-2 Casimirs C_k of {f, g} = det ∂(f, g, C_1, …)/∂(x_1, …, x_n)"),
 }
 

@@ -187,7 +187,9 @@ def _canonical(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | 
     return CanonicalForm(tuple(node.text for node in q), tuple(node.text for node in p))
 
 
-def _lie_algebra(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
+def _lie_algebra(raw: Mapping[str, Any] | Scalar, declared: Declarations) -> PoissonForm | None:
+    if isinstance(raw, Scalar):
+        return _family(raw, 1, declared)
     sign = -1 if raw.get("sign") == "minus" else 1
     if "name" in raw:
         return _family(raw["name"], sign, declared)

@@ -85,6 +85,10 @@ def test_sign_of_a_lie_algebra(written: str, sign: int) -> None:
     assert form(f"{{lie_algebra: {{name: so(3){written}}}}}") == LieAlgebraForm(sign, "so", 3)
 
 
+def test_lie_algebra_by_its_name_alone() -> None:
+    assert form("{lie_algebra: so(3)}") == form("{lie_algebra: {name: so(3)}}")
+
+
 def test_structure_constants_count_from_0_and_stay_as_given() -> None:
     found = form("{lie_algebra: {structure_constants: {E1: {E2: {E3: 1}}, E3: {E1: {E2: k}}}}}")
     assert found == LieAlgebraForm(structure_constants={0: {1: {2: ONE}}, 2: {0: {1: symbol("k")}}})
