@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 09b68cbdae5a4a1aaa24ea37560a5857800ea7e9c2a85bd8ba716fcf56774734
+ * body-sha256: f044b75c5c54659f97c2b43b8fd2d1afc0f3e7f9ddc8b0064ba65d3f1d0def27
  */
 #include "food_web.h"
 #include <float.h>
@@ -35,6 +35,15 @@ static const size_t food_web_least[food_web_AXES] = { 1 };
 /* Whether a part of H is that of the sites of one colour: then it has a flow for each colour. */
 enum { food_web_PARTS = 1 };
 static const unsigned char food_web_by_colour[food_web_PARTS] = { 1 };
+
+/* The part of H that a flow belongs to, from 1 on, and the colour of the sites that it updates. */
+static int food_web_part_of_flow(const food_web_solver *s, int flow, int *colour)
+{
+    int part = 1;
+    for (int own; flow >= (own = food_web_by_colour[part - 1] ? s->colour_count : 1); ++part) flow -= own;
+    *colour = flow;
+    return part;
+}
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
    the last flow and the first of the next step together. */
@@ -193,8 +202,8 @@ static inline void food_web_sweep1(const double *coef, const food_web_row *row)
 /* A flow. */
 static void food_web_sweep_colour(const food_web_solver *s, int flow, const double *coef)
 {
-    int part = 1, colour = flow;
-    for (int own; colour >= (own = food_web_by_colour[part - 1] ? s->colour_count : 1); ++part) colour -= own;
+    int colour;
+    food_web_part_of_flow(s, flow, &colour);
     const size_t units = food_web_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
@@ -213,8 +222,8 @@ static void food_web_energy_row(const food_web_row *row, double *restrict out)
     const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
     food_web_EACH_SITE
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-        const double k_ = k_row[i], x = x_row[i];
-        out[i - row->from] = x - k_ * log(x);
+        const double k = k_row[i], x = x_row[i];
+        out[i - row->from] = x - k * log(x);
     }
 }
 

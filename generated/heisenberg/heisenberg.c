@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: ae6113712f08aaebf6987174582b05bf6575168696ddd6731722869ba9fb93fa
+ * body-sha256: fd4f81c80260d94e533d6791b6fe4c758fa155e16a39255ea68e135baadee5e9
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -437,9 +437,18 @@ static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const do
     size_t first, size_t end)
 {
     switch (part) {
-    case 1: (far ? heisenberg_rows1_far : heisenberg_rows1_near)(s, coef, first, end); break;
-    case 2: (far ? heisenberg_rows2_far : heisenberg_rows2_near)(s, coef, first, end); break;
-    default: (far ? heisenberg_rows3_far : heisenberg_rows3_near)(s, coef, first, end); break;
+    case 1:
+        if (far) heisenberg_rows1_far(s, coef, first, end);
+        else heisenberg_rows1_near(s, coef, first, end);
+        break;
+    case 2:
+        if (far) heisenberg_rows2_far(s, coef, first, end);
+        else heisenberg_rows2_near(s, coef, first, end);
+        break;
+    default:
+        if (far) heisenberg_rows3_far(s, coef, first, end);
+        else heisenberg_rows3_near(s, coef, first, end);
+        break;
     }
 }
 

@@ -12,6 +12,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from phigen.ir import nodes as ir
+from phigen.ir.passes.loop_invariant import loop_invariant
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.program import Program
 from phigen.scheme.reversal import UNDONE
@@ -65,15 +66,11 @@ class LatticeLoops:
     def sums(self, ends: Ends) -> ir.Function:
         """Return the function that sums over the bonds of one kind, or over the pairs, of each site."""
         kernel = ends.kernel
-        once, reads = self._reads(kernel, ())
-        kind = "bonds" if self.step.others.graph else "pairs"
-        body = (*reads, *self._outputs(ir.Storage.SUM, kernel.roots, adds=True))
-        loop = ir.Loop(kind, body, end=ends.end, chosen=ends.chosen)
         source = "params" if "params" in kernel.inputs else "coef"
         varied = "varied" in kernel.inputs or ends in self.step.others.varied.ends
         colour = source == "coef" and bool(self.step.by_colour)
         parameters = (source, "state", *["varied"] * varied, "sites", *["colour"] * colour)
-        return ir.Function(kernel.name, kernel.purpose, kernel.role, parameters, (*once, loop))
+        return self._over_ends(ends, kernel, parameters, self._outputs(ir.Storage.SUM, kernel.roots, adds=True))
 
     def transposed_sweep(self, sweep: Sweep, kernel: Kernel) -> ir.Function:
         """Return the transpose of a sweep, whose kernel is ``kernel``."""
@@ -85,22 +82,30 @@ class LatticeLoops:
         stores = self._cotangents(kernel, gather.names if gather else ())
         return self._over_sites(kernel, ("coef",), stores, gather)
 
-    def recomputing(self, kernel: Kernel, sums: Sequence[str], fields: Sequence[str]) -> ir.Function:
-        """Return the transpose of a sweep or of a stage.
+    def recomputing(
+        self, kernel: Kernel, sums: Sequence[str], fields: Sequence[str], colour: int | None = None
+    ) -> ir.Function:
+        """Return the transpose of a sweep or of a stage, for the sites of a colour.
 
         It reads ``sums`` that are stored already, and recomputes ``fields`` before a sweep by the inverse flow.
         """
-        once, reads = self._reads(kernel, sums)
-        loop = ir.Loop("sites", (*reads, *self._cotangents(kernel, sums, fields)))
-        return ir.Function(kernel.name, kernel.purpose, kernel.role, ("coef",), (*once, loop))
+        selection = ir.Selection(colour if self.step.sites.colours > 1 else None)
+        loop = ir.Loop(
+            "sites", (*self._reads(kernel, sums), *self._cotangents(kernel, sums, fields)), selection=selection
+        )
+        return _function(kernel, ("coef",), loop)
 
     def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
         """Return the transpose of the function that sums over bonds or pairs; ``kernel`` is the transposed kernel."""
-        once, reads = self._reads(kernel, ())
         source = "params" if "params" in kernel.inputs else "coef"
-        body = (*reads, *self._cotangents(kernel))
-        loop = ir.Loop("bonds" if self.step.others.graph else "pairs", body, end=ends.end, chosen=ends.chosen)
-        return ir.Function(kernel.name, kernel.purpose, kernel.role, (source,), (*once, loop))
+        return self._over_ends(ends, kernel, (source,), self._cotangents(kernel))
+
+    def _over_ends(
+        self, ends: Ends, kernel: Kernel, parameters: tuple[str, ...], updates: Iterable[ir.Statement]
+    ) -> ir.Function:
+        kind = "bonds" if self.step.others.graph else "pairs"
+        loop = ir.Loop(kind, (*self._reads(kernel, ()), *updates), end=ends.end, chosen=ends.chosen)
+        return _function(kernel, parameters, loop)
 
     def _cotangents(self, kernel: Kernel, sums: Sequence[str] = (), fields: Sequence[str] = ()) -> Iterator[ir.Update]:
         """Yield the stores of a transposed kernel, without zeros; ``fields`` are the fields that it recomputes."""
@@ -139,23 +144,16 @@ class LatticeLoops:
         gather: Gather | None,
         selection: ir.Selection = ir.ALL_SITES,
     ) -> ir.Function:
-        once, reads = self._reads(kernel, gather.names if gather else ())
-        gathered = (ir.GatherSums(tuple(k.name for k in gather.kernels), len(gather.names)),) if gather else ()
-        body = (*gathered, *once, ir.Loop("sites", (*reads, *updates), selection=selection))
-        return ir.Function(kernel.name, kernel.purpose, kernel.role, parameters, body)
+        gathered = [ir.GatherSums(tuple(k.name for k in gather.kernels), len(gather.names))] if gather else []
+        reads = self._reads(kernel, gather.names if gather else ())
+        return _function(kernel, parameters, *gathered, ir.Loop("sites", (*reads, *updates), selection=selection))
 
     def _outputs(self, storage: ir.Storage, values: Sequence[Expression], *, adds: bool = False) -> list[ir.Store]:
         return [ir.Store(ir.Array(storage, k), e, adds) for k, e in enumerate(values)]
 
-    def _reads(self, kernel: Kernel, sums: Sequence[str]) -> tuple[list[ir.Statement], list[ir.Statement]]:
-        """Return the declarations of values read once, and of values read at each site, in the order of inputs."""
-        once: list[ir.Statement] = []
-        reads: list[ir.Statement] = []
-        for name in _symbols(kernel):
-            meaning = self.meaning(name, sums)
-            at_all_sites = isinstance(meaning, ir.Coefficient | ir.SystemParameter | ir.Time)
-            (once if at_all_sites else reads).append(ir.real(name, meaning))
-        return once, reads
+    def _reads(self, kernel: Kernel, sums: Sequence[str]) -> Iterator[ir.Statement]:
+        """Yield the declarations of the values that a kernel reads, in the order of its inputs."""
+        return (ir.real(s, self.meaning(s, sums)) for listed in kernel.inputs.values() for s in listed)
 
     def meaning(self, s: str, sums: Sequence[str] = ()) -> ir.Value:
         """Return the value that a symbol of a kernel stands for; ``sums`` are the names of the gathered sums."""
@@ -222,8 +220,8 @@ class LatticeLoops:
         return begins(self.step)
 
 
-def _symbols(kernel: Kernel) -> Iterator[str]:
-    return (s for listed in kernel.inputs.values() for s in listed)
+def _function(kernel: Kernel, parameters: tuple[str, ...], *body: ir.Statement) -> ir.Function:
+    return loop_invariant(ir.Function(kernel.name, kernel.purpose, kernel.role, parameters, body))
 
 
 def begins(step: Sweeps) -> tuple[Symbol, ...]:

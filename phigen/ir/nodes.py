@@ -3,10 +3,15 @@
 There are two levels. On the level of *sites*, `Load` and `Store` name an array and the offset of a site, and loops
 run over sites, bonds or pairs. On the level of *memory*, `Entry`, `Member` and plain loops name elements of arrays.
 Each target has one lowering pass from sites to memory; printers accept the level of memory only.
+
+A dialect of C, such as that of a device, takes the functions of the lowering by rows (`phigen.ir.passes.by_rows`) or
+by tables (`phigen.ir.passes.by_tables`) and prints them by a `phigen.targets.spelling.Dialect`. It maps the loops that
+are ``independent`` and the loops over row segments to its threads; all other nodes have one meaning everywhere.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 
@@ -24,7 +29,10 @@ class Type(Enum):
 
     REAL = auto()
     INDEX = auto()
+    SIZE = auto()  # a number of elements, or the number of a row segment
+    FLAG = auto()  # a small integer
     ARRAY = auto()  # of a language without pointers
+    ARRAYS = auto()  # pointers to the first elements of several arrays of reals
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,13 @@ class Vector:
     """Local array of reals."""
 
     length: Value
+
+
+@dataclass(frozen=True)
+class RecordType:
+    """Record of the runtime, by its name: the solver, or a row segment. Parameters of this type are addresses."""
+
+    name: str
 
 
 class Storage(Enum):
@@ -247,7 +262,7 @@ Value = (
 class Declare:
     """Constants of one type; a constant ``in_place`` gets no name: its value is printed wherever it is used."""
 
-    type: Type | Pointer | Vector
+    type: Type | Pointer | Vector | RecordType
     items: tuple[tuple[str, Value], ...]
     in_place: bool = False
     note: str = ""
@@ -309,10 +324,17 @@ class Assign:
 
 
 @dataclass(frozen=True)
+class Together:
+    """Assignments that make up one statement."""
+
+    assignments: tuple[Assign, ...]
+
+
+@dataclass(frozen=True)
 class Clear:
     """Set ``count`` elements of an array to zero, from the index ``first`` on."""
 
-    array: Name
+    array: Value
     first: Value | None
     count: Value
 
@@ -336,7 +358,9 @@ ALL_SITES = Selection()
 class Loop:
     """Loop over sites, bonds or pairs; in memory, over a variable from ``low`` to before ``high``.
 
-    ``end`` and ``chosen`` say which bonds a loop over bonds runs over, as in `phigen.scheme.steps.Ends`.
+    ``end`` and ``chosen`` say which bonds a loop over bonds runs over, as in `phigen.scheme.steps.Ends`. A loop of the
+    kind "segments" runs over row segments, by several threads if there are more sites than ``threads``, unless this is
+    0. A loop of the kind "line" has one statement.
     """
 
     kind: str
@@ -352,6 +376,11 @@ class Loop:
     condition: Value | None = None  # the loop runs while it holds
     independent: str = ""  # SITE or LANE: the iterations that the compiler may vectorise
     note: str = ""
+    threads: int = 0
+
+    def with_body(self, statements: Iterable[Statement]) -> Loop:
+        """Return the loop with other statements."""
+        return replace(self, body=tuple(statements))
 
 
 @dataclass(frozen=True)
@@ -363,10 +392,27 @@ class Discard:
 
 @dataclass(frozen=True)
 class If:
-    """Run statements if a condition holds."""
+    """Run statements if a condition holds, else the others."""
 
     condition: Value
     then: Block
+    otherwise: Block = ()
+
+
+@dataclass(frozen=True)
+class Switch:
+    """Run the statements of the case whose label equals a value; the last case is also that of all other values."""
+
+    value: Value
+    labels: tuple[int, ...]
+    cases: tuple[Block, ...]
+
+
+@dataclass(frozen=True)
+class Comment:
+    """Comment for readers of the generated code."""
+
+    text: str
 
 
 @dataclass(frozen=True)
@@ -405,10 +451,13 @@ Statement = (
     | Reduce
     | GatherSums
     | Assign
+    | Together
     | Clear
     | Loop
     | Discard
     | If
+    | Switch
+    | Comment
     | Within
     | Continue
     | Call
@@ -420,12 +469,29 @@ Block = tuple[Statement, ...]
 #: The parameters of functions on the level of sites; a target gives them its own names.
 PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "out")
 
+_NUMBERED = dict.fromkeys(("first", "end", "unit"), Type.SIZE)
+_ARRAYS = dict.fromkeys(("x", "y", "v", "to", "bar", "handed", "given", "at_bonds"), Type.ARRAYS)
+_SUMMED = dict.fromkeys(("sums", "numbers"), Pointer(constant=False))
+#: The types of the parameters of functions by rows, by their names.
+TYPES: dict[str, Type | Pointer | RecordType] = {
+    "s": RecordType("solver"),
+    "row": RecordType("row"),
+    "coef": Pointer(),
+    "out": Pointer(constant=False, restricted=True),
+    **_NUMBERED,
+    **_ARRAYS,
+    **_SUMMED,
+    **dict.fromkeys(("part", "flow", "far", "across"), Type.FLAG),
+    "sign": Type.REAL,
+}
+
 
 @dataclass(frozen=True)
 class Function:
     """A function; ``doc`` is its purpose, ``role`` that of its kernel.
 
-    On the level of sites its parameters are some of `PARAMETERS`.
+    On the level of sites its parameters are some of `PARAMETERS`. In the lowering by rows they have the types of
+    `TYPES`.
     """
 
     name: str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, is_dataclass, replace
+from functools import cache
 from typing import Any
 
 from phigen.ir import nodes as ir
@@ -14,7 +15,20 @@ def statements(body: ir.Block) -> Iterator[ir.Statement]:
     """Yield all statements, each before those inside it."""
     for s in body:
         yield s
-        yield from statements(getattr(s, "body", getattr(s, "then", ())))
+        for inner in blocks(s):
+            yield from statements(inner)
+
+
+def blocks(s: ir.Statement) -> tuple[ir.Block, ...]:
+    """Return the blocks of statements inside a statement."""
+    match s:
+        case ir.Loop(body=body) | ir.Within(body=body):
+            return (body,)
+        case ir.If(then=then, otherwise=otherwise):
+            return then, otherwise
+        case ir.Switch(cases=cases):
+            return cases
+    return ()
 
 
 def map_blocks(function: ir.Function, change: Callable[[ir.Block], Iterable[ir.Statement]]) -> ir.Function:
@@ -27,16 +41,38 @@ def map_blocks(function: ir.Function, change: Callable[[ir.Block], Iterable[ir.S
 
 
 def _with_body(s: ir.Statement, visit: Callable[[ir.Block], ir.Block]) -> ir.Statement:
-    inner = {f.name: visit(getattr(s, f.name)) for f in fields(s) if f.name in ("body", "then")}
-    return replace(s, **inner) if inner else s  # type: ignore[arg-type]
+    match s:
+        case ir.Loop(body=body) | ir.Within(body=body):
+            return replace(s, body=visit(body))
+        case ir.If(then=then, otherwise=otherwise):
+            return replace(s, then=visit(then), otherwise=visit(otherwise))
+        case ir.Switch(cases=cases):
+            return replace(s, cases=tuple(map(visit, cases)))
+    return s
+
+
+@cache
+def _fields(kind: type) -> tuple[str, ...]:
+    return tuple(f.name for f in fields(kind)) if is_dataclass(kind) else ()
+
+
+def values(node: Any) -> Iterator[Any]:
+    """Yield a node with all statements and values in it, expressions as a whole."""
+    rest = [node]
+    while rest:
+        one = rest.pop()
+        if isinstance(one, tuple):
+            rest += reversed(one)
+        elif isinstance(one, Expression):
+            yield one
+        elif names := _fields(one.__class__):
+            yield one
+            rest += [getattr(one, name) for name in reversed(names)]
 
 
 def names_in(node: Any) -> set[str]:
     """Return the names and the symbols of expressions that are read anywhere in a node."""
-    if isinstance(node, Expression):
-        return {*symbols_of(node)}
-    if isinstance(node, tuple):
-        return set().union(*map(names_in, node))
-    if isinstance(node, ir.Name):
-        return {node.symbol}
-    return set().union(*(names_in(getattr(node, f.name)) for f in fields(node))) if is_dataclass(node) else set()
+    read: set[str] = set()
+    for v in values(node):
+        read |= {*symbols_of(v)} if isinstance(v, Expression) else {v.symbol} if isinstance(v, ir.Name) else set()
+    return read

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 
 from phigen.ir import nodes as ir
-from phigen.ir.walk import statements
+from phigen.ir.walk import statements, values
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 from phigen.targets.language import Language
@@ -14,7 +16,7 @@ from phigen.targets.names import Scope
 from phigen.targets.printer import ATOM, PRODUCT, SUM
 
 #: Binding strength of operators, as in `phigen.targets.printer`, and of what needs no parentheses.
-_STRENGTH = {"and": 1, "==": 2, "!=": 2, "<": 2, ">=": 2, "+": 3, "-": 3, "*": 4, "/": 4, "%": 4}
+_STRENGTH = {"and": 1, "==": 2, "!=": 2, "<": 2, ">": 2, ">=": 2, "+": 3, "-": 3, "*": 4, "/": 4, "%": 4}
 _ATOM = 9
 _OF_ARITHMETIC = {SUM: 3, PRODUCT: 4, ATOM: _ATOM}
 
@@ -27,7 +29,7 @@ class Dialect:
     operators: Mapping[str, str] = field(default_factory=dict)
     functions: Mapping[str, str] = field(default_factory=dict)
     select: str = "{0} ? {1} : {2}"
-    pointers: frozenset[str] = frozenset()  # records whose members are behind an arrow
+    pointers: frozenset[str] = frozenset()  # addresses of records, unless the function declares the record
     quote: str = '"{0}"'
 
 
@@ -35,11 +37,17 @@ class Spelling:
     """The identifiers of one function, and its values as text."""
 
     def __init__(self, dialect: Dialect, reserved: Iterable[str], body: ir.Block) -> None:
-        """Names of the spec come first, so that they are changed only where they are ``reserved``."""
+        """Names of the spec come first, so that they are changed only where they are ``reserved``.
+
+        Names that statements fix are reserved, and so are functions that the dialect can call.
+        """
         self.dialect = dialect
-        self.scope = Scope(dialect.language.reserved | reserved)
-        declared = (s.items for s in statements(body) if isinstance(s, ir.Declare) and not s.in_place)
-        for name in (name for items in declared for name, _ in items if not isinstance(name, Symbol)):
+        called = _words("\n".join(dialect.language.functions.values()))
+        self.scope = Scope(dialect.language.reserved | {*reserved, *called, *_fixed(body)})
+        declarations = [s for s in statements(body) if isinstance(s, ir.Declare) and not s.in_place]
+        records = {self.name(n) for s in declarations if isinstance(s.type, ir.RecordType) for n, _ in s.items}
+        self._pointers = dialect.pointers - records
+        for name in (name for s in declarations for name, _ in s.items if not isinstance(name, Symbol)):
             self.scope[name]
         self._arithmetic = dialect.language.printer(self.scope)
 
@@ -76,9 +84,11 @@ class Spelling:
                 return repr(number), _ATOM
             case ir.Member(record, name):
                 text, last = self(record, _ATOM), record.name if isinstance(record, ir.Member) else self(record)
-                return f"{text}{'->' if last in self.dialect.pointers else '.'}{name}", _ATOM
+                return f"{text}{'->' if last in self._pointers else '.'}{name}", _ATOM
             case ir.Entry(array, index):
                 return f"{self(array, _ATOM)}[{self(index)}]", _ATOM
+            case ir.Binary("&", left, right):
+                return f"{self(left, _ATOM)} & {self(right, _ATOM)}", 0
             case ir.Binary(operator, left, right):
                 level, spelt = _STRENGTH[operator], self.dialect.operators.get(operator, operator)
                 return f"{self(left, level)} {spelt} {self(right, level + (operator != 'and'))}", level
@@ -100,3 +110,24 @@ class Spelling:
                 owner = f"{self(instance, _ATOM)}." if instance else ""
                 return f"{owner}{self.dialect.functions.get(name, name)}({', '.join(map(self, arguments))})", _ATOM
         raise TypeError(value)
+
+
+@cache
+def _words(text: str) -> frozenset[str]:
+    return frozenset(re.findall(r"\w+", text))
+
+
+def _fixed(body: ir.Block) -> Iterator[str]:
+    """Yield the identifiers that statements fix."""
+    for node in values(body):
+        match node:
+            case ir.Name(Symbol(kind=ir.FIXED, key=(name,))):
+                yield from _words(str(name))
+            case ir.Declare(items=items):
+                yield from (str(s.key[0]) for s, _ in items if isinstance(s, Symbol) and s.kind == ir.FIXED)
+            case ir.Unpack(names):
+                yield from names
+            case ir.Loop(variable=variable, limit=limit):
+                yield from (variable, limit)
+            case ir.Discard(name):
+                yield name

@@ -34,11 +34,26 @@ def _lines(body: ir.Block, indent: str) -> Iterator[str]:
                 bounds = f" {s.variable} in {_value(s.low)}..{_value(s.high)}" if s.low else ""
                 bounds += f" by {_value(s.step)}" if s.step else ""
                 chosen = "" if s.selection == ir.ALL_SITES else f" of colour {s.selection.colour}"
-                yield f"{indent}{s.kind}{bounds}{chosen}:"
+                threads = f" by threads above {s.threads} sites" if s.threads else ""
+                yield f"{indent}{s.kind}{bounds}{chosen}{threads}:"
                 yield from _lines(s.body, f"{indent}  ")
-            case ir.If(condition, then):
+            case ir.If(condition, then, otherwise):
                 yield f"{indent}if {_value(condition)}:"
                 yield from _lines(then, f"{indent}  ")
+                if otherwise:
+                    yield f"{indent}else:"
+                    yield from _lines(otherwise, f"{indent}  ")
+            case ir.Switch(value, labels, cases):
+                yield f"{indent}switch {_value(value)}:"
+                for number, case in zip(labels, cases, strict=True):
+                    yield f"{indent}  case {number}:"
+                    yield from _lines(case, f"{indent}    ")
+            case ir.Together(assignments):
+                yield indent + ", ".join(line.strip() for line in _lines(assignments, ""))
+            case ir.Discard(name):
+                yield f"{indent}discard {name}"
+            case ir.Comment(said):
+                yield f"{indent}-- {said}"
             case ir.Within(context, inner):
                 yield f"{indent}with {_value(context)}:"
                 yield from _lines(inner, f"{indent}  ")
@@ -90,6 +105,8 @@ def _value(value: Any) -> str:
             return f"({_value(start)} + ... {_value(terms)})"
         case ir.Cast(inner):
             return _value(inner)
+        case ir.Prefix(operator, inner):
+            return f"{operator}{_value(inner)}"
         case ir.Grouped(inner):
             return f"({_value(inner)})"
         case ir.Listed(values):

@@ -9,13 +9,18 @@ from phigen.compiler import compile_spec
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.passes.by_tables import by_tables
+from phigen.ir.passes.forms import FULL_RANGE, IN_LANES, calling, forms_of
+from phigen.ir.passes.loop_invariant import loop_invariant
+from phigen.ir.passes.open_ends import divided_at_ends
 from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries
+from phigen.ir.passes.unread import discard_unread
 from phigen.ir.passes.whole_arrays import WholeArrays, identical
 from phigen.scheme.kernel import Role
 from phigen.scheme.steps import Sweeps
 from phigen.spec import loads
 from phigen.symbolic.expression import call, symbol
+from phigen.symbolic.symbols import Symbol, coefficient
 
 Q, P = ir.Array(ir.Storage.STATE, 0, "q"), ir.Array(ir.Storage.STATE, 1, "p")
 
@@ -151,4 +156,55 @@ def test_sweeps_that_differ_in_their_colour_share_a_function() -> None:
     expect(second, """
         other(x)
           return _one(x, colour=1)
+        """)  # fmt: skip
+
+
+def test_invariant_values_are_read_before_the_loop() -> None:
+    read = (ir.real("q", ir.Load(Q)), ir.real(coefficient(2), ir.Coefficient(2)), ir.real("t", ir.Time()))
+    before = sweep(*read, ir.Store(P, symbol("q") * symbol(coefficient(2)) + symbol("t")))
+    expect(loop_invariant(before), """
+        sweep(coef)
+          real c:2 = Coefficient(number=2)
+          real t = Time()
+          sites:
+            real q = x[q]
+            x[p] += t + c:2*q
+        """)  # fmt: skip
+
+
+WEIGHT = Symbol("present", 0, 1)
+
+
+def test_all_terms_are_present_away_from_open_ends() -> None:
+    weight = ir.real(WEIGHT, ir.Inside(0, ((0, 1),)))
+    before = sweep(weight, ir.Store(P, symbol(WEIGHT) * symbol("r") + symbol("q")),
+                   ir.Store(Q, symbol(WEIGHT) - 1))  # fmt: skip
+    away, near = divided_at_ends(before)
+    expect(away, """
+        sweep(coef)
+          sites:
+            x[p] += q + r
+        """)  # fmt: skip
+    assert (near.name, near.body) == ("sweep_end", before.body)
+    assert divided_at_ends(away) == [away]
+
+
+def test_functions_have_a_small_argument_and_a_full_range_form() -> None:
+    before = sweep(ir.Store(P, call("sin", symbol("q")) + call("exp", symbol("q")) + call("atan", symbol("q"))))
+    forms = forms_of([before], ["sin"], {"sin"}, IN_LANES)
+    assert [text(calling(before, versions)).splitlines()[-1].split(" += ")[1] for versions in forms.values()] == [
+        "atan(q) + (sin_near(q) + exp_lane(q))",
+        "atan(q) + (sin_lane(q) + exp(q))",
+    ]
+    assert [*forms] == ["_near", "_far"]
+    assert forms_of([before], ["sin"], {"expm1"}, FULL_RANGE) == {"": FULL_RANGE}
+
+
+def test_parameters_that_are_not_read_are_discarded() -> None:
+    before = ir.Function("f", "", Role.OTHER, ("coef", "row", "sums"), (ir.Call("g", (ir.fixed("row"),)),))
+    expect(discard_unread(before), """
+        f(coef, row, sums)
+          discard coef
+          discard sums
+          g(row)
         """)  # fmt: skip

@@ -28,8 +28,8 @@ def rows(loops: LatticeLoops) -> RowLayout:
     return RowLayout(loops, tuple(lines), {p.name: p.name for p in loops.program.parameters})
 
 
-def expect(body: ir.Block, expected: str) -> None:
-    function = ir.Function("f", "", Role.SWEEP, (), body)
+def expect(result: ir.Function | ir.Block, expected: str) -> None:
+    function = result if isinstance(result, ir.Function) else ir.Function("f", "", Role.SWEEP, (), result)
     assert text(function).splitlines()[1:] == [f"  {line}" for line in dedent(expected).strip().splitlines()]
 
 
@@ -37,7 +37,7 @@ def test_a_sweep_reads_neighbours_in_place_and_adds_to_what_it_has_read() -> Non
     once = (ir.real(coefficient(0), ir.Coefficient(0)),)
     change = ir.Store(Q, symbol(coefficient(0)) * symbol("q[i+1]"))
     function = built(Role.SWEEP, Q_READ, NEXT, change, once=once)
-    expect(row_loops.sweep(function, rows(lattice("fput")), None), """
+    expect(row_loops.sweep(function, rows(lattice("fput"))), """
         real c:0 := c0
         real q[i+1] := q_row[(i + 1)]
         real c0 = coef[0]
@@ -50,8 +50,8 @@ def test_a_sweep_reads_neighbours_in_place_and_adds_to_what_it_has_read() -> Non
 
 def test_a_compensated_sweep_carries_what_rounding_leaves_out() -> None:
     function = built(Role.SWEEP, ir.Store(P, symbol("h")))
-    expect(row_loops.sweep(function, rows(lattice("fput")), None, compensated=True), """
-        Discard
+    expect(row_loops.sweep(function, rows(lattice("fput")), compensated=True), """
+        discard coef
         pointer carry:p = row.s.carry[1]
         pointer p_row = row.x[1]
         row i in row.from..row.to:
@@ -62,9 +62,13 @@ def test_a_compensated_sweep_carries_what_rounding_leaves_out() -> None:
 
 
 def test_a_sweep_of_one_colour_steps_from_one_of_its_sites_to_the_next() -> None:
-    function = built(Role.SWEEP, ir.Store(ir.Array(ir.Storage.STATE, 0, "a"), symbol("h")))
-    body = row_loops.sweep(function, rows(lattice("volterra")), ir.Constant(1))
-    assert text(replace(function, body=body)).splitlines()[-2] == "  row i in first(row, 1, row.from)..row.to by 2:"
+    store = ir.Store(ir.Array(ir.Storage.STATE, 0, "a"), symbol("h"))
+    loop = ir.Loop("sites", (store,), selection=ir.Selection(1))
+    layout = rows(lattice("volterra"))
+    function = row_loops.sweep(ir.Function("f", "", Role.SWEEP, ("coef",), (loop,)), layout)
+    assert text(function).splitlines()[-2] == "  row i in first(row, 1, row.from)..row.to by 2:"
+    function = row_loops.sweep(ir.Function("f", "", Role.SWEEP, ("coef",), (loop,)), layout, passed=True)
+    assert text(function).splitlines()[-2] == "  row i in first(row, row.swept, row.from)..row.to by 2:"
 
 
 def test_sums_over_bonds_pass_over_those_without_a_site_of_the_colour() -> None:
@@ -74,7 +78,7 @@ def test_sums_over_bonds_pass_over_those_without_a_site_of_the_colour() -> None:
     loop = replace(before.body[-1], body=(ir.real("x[b]", ir.Load(ir.Array(ir.Storage.STATE, 0, "x"), end="b")),
                                           ir.Store(ir.Array(ir.Storage.SUM, 0), symbol("x[b]"))))  # fmt: skip
     expect(row_loops.over_bonds(row_loops.BondLoop(replace(before, body=(loop,))), rows(loops), first=True), """
-        Discard
+        discard coef
         pointer x_row = row.x[0]
         row i in row.from..row.to:
           real sum0 = 0.0
@@ -99,17 +103,17 @@ def test_cotangents_of_neighbours_are_handed_over() -> None:
     layout = rows(lattice("fput"))
     both = transpose(own, beside)
     expect(row_transposes.transposed(both, layout, vectors=False), """
-        Discard
+        discard coef
+        discard sums
         pointer bar_0 = row.bar[0]
         pointer bar_1 = row.bar[1]
         pointer handed_0 = row.handed[0]
-        Discard
         row i in row.from..row.to:
           real change_bar:0 = bar_1[i]
           bar_0[i] += change_bar:0
           handed_0[i] <- -change_bar:0
         """)  # fmt: skip
-    expect(row_transposes.handing(both.handed, layout), """
+    expect(row_transposes.handing("hand", "", both.handed, layout), """
         pointer handed_0 = row.handed[0]
         pointer bar_0 = row.bar[0]
         row i in row.from..row.to:

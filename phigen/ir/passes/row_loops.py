@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from phigen.ir import nodes as ir
 from phigen.ir.passes.by_rows import (
@@ -24,25 +25,26 @@ from phigen.ir.passes.by_rows import (
     over_sites,
     together,
 )  # fmt: skip
+from phigen.ir.passes.unread import discard_unread
 from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import ZERO as NOTHING
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
-COEF, OUT = ir.fixed("coef"), ir.fixed("out")
+OUT = ir.fixed("out")
 OTHER_SITE = ir.Entry(ir.Member(SOLVER, "other"), BOND)
 ZERO, ONE = ir.Constant(0.0), ir.Constant(1.0)
 #: The distance between two values of one site in arrays that callers receive.
 SITES: ir.Value = ir.Cast(ir.Member(SOLVER, "sites"))
 
 
-def sweep(function: ir.Function, layout: RowLayout, swept: ir.Value | None, *, compensated: bool = False) -> ir.Block:
-    """Return the statements of a sweep; a coloured one updates the sites of the colour ``swept``."""
+def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, compensated: bool = False) -> ir.Function:
+    """Return a sweep; the colour of a coloured one is in its code, or a member of the row if it is ``passed``."""
     loop, tangent = lowered(function), function.role is Role.SWEEP_TANGENT
     stores = [s for s in loop.body if isinstance(s, ir.Store)]
     updated = frozenset(s.array.name for s in stores) if not tangent else frozenset[str]()
     rows = RowDeclarations(layout, Reading(updated)).read((*function.body, *loop.body))
-    head, body = unread_coefficients(rows), [*rows.at_site(), *rows.computed]
+    head, body = list[ir.Statement](), [*rows.at_site(), *rows.computed]
     if tangent:
         head += grouped({Symbol("out", s.array.name): (ir.Pointer(constant=False), layout.row(_varied(s.array.number)))
                          for s in sorted(stores, key=lambda s: s.array.name)})  # fmt: skip
@@ -60,10 +62,29 @@ def sweep(function: ir.Function, layout: RowLayout, swept: ir.Value | None, *, c
             body.append(ir.Assign(field, ir.Accumulated(ir.Name(s.array.name), s.value)))
         else:
             body.append(ir.Assign(field, s.value, adds=True))
-    if swept is None:
-        return (*head, *rows.before(), over_sites(body))
-    first = ir.Called("first", (ROW, swept, FROM))
-    return (*head, *rows.before(), over_sites(body, low=first, step=ir.Constant(layout.colour_step)))
+    colour = loop.selection.colour
+    swept = ir.Member(ROW, "swept") if passed and not tangent else ir.Constant(colour)
+    return row_function(function, "coef", "row", body=(*head, *rows.before(), of_colour(body, colour, swept, layout)))
+
+
+def of_colour(
+    body: Iterable[ir.Statement],
+    colour: int | None,
+    swept: ir.Value,
+    layout: RowLayout,
+    low: ir.Value = FROM,
+    **more: Any,
+) -> ir.Loop:
+    """Return the loop over the sites of the colour ``swept`` from ``low`` on; over all sites if ``colour`` is None."""
+    if colour is None:
+        return over_sites(body, low=low, **more)
+    first = ir.Called("first", (ROW, swept, low))
+    return over_sites(body, low=first, step=ir.Constant(layout.colour_step), **more)
+
+
+def row_function(function: ir.Function, *parameters: str, body: Iterable[ir.Statement]) -> ir.Function:
+    """Return a function with other parameters and statements, which marks the parameters that it does not read."""
+    return discard_unread(replace(function, parameters=parameters, body=tuple(body)))
 
 
 def _compensated(k: int, field: ir.Value, compensation: ir.Value, increment: ir.Value) -> Iterator[ir.Statement]:
@@ -75,31 +96,44 @@ def _compensated(k: int, field: ir.Value, compensation: ir.Value, increment: ir.
     yield ir.Assign(field, total)
 
 
-def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Block:
-    """Return the statements of a kernel of the equation of a stage, which assigns or adds to its outputs."""
+def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Function:
+    """Return a kernel of the equation of a stage, which assigns or adds to its outputs."""
     loop = lowered(function)
     rows = RowDeclarations(layout).read((*function.body, *loop.body))
     arrays = {name: layout.row(ir.Entry(ir.Member(ROW, "out"), ir.Constant(k))) for k, name in enumerate(outputs)}
-    head = [*unread_coefficients(rows), *grouped({name: (WRITTEN, array) for name, array in arrays.items()})]
+    head = grouped({name: (WRITTEN, array) for name, array in arrays.items()})
     stores = (s for s in loop.body if isinstance(s, ir.Store))
     updates = (ir.Assign(_at_site(outputs[s.array.number]), s.value, adds) for s in stores)
     body = (*rows.at_site(), *rows.computed, *updates)
-    return (*head, *rows.before(), over_sites(body))
+    return row_function(function, "coef", "row", body=(*head, *rows.before(), over_sites(body)))
 
 
 @dataclass(frozen=True)
 class BondLoop:
     """A function that sums over bonds or pairs, on the level of sites.
 
-    ``oriented`` and ``at_bonds`` are as in `Reading`. Callers pass the ``sign`` of the direction of bonds, and
-    whether the sites of the colour of the sweep lie ``across`` the bonds, to functions that have these parameters.
+    ``oriented`` is as in `Reading`. Callers pass some of these ``arguments``: the parameters ``at_bonds``, the ``sign``
+    of the direction of bonds, and whether the sites of the colour of the sweep lie ``across`` the bonds.
     """
 
     function: ir.Function
     oriented: frozenset[str] = frozenset()
-    at_bonds: ir.Value = AT_BONDS
-    sign: bool = False
-    across: bool = False
+    arguments: tuple[str, ...] = ()
+
+    @property
+    def at_bonds(self) -> ir.Value:
+        """The parameters at bonds."""
+        return ir.fixed("at_bonds") if "at_bonds" in self.arguments else AT_BONDS
+
+    @property
+    def across(self) -> bool:
+        """Whether callers say which end of a bond has the colour."""
+        return "across" in self.arguments
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The parameters of the function by rows."""
+        return (*[p for p in self.function.parameters if p == "coef"], "row", *self.arguments)
 
     @property
     def loop(self) -> ir.Loop:
@@ -112,8 +146,8 @@ class BondLoop:
         return [s for s in self.loop.body if isinstance(s, ir.Store)]
 
 
-def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], apart: ir.Value = SITES) -> ir.Block:
-    """Return the statements of a density, an energy or the vector field, after ``calls`` that sum over bonds.
+def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], apart: ir.Value = SITES) -> ir.Function:
+    """Return a density, an energy or the vector field, after ``calls`` that sum over bonds.
 
     The values of one site are at the distance ``apart``.
     """
@@ -121,13 +155,14 @@ def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], a
     rows = RowDeclarations(layout).read((*function.body, *loop.body))
     calls_first = [ir.Call(name, (ROW,)) for name in calls]
     body = (*rows.at_site(), *rows.computed, *_observed(loop))
-    return (*calls_first, *_apart(loop, apart), *rows.before(), over_sites(body))
+    head = (*calls_first, *_apart(loop, apart), *rows.before())
+    return row_function(function, "row", "out", body=(*head, over_sites(body)))
 
 
 def observable_with_bonds(
     function: ir.Function, layout: RowLayout, sums: Sequence[BondLoop], apart: ir.Value = SITES
-) -> ir.Block:
-    """Return the statements of an observable where each site sums over its own bonds."""
+) -> ir.Function:
+    """Return an observable where each site sums over its own bonds."""
     loop = lowered(function)
     oriented = frozenset[str]().union(*(s.oriented for s in sums))
     outer = [*function.body, *(s for bond_loop in sums for s in bond_loop.function.body)]
@@ -144,7 +179,7 @@ def observable_with_bonds(
         bond_loops.append(_summed_over_bonds(bond_loop, rows))
     count = max((s.array.number for bond_loop in sums for s in bond_loop.stores), default=0) + 1
     body = (*rows.at_site(), _zeros(count), *bond_loops, *computed, *_observed(loop))
-    return (*_apart(loop, apart), *rows.before(), over_sites(body, ""))
+    return row_function(function, "row", "out", body=(*_apart(loop, apart), *rows.before(), over_sites(body, "")))
 
 
 def _is_computed(s: ir.Statement) -> bool:
@@ -178,15 +213,15 @@ def _observed(loop: ir.Loop) -> Iterator[ir.Statement]:
             yield ir.Assign(ir.Entry(OUT, ir.Binary("-", place, FROM)), value)
 
 
-def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Block:
-    """Return the statements that sum over the bonds of each site; unless ``first``, they add to the sums."""
+def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Function:
+    """Return the function that sums over the bonds of each site; unless ``first``, it adds to the sums."""
     rows = RowDeclarations(layout, Reading(oriented=bond_loop.oriented, at_bonds=bond_loop.at_bonds))
     rows.read((*bond_loop.function.body, *bond_loop.loop.body))
     count = len(bond_loop.stores)
     sums = (ir.Entry(ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(k)), SITE) for k in range(count))
     stores = [ir.Assign(place, ir.fixed(f"sum{k}"), adds=not first) for k, place in enumerate(sums)]
     body = (*together(rows.here), _zeros(count), _summed_over_bonds(bond_loop, rows), *stores)
-    return (*_unread_source(bond_loop.function, rows), *rows.before(), over_sites(body, ""))
+    return row_function(bond_loop.function, *bond_loop.parameters, body=(*rows.before(), over_sites(body, "")))
 
 
 def _zeros(count: int) -> ir.Declare:
@@ -196,7 +231,7 @@ def _zeros(count: int) -> ir.Declare:
 
 def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
     """Return the loop over the bonds of a site."""
-    sign = ir.fixed("sign") if bond_loop.sign else ONE
+    sign = ir.fixed("sign") if "sign" in bond_loop.arguments else ONE
     body = [
         *bond_reads(bond_loop.loop, rows, across=bond_loop.across, oriented=bool(bond_loop.oriented), sign=sign),
         *rows.computed,
@@ -242,8 +277,8 @@ def bonds_of(loop: ir.Loop, body: Iterable[ir.Statement], *, across: bool = Fals
     return ir.Loop("plain", tuple(body), "k", low, high, condition=condition)
 
 
-def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Block:
-    """Return the statements that sum over all other sites, for the sites of a row segment."""
+def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
+    """Return the function that sums over all other sites, for the sites of a row segment."""
     rows = RowDeclarations(layout).read((*bond_loop.function.body, *bond_loop.loop.body))
     sums = [ir.fixed(f"g{s.array.number}") for s in bond_loop.stores]
     arrays = {g.symbol: (WRITTEN, ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(k))) for k, g in enumerate(sums)}
@@ -254,17 +289,9 @@ def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Block:
     updates = (ir.Assign(place, value, adds=True) for place, value in zip(places, values, strict=True))
     inner = over_sites((*together(rows.here), *rows.computed, *updates))
     outer = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(0), LENGTH)
-    return (*rows.before(), *_unread_source(bond_loop.function, rows), *grouped(arrays), clear, outer)
-
-
-def unread_coefficients(rows: RowDeclarations) -> list[ir.Statement]:
-    """Return the statement that marks the coefficients as unused, if no coefficient is read."""
-    read = any(isinstance(value, ir.Entry) and value.array == COEF for _, value in rows.once)
-    return [] if read else [ir.Discard("coef")]
-
-
-def _unread_source(function: ir.Function, rows: RowDeclarations) -> list[ir.Statement]:
-    return unread_coefficients(rows) if "coef" in function.parameters else []
+    return row_function(
+        bond_loop.function, *bond_loop.parameters, body=(*rows.before(), *grouped(arrays), clear, outer)
+    )
 
 
 def _varied(number: int) -> ir.Value:

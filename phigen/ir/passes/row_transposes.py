@@ -29,7 +29,8 @@ from phigen.ir.passes.by_rows import (
     over_sites,
     together,
 )  # fmt: skip
-from phigen.ir.passes.row_loops import ONE, ZERO, bonds_of, side, unread_coefficients
+from phigen.ir.passes.row_loops import ONE, ZERO, bonds_of, of_colour, row_function, side
+from phigen.scheme.kernel import Role
 from phigen.symbolic.symbols import HERE
 
 BEGIN, END, APART, WHOLE, LANES, LANE, INDEX_TO = (
@@ -58,8 +59,7 @@ class Transpose:
     The function reads cotangents of the kind ``seed``: those of the fields with the numbers ``fields``, or else the
     variation of the row. It stores the cotangents of neighbours as ``handed``, and those of sums over bonds or pairs
     in arrays from ``sums_from`` on; ``summed`` is the number of these sums. First it adds the cotangents ``received``
-    from the loop before it. The fields ``recomputed`` are written too. A sweep of one ``colour`` updates the sites of
-    this colour alone.
+    from the loop before it. The fields ``recomputed`` are written too.
     """
 
     function: ir.Function
@@ -70,11 +70,10 @@ class Transpose:
     summed: int = 0
     received: tuple[Handed, ...] = ()
     recomputed: frozenset[str] = frozenset()
-    colour: int | None = None
 
 
-def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.Block:
-    """Return the statements of the first loop of a transpose; with ``vectors`` sums over sites stay in registers."""
+def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.Function:
+    """Return the first loop of a transpose; with ``vectors`` sums over sites stay in registers."""
     loop, fields = lowered(transpose.function), transpose.fields
     row = layout.row
     pointers = [ir.fixed(f"bar_{k}") for k in fields] or [
@@ -87,22 +86,22 @@ def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.
     handed_values, stores = _stores(transpose, loop, rows)
     written_bars = {s.array.number for s in _updates(loop) if s.array.storage in _COTANGENTS and not any(s.offset)}
     written_bars |= {h.base for h in transpose.received} | {fields[k] for k in seeds if fields}
-    head = unread_coefficients(rows)
+    head, colour = list[ir.Statement](), loop.selection.colour
     if not fields:
         head += [_pointer(f"v_{k}", READ, row(_entry("varied", k))) for k in sorted(seeds)]
     head += [_pointer(f"bar_{k}", WRITTEN, row(_entry("bar", k))) for k in sorted(written_bars)]
     for array in handed_values:
         head.append(_pointer(f"handed_{array}", WRITTEN, row(_entry("handed", array))))
-        if transpose.colour is not None:
+        if colour is not None:
             head.append(ir.Clear(ir.fixed(f"handed_{array}"), FROM, ir.Binary("-", TO, FROM)))
     received_pointers, added = _added_up("given", transpose.received, layout)
     body = (*added, *rows.at_site(), *rows.computed, *stores)
     shares = [s for s in loop.body if isinstance(s, ir.Reduce)]
-    colour = transpose.colour
     loops = (
         in_vectors(body, shares) if vectors and shares and colour is None else in_batches(body, shares, layout, colour)
     )
-    return (*head, *received_pointers, *rows.before(), *loops)
+    statements = (*head, *received_pointers, *rows.before(), *loops)
+    return row_function(transpose.function, "coef", "row", "sums", body=statements)
 
 
 _COTANGENTS = (Storage.COTANGENT, Storage.START_COTANGENT)
@@ -132,12 +131,12 @@ def _stores(
     return handed_values, stores
 
 
-def handing(handed: Sequence[Handed], layout: RowLayout) -> ir.Block:
-    """Return the statements of the second loop: each site adds the cotangents that its neighbours have stored."""
+def handing(name: str, doc: str, handed: Sequence[Handed], layout: RowLayout) -> ir.Function:
+    """Return the second loop: each site adds the cotangents that its neighbours have stored."""
     pointers, added = _added_up("handed", handed, layout)
     bars = dict.fromkeys(h.base for h in handed)
     head = [_pointer(f"bar_{k}", WRITTEN, layout.row(_entry("bar", k))) for k in bars]
-    return (*pointers, *head, over_sites(added))
+    return ir.Function(name, doc, Role.OTHER, ("row",), (*pointers, *head, over_sites(added)))
 
 
 def _added_up(
@@ -166,12 +165,9 @@ def in_batches(
     body: ir.Block, shares: Sequence[ir.Reduce], layout: RowLayout, colour: int | None
 ) -> Iterator[ir.Statement]:
     """Yield the loop over sites; for sums over sites each site of a batch has its own partial sum."""
-    step = None if colour is None else ir.Constant(layout.colour_step)
-    low = BEGIN if shares else FROM
-    first = low if colour is None else ir.Called("first", (ROW, ir.Constant(colour), low))
+    swept = ir.Constant(colour)
     if not shares:
-        yield ir.Discard("sums")
-        yield over_sites(body, low=first, limit="end", step=step)
+        yield of_colour(body, colour, swept, layout, limit="end")
         return
     names = [ir.fixed(f"share{k}") for k in range(len(shares))]
     at_site = ir.Binary("-", SITE, BEGIN)
@@ -181,7 +177,7 @@ def in_batches(
     yield ir.Declare(ir.Vector(BATCH), tuple((n.symbol, ir.Constant(None)) for n in names), mutable=True)
     yield from (ir.Clear(n, None, APART) for n in names)
     end = ir.index(END, ir.Select(ir.Binary("<", left, BATCH), TO, ir.Binary("+", BEGIN, BATCH)))
-    inner = over_sites((*body, *added), low=first, high=END, limit="", step=step)
+    inner = of_colour((*body, *added), colour, swept, layout, BEGIN, high=END, limit="")
     yield ir.Loop("plain", (end, inner), "begin", FROM, TO, step=BATCH)
     yield from _totals(shares, "added", APART)
 
@@ -237,8 +233,8 @@ class BondTranspose:
         return [s for s in lowered(self.function).body if isinstance(s, ir.Update)]
 
 
-def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Block:
-    """Return the statements of the transpose of a function that sums over bonds or pairs."""
+def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
+    """Return the transpose of a function that sums over bonds or pairs."""
     rows, loop, updates = transpose.rows(layout), lowered(transpose.function), transpose.updates
     head = [*rows.before()]
     seeds = {transpose.sums_from + d.array.number for d in _loads(loop) if d.array.storage is Storage.SEED}
@@ -246,8 +242,6 @@ def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Block:
     bars = {s.array.number for s in updates if isinstance(s, ir.Store) and s.array.storage is Storage.COTANGENT}
     head += [_pointer(f"bar_{k}", ir.Pointer(constant=False), _entry("bar", k)) for k in sorted(bars)]
     shares = [k for k, s in enumerate(updates) if isinstance(s, ir.Reduce)]
-    head += [ir.Discard("sums")] * (not shares)
-    head += unread_coefficients(rows) if "coef" in transpose.function.parameters else []
     head += [_zero(f"share{k}") for k in shares]
     over = _over_bonds if layout.lattice.step.others.graph else _over_pairs
     totals = (
@@ -255,7 +249,8 @@ def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Block:
         for k, s in enumerate(updates)
         if isinstance(s, ir.Reduce)
     )
-    return (*head, over(transpose, rows), *totals)
+    parameters = (*[p for p in transpose.function.parameters if p == "coef"], "row", "sums")
+    return row_function(transpose.function, *parameters, body=(*head, over(transpose, rows), *totals))
 
 
 def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from phigen.ir import nodes as ir
 from phigen.ir.passes import row_transposes
 from phigen.ir.passes.row_transposes import Handed
-from phigen.ir.passes.temporaries import temporaries
 from phigen.scheme.kernel import Kernel
-from phigen.scheme.program import Program
-from phigen.targets.c.kernels import FUNCTIONS
 from phigen.targets.c.lattice.layout import Layout
-from phigen.targets.c.lattice.loops import Loop, told
-from phigen.targets.c.loops import statements
+from phigen.targets.c.lattice.loops import RowLoops
 
 
 @dataclass(frozen=True)
@@ -26,7 +23,7 @@ class Seeds:
 
     kind: str
     bars: tuple[int, ...] = ()
-    colour: int | None = 0
+    colour: int | None = None
 
 
 def handed_by(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
@@ -41,51 +38,45 @@ def handed_by(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
     return contributions
 
 
-def first_loop(
-    program: Program,
-    layout: Layout,
-    kernel: Kernel,
-    form: str,
-    seeds: Seeds,
-    sums: Sequence[str],
-    handed: Sequence[Handed],
-    begin: int,
-    calls: Mapping[str, str],
-    moved: Sequence[str] = (),
-    received: Sequence[Handed] = (),
-) -> Loop:
-    """The first go of a kernel; cotangents of ``sums`` over bonds or pairs, if it finds any, are handed in arrays from
-    ``begin`` on.
+@dataclass(frozen=True)
+class First:
+    """The first loop of the transpose of a kernel.
 
-    ``moved`` are the fields that it finds as they were before the sweep. The cotangents passed by the flow after it
-    are ``received`` before."""
-    summed = len(sums) * any(o.name == "gathered_bar" for o in kernel.outputs)
-    transpose = row_transposes.Transpose(
-        temporaries(layout.loops(program).recomputing(kernel, sums, moved)),
-        seeds.kind,
-        seeds.bars,
-        tuple(handed),
-        begin,
-        summed,
-        tuple(received),
-        frozenset(moved),
-        seeds.colour if layout.leaves_out(seeds.colour) else None,
-    )
-    body = row_transposes.transposed(transpose, layout.rows(program), vectors=program.profile == "fast")
-    text = statements(body, program.name, calls, layout.reserved(program, len(kernel.roots)))
-    return Loop(kernel.name + form, kernel.purpose, f"{told(program)}, double *sums", text)
+    Cotangents of ``sums`` over bonds or pairs, if it computes any, are stored in arrays from ``begin`` on. It
+    recomputes the fields ``undone`` before the sweep. The cotangents passed by the flow after it are ``received``.
+    """
 
+    loops: RowLoops
+    kernel: Kernel
+    seeds: Seeds
+    sums: Sequence[str]
+    handed: tuple[Handed, ...]
+    begin: int
+    undone: tuple[str, ...] = ()
+    received: tuple[Handed, ...] = ()
 
-def copied_ends(program: Program, layout: Layout, handed: Sequence[Handed], swept: str) -> Iterator[str]:
-    """Yield the copies of the ends of rows for cotangents passed along rows, if ``swept``; open ends have none."""
-    if layout.step.sites.open[-1]:
-        return
-    for array in sorted({h.array for h in handed if h.offset[-1]}):
-        yield f"{program.name}_ends(row.handed[{array}]{layout.at(0, 'row.')}, s->length, {swept});"
+    @property
+    def on_sites(self) -> ir.Function:
+        """The loop on the level of sites."""
+        return self.loops.sites.recomputing(self.kernel, self.sums, self.undone, self.seeds.colour)
 
-
-def handing(program: Program, layout: Layout, name: str, whom: str, handed: Sequence[Handed]) -> Loop:
-    """The second go of a part: a site at an offset from another is handed what that has for it."""
-    body = row_transposes.handing(handed, layout.rows(program))
-    purpose = f"what sites are handed by those around that {whom}"
-    return Loop(name, purpose, told(program, "params"), statements(body, program.name, FUNCTIONS))
+    def loops_of(self, form: str, versions: Mapping[str, str]) -> list[ir.Function]:
+        """Return the loops of one form, by rows."""
+        summed = len(self.sums) * any(o.name == "gathered_bar" for o in self.kernel.outputs)
+        return [
+            row_transposes.transposed(
+                row_transposes.Transpose(
+                    loop,
+                    self.seeds.kind,
+                    self.seeds.bars,
+                    self.handed,
+                    self.begin,
+                    summed,
+                    self.received,
+                    frozenset(self.undone),
+                ),
+                self.loops.rows,
+                vectors=self.loops.fast,
+            )
+            for loop in self.loops.after_passes(self.on_sites, form, versions)
+        ]

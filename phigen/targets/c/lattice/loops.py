@@ -1,4 +1,4 @@
-"""Kernels of lattices in C, as loops over the sites of a row."""
+"""Kernels of lattices in C, as loops over the sites of a row: the passes that make them, in their order."""
 
 from __future__ import annotations
 
@@ -7,22 +7,23 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from phigen.ir import nodes as ir
+from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.passes import row_loops
-from phigen.ir.passes.by_rows import ROW
+from phigen.ir.passes.by_rows import RowLayout
+from phigen.ir.passes.forms import FULL_RANGE, IN_LANES, calling, forms_of
+from phigen.ir.passes.open_ends import divided_at_ends
 from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries
-from phigen.lanes.lane_functions import FULL_RANGE_FUNCTIONS
+from phigen.lanes.in_lanes import Rows
 from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Sweep
-from phigen.symbolic import functions as elementary
-from phigen.symbolic.expression import ONE, ZERO, gradient, substitute
-from phigen.symbolic.special import SPECIAL
-from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
-from phigen.targets.c.kernels import FUNCTIONS, lane_calls
-from phigen.targets.c.lattice.layout import Layout
+from phigen.scheme.steps import Ends, Gather, Sweep
+from phigen.symbolic.expression import ZERO, gradient
+from phigen.symbolic.symbols import Symbol
+from phigen.targets.c.lattice.ends import over_ends
+from phigen.targets.c.lattice.layout import Layout, chosen_ends
 from phigen.targets.c.layout import comment
-from phigen.targets.c.loops import statements
+from phigen.targets.c.loops import function
 from phigen.targets.header import plain, sentence
 
 #: The name of a part of H.
@@ -30,6 +31,142 @@ _PART = re.compile(r"\bH_\d+")
 
 #: The kernel of the derivatives of a sweep along the fields at the site itself.
 BLOCK = "own_slope"
+
+#: Doubles that the densities of observables take, unless there are more observables: two pages, a quarter of the
+#: nearest cache.
+_BUFFER = 1024
+
+#: Versions of elementary functions by the forms of a function, see `phigen.ir.passes.forms`.
+Forms = Mapping[str, Mapping[str, str]]
+
+
+def printed(program: Program, loop: ir.Function, purposes: Iterable[str] = (), *, inline: bool = True) -> str:
+    """Return the text of a loop, below its purpose or those of all loops that are equal to it."""
+    sentences = [plain(sentence(purpose)) for purpose in _together(purposes or (loop.doc,))]
+    lines = [line for text in sentences for line in comment(text, "   ")]
+    lines[0] = f"/* {lines[0].strip()}"
+    return "\n".join([*lines[:-1], f"{lines[-1]} */", function(loop, program.name, inline=inline)])
+
+
+def _together(purposes: Iterable[str]) -> Iterator[str]:
+    """Yield the purposes of a loop, with the parts of H that have the same purpose in one sentence."""
+    grouped: dict[str, dict[str, None]] = {}
+    for purpose in purposes:
+        part, _, manner = purpose.rpartition(": ")
+        name = _PART.search(manner)
+        text, entry = (f"{part}: {{}}", manner) if part or not name else (manner.replace(name[0], "{}"), name[0])
+        grouped.setdefault(text, {})[entry] = None
+    for text, entries in grouped.items():
+        yield text.removeprefix(": ").replace("{}", ("; " if ": " in text else ", ").join(entries))
+
+
+def code(loop: ir.Function) -> tuple[tuple[str, ...], ir.Block]:
+    """Return the parameters and statements of a loop, which are equal for loops that do the same."""
+    return loop.parameters, loop.body
+
+
+def share(densities: Kernel) -> int:
+    """Return the number of sites whose densities of observables are computed in one go."""
+    return max(1, _BUFFER // len(densities.roots))
+
+
+@dataclass(frozen=True)
+class RowLoops:
+    """The loops over sites of one lattice, by rows."""
+
+    program: Program
+    layout: Layout
+
+    @property
+    def fast(self) -> bool:
+        """Whether the code is to be fast rather than short."""
+        return self.program.profile == "fast"
+
+    @property
+    def sites(self) -> LatticeLoops:
+        """The builder of the loops on the level of sites."""
+        return self.layout.loops(self.program)
+
+    @property
+    def rows(self) -> RowLayout:
+        """The rows that loops read."""
+        return self.layout.rows(self.program)
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """The versions of functions in loops of one form: those for lanes, in short code full-range ones."""
+        return IN_LANES if self.fast else FULL_RANGE
+
+    def forms(self, rows: Rows | None, loops: Iterable[ir.Function]) -> Forms:
+        """Return the forms that some loops need together; one form without ``rows``."""
+        if rows is None:
+            return {"": self.versions}
+        return forms_of(loops, rows.small_argument, rows.limited, self.versions)
+
+    def after_passes(self, loop: ir.Function, form: str, versions: Mapping[str, str]) -> Iterator[ir.Function]:
+        """Yield the loop after the passes on the level of sites; fast code has another one for sites near open ends."""
+        doc = "the same for large arguments of functions" if form == "_far" else loop.doc
+        loop = replace(loop, name=loop.name + form, doc=doc)
+        for part in divided_at_ends(loop) if self.fast else [loop]:
+            yield calling(simultaneous(temporaries(part)), versions)
+
+    def sweep(self, sweep: Sweep, form: str, versions: Mapping[str, str]) -> list[ir.Function]:
+        """Return the loops that update some fields of the sites of a row, or their variation."""
+        loops = self.after_passes(self.sites.sweep(sweep), form, versions)
+        compensated = self.program.compensated
+        return [row_loops.sweep(loop, self.rows, passed=not self.fast, compensated=compensated) for loop in loops]
+
+    def stage(self, kernel: Kernel, form: str, versions: Mapping[str, str], *, adds: bool) -> list[ir.Function]:
+        """Return the loops of a kernel of the equation of a stage, which assign or add to the arrays of the row."""
+        fields = self.program.coordinates
+        outputs = [Symbol("out", f) for f in fields]
+        if kernel.role is Role.OWN_SLOPE:
+            outputs = [Symbol("out", f, g) for f in fields for g in fields]
+        loops = self.after_passes(self.sites.stage(kernel), form, versions)
+        return [row_loops.stage(loop, self.rows, outputs, adds=adds) for loop in loops]
+
+    def sums(self, gather: Gather | None, *, swept: bool = False) -> Iterator[ir.Function]:
+        """Yield the loops that sum over all bonds of a site, or its pairs with other sites.
+
+        Those that a sweep reads (``swept``) may have further arguments, see `told_of_bonds`.
+        """
+        partners = self.layout.partners
+        observed = not swept and gather in (partners.energy, partners.field, partners.observed)
+        for number, (ends, oriented) in enumerate(over_ends(gather) if gather else ()):
+            arguments = self.told_of_bonds(ends, oriented) if swept else ()
+            one = self._bond_loop(ends, oriented, {} if observed else self.versions, arguments)
+            over = row_loops.over_bonds(one, self.rows, first=number == 0) if self.layout.graph else None
+            yield over or row_loops.over_pairs(one, self.rows)
+
+    def told_of_bonds(self, ends: Ends, oriented: frozenset[str]) -> tuple[str, ...]:
+        """Return further arguments of short loops over bonds, so that several parts of H share a loop.
+
+        The arguments are the address of the parameters at bonds, the sign of the direction of bonds, and whether the
+        sites of the chosen colour are at the other end of the bonds.
+        """
+        if self.fast or self.layout.step.adjoint or not self.layout.graph:
+            return ()
+        both = ends.chosen != "" and {"here", "there"} <= chosen_ends(self.layout.step)
+        return (*["at_bonds", "sign"] * bool(oriented), *["across"] * both)
+
+    def _bond_loop(
+        self, ends: Ends, oriented: frozenset[str], versions: Mapping[str, str], arguments: tuple[str, ...] = ()
+    ) -> row_loops.BondLoop:
+        return row_loops.BondLoop(calling(temporaries(self.sites.sums(ends)), versions), oriented, arguments)
+
+    def observable(self, kernel: Kernel) -> ir.Function:
+        """Return the function that fills arrays over the sites with the values of a kernel.
+
+        What bonds or pairs add is summed before, or at each site where nothing else needs these sums.
+        """
+        gather, several = self.layout.partners.sums_of(kernel), kernel.role is Role.OBSERVABLES
+        apart = ir.Constant(share(kernel)) if several else row_loops.SITES
+        built, meant = temporaries(self.sites.observable(kernel)), over_ends(gather)
+        built = replace(built, name=f"{kernel.name}_row", doc=f"{kernel.purpose}, at the sites of a row")
+        if meant and self.layout.sums_up:
+            sums = [self._bond_loop(ends, oriented, {}) for ends, oriented in meant]
+            return row_loops.observable_with_bonds(built, self.rows, sums, apart)
+        return row_loops.observable(built, self.rows, [ends.kernel.name for ends, _ in meant], apart)
 
 
 def site_block(program: Program, layout: Layout, relax: Kernel) -> Kernel:
@@ -46,124 +183,17 @@ def site_block(program: Program, layout: Layout, relax: Kernel) -> Kernel:
     )
 
 
-def told(program: Program, source: str = "coef") -> str:
-    """The arguments of a loop over sites: coefficients, unless it goes by the parameters of the solver; and the row."""
-    return "const double *coef, " * (source == "coef") + f"const {program.name}_row *row"
+def beside_seams(sweep: Sweep) -> bool:
+    """Whether a sweep has loops for sites away from boundary seams only, or near them only."""
+    return sweep.inside or sweep.window is not None
 
 
-@dataclass(frozen=True)
-class Loop:
-    """A function that goes over the sites of a row, or of a piece of it; ``shared`` is its name where several parts of
-    H have the same."""
-
-    name: str
-    purpose: str
-    arguments: str
-    body: str
-    shared: str = ""
-
-    @property
-    def code(self) -> str:
-        """Arguments and body, which are equal for loops that do the same."""
-        return self.arguments + self.body
-
-    def text(self, program: Program, purposes: Iterable[str] = ()) -> str:
-        """The function, below what it is for."""
-        sentences = [plain(sentence(one)) for one in _together(purposes or (self.purpose,))]
-        said = [line for one in sentences for line in comment(one, "   ")]
-        said[0] = f"/* {said[0].strip()}"
-        head = f"static inline void {program.name}_{self.name}({self.arguments})"
-        return "\n".join([*said[:-1], f"{said[-1]} */", head, "{", self.body + "}\n"])
+def first_kind(layout: Layout, sweep: Sweep) -> int | None:
+    """Return the first of the kinds of sites on the seams that a sweep is for."""
+    return None if sweep.window is None else sweep.window * layout.step.sites.colours
 
 
-def _together(purposes: Iterable[str]) -> Iterator[str]:
-    """Yield the purposes of a loop, with the parts of H that have the same purpose in one sentence."""
-    grouped: dict[str, dict[str, None]] = {}
-    for purpose in purposes:
-        part, _, manner = purpose.rpartition(": ")
-        name = _PART.search(manner)
-        text, entry = (f"{part}: {{}}", manner) if part or not name else (manner.replace(name[0], "{}"), name[0])
-        grouped.setdefault(text, {})[entry] = None
-    for text, entries in grouped.items():
-        yield text.removeprefix(": ").replace("{}", ("; " if ": " in text else ", ").join(entries))
-
-
-def has_ends(program: Program, kernels: Sequence[Kernel]) -> bool:
-    """Whether sites beside open ends have loops of their own."""
-    return program.profile == "fast" and any(weights_of(kernel) for kernel in kernels)
-
-
-def weights_of(kernel: Kernel) -> list[str]:
-    """The symbols of terms that open ends take away."""
-    return [s for s in kernel.inputs["present"] if kind_of(s) == PRESENT]
-
-
-def in_loops(program: Program) -> dict[str, str]:
-    """Return the functions that flows and stages call: versions for lanes, in short code only full-range ones."""
-    return far_calls(program) if program.profile == "small" else _called(program, lane_calls(program))
-
-
-def far_calls(program: Program) -> dict[str, str]:
-    """Return the functions for arguments that may be very large: libm where versions for lanes have no value."""
-    lanes = lane_calls(program)
-    return _called(program, {**FUNCTIONS, **{f: lanes[f] for f in FULL_RANGE_FUNCTIONS if f in lanes}})
-
-
-def seen_calls(program: Program) -> dict[str, str]:
-    """Return the functions that observables call: libm, or functions that phigen defines."""
-    return _called(program, FUNCTIONS)
-
-
-def _called(program: Program, calls: Mapping[str, str]) -> dict[str, str]:
-    defined = {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS}
-    return defined | dict(calls) | {f: defined[f] for f in SPECIAL}
-
-
-def forms_of(program: Program, kernel: Kernel) -> Iterator[tuple[Kernel, str]]:
-    """The kernel for the loop, and for that beside open ends; short code has one for both."""
-    if has_ends(program, [kernel]):
-        yield _inside(kernel), ""
-        yield kernel, "_end"
-    else:
-        yield kernel, ""
-
-
-def _inside(kernel: Kernel) -> Kernel:
-    """The kernel away from open ends."""
-    weights = weights_of(kernel)
-    values = iter(substitute(kernel.roots, dict.fromkeys(weights, ONE)))
-    others = tuple(s for s in kernel.inputs["present"] if s not in weights)
-    outputs = tuple(Output(o.name, tuple(next(values) for _ in o.values)) for o in kernel.outputs)
-    return replace(kernel, inputs={**kernel.inputs, "present": others}, outputs=outputs)
-
-
-def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Loop:
-    """Return the loop that updates some fields of the sites of a row, or their variation."""
-    built = simultaneous(temporaries(layout.loops(program).sweep(sweep)))
-    known = program.profile == "fast" or sweep.is_tangent
-    swept: ir.Value | None = ir.Constant(sweep.colour) if known else ir.Member(ROW, "swept")
-    swept = swept if layout.leaves_out(sweep.colour) else None
-    body = row_loops.sweep(built, layout.rows(program), swept, compensated=program.compensated)
-    fields = [program.coordinates[i] for i in sweep.moved]
-    shared = "_".join(["tangent" if sweep.is_tangent else "sweep", *fields]) + form
-    text = statements(body, program.name, calls, layout.reserved(program, len(sweep.kernel.roots)))
-    return Loop(sweep.kernel.name + form, _purpose(sweep.kernel, form), told(program), text, shared)
-
-
-def _purpose(kernel: Kernel, form: str) -> str:
-    other = {"_far": "the same for large arguments of functions", "_end": "the same beside open ends"}
-    return next((text for key, text in other.items() if form.endswith(key)), kernel.purpose)
-
-
-def middle_loop(
-    program: Program, layout: Layout, kernel: Kernel, form: str, calls: Mapping[str, str], assign: str
-) -> Loop:
-    """A kernel as a loop from y, of which rows are told, into or onto what they call out."""
-    built, fields = temporaries(layout.loops(program).stage(kernel)), program.coordinates
-    if kernel.role is Role.OWN_SLOPE:
-        outputs = [Symbol("out", f, g) for f in fields for g in fields]
-    else:
-        outputs = [Symbol("out", f) for f in fields]
-    body = row_loops.stage(built, layout.rows(program), outputs, adds=assign == "+=")
-    text = statements(body, program.name, calls, layout.reserved(program, len(kernel.roots)))
-    return Loop(kernel.name + form, _purpose(kernel, form), told(program), text)
+def observables(program: Program, loops: RowLoops) -> Sequence[str]:
+    """Return the text of the functions of observables."""
+    kernels = (kernel for kernel in program.observables.kernels if kernel.roots)
+    return [printed(program, loops.observable(kernel), inline=False) for kernel in kernels]

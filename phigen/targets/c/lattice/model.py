@@ -17,7 +17,7 @@ from phigen.targets.c.lattice.layout import (
     layout_of,
     switches,
 )
-from phigen.targets.c.lattice.seen import share
+from phigen.targets.c.lattice.loops import share
 from phigen.targets.header import plain
 from phigen.targets.rendering import render
 

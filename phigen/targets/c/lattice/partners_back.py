@@ -7,20 +7,20 @@ others, or are not alike from both ends, it goes over them as the other one, and
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Set
+from collections.abc import Iterator
 from dataclasses import replace
 
+from phigen.ir import nodes as ir
 from phigen.ir.passes import row_transposes
+from phigen.ir.passes.forms import calling
 from phigen.ir.passes.temporaries import temporaries
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.pair_transposes import paired
-from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends
 from phigen.symbolic.expression import ZERO
 from phigen.symbolic.symbols import HERE
 from phigen.targets.c.lattice.layout import Layout
-from phigen.targets.c.lattice.loops import Loop, in_loops, told
-from phigen.targets.c.loops import statements
+from phigen.targets.c.lattice.loops import RowLoops
 
 #: The bonds of a site at the other end of those that begin or end at another, and how these are chosen.
 _OPPOSITE = {"": "", "a": "b", "b": "a"}
@@ -28,29 +28,22 @@ _CHOSEN = {"": "", "here": "there", "there": "here"}
 
 
 def gathering_back(
-    program: Program,
-    layout: Layout,
-    ends: Ends,
-    opposite: Set[str],
-    kernel: Kernel,
-    first: int,
-    *,
-    summed: bool = False,
-) -> Iterator[Loop]:
+    loops: RowLoops, ends: Ends, opposite: frozenset[str], kernel: Kernel, first: int, *, summed: bool = False
+) -> Iterator[ir.Function]:
     """The loops for bonds or pairs, where the cotangents of sums are in arrays from the first on.
 
     Parameters at bonds that are ``opposite`` have the other sign seen from the end b. The sums themselves are found too
     if they are to be ``summed``."""
     if ends.of_all:
-        whole = paired(layout.step.sites.ends, ends.kernel, kernel, opposite)
+        whole = paired(loops.layout.step.sites.ends, ends.kernel, kernel, opposite)
         sums = [o for o in ends.kernel.outputs if summed]
-        loops = [("a", ends, replace(whole, outputs=(*whole.outputs, *sums)))]
+        transposes = [("a", ends, replace(whole, outputs=(*whole.outputs, *sums)))]
     else:
         turned = replace(ends, end=_OPPOSITE[ends.end], chosen=_CHOSEN[ends.chosen])
-        loops = [("b", turned, _at_end(layout, kernel, "b")), ("a", ends, _at_end(layout, kernel, "a"))]
-    for end, seen, transposed in loops:
+        transposes = [(end, seen, _at_end(loops.layout, kernel, end)) for end, seen in (("b", turned), ("a", ends))]
+    for end, seen, transposed in transposes:
         if any(not e.is_zero for e in transposed.roots):
-            yield _loop(program, layout, seen, opposite, transposed, end, first)
+            yield _loop(loops, seen, opposite, transposed, end, first)
 
 
 def _at_end(layout: Layout, kernel: Kernel, end: str) -> Kernel:
@@ -65,15 +58,12 @@ def _at_end(layout: Layout, kernel: Kernel, end: str) -> Kernel:
     return replace(kernel, outputs=tuple(outputs))
 
 
-def _loop(
-    program: Program, layout: Layout, ends: Ends, opposite: Set[str], kernel: Kernel, end: str, first: int
-) -> Loop:
-    built = temporaries(layout.loops(program).transposed_sums(ends, kernel))
-    transpose = row_transposes.BondTranspose(built, end, first, len(kernel.inputs[HERE]), frozenset(opposite))
-    body = row_transposes.transposed_sums(transpose, layout.rows(program))
-    text = statements(body, program.name, in_loops(program), layout.reserved(program, len(kernel.roots)))
-    arguments = f"{told(program, 'params' if 'params' in kernel.inputs else 'coef')}, double *sums"
-    if ends.of_all:
-        return Loop(kernel.name, "what a site gets of cotangents of sums, its own and those of others", arguments, text)
-    said = "the site where the sum is" if end == "a" else "the other site"
-    return Loop(f"{kernel.name}_{end}", f"what {said} gets of cotangents of sums", arguments, text)
+def _loop(loops: RowLoops, ends: Ends, opposite: frozenset[str], kernel: Kernel, end: str, first: int) -> ir.Function:
+    built = calling(temporaries(loops.sites.transposed_sums(ends, kernel)), loops.versions)
+    name, purpose = kernel.name, "what a site gets of cotangents of sums, its own and those of others"
+    if not ends.of_all:
+        receiver = "the site where the sum is" if end == "a" else "the other site"
+        name, purpose = f"{kernel.name}_{end}", f"what {receiver} gets of cotangents of sums"
+    built = replace(built, name=name, doc=purpose)
+    transpose = row_transposes.BondTranspose(built, end, first, len(kernel.inputs[HERE]), opposite)
+    return row_transposes.transposed_sums(transpose, loops.rows)

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-from phigen.ir.lattice_loops import bounds
+from phigen.ir import nodes as ir
+from phigen.ir import row_drivers
+from phigen.ir.passes.by_rows import ROW
+from phigen.ir.passes.open_ends import NEAR_ENDS
+from phigen.ir.row_drivers import (
+    AWAY,
+    COEF,
+    FIRST_SITES,
+    LAST_SITES,
+    LENGTH,
+    SEGMENT,
+    STATE,
+    RowDrivers,
+    RowSegment,
+    S,
+    at,
+)
 from phigen.lanes.in_lanes import Rows
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.program import Program
@@ -18,45 +32,41 @@ from phigen.targets.c.kernels import members
 from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout, layout_of, switches, wide
 from phigen.targets.c.lattice.loops import (
-    Loop,
-    far_calls,
-    forms_of,
-    has_ends,
-    in_loops,
-    middle_loop,
+    RowLoops,
+    beside_seams,
+    code,
+    first_kind,
+    observables,
+    printed,
     site_block,
-    sweep_loop,
 )
-from phigen.targets.c.lattice.partners import gathering, partners, told_of_bonds
-from phigen.targets.c.lattice.seen import seen_loop
 from phigen.targets.c.lattice.turned import orders, other_ways, turned, turned_increments
+from phigen.targets.c.loops import function
 from phigen.targets.rendering import render
 
 
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     """All kernels as loops over sites, and which of them make which part of H."""
     layout = layout_of(program, step)
+    loops, equation = RowLoops(program, layout), step.equation
     texts = [
-        *functions.called(program, [step.equation.slope] if step.equation and not layout.slopes else ()),
+        *functions.called(program, [equation.slope] if equation and not layout.slopes else ()),
         *functions.phi_lanes(program, set(rows.small_argument)),
     ]
     texts += functions.near_rows(program, [f for f in rows.small_argument if f not in SPECIAL])
     if step.parts:
-        texts += _parts(program, layout, rows, step.parts)
-        texts += _parts(program, layout, None, step.tangents) if program.extras.tangent else []
-    texts += partners(program, layout)
-    if step.equation:
-        relax, end = step.equation.relax, step.equation.advance
-        forms = call_forms(program, rows, [relax, end])
-        texts += _of_equation(program, layout, relax, forms, end=[end], far=bool(rows.limited))
-    if step.equation and switches(program, step, layout)["SITE_BLOCKS"]:
-        texts += _of_equation(
-            program, layout, site_block(program, layout, step.equation.relax), {"": in_loops(program)}
-        )
-    for kernel in (step.equation.slope, *step.equation.tangents) if step.equation and layout.slopes else ():
-        texts += _of_equation(program, layout, kernel, {"": in_loops(program)})
-    texts += [seen_loop(program, layout, k) for k in program.observables.kernels if k.roots]
-    return "\n".join(texts)
+        texts += _PartLoops(loops, rows, step.parts).texts()
+        texts += _PartLoops(loops, None, step.tangents).texts() if program.extras.tangent else []
+    partners = layout.partners
+    for gather in () if layout.sums_up else (partners.field, partners.energy, partners.varied, partners.observed):
+        texts += [printed(program, loop) for loop in loops.sums(gather)]
+    if equation:
+        texts += _of_equation(loops, equation.relax, rows, end=equation.advance)
+        if switches(program, step, layout)["SITE_BLOCKS"]:
+            texts += _of_equation(loops, site_block(program, layout, equation.relax))
+        for kernel in (equation.slope, *equation.tangents) if layout.slopes else ():
+            texts += _of_equation(loops, kernel)
+    return "\n".join([*texts, *observables(program, loops)])
 
 
 def parameters(program: Program, step: Sweeps) -> str:
@@ -75,433 +85,285 @@ def parameters(program: Program, step: Sweeps) -> str:
     return render("c", "lattice_parameters.c", values)
 
 
-def call_forms(program: Program, rows: Rows | None, kernels: Sequence[Kernel]) -> dict[str, Mapping[str, str]]:
-    """The forms in which kernels are needed, each with what its functions are called; without rows one for all."""
-    calls = in_loops(program)
-    if rows is None or not any(rows.calls_limited(kernel) for kernel in kernels):
-        return {"": calls}
-    lanes = {f: f"{program.name}_{f}_{'lane' if f in SPECIAL else 'near'}" for f in rows.small_argument}
-    return {"_near": {**calls, **lanes}, "_far": far_calls(program)}
+def drivers(loops: RowLoops) -> RowDrivers:
+    """Return the builder of the row drivers of a lattice."""
+    by_hand = switches(loops.program, loops.layout.step, loops.layout)["BY_HAND"]
+    return RowDrivers(loops.rows, loops.layout.halo, may_be_empty=by_hand, one_loop=not loops.fast)
 
 
-def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[Sequence[Sweep]]) -> Iterator[str]:
-    """The loops of all parts of H, and which of them make which. Those of equal code are one, whoever needs it.
+def driver_text(program: Program, driver: ir.Function) -> str:
+    """Return the text of a driver, below its purpose."""
+    return f"/* {driver.doc}. */\n{function(driver, program.name)}"
 
-    Without ``rows`` these are derivatives.
+
+@dataclass(frozen=True)
+class _Call:
+    """Call of a loop for some sites of a row segment.
+
+    The loop reads the fields in another ``order`` and the parameters at ``bonds`` likewise, if these are not empty. The
+    record of the segment has the ``colour`` and the first kind of the ``window`` of a sweep. ``shared`` is the name of
+    the loop where several parts of H call it; the ``others`` do the same.
     """
-    step = layout.step
-    parts_by_form = [_forms_of_part(program, layout, rows, part) for part in parts]
-    alike = _alike(parts_by_form)
-    names: dict[str, str] = {}
-    for code, same in alike.items():
-        shared = same[0].loop.shared if len(same) > 1 and same[0].loop.shared not in names.values() else ""
-        names[code] = shared or same[0].loop.name
-        yield replace(same[0].loop, name=names[code]).text(program, [call.loop.purpose for call in same])
-    near = rows is not None and bool(rows.limited)
-    unused, varied = ["far"] * (near and all(len(forms) == 1 for forms in parts_by_form)), rows is None
-    has = switches(program, step, layout)
-    threads = 0 if varied or has["SHARED"] else 512 if has["PAIRS"] else 4096
-    flow, what = ("flow", "A flow") if step.by_colour else ("part", "The flow of a part of H")
-    head = "tangent_rows" if varied else f"sweep_{'colour' if step.by_colour else 'part'}" if threads else "sweep_rows"
-    cases: list[Case | str] = []
-    for k, forms in enumerate(parts_by_form):
-        if varied or not _has_rows_of_its_own(program, layout):
-            cases.append(_case(program, layout, k, parts[k], forms, names))
-            continue
-        called = [f"{program.name}_rows{k + 1}{form}" for form in sorted(forms)]
-        for form in sorted(forms):
-            case = _case(program, layout, k, parts[k], {form: forms[form]}, names)
-            title = f"The flow of H_{k + 1}" + ", for large arguments of functions" * (form == "_far")
-            yield over_rows(
-                program, layout, [case], title=title, head=f"rows{k + 1}{form}", arguments="const double *coef"
-            )
-        cases.append(f"{called[0] if len(called) == 1 else f'(far ? {called[0]} : {called[1]})'}(s, coef, first, end);")
-    yield over_rows(
-        program,
-        layout,
-        cases,
-        title=f"How {what[0].lower()}{what[1:]} carries a tangent vector" if varied else what,
-        head=head,
-        arguments=f"int {flow}, const double *coef{', double *const *v' * varied}{', int far' * near}",
-        coloured=bool(step.by_colour),
-        unused=["part"] * (len(cases) == 1 and not step.by_colour) + ([] if varied else unused),
-        threads=threads,
-    )
+
+    loop: ir.Function
+    sites: row_drivers.Sites = None
+    arguments: tuple[ir.Value, ...] = ()
+    order: tuple[str, ...] = ()
+    bonds: tuple[str, ...] = ()
+    colour: int | None = None
+    window: int | None = None
+    shared: str = ""
+    others: tuple[_Call, ...] = ()
 
 
-def _has_rows_of_its_own(program: Program, layout: Layout) -> bool:
-    """Whether each part of H has a loop over rows of its own, which compilers make faster where these are short."""
-    return program.profile == "fast" and len(layout.step.sites.axes) > 1
+#: The calls of the flow of a part of H, by the forms of functions; and the names of loops by their code.
+Calls = dict[str, list[_Call]]
+Names = Mapping[tuple[tuple[str, ...], ir.Block], str]
 
 
-def _alike(parts_by_form: Sequence[dict[str, list[_Call]]]) -> dict[str, list[_Call]]:
-    """The calls of all loops, by the code that is to be printed of them: those that another one can make call that."""
-    alike: dict[str, list[_Call]] = {}
-    for forms in parts_by_form:
-        for called in forms.values():
+@dataclass(frozen=True)
+class _PartLoops:
+    """The loops and drivers of all parts of H; without ``rows`` these are derivatives."""
+
+    loops: RowLoops
+    rows: Rows | None
+    parts: Sequence[Sequence[Sweep]]
+
+    @property
+    def varied(self) -> bool:
+        """Whether the parts update variations."""
+        return self.rows is None
+
+    @property
+    def by_part(self) -> bool:
+        """Whether each part has a driver of its own, which compilers make faster where rows are short."""
+        return self.loops.fast and not self.loops.rows.single_row and not self.varied
+
+    def texts(self) -> Iterator[str]:
+        """Yield the loops and the drivers; loops of equal code are one, whichever parts need them."""
+        program, layout, step = self.loops.program, self.loops.layout, self.loops.layout.step
+        calls_of_parts = [self._calls_of_part(part) for part in self.parts]
+        alike = _alike(calls_of_parts)
+        names: dict[tuple[tuple[str, ...], ir.Block], str] = {}
+        for key, same in alike.items():
+            shared = same[0].shared if len(same) > 1 and same[0].shared not in names.values() else ""
+            loop = replace(same[0].loop, name=shared or same[0].loop.name)
+            names[key] = loop.name
+            yield printed(program, loop, [call.loop.doc for call in same])
+        has, coloured = switches(program, step, layout), bool(step.by_colour)
+        threads = 0 if self.varied or has["SHARED"] else 512 if has["PAIRS"] else 4096
+        name = (
+            "tangent_rows" if self.varied else f"sweep_{'colour' if coloured else 'part'}" if threads else "sweep_rows"
+        )
+        parameters = ["flow" if coloured else "part", "coef", *["v"] * self.varied]
+        parameters += ["far"] * (self.rows is not None and bool(self.rows.limited))
+        cases, build = list[RowSegment | ir.Block](), drivers(self.loops)
+        for k, forms in enumerate(calls_of_parts):
+            if not self.by_part:
+                cases.append(self._segment(k, forms, names))
+                continue
+            for form in sorted(forms):
+                title = f"The flow of H_{k + 1}" + ", for large arguments of functions" * (form == "_far")
+                case = self._segment(k, {form: forms[form]}, names)
+                yield driver_text(program, build.driver(f"rows{k + 1}{form}", title, ["coef"], [case]))
+            arguments = (S, COEF, ir.fixed("first"), ir.fixed("end"))
+            blocks: dict[str, ir.Block] = {form: (ir.Call(f"rows{k + 1}{form}", arguments),) for form in forms}
+            cases.append(row_drivers.in_forms(blocks))
+        title = "a flow" if coloured else "the flow of a part of H"
+        title = f"How {title} carries a tangent vector" if self.varied else title[0].upper() + title[1:]
+        yield driver_text(program, build.driver(name, title, parameters, cases, threads=threads))
+
+    def _calls_of_part(self, part: Sequence[Sweep]) -> Calls:
+        """Return the calls for a row segment that make the flow of a part of H, in each form.
+
+        Short code has loops that also serve with the fields in another order.
+        """
+        layout, program = self.loops.layout, self.loops.program
+        forms = self.loops.forms(self.rows, [self.loops.sites.sweep(sweep) for sweep in part])
+        fields, calls_of_forms = program.coordinates, Calls()
+        tried = [] if self.loops.fast or self.varied else [*orders(fields)]
+        for form, versions in forms.items():
+            calls_of_forms[form] = []
+            for sweep in part:
+                calls = [*self._calls(sweep, form, versions)]
+                # transposes gather by loops of their own
+                for order in () if sweep.gather and layout.step.adjoint else tried:
+                    other = turned(layout.step.sites, fields, order, sweep)
+                    for k, call in enumerate(self._calls(other, form, versions) if other else ()):
+                        more = (replace(c, order=order) for c in (call, *call.others))
+                        calls[k] = replace(calls[k], others=(*calls[k].others, *more))
+                calls_of_forms[form] += calls
+        return calls_of_forms
+
+    def _calls(self, sweep: Sweep, form: str, versions: Mapping[str, str]) -> Iterator[_Call]:
+        """Yield the calls of the loops of a sweep, in their order for a row segment."""
+        layout, program = self.loops.layout, self.loops.program
+        meant = over_ends(sweep.gather) if sweep.gather else []
+
+        def arguments(k: int, bonds: tuple[str, ...], sign: float) -> tuple[ir.Value, ...]:
+            across = ir.Constant(int(meant[k][0].chosen == "there"))
+            at_bonds = ir.label("_".join(bonds)) if bonds else ir.Member(S, "at_bonds")
+            values = {"at_bonds": at_bonds, "sign": ir.Constant(sign), "across": across}
+            return tuple(values[name] for name in self.loops.told_of_bonds(*meant[k]))
+
+        for k, loop in enumerate(self.loops.sums(sweep.gather, swept=True)):
+            others = []
+            alone = self.loops.fast or layout.step.adjoint
+            ways = () if alone or not sweep.gather else other_ways(layout.step.sites, sweep.gather)
+            for gather, bonds, sign in ways:
+                again = [*self.loops.sums(gather, swept=True)]
+                others.append(_Call(again[k], None, arguments(k, bonds, sign), bonds=bonds))
+            yield _Call(loop, None, arguments(k, (), 1.0), others=tuple(others))
+        loops = self.loops.sweep(sweep, form, versions)
+        swept = not self.loops.fast and layout.leaves_out(sweep.colour) and not sweep.is_tangent
+        colour, window = sweep.colour if swept else None, first_kind(layout, sweep)
+        called = calls_of(loops, sweep)
+        if len(loops) == 1 and wide(layout, sweep):
+            up = row_drivers.whole_vectors(ir.Binary("+", LENGTH, ir.Constant(row_drivers.VECTOR - 1)))
+            called, colour, window = [(loops[0], (ir.Constant(0), up))], None, None
+        fields = [program.coordinates[i] for i in sweep.moved]
+        shared = "_".join(["tangent" if sweep.is_tangent else "sweep", *fields]) + form
+        for loop, sites in called:
+            end = loop.name.removeprefix(sweep.kernel.name + form)
+            yield _Call(loop, sites, colour=colour, window=window, shared=shared + end)
+
+    def _segment(self, k: int, forms: Mapping[str, Sequence[_Call]], names: Names) -> RowSegment:
+        """Return the statements of a part of H, where the loops have ``names`` by their code."""
+        layout, coloured = self.loops.layout, self.loops.layout.step.by_colour
+        setup = [row_drivers.member("varied", ir.fixed("v"))] * self.varied
+        setup += [row_drivers.member("chosen", row_drivers.COLOUR)] * bool(coloured and coloured[k])
+        near = [*_near_seams(layout, self.parts[k])] if self.by_part else []
+        calls = [call for called in forms.values() for call in called]
+        declared = [*_reordered(layout, [call.order for call in calls])]
+        declared += _other_bonds(layout, [call.bonds for call in calls])
+        blocks = {form: tuple(_statements(called, names)) for form, called in forms.items()}
+        updated = sorted({f for sweep in self.parts[k] for f in sweep.moved})
+        arrays = ir.fixed("v") if self.varied else STATE
+        return RowSegment(row_drivers.in_forms(blocks), (*setup, *near), tuple(declared), updated, arrays)
+
+
+def _alike(calls_of_parts: Sequence[Calls]) -> dict[tuple[tuple[str, ...], ir.Block], list[_Call]]:
+    """Return the calls of all loops by the code that is printed for them.
+
+    A call of a loop that another loop can replace becomes a call of that loop.
+    """
+    alike: dict[tuple[tuple[str, ...], ir.Block], list[_Call]] = {}
+    for calls_of_forms in calls_of_parts:
+        for called in calls_of_forms.values():
             for k, call in sorted(enumerate(called), key=_place):
-                choices = [call, *call.others]
-                called[k] = next((c for c in choices if c.loop.code in alike), call)
-                known = alike.setdefault(called[k].loop.code, [])
+                called[k] = next((c for c in (call, *call.others) if code(c.loop) in alike), call)
+                known = alike.setdefault(code(called[k].loop), [])
                 if all(c.loop.name != call.loop.name for c in known):
                     known.append(called[k])
     return alike
 
 
 def _place(numbered: tuple[int, _Call]) -> tuple[str, bool]:
-    """Where a loop is printed: that beside open ends behind the one that it is the same as."""
+    """Return the place of a loop in the code: one for sites near open ends is behind the one for other sites."""
     name = numbered[1].loop.name
-    return name.removesuffix("_end"), name.endswith("_end")
+    return name.removesuffix(NEAR_ENDS), name.endswith(NEAR_ENDS)
 
 
-def _forms_of_part(
-    program: Program, layout: Layout, rows: Rows | None, part: Sequence[Sweep]
-) -> dict[str, list[_Call]]:
-    """Return the calls for a segment of a row that make the flow of a part of H, in each form.
-
-    Short code has loops that also serve with the fields in another order.
-    """
-    forms = call_forms(program, rows, [sweep.kernel for sweep in part])
-    fields, calls_by_form = program.coordinates, dict[str, list[_Call]]()
-    tried = [*orders(fields)] if program.profile == "small" and rows is not None else []
-    for form, names in forms.items():
-        calls_by_form[form] = []
-        for sweep in part:
-            calls = [*_calls(program, layout, sweep, form, names)]
-            for order in (
-                () if sweep.gather and layout.step.adjoint else tried
-            ):  # transposes gather by loops of their own
-                other = turned(layout.step.sites, fields, order, sweep)
-                again = [*_calls(program, layout, other, form, names)] if other else []
-                for k, call in enumerate(again):
-                    more = (replace(c, order=order) for c in (call, *call.others))
-                    calls[k] = replace(calls[k], others=(*calls[k].others, *more))
-            calls_by_form[form] += calls
-    return calls_by_form
-
-
-def _case(
-    program: Program,
-    layout: Layout,
-    k: int,
-    part: Sequence[Sweep],
-    forms: Mapping[str, Sequence[_Call]],
-    names: Mapping[str, str],
-) -> Case:
-    """The statements of a part of H, where the loops have ``names`` by their code."""
-    coloured, varied = layout.step.by_colour, any(sweep.is_tangent for sweep in part)
-    lines = {form: [*_called(program, called, names)] for form, called in forms.items()}
-    moved = sorted({f for sweep in part for f in sweep.moved})
-    setup = ["row.varied = v;"] * varied + (["row.chosen = colour;"] if coloured and coloured[k] else [])
-    setup += _near_seams(layout, part) if _has_rows_of_its_own(program, layout) else []
-    all_called = [call for called in forms.values() for call in called]
-    orders = [*_reordered(layout, [call.order for call in all_called])]
-    orders += _other_bonds(layout, [call.bonds for call in all_called])
-    beside = has_ends(program, [sweep.kernel for sweep in part]) or any(map(beside_seams, part))
-    where = "v" if varied else "s->x"
-    return Case(either(lines), setup, beside, orders, moved, where)
-
-
-def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[str]:
+def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[ir.Statement]:
     """Yield the statements that skip rows and sites away from the seams at which the terms of a part begin."""
     window, last = max((s.window or 0 for s in part), default=0), len(layout.step.sites.axes) - 1
-    rows = window & ~(1 << last)
-    if rows:
-        yield f"if ((row.near & {rows}) != {rows}) continue;"
+    rows, near = ir.Constant(window & ~(1 << last)), ir.Member(ROW, "near")
+    if rows.value:
+        yield ir.If(ir.Binary("!=", ir.Binary("&", near, rows), rows), (ir.Continue(),))
     if window >> last:
-        yield "row.near = 0;"
+        yield ir.Assign(near, ir.Constant(0))
 
 
-#: The most statements of a case of a switch that are on its line.
-MOST_ON_A_LINE = 2
-
-
-@dataclass(frozen=True)
-class Case:
-    """Calls for a segment of a row, after its ``setup``; whether there are sites beside open ends; the
-    declarations of ``orders`` of the fields; which fields are ``moved``, and where these are."""
-
-    calls: Sequence[str]
-    setup: Sequence[str]
-    beside: bool
-    orders: Sequence[str] = ()
-    moved: Sequence[int] = ()
-    where: str = "s->x"
-
-
-@dataclass(frozen=True)
-class _Call:
-    """A loop for some sites of a piece: their bounds, if not all of them; the ``colour`` that it is told, if any; the
-    fields in the ``order`` that it takes for its own, if another one, and where it gathers the parameters at ``bonds``
-    likewise; what it is ``told`` of bonds besides; the first kind of its ``window``, if any; ``others`` do the same."""
-
-    loop: Loop
-    sites: str = ""
-    colour: int | None = None
-    order: tuple[str, ...] = ()
-    bonds: tuple[str, ...] = ()
-    told: tuple[str, ...] = ()
-    others: tuple[_Call, ...] = ()
-    window: int | None = None
-
-
-def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str]) -> Iterator[str]:
-    """The statements that call loops, which have ``names`` by their code, each with the fields in its order."""
+def _statements(called: Sequence[_Call], names: Names) -> Iterator[ir.Statement]:
+    """Yield the statements that call loops, each with the fields in its order."""
     order: tuple[str, ...] = ()
     colour: int | None = 0
     window: int | None = 0
     for call in called:
-        assignments = list[str]()
+        assignments = list[ir.Assign]()
         if call.window not in (window, None):
             window = call.window
-            assignments.append(f"row.window = {window}.0")
+            assignments.append(row_drivers.member("window", ir.Constant(float(window or 0))))
         if call.colour not in (colour, None):
             colour = call.colour
-            assignments.append(f"row.swept = {colour}")
+            assignments.append(row_drivers.member("swept", ir.Constant(colour)))
         if call.order != order:
             order = call.order
-            assignments.append(f"row.x = {'_'.join(order) or 's->x'}")
-        yield from [f"{', '.join(assignments)};"] if assignments else []
-        yield f"{program.name}_{names[call.loop.code]}({', '.join(['coef', at(program, call.sites), *call.told])});"
+            assignments.append(row_drivers.member("x", ir.label("_".join(order)) if order else STATE))
+        yield from [ir.Together(tuple(assignments))] if assignments else []
+        yield ir.Call(names[code(call.loop)], (COEF, at(call.sites), *call.arguments))
 
 
-def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """The parameters at bonds, in other orders that are used."""
+def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
+    """Yield the declarations of the parameters at bonds in other orders."""
+    listed = layout.step.sites.at_bonds
     for order in dict.fromkeys(order for order in used if order):
-        places = ", ".join(f"s->at_bonds[{layout.step.sites.at_bonds.index(p)}]" for p in order)
-        yield f"double *const {'_'.join(order)}[] = {{ {places} }};"
+        yield _arrays(order, [ir.Entry(ir.Member(S, "at_bonds"), ir.Constant(listed.index(p))) for p in order])
 
 
-def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """The arrays over the sites, with the fields in other orders that are used."""
+def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
+    """Yield the declarations of the arrays over the sites with the fields in other orders."""
     for order in dict.fromkeys(order for order in used if order):
-        turned = {
-            **dict(zip(layout.arrays, order, strict=False)),
-            **turned_increments(layout.step.sites, layout.arrays, order),
-        }
-        arrays = [turned.get(a, a) for a in layout.arrays]
-        places = ", ".join(f"s->x[{layout.arrays.index(a)}]" for a in arrays)
-        yield f"double *const {'_'.join(order)}[] = {{ {places} }};"
+        increments = turned_increments(layout.step.sites, layout.arrays, order)
+        other = {**dict(zip(layout.arrays, order, strict=False)), **increments}
+        places = [layout.arrays.index(other.get(a, a)) for a in layout.arrays]
+        yield _arrays(order, [ir.Entry(STATE, ir.Constant(place)) for place in places])
 
 
-def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Iterator[_Call]:
-    """The loops of a sweep, in the order in which they are called for a piece of a row."""
-    meant = over_ends(sweep.gather) if sweep.gather else []
-
-    def said(k: int, bonds: tuple[str, ...], sign: float) -> tuple[str, ...]:
-        ends, opposite = meant[k]
-        values = {"at_bonds": "_".join(bonds) or "s->at_bonds", "sign": f"{sign!r}"}
-        values["across"] = str(int(ends.chosen == "there"))
-        return tuple(values[name] for name in told_of_bonds(program, layout, ends, opposite))
-
-    for k, loop in enumerate(gathering(program, layout, sweep.gather, "coef") if sweep.gather else ()):
-        others = []
-        alone = program.profile == "fast" or layout.step.adjoint
-        for gather, bonds, sign in () if alone or not sweep.gather else other_ways(layout.step.sites, sweep.gather):
-            again = [*gathering(program, layout, gather, "coef")]
-            others.append(_Call(again[k], bonds=bonds, told=said(k, bonds, sign)))
-        yield _Call(loop, told=said(k, (), 1.0), others=tuple(others))
-    loops = [
-        sweep_loop(program, layout, replace(sweep, kernel=kernel), form + more, calls)
-        for kernel, more in forms_of(program, sweep.kernel)
-    ]
-    if len(loops) == 1 and wide(layout, sweep):
-        yield _Call(loops[0], "0, (s->length + 7) & ~(ptrdiff_t)7")
-    else:
-        swept = program.profile == "small" and layout.leaves_out(sweep.colour) and not sweep.is_tangent
-        colour = sweep.colour if swept else None
-        called = [_Call(loops[0], sites) for sites in beside_seams(sweep)] or calls_over_sites(loops)
-        window = first_kind(layout, sweep)
-        yield from (replace(call, colour=colour, window=window) for call in called)
+def _arrays(order: tuple[str, ...], arrays: Sequence[ir.Value]) -> ir.Declare:
+    return ir.Declare(ir.Type.ARRAYS, ((ir.label("_".join(order)).symbol, ir.Listed(tuple(arrays))),))
 
 
-def first_kind(layout: Layout, sweep: Sweep) -> int | None:
-    """The first of the kinds of sites on the seams that a sweep is for."""
-    return None if sweep.window is None else sweep.window * layout.step.sites.colours
+def calls_of(loops: Sequence[ir.Function], sweep: Sweep | None = None) -> list[tuple[ir.Function, row_drivers.Sites]]:
+    """Return the loops with the sites that each is called for.
 
-
-def beside_seams(sweep: Sweep) -> tuple[str, ...]:
-    """The sites of a piece of a row away from seams, or near them, if a sweep is made there only."""
-    near = ("begin, second", "third, stop") if sweep.window is not None else ()
-    return ("second, third",) if sweep.inside else near
-
-
-def calls_over_sites(loops: Sequence[Loop]) -> Iterator[_Call]:
-    """One loop for all sites, or two: for those away from open ends, and for those beside them."""
+    There is one for all sites, or for those that boundary seams leave, or two: for sites away from open ends, and for
+    sites near them.
+    """
+    if sweep and beside_seams(sweep):
+        return [(loops[0], sites) for sites in ((AWAY,) if sweep.inside else (FIRST_SITES, LAST_SITES))]
     if len(loops) == 1:
-        yield _Call(loops[0])
-        return
+        return [(loops[0], None)]
     inside, end = loops
-    yield from (_Call(end, "begin, second"), _Call(inside, "second, third"), _Call(end, "third, stop"))
+    return [(end, FIRST_SITES), (inside, AWAY), (end, LAST_SITES)]
 
 
-def at(program: Program, sites: str) -> str:
-    """The argument that is a piece of a row, or some sites of it."""
-    return f"{program.name}_between(&row, {sites})" if sites else "&row"
+def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end: Kernel | None = None) -> Iterator[str]:
+    """Yield the loops and the driver of a kernel of the equation of a stage.
 
-
-def either(lines: Mapping[str, Sequence[str]]) -> list[str]:
-    """The calls of each form, for those arguments that it is for."""
-    if len(lines) == 1:
-        return [line for calls in lines.values() for line in calls]
-    return _either("far", lines["_far"], lines["_near"])
-
-
-def _either(condition: str, first: Sequence[str], other: Sequence[str]) -> list[str]:
-    """The first statements if a condition holds, else the others."""
-    if len(first) == len(other) == 1:
-        return [f"if ({condition}) {first[0]}", f"else {other[0]}"]
-    indented = [[f"    {line}" for line in lines] for lines in (first, other)]
-    return [f"if ({condition}) {{", *indented[0], "} else {", *indented[1], "}"]
-
-
-def _copied_ends(program: Program, layout: Layout, fields: Sequence[int | str], case: Case) -> list[str]:
-    """Return the statements that copy the ends of a row of fields that were changed."""
-    place, swept = layout.at(0, "row."), layout.swept("begin, stop" if case.beside else "row.from, row.to")
-    return [f"{program.name}_ends({case.where}[{f}]{place}, s->length, {swept});" for f in fields if layout.halo]
-
-
-def _of_equation(
-    program: Program,
-    layout: Layout,
-    kernel: Kernel,
-    forms: Mapping[str, Mapping[str, str]],
-    *,
-    end: Sequence[Kernel] = (),
-    far: bool = False,
-) -> Iterator[str]:
-    """The loops of a kernel of the equation of a stage over rows and their sites, in each form, or of that of the
-    ``end`` of a stage where this moves x; whether they are told of arguments that are far."""
-    name, relaxing, adds = program.name, kernel.role is Role.RELAX, kernel.role is Role.FOLLOW
-    varied = kernel.reads_variations
-    gathers = over_ends(layout.gathered(kernel)) if kernel.inputs["gathered"] else ()
-    gathered = [f"{name}_{ends.kernel.name}(&row);" for ends, _ in gathers]
-    lines = {}
-    for form, calls in forms.items():
-        both = list[list[str]]()
-        for printed in (kernel, *end):
-            added = "+=" if adds or printed in end else "="
-            loops = [
-                middle_loop(program, layout, one, form + more, calls, added) for one, more in forms_of(program, printed)
-            ]
-            yield from (loop.text(program) for loop in loops)
-            called = calls_over_sites(loops)
-            both.append([f"{name}_{call.loop.name}(coef, {at(program, call.sites)});" for call in called])
-        lines[form] = _either("to == s->x", both[1], both[0]) if end else both[0]
-    reads = ["row.start = s->x;"] * ("start" in kernel.inputs) + ["row.varied = v;"] * varied
-    titles = {
-        Role.RELAX: "A sweep, or to x the end of a stage",
-        Role.SLOPE: "How a sweep follows y along v",
-        Role.OWN_SLOPE: "How a sweep follows y at the site itself",
-        Role.SIDE: "How a sweep follows x along v",
-        Role.FOLLOW: "How the end of a stage follows y along v, added",
-    }
-    moved = range(program.dimension) if relaxing or adds else ()
-    setup = ["row.x = y;", *reads, "row.out = to;"]
-    yield over_rows(
-        program,
-        layout,
-        [Case([*gathered, *either(lines)], setup, has_ends(program, [kernel, *end]), (), moved, "to")],
-        title=titles[kernel.role],
-        head="stage_piece" if end else f"{kernel.name}_piece",
-        arguments=f"const double *coef, {'int far, ' * far}double *const *y, {'double *const *v, ' * varied}"
-        "double *const *to",
-        unused=["far"] * (far and len(forms) == 1),
-        alone=True,
-    )
-
-
-def over_rows(
-    program: Program,
-    layout: Layout,
-    cases: Sequence[Case | str],
-    labels: Sequence[int] = (),
-    *,
-    alone: bool = False,
-    threads: int = 0,
-    back: bool = False,
-    **more: object,
-) -> str:
-    """A function that goes over pieces of rows, or ``alone`` over one, or over all, by several threads where there are
-    more sites than ``threads`` says, if it does; what it does is one of some ``cases``, or what these call.
-
-    They have the numbers 1, 2, …, or those of ``labels``. On the way ``back``, sites beside open ends are whole vectors
-    of 8, so that those between are too.
+    The driver of the equation itself also treats the ``end`` of a stage, where it updates x.
     """
-    last = [bounds(w.key)[-1] for w in layout.weights]
-    low, one_row = max([0, *(-low for low, _ in last)]), len(layout.step.sites.axes) == 1
-    low = (low + 7) // 8 * 8 if back else low
-    seamed = bool(layout.step.sites.seams)
-    away, end = "s->inside[0]" if seamed else low, f"s->length - {max([0, *(high for _, high in last)])}"
-    values: dict[str, Any] = {
-        "NAME": program.name,
-        "low": away if one_row else f"{'row.near == 0' if seamed else 'row.whole'} ? {away} : s->length",
-        "high": "s->inside[1]" if seamed else f"({end}) & ~(ptrdiff_t)7" if back else end,
-        "ends": "seams" if seamed else "open ends",
-        "skipping": switches(program, layout.step, layout)["BY_HAND"] and one_row,
-        "alone": alone,
-        "threads": threads,
-        "several": not alone and not threads,
-    }
-    orders = dict.fromkeys(line for case in cases if not isinstance(case, str) for line in case.orders)
-    body = ["/* the fields in other orders, in which loops that are for one order serve others */"] * bool(orders)
-    body += [*orders, *_over_pieces(program, layout, values, cases, labels or range(1, 1 + len(cases)))]
-    indented = [line if line.startswith("#") else f"    {line}" for line in body]
-    values |= {"coloured": False, "unused": (), "body": indented, "counted": threads and indented, **more}
-    if any(isinstance(case, Case) and not case.calls for case in cases):  # nothing moves, as where brackets are zero
-        values["unused"] = _not_read(values)
-    return render("c", "sweep_rows.c", values)
+    program, layout = loops.program, loops.layout
+    adds, varied = kernel.role is Role.FOLLOW, kernel.reads_variations
+    gather = layout.gathered(kernel) if kernel.inputs["gathered"] else None
+    gathered = [ir.Call(ends.kernel.name, (SEGMENT,)) for ends, _ in (over_ends(gather) if gather else ())]
+    kernels = [kernel, end] if end else [kernel]
+    blocks = dict[str, ir.Block]()
+    for form, versions in loops.forms(rows, map(loops.sites.stage, kernels)).items():
+        both = list[ir.Block]()
+        for one in kernels:
+            parts = loops.stage(one, form, versions, adds=adds or one is end)
+            yield from (printed(program, loop) for loop in parts)
+            both.append(tuple(ir.Call(loop.name, (COEF, at(sites))) for loop, sites in calls_of(parts)))
+        updates_state = ir.Binary("==", ir.fixed("to"), STATE)
+        blocks[form] = (ir.If(updates_state, both[1], both[0]),) if end else both[0]
+    setup = [row_drivers.member("x", ir.fixed("y"))]
+    setup += [row_drivers.member("start", STATE)] * ("start" in kernel.inputs)
+    setup += [row_drivers.member("varied", ir.fixed("v"))] * varied
+    setup.append(row_drivers.member("out", ir.fixed("to")))
+    updated = range(program.dimension) if kernel.role in (Role.RELAX, Role.FOLLOW) else ()
+    calls = (*gathered, *row_drivers.in_forms(blocks))
+    case = RowSegment(calls, tuple(setup), updated=updated, arrays=ir.fixed("to"))
+    far = rows is not None and bool(rows.limited)
+    parameters = ["coef", *["far"] * far, "y", *["v"] * varied, "to"]
+    name = "stage_piece" if end else f"{kernel.name}_piece"
+    yield driver_text(program, drivers(loops).driver(name, _TITLES[kernel.role], parameters, [case], alone=True))
 
 
-def _not_read(values: Mapping[str, Any]) -> list[str]:
-    """The arguments of a function over rows that its body does not name."""
-    range_names = ["unit"] * values["alone"] + ["first", "end"] * values["several"]
-    arguments = ["s", *re.findall(r"(\w+)(?:,|$)", values["arguments"]), *range_names]
-    named = " s flow part" if values["coloured"] else ""  # by the lines that find the colour of a flow
-    text = "\n".join(values["body"]) + named
-    return [name for name in arguments if not re.search(rf"\b{name}\b", text)]
-
-
-def _over_pieces(
-    program: Program, layout: Layout, values: Mapping[str, object], cases: Sequence[Case | str], labels: Sequence[int]
-) -> list[str]:
-    """The loop over pieces; short code tells the parts of H apart in it, other code has a loop for each.
-
-    What lies beside the open ends of a single row is read by their pieces alone: short code copies it of all fields.
-    """
-    pieces = [case for case in cases if isinstance(case, Case)]
-    ends = [_copied_ends(program, layout, case.moved, case) for case in pieces]
-    statements, last = [[*case.calls] for case in pieces], list[str]()
-    if layout.step.sites.open == (True,) and any(ends):
-        (line,) = _copied_ends(program, layout, ["k"], pieces[0])
-        last = [f"for (int k = 0; k < {program.name}_DIM; ++k) {line}"]
-    else:
-        statements = [[*lines, *copied] for lines, copied in zip(statements, ends, strict=True)]
-    if len(statements) > 1 and program.profile == "small":
-        calls = ["switch (part) {", *_cases(statements, labels), "}", *last]
-        setup = [*dict.fromkeys(line for case in pieces for line in case.setup)]
-        return _piece(values, Case(calls, setup, any(case.beside for case in pieces)))
-    whole = iter([replace(case, calls=[*case.calls, *copied]) for case, copied in zip(pieces, ends, strict=True)])
-    loops = [[case] if isinstance(case, str) else _piece(values, next(whole)) for case in cases]
-    return loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops, labels), "}"]
-
-
-def _piece(values: Mapping[str, object], case: Case) -> list[str]:
-    if not case.calls:
-        return []
-    changed = any(re.search(r"\brow\.\w+ = |_between\(", line) for line in (*case.setup, *case.calls))
-    lines = render("c", "each_piece.c", {**values, **vars(case), "changed": changed}).splitlines()
-    threads = values["threads"]
-    first, end = ("0", "units") if threads else ("first", "end")
-    begin = ["#ifdef _OPENMP", f"#pragma omp parallel for if (s->sites > {threads})", "#endif"] if threads else []
-    begin.append(f"for (size_t unit = {first}; unit < {end}; ++unit) {{")
-    return lines if values["alone"] else [*begin, *(f"    {line}" for line in lines), "}"]
-
-
-def _cases(loops: Sequence[Sequence[str]], labels: Sequence[int]) -> Iterator[str]:
-    """The cases of a switch over parts of H, with their statements; each on a line, where all are short."""
-    heads = ["default:" if k == labels[-1] else f"case {k}:" for k in labels]
-    short = all(len(lines) <= MOST_ON_A_LINE and "for" not in "".join(lines[:1]) for lines in loops)
-    for head, lines in zip(heads, loops, strict=True):
-        yield " ".join([head, *lines, "break;"]) if short else head
-        yield from () if short else (f"    {line}" for line in (*lines, "break;"))
+_TITLES = {
+    Role.RELAX: "A sweep, or to x the end of a stage",
+    Role.SLOPE: "How a sweep follows y along v",
+    Role.OWN_SLOPE: "How a sweep follows y at the site itself",
+    Role.SIDE: "How a sweep follows x along v",
+    Role.FOLLOW: "How the end of a stage follows y along v, added",
+}

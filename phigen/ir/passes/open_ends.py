@@ -1,0 +1,43 @@
+"""Open ends: a loop in which all terms are present, for sites away from open ends, and the loop for the other sites.
+
+Applied on the level of sites, to whole expression graphs, before `phigen.ir.passes.temporaries`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from phigen.ir import nodes as ir
+from phigen.ir.walk import map_blocks, statements
+from phigen.symbolic.expression import ONE, Expression, substitute
+
+#: The end of the names of loops for sites near open ends.
+NEAR_ENDS = "_end"
+
+
+def divided_at_ends(function: ir.Function) -> list[ir.Function]:
+    """Return two functions, for sites away from open ends and for all; one function if open ends change nothing."""
+    if not any(map(_weight, statements(function.body))):
+        return [function]
+    near = replace(function, name=function.name + NEAR_ENDS, doc="the same beside open ends")
+    return [map_blocks(function, _without_weights), near]
+
+
+def _weight(s: ir.Statement) -> str:
+    """Return the symbol of a weight that a statement declares, or nothing."""
+    return s.items[0][0] if isinstance(s, ir.Declare) and isinstance(s.items[0][1], ir.Inside) else ""
+
+
+def _without_weights(body: ir.Block) -> Iterator[ir.Statement]:
+    """Yield the statements with 1 for all weights, without sums to which nothing is added then."""
+    ones = dict.fromkeys(filter(None, map(_weight, body)), ONE)
+    graphs = (s.value for s in body if isinstance(s, ir.Update))
+    values = iter(substitute([e for e in graphs if isinstance(e, Expression)], ones))
+    for s in body:
+        if isinstance(s, ir.Update):
+            value = next(values)
+            if not (value.is_zero and (isinstance(s, ir.Reduce) or s.adds)):
+                yield replace(s, value=value)
+        elif not _weight(s):
+            yield s

@@ -1,0 +1,235 @@
+"""Row drivers: functions that call the loops over sites for the row segments of a lattice.
+
+They are built on the level of memory, for the lowering by rows. A target in which a device distributes row segments
+maps the loop of the kind "segments" to its threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from phigen.ir import nodes as ir
+from phigen.ir.lattice_loops import bounds
+from phigen.ir.passes.by_rows import FROM, ROW, TO, RowLayout
+from phigen.ir.passes.unread import discard_unread
+from phigen.ir.walk import names_in, statements, values
+from phigen.scheme.kernel import Role
+
+S, UNIT, COEF, FAR, PART, COLOUR = (ir.fixed(name) for name in ("s", "unit", "coef", "far", "part", "colour"))
+BEGIN, SECOND, THIRD, STOP, LOW, HIGH = (ir.fixed(name) for name in ("begin", "second", "third", "stop", "low", "high"))
+SEGMENT = ir.Prefix("&", ROW)
+LENGTH, STATE = ir.Member(S, "length"), ir.Member(S, "x")
+
+#: First site, and site after the last, of the part of a row segment that a loop runs over; none of the whole segment.
+Sites = tuple[ir.Value, ir.Value] | None
+#: The sites away from open ends and boundary seams, those near them, and all of them in their order.
+AWAY, FIRST_SITES, LAST_SITES = (SECOND, THIRD), (BEGIN, SECOND), (THIRD, STOP)
+
+#: Sites of a vector. Loops that add in vectors begin at multiples of it, and rows have room for whole vectors.
+VECTOR = 8
+
+
+def whole_vectors(count: ir.Value) -> ir.Value:
+    """Return the largest multiple of `VECTOR` that a number contains."""
+    return ir.Binary("&", count, ir.Prefix("~", ir.Cast(ir.Constant(VECTOR - 1))))
+
+
+@dataclass(frozen=True)
+class RowSegment:
+    """Statements for one row segment: ``calls`` of loops, after a ``setup`` of the record of the segment.
+
+    ``orders`` are declarations that all segments share. The fields with the numbers ``updated`` of some ``arrays`` are
+    changed, so that the copies of the ends of rows beside them are updated.
+    """
+
+    calls: ir.Block
+    setup: ir.Block = ()
+    orders: ir.Block = ()
+    updated: Sequence[int] = ()
+    arrays: ir.Value = STATE
+
+    @property
+    def near_ends(self) -> bool:
+        """Whether the segment is divided into sites away from open ends and seams, and sites near them."""
+        return divides(self.calls)
+
+
+@dataclass(frozen=True)
+class RowDrivers:
+    """Builder of the row drivers of one lattice.
+
+    ``halo`` is the number of sites that are copied beside a row. With ``may_be_empty`` segments may have no site. With
+    ``one_loop`` the parts of H are distinguished inside one loop over row segments, else each has a loop.
+    """
+
+    layout: RowLayout
+    halo: int
+    may_be_empty: bool = False
+    one_loop: bool = False
+
+    def driver(
+        self,
+        name: str,
+        doc: str,
+        parameters: Sequence[str],
+        cases: Sequence[RowSegment | ir.Block],
+        labels: Sequence[int] = (),
+        *,
+        threads: int = 0,
+        alone: bool = False,
+        vectors: bool = False,
+    ) -> ir.Function:
+        """Return a function that treats the row segments from ``first`` on, before ``end``, by one of some cases.
+
+        The cases have the numbers 1, 2, …, or ``labels``. With ``threads`` the function treats all segments, by
+        several threads if there are more sites than that; if it is for one segment ``alone``, it has no loop. With
+        ``vectors`` the sites near ends are whole vectors.
+        """
+        several = not alone and not threads
+        range_names = ("first", "end") if several else ("unit",) * alone
+        build = _Driver(self, threads, alone, vectors)
+        body = build.over_segments(cases, labels or range(1, 1 + len(cases)))
+        orders = dict.fromkeys(s for case in cases if isinstance(case, RowSegment) for s in case.orders)
+        head: list[ir.Statement] = []
+        if "flow" in parameters:
+            head += self._part_of_flow(switched=len(cases) > 1)
+        if threads and body:
+            head.append(ir.Declare(ir.Type.SIZE, ((ir.fixed("units").symbol, ir.Called("units", (S,))),)))
+        if orders:
+            head.append(ir.Comment("the fields in other orders, in which loops that are for one order serve others"))
+        said = ", for a piece of a row" * alone + ", for the pieces of rows from first on, before end" * several
+        function = ir.Function(name, doc + said, Role.OTHER, ("s", *parameters, *range_names), (*head, *orders, *body))
+        return discard_unread(function)
+
+    def _part_of_flow(self, *, switched: bool) -> Iterator[ir.Statement]:
+        """Yield the statements that find the part of H and the colour that a flow updates."""
+        arguments = (S, ir.fixed("flow"), ir.Prefix("&", COLOUR))
+        yield ir.Declare(ir.Type.FLAG, ((COLOUR.symbol, ir.Constant(None)),), mutable=True)
+        if switched:
+            yield ir.Declare(ir.Type.FLAG, ((PART.symbol, ir.Called("part_of_flow", arguments)),))
+        else:
+            yield ir.Call("part_of_flow", arguments)
+
+    def first_of_row(self, arrays: ir.Value, number: int | ir.Value) -> ir.Value:
+        """Return the address of the row of a segment in the array with a number."""
+        index = ir.Constant(number) if isinstance(number, int) else number
+        return self.layout.row(ir.Entry(arrays, index))
+
+    def copied_ends(self, arrays: ir.Value, number: int | ir.Value, *, near_ends: bool = False) -> ir.Call:
+        """Return the statement that copies the ends of a row beside it; of many rows each segment is a whole row."""
+        begin, stop = (BEGIN, STOP) if near_ends else (FROM, TO)
+        swept = (begin, stop) if self.layout.single_row else (ir.Constant(0), LENGTH)
+        return ir.Call("ends", (self.first_of_row(arrays, number), LENGTH, *swept))
+
+    def divided(self, *, vectors: bool = False) -> Iterator[ir.Statement]:
+        """Yield the declarations that divide a segment into sites near ends or seams, and sites away from them."""
+        sites = self.layout.lattice.step.sites
+        reaches = [bounds(w.key)[-1] for w in self.layout.lattice.weights]
+        below, above = max([0, *(-low for low, _ in reaches)]), max([0, *(high for _, high in reaches)])
+        inside = [ir.Entry(ir.Member(S, "inside"), ir.Constant(k)) for k in range(2)]
+        low: ir.Value = ir.Constant((below + VECTOR - 1) // VECTOR * VECTOR if vectors else below)
+        high = whole_vectors(ir.plus(LENGTH, -above)) if vectors else ir.plus(LENGTH, -above)
+        away: ir.Value = ir.Member(ROW, "whole")
+        if sites.seams:
+            low, high = inside
+            away = ir.Binary("==", ir.Member(ROW, "near"), ir.Constant(0))
+        if not self.layout.single_row:
+            low = ir.Select(away, low, LENGTH)
+        ends = "seams" if sites.seams else "open ends"
+        yield ir.Comment(f"the sites from second on, before third, are away from all {ends}")
+        yield _indices((BEGIN, FROM), (STOP, TO), (LOW, low), (HIGH, high))
+        below_low = ir.Select(ir.Binary("<", STOP, LOW), STOP, LOW)
+        yield _indices((SECOND, ir.Select(ir.Binary(">", BEGIN, LOW), BEGIN, below_low)))
+        below_second = ir.Select(ir.Binary("<", HIGH, SECOND), SECOND, HIGH)
+        yield _indices((THIRD, ir.Select(ir.Binary("<", STOP, HIGH), STOP, below_second)))
+
+
+@dataclass(frozen=True)
+class _Driver:
+    """One driver, with the options of `RowDrivers.driver`."""
+
+    drivers: RowDrivers
+    threads: int
+    alone: bool
+    vectors: bool
+
+    def over_segments(self, cases: Sequence[RowSegment | ir.Block], labels: Sequence[int]) -> ir.Block:
+        """Return the loop over row segments, or a switch over such loops.
+
+        With one loop, the ends of a single open row are copied for all fields: only the segments there read the copies.
+        """
+        drivers, segments = self.drivers, [case for case in cases if isinstance(case, RowSegment)]
+        copies = [
+            [drivers.copied_ends(case.arrays, f, near_ends=case.near_ends) for f in case.updated]
+            if drivers.halo
+            else []
+            for case in segments
+        ]
+        if len(segments) > 1 and drivers.one_loop:
+            last: ir.Block = ()
+            if drivers.layout.lattice.step.sites.open == (True,) and any(copies):
+                first, k = segments[0], ir.fixed("k")
+                copy = drivers.copied_ends(first.arrays, k, near_ends=first.near_ends)
+                last, copies = (ir.Loop("line", (copy,), "k", ir.Constant(0), ir.fixed("DIM")),), [[] for _ in copies]
+            blocks = [(*case.calls, *copied) for case, copied in zip(segments, copies, strict=True)]
+            setup = tuple(dict.fromkeys(s for case in segments for s in case.setup))
+            calls = (ir.Switch(PART, tuple(labels), tuple(blocks)), *last)
+            return self._segment(RowSegment(calls, setup))
+        whole = iter([replace(c, calls=(*c.calls, *copied)) for c, copied in zip(segments, copies, strict=True)])
+        loops = [self._segment(next(whole)) if isinstance(case, RowSegment) else case for case in cases]
+        return loops[0] if len(loops) == 1 else (ir.Switch(PART, tuple(labels), tuple(loops)),)
+
+    def _copied_ends(self, case: RowSegment) -> Iterator[ir.Statement]:
+        for field in case.updated if self.drivers.halo else ():
+            yield self.drivers.copied_ends(case.arrays, field, near_ends=case.near_ends)
+
+    def _segment(self, case: RowSegment) -> ir.Block:
+        """Return the loop over row segments with the statements of one case; none if there are no calls."""
+        if not case.calls:
+            return ()
+        piece = ((ROW.symbol, ir.Called("piece_of", (S, UNIT))),)
+        body: list[ir.Statement] = [*case.setup]
+        if self.drivers.may_be_empty and self.drivers.layout.single_row:
+            body.append(ir.If(ir.Binary(">=", FROM, TO), (ir.Return() if self.alone else ir.Continue(),)))
+        body += self.drivers.divided(vectors=self.vectors) if case.near_ends else ()
+        body += case.calls
+        body.insert(0, ir.Declare(ir.RecordType("row"), piece, mutable=_is_changed(tuple(body))))
+        if self.alone:
+            return tuple(body)
+        low, high = (ir.Constant(0), ir.fixed("units")) if self.threads else (ir.fixed("first"), ir.fixed("end"))
+        return (ir.Loop("segments", tuple(body), "unit", low, high, threads=self.threads),)
+
+
+def at(sites: Sites) -> ir.Value:
+    """Return the argument that stands for a row segment, or for some sites of it."""
+    return ir.Called("between", (SEGMENT, *sites)) if sites else SEGMENT
+
+
+def divides(calls: ir.Block) -> bool:
+    """Whether calls are for sites near open ends or seams, or for those away from them."""
+    return not {SECOND.symbol, STOP.symbol}.isdisjoint(names_in(calls))
+
+
+def in_forms(blocks: dict[str, ir.Block]) -> ir.Block:
+    """Return the calls of each form of functions, selected by the flag ``far``; see `phigen.ir.passes.forms`."""
+    if len(blocks) == 1:
+        return next(iter(blocks.values()))
+    return (ir.If(FAR, blocks["_far"], blocks["_near"]),)
+
+
+def member(name: str, value: ir.Value) -> ir.Assign:
+    """Return the assignment to a member of the record of a segment."""
+    return ir.Assign(ir.Member(ROW, name), value)
+
+
+def _is_changed(body: ir.Block) -> bool:
+    """Whether statements change the record of a segment, as calls for some of its sites do."""
+    assigned = (a.target for s in statements(body) for a in (s.assignments if isinstance(s, ir.Together) else [s])
+                if isinstance(a, ir.Assign))  # fmt: skip
+    between = any(isinstance(v, ir.Called) and v.name == "between" for v in values(body))
+    return between or any(isinstance(place, ir.Member) and place.record == ROW for place in assigned)
+
+
+def _indices(*items: tuple[ir.Name, ir.Value]) -> ir.Declare:
+    return ir.Declare(ir.Type.INDEX, tuple((name.symbol, value) for name, value in items))
