@@ -7,7 +7,7 @@ sites. Their stores hold whole expression graphs, which `phigen.ir.passes.tempor
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -70,7 +70,10 @@ class LatticeLoops:
         varied = "varied" in kernel.inputs or ends in self.step.others.varied.ends
         colour = source == "coef" and bool(self.step.by_colour)
         parameters = (source, "state", *["varied"] * varied, "sites", *["colour"] * colour)
-        return self._over_ends(ends, kernel, parameters, self._outputs(ir.Storage.SUM, kernel.roots, adds=True))
+        sums = self._outputs(ir.Storage.SUM, kernel.roots, adds=True)
+        kinds = [ends.extremes.get(k, "") for k in range(len(sums))]
+        updates = (replace(s, adds=not kind, extreme=kind) for s, kind in zip(sums, kinds, strict=True))
+        return self._over_ends(ends, kernel, parameters, updates)
 
     def transposed_sweep(self, sweep: Sweep, kernel: Kernel) -> ir.Function:
         """Return the transpose of a sweep, whose kernel is ``kernel``."""

@@ -281,7 +281,8 @@ class Unpack:
 class Store:
     """Assign a value to the element at the site of the loop or, if it ``adds``, add the value to the element.
 
-    ``offset`` and ``end`` select other elements, as in `Load`.
+    An ``extreme``, ``max`` or ``min``, replaces the element only where it is larger or smaller. ``offset`` and ``end``
+    select other elements, as in `Load`.
     """
 
     array: Array
@@ -289,6 +290,7 @@ class Store:
     adds: bool = True
     offset: tuple[int, ...] = ()
     end: str = ""
+    extreme: str = ""
 
 
 @dataclass(frozen=True)

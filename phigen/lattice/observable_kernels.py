@@ -50,23 +50,23 @@ def observables(cell: Cell, *, single: bool = False) -> Observables:
 
 
 def observed_sums(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the sums of observables of bonds, at the sites where these begin, or of pairs, in both orders."""
+    """Return the sums and extremes of observables of bonds, where they begin, or of pairs, in both orders."""
     names = [name for name, reduction in cell.reductions.items() if reduction.over != "sites"]
     sums: dict[str, Expression] = {Symbol(GATHERED, name): cell.observables[name] for name in names}
-    return (BondSum(sums, "" if cell.relation == PAIRS else "a"),) if sums else ()
+    kinds = {name: cell.reductions[name].kind for name in names}
+    extremes: dict[str, str] = {Symbol(GATHERED, n): kind for n, kind in kinds.items() if kind not in ADDITIVE}
+    return (BondSum(sums, "" if cell.relation == PAIRS else "a", extremes=extremes),) if sums else ()
 
 
 def _density(cell: Cell, name: str, *, single: bool) -> Expression:
-    """Return the density of an observable at a site, with symbols for sums over bonds and pairs.
+    """Return the density of an observable at a site, with symbols for sums and extremes over bonds and pairs.
 
     Where it reaches beyond an open end, it is a number that is not the largest, or the least, of any two.
     """
     reduction = cell.reductions[name]
-    match reduction.over:
-        case "bonds":
-            return symbol(Symbol(GATHERED, name))
-        case "pairs":
-            return _SHARE * symbol(Symbol(GATHERED, name))
+    if reduction.over != "sites":
+        halved = reduction.over == "pairs" and reduction.kind in ADDITIVE
+        return (_SHARE if halved else ONE) * symbol(Symbol(GATHERED, name))
     value = cell.observables[name]
     if reduction.kind in ADDITIVE:
         return _within(cell, value)

@@ -113,12 +113,14 @@ class BondSum:
 
     x[a] is x at the site itself, x[b] at the other end. ``end`` is the end of the bond, as the user lists it, at
     which the site is: a, b, or "" for either. In a part of one colour, ``chosen`` says which of the two sites has the
-    colour: ``here``, ``there``, or "" for neither.
+    colour: ``here``, ``there``, or "" for neither. Of the symbols in ``extremes`` the largest or the least value is
+    kept, ``max`` or ``min``, in place of the sum.
     """
 
     values: Mapping[str, Expression]
     end: str = ""
     chosen: str = ""
+    extremes: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -418,6 +418,7 @@ def _gather(
                 site_kernel(cell, name + suffix, purpose + condition, values, "sums", coefficients, Role.GATHER),
                 s.end,
                 s.chosen,
+                {k: s.extremes[n] for k, n in enumerate(s.values) if n in s.extremes},
             )
         )
     return Gather(tuple(ends), tuple(sums[0].values))

@@ -471,12 +471,14 @@ class Ends:
 
     Its inputs are ``coef`` or ``params``, ``site`` and ``bonds``, the parameters at bonds. ``end`` is the end of the
     bond, as the user lists it, at which the site is: a, b, or "" for either. ``chosen`` says which of the two must
-    have the colour of the sweep: ``here``, ``there``, or "" for neither.
+    have the colour of the sweep: ``here``, ``there``, or "" for neither. ``extremes`` maps numbers of outputs, of which
+    the largest or the least value is kept in place of the sum, to ``max`` or ``min``.
     """
 
     kernel: Kernel
     end: str = ""
     chosen: str = ""
+    extremes: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def of_all(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 from phigen.spec.declarations import Declarations
 from phigen.spec.grammar import AllowedNames
 from phigen.spec.model import Reduction
-from phigen.spec.names import ADDITIVE, REDUCTIONS
+from phigen.spec.names import REDUCTIONS
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import Expression
 
@@ -65,9 +65,5 @@ def _reduction(name: str, entry: Mapping[str, Any], declared: Declarations) -> R
         place = declared.reader.locations["observables", name, "over"]
         hint = "x[i+1] is a neighbour on a grid" if declared.relation == "grid" else ""
         add(f"observables: over: {over} needs {declaration}", place, hint)
-        return None
-    if over != "sites" and kind not in ADDITIVE:
-        message = f"observables: {kind} is over sites only; of {over} there are sums and means"
-        add(message, place, f"{{{ADDITIVE[0]}: …, over: {over}}}")
         return None
     return Reduction(kind, over)

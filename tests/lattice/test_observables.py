@@ -50,6 +50,8 @@ hamiltonian: {sites: p**2/2, bonds: "k*(1 - cos(q[a] - q[b]))"}
 observables:
   flow: {mean: "k*(p[a] - p[b])*sin(q[a] - q[b])", over: bonds}
   oriented: {sum: "q[a]*p[b]**2", over: bonds}
+  tightest: {max: "k*abs(q[a] - q[b])", over: bonds}
+  steepest: {min: "k*q[a] - p[b]", over: bonds}
   P: {sum: p}
   hot: {max: p**2}
   e: p**2/2
@@ -75,6 +77,8 @@ hamiltonian: {pairs: "-g[a]*g[b]*log((x[a] - x[b])**2 + (y[a] - y[b])**2)/(4*pi)
 observables:
   apart: {mean: "sqrt((x[a] - x[b])**2 + (y[a] - y[b])**2)", over: pairs}
   both: {sum: "x[a]*g[b]**2", over: pairs}
+  closest: {min: "sqrt((x[a] - x[b])**2 + (y[a] - y[b])**2)", over: pairs}
+  widest: {max: "g[a]*x[b]", over: pairs}
   X: {mean: g*x}
 order: 2
 runs:
@@ -115,7 +119,10 @@ def of_web(x, t, k):
     (q, p), bonds = x, [(0, 1), (2, 1), (2, 3), (3, 0), (0, 2)]
     flows = [k_ab * (p[a] - p[b]) * math.sin(q[a] - q[b]) for k_ab, (a, b) in zip(k, bonds, strict=True)]
     oriented = sum(q[a] * p[b] ** 2 for a, b in bonds)
-    return {"flow": np.mean(flows), "oriented": oriented, "P": p.sum(), "hot": max(p**2), "e": p**2 / 2}
+    tightest = max(k_ab * abs(q[a] - q[b]) for k_ab, (a, b) in zip(k, bonds, strict=True))
+    steepest = min(k_ab * q[a] - p[b] for k_ab, (a, b) in zip(k, bonds, strict=True))
+    of_bonds = {"flow": np.mean(flows), "oriented": oriented, "tightest": tightest, "steepest": steepest}
+    return {**of_bonds, "P": p.sum(), "hot": max(p**2), "e": p**2 / 2}
 
 
 def of_vortices(x, t, g):
@@ -124,6 +131,8 @@ def of_vortices(x, t, g):
     return {
         "apart": np.mean([math.dist(x[:, a], x[:, b]) for a, b in pairs]),
         "both": both,
+        "closest": min(math.dist(x[:, a], x[:, b]) for a, b in pairs),
+        "widest": max(g[a] * x[0][b] for a in range(4) for b in range(4) if a != b),
         "X": np.mean(g * x[0]),
     }
 
@@ -145,8 +154,10 @@ CASES = {
         ("film", "numpy", "fast"),
         ("web", "c", "fast"),
         ("web", "numpy", "fast"),
+        ("web", "c", "small"),
         ("web by the series", "c", "small"),
         ("vortices", "c", "fast"),
+        ("vortices", "c", "small"),
         ("vortices", "numpy", "fast"),
     ],
 )
@@ -197,6 +208,21 @@ def test_sums_are_compensated_and_the_largest_of_no_number_is_none():
         assert math.isnan(web.observables(state, bonds=[[0, 1]])["hot"])
 
 
+@pytest.mark.parametrize("text", [WEB, WEB + "scheme: series\n"])
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_extremes_over_no_bonds_are_infinite_and_those_of_no_number_are_none(text, target):
+    web = phigen.compile(phigen.spec.loads(text), target=target)
+    state = np.array([[0.0, 1.0, 3.0], [0.0, 0.0, 0.0]])
+    assert web.observables(state, bonds=[[0, 1]])["tightest"] == 1
+    none = web.observables(state, bonds=[])
+    assert (none["tightest"], none["steepest"]) == (-math.inf, math.inf)
+    text = text.replace("k*abs(q[a] - q[b])", "sqrt(q[a] - q[b])")
+    web = phigen.compile(phigen.spec.loads(text), target=target)
+    assert web.observables(state, bonds=[[1, 0], [2, 0]])["tightest"] == math.sqrt(3)
+    for bonds in ([[2, 0], [0, 1]], [[0, 1], [2, 0]], [[1, 0], [1, 2]], [[1, 2], [1, 0]]):
+        assert math.isnan(web.observables(state, bonds=bonds)["tightest"])
+
+
 def test_the_command_prints_means(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "web.yaml").write_text(WEB.replace("stride: 2", "average: {after: 0.1}"))
@@ -204,7 +230,7 @@ def test_the_command_prints_means(tmp_path, monkeypatch):
     trajectory = phigen.compile("web.yaml").run()
     late = trajectory.observables["flow"][2:]
     assert told["observables"]["flow"]["mean"] == pytest.approx(late.mean(), rel=1e-12)
-    assert [*told["observables"]] == ["flow", "oriented", "P", "hot"]
+    assert [*told["observables"]] == ["flow", "oriented", "tightest", "steepest", "P", "hot"]
     plain = CliRunner().invoke(group, ["run", "web.yaml"], prog_name="phigen").stdout
     assert "observables, means over 5 rows from t = 0.1 to 0.3" in plain
 
@@ -230,7 +256,7 @@ def test_observables_go_to_files_sessions_and_xarray(tmp_path):
         (FILM, "{mean: z}", '{mean: "z[k+1]"}', "'k'"),
         (FILM, "{mean: z}", "{mean: z, over: bonds}", "over: bonds needs lattice: {graph: NAME}"),
         (FILM, "M: {mean: z}", "C: {mean: z}", "observables: 'C' is the name of a Casimir"),
-        (WEB, "{max: p**2}", '{max: "p[a]", over: bonds}', "max is over sites only; of bonds there are sums and means"),
+        (WEB, "{max: p**2}", "{max: p**2, over: bonds}", "'p' needs an end of a bond"),
         (WEB, "{sum: p}", "{sum: p, over: pairs}", "over: pairs needs lattice: {pairs: all}"),
         (WEB, "{sum: p}", '{sum: "p[a]"}', "p[…]"),
         (WEB, '{sum: "q[a]*p[b]**2", over: bonds}', "{sum: q*p, over: bonds}", "'q' needs an end of a bond"),
@@ -286,7 +312,9 @@ def test_series_go_on_from_their_checkpoint(tmp_path, monkeypatch):
         solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=kept, progress=interrupt)
     with pytest.raises(ValueError, match="an interrupted run: continue"):
         solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=kept, resume=False)
-    with pytest.raises(ValueError, match="cannot record 'e'; there are energy, flow, oriented, P, hot"):
+    with pytest.raises(
+        ValueError, match="cannot record 'e'; there are energy, flow, oriented, tightest, steepest, P, hot"
+    ):
         solver.series(x0, 0.05, 12, of=["e"], bonds=bonds)
     resumed = solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=kept)
     whole = solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds)

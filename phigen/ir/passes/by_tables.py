@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
+from phigen.ir.passes.extremes import keep, limit
 from phigen.ir.walk import names_in, statements
 from phigen.scheme.kernel import Role
 from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
@@ -54,7 +55,7 @@ class _Tables:
                 loops.append(self._loop(s))
             else:
                 self.head += self._lowered(s, ir.Selection())
-        counted = [ir.Unpack(("count",), SITES)] if COUNT.symbol in names_in(tuple(loops)) else []
+        counted = [ir.Unpack(("count",), SITES)] if COUNT.symbol in names_in((*self.head, *loops)) else []
         return self.function.with_body(*calls, *counted, *self.head, *loops)
 
     def _gather_sums(self, s: ir.GatherSums) -> Iterator[ir.Statement]:
@@ -69,6 +70,7 @@ class _Tables:
         here, chosen = ir.fixed("here"), ir.fixed("chosen")
         if s.kind != "sites":
             self.head.append(ir.Unpack(("sums",), SITES))
+            self.head += _cleared(s)
         if s.kind == "pairs":
             other = ir.If(ir.Binary("==", OTHER, SITE), (ir.Continue(),))
             return _counted("i", COUNT, (_counted("j", COUNT, (other, *body)),))
@@ -88,6 +90,8 @@ class _Tables:
 
     def _lowered(self, s: ir.Statement, selection: ir.Selection) -> Iterator[ir.Statement]:
         match s:
+            case ir.Store(array, value, extreme=extreme) if extreme:
+                yield from keep(extreme, self._element(array, SITE), value, array.number)
             case ir.Store(array, value, adds):
                 yield ir.Assign(self._element(array, SITE), value, adds)
             case ir.Declare(items=((name, ir.Load() as load),)):
@@ -161,6 +165,14 @@ class _Tables:
 
 def _counted(variable: str, end: ir.Value, body: ir.Block) -> ir.Loop:
     return ir.Loop("plain", body, variable, ir.Constant(0), end)
+
+
+def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:
+    """Yield the calls that set extremes to what every value replaces; sums are set to 0 by the caller."""
+    for s in loop.body:
+        if isinstance(s, ir.Store) and s.extreme:
+            ends = _of_field(ir.Constant(0), s.array.number), _of_field(ir.Constant(0), s.array.number + 1)
+            yield ir.Call("fill", (limit(s.extreme, "Infinity"), *ends), ir.fixed("sums"))
 
 
 def _of_field(site: ir.Value, number: int) -> ir.Value:

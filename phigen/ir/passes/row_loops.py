@@ -25,6 +25,7 @@ from phigen.ir.passes.by_rows import (
     over_sites,
     together,
 )  # fmt: skip
+from phigen.ir.passes.extremes import keep, limit
 from phigen.ir.passes.unread import discard_unread
 from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import ZERO as NOTHING
@@ -177,8 +178,8 @@ def observable_with_bonds(
     for bond_loop in sums:
         rows.computed = [s for s in bond_loop.loop.body if _is_computed(s)]
         bond_loops.append(_summed_over_bonds(bond_loop, rows))
-    count = max((s.array.number for bond_loop in sums for s in bond_loop.stores), default=0) + 1
-    body = (*rows.at_site(), _zeros(count), *bond_loops, *computed, *_observed(loop))
+    stores = [s for bond_loop in sums for s in bond_loop.stores]
+    body = (*rows.at_site(), _begun(stores), *bond_loops, *computed, *_observed(loop))
     return row_function(function, "row", "out", body=(*_apart(loop, apart), *rows.before(), over_sites(body, "")))
 
 
@@ -220,13 +221,27 @@ def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Fun
     count = len(bond_loop.stores)
     sums = (ir.Entry(ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(k)), SITE) for k in range(count))
     stores = [ir.Assign(place, ir.fixed(f"sum{k}"), adds=not first) for k, place in enumerate(sums)]
-    body = (*together(rows.here), _zeros(count), _summed_over_bonds(bond_loop, rows), *stores)
+    body = (*together(rows.here), _begun(bond_loop.stores), _summed_over_bonds(bond_loop, rows), *stores)
     return row_function(bond_loop.function, *bond_loop.parameters, body=(*rows.before(), over_sites(body, "")))
 
 
-def _zeros(count: int) -> ir.Declare:
-    items = tuple((ir.fixed(f"sum{k}").symbol, ZERO) for k in range(count))
+def _begun(stores: Sequence[ir.Store]) -> ir.Declare:
+    """Return the declaration of the sums, 0, and of the extremes, infinite, that are over no bonds yet."""
+    starts = {s.array.number: _start(s) for s in stores}
+    items = tuple((ir.fixed(f"sum{k}").symbol, starts.get(k, ZERO)) for k in range(max(starts, default=0) + 1))
     return ir.Declare(ir.Type.REAL, items, mutable=True)
+
+
+def _start(s: ir.Store) -> ir.Value:
+    return limit(s.extreme, "HUGE_VAL") if s.extreme else ZERO
+
+
+def _update(s: ir.Store, place: ir.Value, value: ir.Value) -> Iterator[ir.Statement]:
+    """Yield the statements that take a value into a sum or an extreme."""
+    if s.extreme:
+        yield from keep(s.extreme, place, value, s.array.number)
+    else:
+        yield ir.Assign(place, value, adds=True)
 
 
 def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
@@ -236,7 +251,7 @@ def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
         *bond_reads(bond_loop.loop, rows, across=bond_loop.across, oriented=bool(bond_loop.oriented), sign=sign),
         *rows.computed,
     ]
-    body += [ir.Assign(ir.fixed(f"sum{s.array.number}"), s.value, adds=True) for s in bond_loop.stores]
+    body += [u for s in bond_loop.stores for u in _update(s, ir.fixed(f"sum{s.array.number}"), s.value)]
     return bonds_of(bond_loop.loop, body, across=bond_loop.across)
 
 
@@ -283,14 +298,19 @@ def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
     sums = [ir.fixed(f"g{s.array.number}") for s in bond_loop.stores]
     arrays = {g.symbol: (WRITTEN, ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(k))) for k, g in enumerate(sums)}
     places = [ir.Entry(g, SITE) for g in sums]
-    clear = over_sites((ir.Assign(places[0], ZERO, too=tuple(places[1:])),), "", kind="line")
+    starts = [_start(s) for s in bond_loop.stores]
+    alike = {start: [p for p, other in zip(places, starts, strict=True) if other == start] for start in starts}
+    clear = [
+        over_sites((ir.Assign(alike[start][0], start, too=tuple(alike[start][1:])),), "", kind="line")
+        for start in alike
+    ]
     same = ir.Binary("==", SITE, OTHER)
-    values = [ir.Select(same, ZERO, s.value) for s in bond_loop.stores]
-    updates = (ir.Assign(place, value, adds=True) for place, value in zip(places, values, strict=True))
+    values = [ir.Select(same, start, s.value) for start, s in zip(starts, bond_loop.stores, strict=True)]
+    updates = (u for s, p, v in zip(bond_loop.stores, places, values, strict=True) for u in _update(s, p, v))
     inner = over_sites((*together(rows.here), *rows.computed, *updates))
     outer = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(0), LENGTH)
     return row_function(
-        bond_loop.function, *bond_loop.parameters, body=(*rows.before(), *grouped(arrays), clear, outer)
+        bond_loop.function, *bond_loop.parameters, body=(*rows.before(), *grouped(arrays), *clear, outer)
     )
 
 

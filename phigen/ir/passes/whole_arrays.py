@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.nodes import Storage
+from phigen.ir.passes.extremes import limit
 from phigen.scheme.kernel import Role
 from phigen.symbolic.symbols import HERE
 
@@ -80,7 +81,7 @@ class WholeArrays:
         body: list[ir.Statement] = []
         for function in functions:
             loop = _loop(function)
-            added = (self._summed(s.value) for s in _stores(loop))
+            added = (self._summed(s) for s in _stores(loop))
             total = ir.Binary("+", SUMS, ir.Called("array", (ir.Listed(tuple(added)),), NP))
             body += [*self._bonds(loop), *self._reads(function), ir.Assign(SUMS, total)]
         quiet = ir.Within(ir.Called("errstate", (ir.fixed('all="ignore"'),), NP), tuple(body))
@@ -194,10 +195,18 @@ class WholeArrays:
             which = (ir.fixed(repr(loop.end)), ir.fixed(repr(loop.chosen)))
             yield ir.Unpack(("here", "there", "bond"), ir.Called("bonds", which, SITES))
 
-    def _summed(self, value: ir.Value) -> ir.Value:
-        if self.lattice.step.others.graph:
-            return ir.Called("summed", (value, ir.fixed("here")), SITES)
-        return ir.Called("_over_others", (value, SITES))
+    def _summed(self, s: ir.Store) -> ir.Value:
+        """Return the sum, or the extreme, of a value of bonds or pairs at each site."""
+        graph = self.lattice.step.others.graph
+        if s.extreme:
+            choose = ir.fixed({"max": "np.maximum", "min": "np.minimum"}[s.extreme])
+            start = limit(s.extreme, "np.inf")
+            if graph:
+                return ir.Called("extreme", (choose, start, s.value, ir.fixed("here")), SITES)
+            return ir.Called("_extreme_of_others", (choose, start, s.value, SITES))
+        if graph:
+            return ir.Called("summed", (s.value, ir.fixed("here")), SITES)
+        return ir.Called("_over_others", (s.value, SITES))
 
     def _reads(self, function: ir.Function) -> Iterator[ir.Statement]:
         """Yield the declarations of a function, those in its loop last."""

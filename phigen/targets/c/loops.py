@@ -68,7 +68,7 @@ def statements(printed: ir.Function, name: str) -> str:
     """Return the body of a function of a solver as text."""
     dialect = Dialect(
         replace(LANGUAGE, functions=elementary_functions(name)),
-        operators={"and": "&&", "index": "ptrdiff_t", "size": "size_t"},
+        operators={"and": "&&", "or": "||", "index": "ptrdiff_t", "size": "size_t"},
         functions={function: f"{name}_{function}" for function in _RUNTIME},
         pointers=frozenset({"row", "s"}),
     )

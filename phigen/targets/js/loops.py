@@ -13,7 +13,7 @@ _RESERVED = frozenset({"coef", "params", "start", "x", "v", "sites", "count", "n
 _RESERVED |= {"i", "j", "k", "bond", "here", "there", "colour", "colours", "chosen", *(f"change{k}" for k in range(9))}
 _RESERVED |= set(LANGUAGE.functions.values())
 
-DIALECT = Dialect(LANGUAGE, operators={"==": "===", "and": "&&"})
+DIALECT = Dialect(LANGUAGE, operators={"==": "===", "!=": "!==", "and": "&&", "or": "||"})
 
 
 def function(lowered: ir.Function, names: Iterable[str] = ()) -> str:

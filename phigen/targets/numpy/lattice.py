@@ -45,6 +45,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     flows = "(part, _), _ in sites.schedule" if step.by_colour else "part, _ in SCHEDULE"
     swept = f"sum(len(PARTS[part]) for {flows})" if any(step.parts) else "1"  # where nothing moves, still no 0
     values["kept"] = "2 * len(SCHEDULE)" if step.equation else swept
+    values["extremes"] = any(ends.extremes for ends in step.others.observed.ends)
     values["pairs"] = step.partners is not None and not graph
     values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
     values["flow"] = "(part, sites.colour), row" if step.by_colour else "part, row"
@@ -86,7 +87,7 @@ def _functions(loops: LatticeLoops) -> Iterator[str]:
         return lowering.sums([temporaries(loops.sums(ends)) for ends in gather.ends])
 
     if step.partners and not step.others.graph:
-        yield render("numpy", "pairs.py", {})
+        yield render("numpy", "pairs.py", {"extremes": any(ends.extremes for ends in step.others.observed.ends)})
     gathers = [s.gather for s in step.sweeps if s.gather]
     gathers += [g for g in step.others.gathers if g.names]
     yield from (function(summed(gather)) for gather in gathers)
