@@ -6,12 +6,12 @@
  *   generating function: S_1
  *   step: implicit, by sweeps over the sites until they change nothing
  *   composition: suzuki, 5 stages of order 2
- *   one step of one site: 2 additions, 10 multiplications, 2 divisions
+ *   one step of one site: 2 additions, 6 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 840df6bd91b00b9710e55aa85c3ae58ffd8a394ee141dcfcb6d672abce762e3f
+ * body-sha256: 4a07a97938b2eaee4a6eaf174039b5b274e6202b680094ef68a119c083e1f785
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -125,12 +125,12 @@ static inline void point_vortices_pair_forces(const point_vortices_row *row)
         const double G_b_ = G_row[j], x_b_ = x_row[j], y_b_ = y_row[j];
         point_vortices_EACH_SITE
         for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-            const double G_a_ = G_row[i], x_a_ = x_row[i], y_a_ = y_row[i];
+            const double x_a_ = x_row[i], y_a_ = y_row[i];
             const double t1 = x_a_ - x_b_;
             const double t2 = y_a_ - y_b_;
-            const double t3 = G_a_ * G_b_ / 3.141592653589793 / (t1 * t1 + t2 * t2);
-            g0[i] += i == j ? 0.0 : (-0.5) * (t1 * t3);
-            g1[i] += i == j ? 0.0 : (-0.5) * (t2 * t3);
+            const double t3 = 1.0 / 3.141592653589793 / (t1 * t1 + t2 * t2);
+            g0[i] += i == j ? 0.0 : (-0.5) * (G_b_ * (t1 * t3));
+            g1[i] += i == j ? 0.0 : (-0.5) * (G_b_ * (t2 * t3));
         }
     }
 }
@@ -148,7 +148,7 @@ static inline void point_vortices_pair_energy(const point_vortices_row *row)
             const double G_a_ = G_row[i], x_a_ = x_row[i], y_a_ = y_row[i];
             const double t1 = x_a_ - x_b_;
             const double t2 = y_a_ - y_b_;
-            g0[i] += i == j ? 0.0 : (-0.25) * (G_a_ * G_b_ * log(t1 * t1 + t2 * t2) / 3.141592653589793);
+            g0[i] += i == j ? 0.0 : (-0.25) * (G_a_ * G_b_ * (log(t1 * t1 + t2 * t2) / 3.141592653589793));
         }
     }
 }
@@ -166,25 +166,26 @@ static inline void point_vortices_pair_slopes(const point_vortices_row *row)
             v_y_b_ = varied_y_0[j];
         point_vortices_EACH_SITE
         for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-            const double G_a_ = G_row[i], x_a_ = x_row[i], y_a_ = y_row[i], v_x_a_ = varied_x_0[i],
-                v_y_a_ = varied_y_0[i];
+            const double x_a_ = x_row[i], y_a_ = y_row[i], v_x_a_ = varied_x_0[i], v_y_a_ = varied_y_0[i];
             const double t1 = x_a_ - x_b_;
-            const double t2 = G_a_ * G_b_ / 3.141592653589793;
+            const double t2 = 1.0 / 3.141592653589793;
             const double t3 = y_a_ - y_b_;
             const double t4 = 1.0 / (t1 * t1 + t3 * t3);
             const double t5 = t2 * t4;
             const double t6 = t4 * t4;
             const double t7 = t1 * t2 * t6;
             const double t8 = t3 * t7;
-            const double t9 = 0.5 * t5;
-            const double t10 = t1 * t7;
+            const double t9 = t1 * t7;
+            const double t10 = 0.5 * t5;
             const double t11 = t3 * t2 * t6;
             const double t12 = t1 * t11;
             const double t13 = t3 * t11;
-            g0[i] += i == j ? 0.0 : (-0.5) * (t1 * t5);
-            g1[i] += i == j ? 0.0 : (-0.5) * (t3 * t5);
-            g2[i] += i == j ? 0.0 : v_y_a_ * t8 - v_y_b_ * t8 + (v_x_b_ * (t9 - t10) + v_x_a_ * (t10 - t9));
-            g3[i] += i == j ? 0.0 : v_x_a_ * t12 - v_x_b_ * t12 + (v_y_a_ * (t13 - t9) + v_y_b_ * (t9 - t13));
+            g0[i] += i == j ? 0.0 : (-0.5) * (G_b_ * (t1 * t5));
+            g1[i] += i == j ? 0.0 : (-0.5) * (G_b_ * (t3 * t5));
+            g2[i] += i == j ? 0.0
+                : G_b_ * (v_y_a_ * t8 - v_y_b_ * t8 + (v_x_a_ * (t9 - t10) + v_x_b_ * (t10 - t9)));
+            g3[i] += i == j ? 0.0
+                : G_b_ * (v_x_a_ * t12 - v_x_b_ * t12 + (v_y_b_ * (t10 - t13) + v_y_a_ * (t13 - t10)));
         }
     }
 }
@@ -194,14 +195,11 @@ static inline void point_vortices_relax(const double *coef, const point_vortices
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
     const double c0 = coef[0];
-    const double *restrict start_x = row->start[0], *restrict start_y = row->start[1], *restrict G_row =
-        row->x[2];
+    const double *restrict start_x = row->start[0], *restrict start_y = row->start[1];
     point_vortices_EACH_SITE
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-        const double G = G_row[i];
-        const double t1 = 1.0 / G;
-        out_x[i] = start_x[i] + 0.5 * (t1 * (c0 * row->s->gathered[1][i]));
-        out_y[i] = start_y[i] - 0.5 * (t1 * (c0 * row->s->gathered[0][i]));
+        out_x[i] = start_x[i] + 0.5 * (c0 * row->s->gathered[1][i]);
+        out_y[i] = start_y[i] - 0.5 * (c0 * row->s->gathered[0][i]);
     }
 }
 
@@ -210,13 +208,10 @@ static inline void point_vortices_increment(const double *coef, const point_vort
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
     const double c0 = coef[0];
-    const double *restrict G_row = row->x[2];
     point_vortices_EACH_SITE
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-        const double G = G_row[i];
-        const double t1 = 1.0 / G;
-        out_x[i] += t1 * (c0 * row->s->gathered[1][i]);
-        out_y[i] += -(t1 * (c0 * row->s->gathered[0][i]));
+        out_x[i] += c0 * row->s->gathered[1][i];
+        out_y[i] += -(c0 * row->s->gathered[0][i]);
     }
 }
 
@@ -238,13 +233,10 @@ static inline void point_vortices_slope(const double *coef, const point_vortices
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
     const double c0 = coef[0];
-    const double *restrict G_row = row->x[2];
     point_vortices_EACH_SITE
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-        const double G = G_row[i];
-        const double t1 = c0 / G;
-        out_x[i] = 0.5 * (row->s->gathered[3][i] * t1);
-        out_y[i] = (-0.5) * (row->s->gathered[2][i] * t1);
+        out_x[i] = 0.5 * (c0 * row->s->gathered[3][i]);
+        out_y[i] = (-0.5) * (c0 * row->s->gathered[2][i]);
     }
 }
 
@@ -275,13 +267,10 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 {
     point_vortices_pair_forces(row);
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
-    const double *restrict G_row = row->x[2];
     point_vortices_EACH_SITE
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-        const double G = G_row[i];
-        const double t1 = 1.0 / G;
-        out[i - row->from] = row->s->gathered[1][i] * t1;
-        out[apart + i - row->from] = -(row->s->gathered[0][i] * t1);
+        out[i - row->from] = row->s->gathered[1][i];
+        out[apart + i - row->from] = -row->s->gathered[0][i];
     }
 }
 

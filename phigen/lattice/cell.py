@@ -79,6 +79,11 @@ class Cell:
         return Neighbours((*self.fields, *at_sites, *self.increments), self.axes)
 
     @property
+    def vanishing(self) -> frozenset[str]:
+        """The parameters at sites that may be 0."""
+        return frozenset(p.name for p in self.parameters if p.at == "sites" and not p.positive)
+
+    @property
     def origin(self) -> Offset:
         """The offset of the site itself."""
         return self.neighbours.origin

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
+from phigen.lattice.cancelling import divided, sum_factors
 from phigen.lattice.cell import GRID, PAIRS, Cell
 from phigen.lattice.site_parts import (
     FORCE,
@@ -132,7 +133,7 @@ class _SiteEquation:
             if self.place == INSIDE and not force.is_zero:
                 force = symbol(Symbol(CHOSEN)) * force
             if any(not s.values.get(_gathered(g), ZERO).is_zero for s in sums):
-                force = force + symbol(_gathered(g))
+                force = force + sum_factors(self.cell, g).at_site * symbol(_gathered(g))
             if not force.is_zero:
                 name = Symbol(FORCE, g)
                 self.forces[name] = force
@@ -210,9 +211,10 @@ def site_sums(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def sums_by_field(cell: Cell) -> dict[str, Expression]:
-    """Return the symbols of the sums in the force on a field or, with brackets along bonds, in its rate."""
+    """Return the sums, with their factors, in the force on a field or, with brackets along bonds, in its rate."""
     names = {n for s in site_sums(cell) for n in s.values} if cell.relation != GRID else set()
-    return {f: symbol(_gathered(f)) for f in cell.fields if _gathered(f) in names}
+    at_site = {f: sum_factors(cell, f).at_site for f in cell.fields if _gathered(f) in names}
+    return {f: factor * symbol(_gathered(f)) for f, factor in at_site.items()}
 
 
 def field_with_sums(cell: Cell) -> list[Expression]:
@@ -245,11 +247,10 @@ def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
 
 
 def _forces_at(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
-    """Return the derivatives of the density of a bond by the fields of an end."""
+    """Return the derivatives of the density of a bond by the fields of an end, without the `sum_factors`."""
     slopes = gradient(density, [cell.at(f, (end,)) for f in cell.fields])
-    return {
-        _gathered(f): with_first_end(cell, e, end) for f, e in zip(cell.fields, slopes, strict=True) if not e.is_zero
-    }
+    forces = {f: with_first_end(cell, e, end) for f, e in zip(cell.fields, slopes, strict=True) if not e.is_zero}
+    return {_gathered(f): divided(e, sum_factors(cell, f).at_end) for f, e in forces.items()}
 
 
 def _moving_forces(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:

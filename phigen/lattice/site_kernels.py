@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from phigen.lattice.cancelling import cancelled
 from phigen.lattice.cell import Cell
 from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.staging import Coefficients
@@ -22,8 +23,11 @@ def site_kernel(
 ) -> Kernel:
     """Return a kernel at a site.
 
-    Its inputs are coefficients, or parameters, then the values that it reads at sites, and the weights.
+    Its inputs are coefficients, or parameters, then the values that it reads at sites, and the weights. Powers of
+    parameters that may be 0 are multiplied together.
     """
+    if cell.vanishing:
+        values = cancelled(values, [name for name, (base, _) in cell.places(*values).items() if base in cell.vanishing])
     used = symbols_of(*values)
     places = cell.places(*values)
 

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from phigen.errors import Diagnostic, Location, SpecError
+from phigen.lattice.cancelling import divided, sum_factors
 from phigen.lattice.cell import GRID, PERIODIC, Cell
 from phigen.scheme.steps import Seam
 from phigen.splitting.conflicts import Conflicts, coloured
@@ -407,8 +408,9 @@ class PartSearch:
             force = self.force(part, g, other_colour, d) + self.force(more, g, other_colour, d, symbol(KICK))
             slope = total(gradient(s.expression, [cell.at(g, ("a",))])[0] for s, _ in part if s.bond)
             if not slope.is_zero:
-                gathered[Symbol(GATHERED, g)] = slope
-                force = force + symbol(Symbol(GATHERED, g))
+                factors = sum_factors(cell, g)
+                gathered[Symbol(GATHERED, g)] = divided(slope, factors.at_end)
+                force = force + factors.at_site * symbol(Symbol(GATHERED, g))
             if force.is_zero:
                 continue
             name = Symbol(FORCE, g, *d)

@@ -22,7 +22,8 @@ TRANSPOSED = 1e-12
 #: Differences of order 6, whose own error this bounds, are taken at two distances, in units of what is moved.
 DIFFERENCES = 1e-7
 _DISTANCES = (2e-3, 2e-3 / 256)
-_WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
+_WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60), (-1, -3 / 4), (-2, 3 / 20), (-3, -1 / 60))
+_FORWARD_WEIGHTS = ((1, 6.0), (2, -15 / 2), (3, 20 / 3), (4, -15 / 4), (5, 6 / 5), (6, -1 / 6))
 #: Derivatives below this part of the function itself are compared with that: differences cannot resolve them.
 _LEAST = 1e-3
 #: Random directions along which a start is moved, and the most numbers that each have a tangent vector.
@@ -170,6 +171,7 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
         # Entries that must be positive may differ by powers of ten: each is moved by its own size.
         units = np.where(value != 0, np.abs(value), largest)
         v = units * (_directions(value.size, 1).reshape(value.shape) if value.ndim else np.ones(()))
+        v = np.where(value != 0, v, np.abs(v))  # a parameter may have to be 0 or positive
         yield (
             float(np.sum(bar * v)),
             lambda e, name=name, value=value, v=v: (run.x, {**run.parameters, name: _plain(value + e * v)}),  # type: ignore[misc]
@@ -177,13 +179,19 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
 
 
 def _differences(run: GradedRun, moved: _Moved) -> Iterator[float]:
-    """Yield the derivative along a motion by differences, at each distance where all runs can be made."""
+    """Yield the derivative along a motion by differences, at each distance where all runs can be made.
+
+    Differences are central, or forward where runs on the other side fail.
+    """
+    middle = run.rows(run.x, run.parameters)
     for apart in _DISTANCES:
-        try:
-            ends = [(w, run.rows(*moved(k * apart)) - run.rows(*moved(-k * apart))) for k, w in _WEIGHTS]
-        except (StepError, ValueError):  # past a singularity, or a positive parameter past 0
-            continue
-        yield float(sum(w * np.sum(run.bars * change) for w, change in ends)) / apart
+        for weights in (_WEIGHTS, _FORWARD_WEIGHTS):
+            try:
+                changes = [(w, run.rows(*moved(k * apart)) - middle) for k, w in weights]
+            except (StepError, ValueError):  # past a singularity, or a parameter past its bound
+                continue
+            yield float(sum(w * np.sum(run.bars * change) for w, change in changes)) / apart
+            break
 
 
 def members_error(

@@ -1,0 +1,97 @@
+"""Cancellation of parameters at sites that may be 0, such as the masses of test particles.
+
+A factor m of H and a factor 1/m of a bracket cancel, so that equations of motion have their limits at m = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from phigen.lattice.cell import GRID, Cell
+from phigen.symbolic.expression import ONE, Expression, fold, gradient, mul, power, product, rebuild, symbol
+from phigen.symbolic.neighbours import ENDS
+
+#: An expression without factors that are powers of some symbols, and the exponents of these powers.
+Factored = tuple[Expression, Mapping[str, int]]
+
+
+def cancelled(values: Sequence[Expression], names: Iterable[str]) -> list[Expression]:
+    """Return equal expressions in which powers of the named symbols, which are not 0, have been multiplied together."""
+    return [_multiplied(f) for f in _factored(values, names)]
+
+
+def divided(e: Expression, exponents: Mapping[str, int]) -> Expression:
+    """Return the quotient of an expression and powers of symbols."""
+    return cancelled([mul(e, powers({name: -k for name, k in exponents.items()}))], exponents)[0]
+
+
+def common_powers(values: Sequence[Expression], names: Iterable[str]) -> dict[str, int]:
+    """Return the exponents of the powers of symbols that divide all expressions."""
+    listed = [exponents for _, exponents in _factored(values, names)]
+    lowest = {name: min(exponents.get(name, 0) for exponents in listed) for name in names} if listed else {}
+    return {name: k for name, k in lowest.items() if k > 0}
+
+
+def powers(exponents: Mapping[str, int]) -> Expression:
+    """Return the product of powers of symbols."""
+    return product(power(symbol(name), k) for name, k in exponents.items())
+
+
+@dataclass(frozen=True)
+class SumFactors:
+    """Powers of parameters at sites that may be 0, by which all forces of bonds or pairs on one field are multiplied.
+
+    The sums over bonds and pairs are without them: ``at_site`` is their product, and ``at_end`` has their exponents by
+    the symbols ``m[a]``.
+    """
+
+    at_site: Expression = ONE
+    at_end: Mapping[str, int] = field(default_factory=dict)
+
+
+def sum_factors(cell: Cell, name: str) -> SumFactors:
+    """Return the powers that are taken out of the sums in the force on a field; none with brackets along bonds."""
+    if not cell.vanishing or cell.bond_bracket or cell.relation == GRID:
+        return SumFactors()
+    density = cell.bond_hamiltonian + cell.pair_hamiltonian
+    slopes = {end: gradient(density, [cell.at(name, (end,))])[0] for end in ENDS}
+    exponents: list[dict[str, int]] = [
+        {p: common_powers([slope], [cell.at(p, (end,))]).get(cell.at(p, (end,)), 0) for p in sorted(cell.vanishing)}
+        for end, slope in slopes.items()
+        if not slope.is_zero
+    ]
+    common = {p: min(of_end[p] for of_end in exponents) for p in sorted(cell.vanishing)} if exponents else {}
+    common = {p: k for p, k in common.items() if k}
+    return SumFactors(powers(common), {cell.at(p, ("a",)): k for p, k in common.items()})
+
+
+def _factored(values: Sequence[Expression], names: Iterable[str]) -> list[Factored]:
+    separated = frozenset(names)
+
+    def visit(node: Expression, args: list[Factored]) -> Factored:
+        match node.op:
+            case "symbol" if node.value in separated:
+                return ONE, {node.value: 1}
+            case "mul":
+                (a, of_a), (b, of_b) = args
+                return mul(a, b), {name: of_a.get(name, 0) + of_b.get(name, 0) for name in of_a.keys() | of_b.keys()}
+            case "neg":
+                return rebuild(node, [args[0][0]]), args[0][1]
+            case "pow" if node.value.denominator == 1:
+                base, exponents = args[0]
+                return power(base, node.value), {name: k * int(node.value) for name, k in exponents.items()}
+            case "add" | "sub":
+                present = args[0][1].keys() | args[1][1].keys()
+                common = {name: min(exponents.get(name, 0) for _, exponents in args) for name in present}
+                rests = [_multiplied((e, {n: of_e.get(n, 0) - k for n, k in common.items()})) for e, of_e in args]
+                return rebuild(node, rests), common
+        return rebuild(node, [_multiplied(a) for a in args]), {}
+
+    return fold(values, visit)
+
+
+def _multiplied(value: Factored) -> Expression:
+    rest, exponents = value
+    nonzero = {name: k for name, k in sorted(exponents.items()) if k}
+    return mul(rest, powers(nonzero)) if nonzero else rest
