@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: e2a421015580edc694fac32b8df083480130526ada77cc93d69133d22df82666
+ * body-sha256: 98aadcf3cb85d0505fbce4d3df9d7829cf79b53d99a7d781dbefabd00f2ff23c
  */
 #include "duffing.h"
 #include <float.h>
@@ -311,7 +311,7 @@ static duffing_status duffing_attempt(duffing_solver *s)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, const double x0[duffing_DIM],
     double t0)
 {
@@ -336,13 +336,13 @@ duffing_status duffing_init(duffing_solver *s, const duffing_params *params, con
     return duffing_init_at(s, params, x0, 0.0);
 }
 
-/* What depends on the time of the next step. */
+/* Compute the coefficients of the next step that are functions of the time or of the noise. */
 static void duffing_renew(duffing_solver *s)
 {
     duffing_at_time(s->coef, s->t + duffing_middles * s->h, s->coef + duffing_PREPARED);
 }
 
-/* One stage. A guess from earlier steps may have misled it: then once more without. */
+/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
 static duffing_status duffing_stage(duffing_solver *s)
 {
     const duffing_status status = duffing_attempt(s);
@@ -354,7 +354,7 @@ static duffing_status duffing_stage(duffing_solver *s)
 duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return duffing_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
         duffing_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

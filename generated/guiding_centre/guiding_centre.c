@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 77a9c8080be11fd880bc29ee8f9d418f37e447c83c88df8aece89a234e46df11
+ * body-sha256: f90240e9d0626b1dc95107f6a52ebc00bcfd74c9852cd21dbc13430e517503cb
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -610,7 +610,7 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
     const double x0[guiding_centre_DIM])
 {
@@ -629,7 +629,7 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     return guiding_centre_OK;
 }
 
-/* One stage. A guess from earlier steps may have misled it: then once more without. */
+/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
 static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int stage)
 {
     const guiding_centre_status status = guiding_centre_attempt(s, stage);
@@ -657,7 +657,7 @@ static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return guiding_centre_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
         for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
             guiding_centre_prepare(&s->params, guiding_centre_fractions[stage] * h, s->coef[stage]);
         s->h = h;

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; What a monitored trajectory holds fixed: e = -H(x0), so that
  *   K = monitor (H + e) is 0 along it; The solver
- * body-sha256: 2178235f7f579efc6cb7035aa5c5b3ab91ba44c3edfdbfe16b084d5a8d86b61c
+ * body-sha256: 10cd520bdcb907663c280ca91d1e7621afeec9acd664cfcb427b48a51ca0bd65
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -109,6 +109,8 @@ static void kepler_eccentric_pass(kepler_eccentric_solver *s, double elapsed)
     s->t = sum + small;
     s->t_carry = small - (s->t - sum);
 }
+
+double kepler_eccentric_solver_time(const kepler_eccentric_solver *s) { return s->t + s->t_carry; }
 
 /* In a step from start, moved holds the sum of the changes so far, and the carry; x is start + moved,
    rounded. */
@@ -237,8 +239,25 @@ static void kepler_eccentric_choose_gauge(const kepler_eccentric_params *params,
     gauge[0] = -kepler_eccentric_hamiltonian(params, x);
 }
 
+/* Whether the monitor is positive at a state, so that the physical time increases with tau. */
+static int kepler_eccentric_time_passes(const kepler_eccentric_params *params,
+    const double x[kepler_eccentric_DIM])
+{
+    const double rate = kepler_eccentric_monitor(params, x);
+    return isfinite(rate) && rate > 0.0;
+}
+
 /* ---- The solver ---- */
-/* The arguments may be parts of *s, which is therefore written last. */
+/* Hold the given gauge fixed, or for NULL the one chosen at the state. 0 if it is not finite. */
+static int kepler_eccentric_take_gauge(kepler_eccentric_solver *s,
+    const double gauge[kepler_eccentric_GAUGES])
+{
+    if (gauge == NULL) kepler_eccentric_choose_gauge(&s->params, s->x, s->gauge);
+    else memcpy(s->gauge, gauge, sizeof s->gauge);
+    return kepler_eccentric_finite(s->gauge, kepler_eccentric_GAUGES);
+}
+
+/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM],
     const double gauge[kepler_eccentric_GAUGES])
@@ -254,11 +273,8 @@ kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     if (!kepler_eccentric_finite(fresh.x, kepler_eccentric_DIM) || !kepler_eccentric_allowed(&fresh.params)
         || !kepler_eccentric_finite(fresh.coef, kepler_eccentric_COEFFICIENTS))
         return kepler_eccentric_BAD_ARGUMENT;
-    if (gauge == NULL) kepler_eccentric_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
-    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    if (!kepler_eccentric_finite(fresh.gauge, kepler_eccentric_GAUGES)) return kepler_eccentric_BAD_ARGUMENT;
-    const double rate = kepler_eccentric_monitor(&fresh.params, fresh.x);
-    if (!isfinite(rate) || !(rate > 0.0)) return kepler_eccentric_BAD_ARGUMENT;
+    if (!kepler_eccentric_take_gauge(&fresh, gauge)) return kepler_eccentric_BAD_ARGUMENT;
+    if (!kepler_eccentric_time_passes(&fresh.params, fresh.x)) return kepler_eccentric_BAD_ARGUMENT;
     *s = fresh;
     return kepler_eccentric_OK;
 }
@@ -272,7 +288,7 @@ kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
 kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return kepler_eccentric_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
         kepler_eccentric_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
     }
@@ -349,7 +365,6 @@ const char *kepler_eccentric_status_string(kepler_eccentric_status status)
 
 size_t kepler_eccentric_solver_size(void) { return sizeof(kepler_eccentric_solver); }
 size_t kepler_eccentric_solver_steps_done(const kepler_eccentric_solver *s) { return s->steps; }
-double kepler_eccentric_solver_time(const kepler_eccentric_solver *s) { return s->t + s->t_carry; }
 
 kepler_eccentric_status kepler_eccentric_ensemble(const kepler_eccentric_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)

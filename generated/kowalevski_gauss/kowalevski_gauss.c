@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; Several steps or members at once; The implicit step, by Gauss
  *   collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 7a5d041c53b19f4b603d409d7081e910b07ace833b82fa1de08fcda04ade7620
+ * body-sha256: 5590fa733d7671ede09dc72e7a7b9db7884841bef38c15e41e261bb871dca61a
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -418,7 +418,7 @@ static kowalevski_gauss_status kowalevski_gauss_attempt(kowalevski_gauss_solver 
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     const kowalevski_gauss_params *params, const double x0[kowalevski_gauss_DIM])
 {
@@ -429,12 +429,13 @@ kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     fresh.h = (double)NAN;
     fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    if (!kowalevski_gauss_finite(fresh.x, kowalevski_gauss_DIM)) return kowalevski_gauss_BAD_ARGUMENT;
+    if (!kowalevski_gauss_finite(fresh.x, kowalevski_gauss_DIM))
+        return kowalevski_gauss_BAD_ARGUMENT;
     *s = fresh;
     return kowalevski_gauss_OK;
 }
 
-/* One stage. A guess from earlier steps may have misled it: then once more without. */
+/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
 static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s)
 {
     const kowalevski_gauss_status status = kowalevski_gauss_attempt(s);
@@ -446,7 +447,7 @@ static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s
 kowalevski_gauss_status kowalevski_gauss_integrate(kowalevski_gauss_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return kowalevski_gauss_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
         kowalevski_gauss_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 31400b61b999309100cde5c66409155c9adc632c5f48e57d3ac60774405adb1e
+ * body-sha256: 8ac3027e298e2d48e7d260d70ca15a65808308da1c4b23bcc01d0abe52023315
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -82,7 +82,16 @@ static int pendulum_euler_advance(pendulum_euler_solver *s, const double *change
     return 1;
 }
 
-/* The arguments may be parts of *s, which is therefore written last. */
+/* One explicit stage: x + increment(x). */
+static pendulum_euler_status pendulum_euler_stage(pendulum_euler_solver *s)
+{
+    double increment[pendulum_euler_DIM];
+    pendulum_euler_explicit(s->coef, s->x, increment);
+    ++s->evaluations;
+    return pendulum_euler_advance(s, increment, s->carry) ? pendulum_euler_OK : pendulum_euler_NOT_FINITE;
+}
+
+/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
     const double x0[pendulum_euler_DIM])
 {
@@ -104,17 +113,15 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return pendulum_euler_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
         pendulum_euler_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;
         s->steps_before_h = s->steps;
     }
     for (; steps > 0; --steps) {
-        double increment[pendulum_euler_DIM];
-        pendulum_euler_explicit(s->coef, s->x, increment);
-        ++s->evaluations;
-        if (!pendulum_euler_advance(s, increment, s->carry)) return pendulum_euler_NOT_FINITE;
+        const pendulum_euler_status status = pendulum_euler_stage(s);
+        if (status != pendulum_euler_OK) return status;
         ++s->steps;
         s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     }

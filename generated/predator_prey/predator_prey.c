@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 6a776038027afa6204cfe9cb43f05e83d133a9a56e7c4cf9af774c79e8def243
+ * body-sha256: 477f306094e3eed70b6725120d5b56fcafb476bf9d721cf92d0ca77b7ae8a5c5
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -290,7 +290,7 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
     const double x0[predator_prey_DIM])
 {
@@ -309,7 +309,7 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     return predator_prey_OK;
 }
 
-/* One stage. A guess from earlier steps may have misled it: then once more without. */
+/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
 static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 {
     const predator_prey_status status = predator_prey_attempt(s);
@@ -321,7 +321,7 @@ static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return predator_prey_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
         predator_prey_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

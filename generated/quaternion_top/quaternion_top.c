@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 164058b614f2bb88319535cac3e28b3ab9ab5f6dd068294885c41d3f1037b03a
+ * body-sha256: d1f0b34bee14462d1b73f8164236fc9d6a7d571ac8baf9e6ac600a010326f9f4
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -858,7 +858,15 @@ static void quaternion_top_choose_gauge(const quaternion_top_params *params,
     }
 }
 
-/* The arguments may be parts of *s, which is therefore written last. */
+/* Hold the given gauge fixed, or for NULL the one chosen at the state. 0 if it is not finite. */
+static int quaternion_top_take_gauge(quaternion_top_solver *s, const double gauge[quaternion_top_GAUGES])
+{
+    if (gauge == NULL) quaternion_top_choose_gauge(&s->params, s->x, s->gauge);
+    else memcpy(s->gauge, gauge, sizeof s->gauge);
+    return quaternion_top_finite(s->gauge, quaternion_top_GAUGES);
+}
+
+/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM], const double gauge[quaternion_top_GAUGES])
 {
@@ -873,9 +881,7 @@ quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const 
     if (!quaternion_top_finite(fresh.x, quaternion_top_DIM) || !quaternion_top_allowed(&fresh.params)
         || !quaternion_top_finite(fresh.coef, quaternion_top_COEFFICIENTS))
         return quaternion_top_BAD_ARGUMENT;
-    if (gauge == NULL) quaternion_top_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
-    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    if (!quaternion_top_finite(fresh.gauge, quaternion_top_GAUGES)) return quaternion_top_BAD_ARGUMENT;
+    if (!quaternion_top_take_gauge(&fresh, gauge)) return quaternion_top_BAD_ARGUMENT;
     *s = fresh;
     return quaternion_top_OK;
 }
@@ -886,7 +892,7 @@ quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quater
     return quaternion_top_init_gauge(s, params, x0, NULL);
 }
 
-/* One stage. A guess from earlier steps may have misled it: then once more without. */
+/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
 static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 {
     const quaternion_top_status status = quaternion_top_attempt(s);
@@ -898,7 +904,7 @@ static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return quaternion_top_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
         quaternion_top_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 1c761fdc7c7ca6be8a1cb93f71232c4cf35f06e115ba6178afb56b54c3218403
+ * body-sha256: a358977dac27ec72439059a2114118f7604b05b9cb8663aa26cfa7623a1e2874
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -836,7 +836,15 @@ static void rigid_body_choose_gauge(const rigid_body_params *params, const doubl
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s, which is therefore written last. */
+/* Hold the given gauge fixed, or for NULL the one chosen at the state. 0 if it is not finite. */
+static int rigid_body_take_gauge(rigid_body_solver *s, const double gauge[rigid_body_GAUGES])
+{
+    if (gauge == NULL) rigid_body_choose_gauge(&s->params, s->x, s->gauge);
+    else memcpy(s->gauge, gauge, sizeof s->gauge);
+    return rigid_body_finite(s->gauge, rigid_body_GAUGES);
+}
+
+/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES])
 {
@@ -851,9 +859,7 @@ rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_p
     if (!rigid_body_finite(fresh.x, rigid_body_DIM) || !rigid_body_allowed(&fresh.params)
         || !rigid_body_finite(fresh.coef, rigid_body_COEFFICIENTS))
         return rigid_body_BAD_ARGUMENT;
-    if (gauge == NULL) rigid_body_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
-    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    if (!rigid_body_finite(fresh.gauge, rigid_body_GAUGES)) return rigid_body_BAD_ARGUMENT;
+    if (!rigid_body_take_gauge(&fresh, gauge)) return rigid_body_BAD_ARGUMENT;
     *s = fresh;
     return rigid_body_OK;
 }
@@ -864,7 +870,7 @@ rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params 
     return rigid_body_init_gauge(s, params, x0, NULL);
 }
 
-/* One stage. A guess from earlier steps may have misled it: then once more without. */
+/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
 static rigid_body_status rigid_body_stage(rigid_body_solver *s)
 {
     const rigid_body_status status = rigid_body_attempt(s);
@@ -873,11 +879,11 @@ static rigid_body_status rigid_body_stage(rigid_body_solver *s)
     return rigid_body_attempt(s);
 }
 
-/* Steps one by one. */
+/* Steps one by one; those who call it update the attitude, if there is one. */
 static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return rigid_body_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
         rigid_body_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;
@@ -896,8 +902,6 @@ static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h,
     }
     return rigid_body_OK;
 }
-
-rigid_body_status rigid_body_step(rigid_body_solver *s, double h) { return rigid_body_single_steps(s, h, 1); }
 
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define rigid_body_NEAR_BY 0.125
@@ -1186,12 +1190,12 @@ static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_b
 typedef struct {
     rigid_body_lanes y[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM],
         residual[rigid_body_DIM];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
+    /* for a residual r of alpha(y) = x, y is corrected by -inverse r, and the increment by -gain r */
     rigid_body_lanes inverse[rigid_body_DIM * rigid_body_DIM], gain[rigid_body_DIM * rigid_body_DIM];
 } rigid_body_model;
 
-/* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
-   rigid_body_size. */
+/* Units of corrections of y, so that matrices are reused down to the same relative size as in
+   rigid_body_size, or larger: the least that a component is in the stages. */
 static void rigid_body_measure(const rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM])
 {
     rigid_body_lanes norm = { 0.0 };
@@ -1369,7 +1373,7 @@ static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[rest
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
    foreseen. */
 typedef struct {
-    int fits; /* the fit that weight is of; -1 for none */
+    int fits; /* number of the fit that weight belongs to; -1 for none */
     rigid_body_lanes coef[rigid_body_COEFFICIENTS], weight[rigid_body_WINDOW][rigid_body_DIM];
 } rigid_body_table;
 
@@ -1428,7 +1432,7 @@ static void rigid_body_record_lanes(rigid_body_history *history, rigid_body_lane
     history->count += rigid_body_LANES;
 }
 
-/* The slope of the motion at x. */
+/* The vector field at x; with a monitor, per unit of tau. */
 static void rigid_body_slope(const rigid_body_solver *s, const double x[rigid_body_DIM],
     double slope[rigid_body_DIM])
 {
@@ -1472,8 +1476,9 @@ static void rigid_body_guess_by_march(const rigid_body_solver *s, rigid_body_tab
 {
     double x[rigid_body_DIM], mean[rigid_body_DIM];
     memcpy(x, s->x, sizeof x);
-    const double h = s->h;
-    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+    for (int k = 0; k < rigid_body_LANES; ++k) {
+        const int lane = k;
+        const double h = s->h;
         for (int i = 0; i < rigid_body_DIM; ++i) model->y[i][lane] = x[i];
         rigid_body_runge_kutta(s, h, x, mean);
         for (int i = 0; i < rigid_body_DIM; ++i) model->y[i][lane] += 0.5 * h * mean[i];
@@ -1485,8 +1490,8 @@ static void rigid_body_guess_by_march(const rigid_body_solver *s, rigid_body_tab
    state. */
 static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid_body_model *model)
 {
+    if (!s->blocks.use_recurrences) rigid_body_guess_by_march(s, table, model);
     if (s->blocks.use_recurrences) rigid_body_foresee(&s->history, table->weight, model->y);
-    else rigid_body_guess_by_march(s, table, model);
     return rigid_body_near_lanes(model, s->x);
 }
 
@@ -1556,7 +1561,8 @@ static void rigid_body_choose_guess(rigid_body_solver *s, size_t steps)
     }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < rigid_body_REPAY_BLOCKS && s->steps < rigid_body_REPAY) return;
-    s->blocks.use_recurrences = rigid_body_fit(&s->history);
+    s->blocks.use_recurrences = 1;
+    s->blocks.use_recurrences = s->blocks.use_recurrences && rigid_body_fit(&s->history);
     s->blocks.single_steps = rigid_body_LANES;
     if (!s->blocks.use_recurrences) rigid_body_give_up(s);
 }
@@ -1615,6 +1621,12 @@ rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t st
     return status;
 }
 
+rigid_body_status rigid_body_step(rigid_body_solver *s, double h)
+{
+    const rigid_body_status status = rigid_body_single_steps(s, h, 1);
+    return status;
+}
+
 /* ---- Members of an ensemble ---- */
 /* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
    where it is 0, all have the first. */
@@ -1623,7 +1635,7 @@ typedef struct {
     size_t members, steps, own;
     const rigid_body_params *params; /* NULL for the defaults */
     const double *h;
-    const double *gauge;   /* NULL to choose it */
+    const double *gauge;   /* gauges, or NULL to choose them at the start */
     size_t stride;         /* 0 where there are no frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
@@ -1908,8 +1920,7 @@ static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *mod
 static void rigid_body_group_advance(rigid_body_lanes x[restrict rigid_body_DIM],
     rigid_body_lanes carry[restrict rigid_body_DIM], rigid_body_model *model)
 {
-    rigid_body_lanes gained[rigid_body_DIM];
-    rigid_body_gain(model, model->residual, gained);
+    rigid_body_lanes gained[rigid_body_DIM]; rigid_body_gain(model, model->residual, gained);
     for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
@@ -1988,7 +1999,7 @@ static rigid_body_status rigid_body_group_join(rigid_body_group *group, int lane
     for (int i = 0; i < rigid_body_DIM; ++i) group->x[i][lane] = x[i];
     if (status != rigid_body_OK) return status;
     for (int k = 0; k < rigid_body_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
-    memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
+    memcpy(group->gauge[lane], s.gauge, sizeof group->gauge[lane]);
     group->active[lane] = 1;
     return status;
 }

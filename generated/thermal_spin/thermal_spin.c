@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 0766d235e39cb10f8b5903ad80446eaf757380d26bc3f9815bfc3a2534ec9b83
+ * body-sha256: 1e4352891d0a6040e1b124a3dd325927f44985f6e74ec2b354f7b6b0369f3002
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -417,8 +417,13 @@ thermal_spin_status thermal_spin_set_noise(thermal_spin_solver *s, uint64_t seed
     return thermal_spin_OK;
 }
 
+thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h, size_t steps)
+{
+    return thermal_spin_integrate_along(s, h, steps, NULL);
+}
+
 /* ---- The solver ---- */
-/* The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin_params *params,
     const double x0[thermal_spin_DIM])
 {
@@ -437,7 +442,7 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
     return thermal_spin_OK;
 }
 
-/* What depends on the increments of the next step. */
+/* Compute the coefficients of the next step that are functions of the time or of the noise. */
 static void thermal_spin_renew(thermal_spin_solver *s)
 {
     thermal_spin_at_step(s->coef, s->dw, s->coef + thermal_spin_PREPARED);
@@ -450,7 +455,7 @@ thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double 
     const double *dw)
 {
     if (s == NULL || !isfinite(h)) return thermal_spin_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
         thermal_spin_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;
@@ -466,11 +471,6 @@ thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double 
         s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     }
     return thermal_spin_OK;
-}
-
-thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h, size_t steps)
-{
-    return thermal_spin_integrate_along(s, h, steps, NULL);
 }
 
 thermal_spin_status thermal_spin_step(thermal_spin_solver *s, double h)

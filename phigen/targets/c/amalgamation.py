@@ -32,7 +32,7 @@ class Amalgam:
 
     def __post_init__(self) -> None:
         self._defined |= set(self.left_out.values())
-        self._not_called = re.compile(rf" +({'|'.join(calls_left_out(self.switches))})\(.*\);$")
+        self._not_called = re.compile(rf" +((if|for) \(.*\) )?({'|'.join(calls_left_out(self.switches))})\(.*\);$")
         for definition in phrases.definitions(self.switches):
             self._macros.define(definition)
 

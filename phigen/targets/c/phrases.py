@@ -66,7 +66,25 @@ STAGES = Choice(
         "AT_FIRST(pointer)": ("stage == 0 ? pointer : NULL", "pointer"),
         "PER_STAGE": ("/ (double)PHI_STAGES", ""),
         "STAGE_OF_LANE": ("PHI_STAGES * lane + stage", "lane"),
+        "AND_STAGES": (", PHI_STAGES", ""),
+        "AND_INT_STAGES": (", int stages", ""),
+        "STEP_OF(k)": ("k / PHI_STAGES", "k"),
+        "TAKE_STAGE_OF(k)": ("const int stage = (int)(k % PHI_STAGES);", ""),
+        "IF_LAST_STAGE": ("if (stage == PHI_STAGES - 1)", ""),
+        "AND_ONE_STAGE": (", 1", ""),
     },
+)
+
+SWEPT = Choice(
+    "The corrections of the stages of a step are solved for by a sweep over them.",
+    ("SWEPT",),
+    {"TURN_OF_BLOCK": ("phi_lanes turn[PHI_DIM * PHI_DIM];", ""), "AND_TURN": (", turn", "")},
+)
+
+ORDERS = Choice(
+    "The error of half of an increment, as a power of the size of a stage.",
+    ("CENTRED",),
+    {"POWER_OF_STAGE(c)": ("c * c * c", "c * c")},
 )
 
 VALUES = Choice(
@@ -89,7 +107,9 @@ TIME = Choice(
     ("TIMED",),
     {
         "AND_T(t)": (", t", ""),
+        "AND_DOUBLE_T": (", double t", ""),
         "AND_T0": (", double t0", ""),
+        "BEGIN_AT_T0(s)": ("s.t = t0;", ""),
         "OR_NO_T0": ("|| !isfinite(t0)", ""),
         "INIT_AT(s, params, x, t)": ("phi_init_at(s, params, x, t)", "phi_init(s, params, x)"),
         "ENSEMBLE_AT": ("phi_ensemble_at", "phi_ensemble"),
@@ -97,6 +117,9 @@ TIME = Choice(
         "TAKE_T0": ("s->t = s->now = t0;", ""),
         "SET_TIME(s)": ("s->t = s->now =", "s->t ="),
         "TIME_AFTER(s, steps)": (LATTICE_TIME, LATTICE_TIME),
+        "TIMES_OF_SLOPES": ("static const double after[4] = { 0.0, 0.5, 0.5, 1.0 };", ""),
+        "BEGIN_OF_STAGES(s)": ("double begin = s->t;", ""),
+        "NEXT_BEGIN(h)": ("begin += h;", ""),
     },
 )
 
@@ -105,7 +128,10 @@ GAUGE = Choice(
     ("GAUGE",),
     {
         "AND_GAUGE(gauge)": (", gauge", ""),
+        "TAKE_GAUGE(s, gauge)": ("if (!phi_take_gauge(s, gauge)) return PHI_BAD_ARGUMENT;", ""),
         "AND_GAUGE_OF(all, m)": (", all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL", ""),
+        "COPY_GAUGE(to, from)": ("memcpy(to, from, sizeof to);", ""),
+        "GAUGES_OF_MEMBERS": ("double gauge[PHI_LANES][PHI_GAUGES]; /* of each member */", ""),
     },
 )
 
@@ -115,8 +141,18 @@ LEVEL = Choice(
     {
         "AND_DOUBLE(e_bar)": (", double *e_bar", ""),
         "AND_LEVEL(level)": (", level", ""),
+        "AND_E_BAR": (", e_bar", ""),
+        "AND_NO_LEVEL": (", NULL", ""),
+        "COUNT_TIME(s)": ("", "s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;"),
+        "TAKE_RATE_OF_TIME(s)": ("if (!phi_time_passes(&s.params, s.x)) return PHI_BAD_ARGUMENT;", ""),
         "PASS(s, elapsed)": ("phi_pass(s, elapsed);", ""),
         "TAKE_LEVEL(s, from)": ("if (!phi_take_level(s, from, carry)) return PHI_BAD_ARGUMENT;", ""),
+        "ELAPSED_OF_BLOCK": ("phi_lanes elapsed, lost;", ""),
+        "ELAPSE": ("if (!phi_elapse(s, table, PHI_ADDRESS(model), elapsed, lost)) return 0;", ""),
+        "BAR_OF_LEVEL": ("double level[1];", ""),
+        "ADD_BAR_OF_LEVEL(e_bar)": ("if (e_bar != NULL) *e_bar += level[0];", ""),
+        "E_BAR_FROM_ZERO": ("double e_bar = 0.0;", ""),
+        "AND_TO_E_BAR": (", &e_bar", ""),
     },
 )
 
@@ -131,6 +167,10 @@ OWN = Choice(
             "phi_init(s, params, x)",
         ),
         "TAKE_OWN": ("all.t0 = t0;", "all.gauge = gauge;", ""),
+        "ASK_FOR_OWN": ("if (members > 0 && t0 == NULL) return PHI_BAD_ARGUMENT;", "", ""),
+        "INIT_FROM": ("phi_init_at", "phi_init_gauge", "phi_init"),
+        "AND_START": (", double t0", ", const double gauge[PHI_GAUGES]", ""),
+        "AND_USUAL_START": (", 0.0", ", NULL", ""),
     },
 )
 
@@ -139,22 +179,205 @@ NOISE = Choice(
     ("NOISE",),
     {
         "AND_DW(dw)": (", dw", ""),
+        "DRAW": ("if (!phi_draw(s, dw)) return PHI_END_RUN(PHI_BAD_ARGUMENT);", ""),
+        "NEXT_DRAW": ("if (dw != NULL) dw += PHI_DRAWS;", ""),
         "RENEWAL": ("phi_at_step", "phi_at_time"),
         "ENSEMBLE_OF": ("phi_ensemble_of", "PHI_ENSEMBLE_AT"),
         "RANDOM_NUMBERS": ("uint64_t seed, uint32_t first_member, uint64_t first_step,", ""),
     },
 )
 
+PARAMETERS = Choice(
+    "A solver starts with parameters that the model allows, and whose coefficients are finite.",
+    ("PARAMETERS",),
+    {
+        "TRY_PARAMETERS(s)": ("phi_prepare(&s.params PHI_AND_GAUGE(s.gauge), PHI_PROBE_STEP, PHI_OF(s.coef, 0));", ""),
+        "OR_BAD_PARAMETERS(s)": (
+            "|| !phi_allowed(&s.params) || !phi_finite(PHI_OF(s.coef, 0), PHI_COEFFICIENTS)",
+            "",
+        ),
+        "SUMS_OF_PARAMETERS": ("double sums[sizeof(phi_params) / sizeof(double)] = { 0.0 };", "(void)params_bar;"),
+        "TAKE_SUMS(sums, bar)": ("if (bar != NULL) memcpy(sums, bar, sizeof *bar);", ""),
+        "ADD_TO_SUMS(sums, more)": (
+            "for (size_t i = 0; i < sizeof sums / sizeof sums[0]; ++i) sums[i] += more[i];",
+            "",
+        ),
+        "GIVE_SUMS(bar, sums)": ("if (bar != NULL) memcpy(bar, sums, sizeof *bar);", ""),
+        "NO_NAMED_PARAMETERS(bar)": ("", "(void)bar;"),
+    },
+)
+
+UNUSED_PARAMETERS = Choice(
+    "Nothing depends on parameters, so that there are no derivatives by them.",
+    ("PARAMETERS || MONITOR",),
+    {"NO_PARAMETERS(bar)": ("", "(void)bar;")},
+)
+
+UNUSED_GROUP = Choice(
+    "A gauge is of no use to derivatives by parameters, if there are none.",
+    ("GAUGE && !PARAMETERS && !MONITOR",),
+    {"NO_GROUP(group)": ("(void)group;", "")},
+)
+
+KICKS = Choice(
+    "Flows of a splitting whose coefficients depend on h squared too.",
+    ("KICKS",),
+    {"KICK(k, h)": ("const double kick[1] = { phi_multiples[k] * (h * h) };", ""), "AND_KICK": (", kick", "")},
+)
+
+TAPE = Choice(
+    "What the tape of the reverse pass has of a step, and how the pass goes through a step.",
+    ("SPLITTING", "GAUSS"),
+    {
+        "RECORD_OF_STEP": (
+            "double phi_kept[PHI_FLOWS][PHI_DIM]",
+            "double phi_kept[PHI_TRAIL]",
+            "double PHI_OF(phi_kept, PHI_STAGES)[PHI_DIM]",
+        ),
+        "STEP_BACK(s, trail, bar)": (
+            "phi_stage_adjoint(s->coef, trail, bar, bar->coef)",
+            "phi_stage_adjoint(s, trail, bar)",
+            "phi_stages_adjoint(s, trail, bar)",
+        ),
+        "AND_STARTS_OF_PACKS": (", &bar", "", ""),
+    },
+)
+
+BATCHES = Choice(
+    "The reverse pass of an ensemble is vectorised over batches of members.",
+    ("ABREAST",),
+    {
+        "BACK_MEMBERS": ("PHI_BACK_GROUP", "1"),
+        "PULL_MEMBERS(all, m)": ("phi_pull_group(all, m)", "phi_pull_member(all, m)"),
+    },
+)
+
+PACKS = Choice(
+    "A batch has several SIMD packs of members.",
+    ("PACKS",),
+    {"COUNT_PACKS(group, count)": ("group.packs = (count + PHI_LANES - 1) / PHI_LANES;", "")},
+)
+
+RECOMPUTED = Choice(
+    "The reverse pass recomputes states by inverse flows, in segments of at least 16 steps.",
+    ("UNDONE",),
+    {"STEPS_OF_SEGMENT(steps)": ("16 + steps", "steps")},
+)
+
+RENEWED = Choice(
+    "Coefficients depend on the time of a stage.",
+    ("RENEWED",),
+    {"NOTE_TIME_OF_LANE(g, at)": ("g->t[lane] = at->t + PHI_OF(phi_middles, stage) * at->h;", "")},
+)
+
+PATHS = Choice(
+    "Stages are paths, whose reverse pass begins where the forward one ended.",
+    ("PATH",),
+    {
+        "NOTE_START(bar, g)": ("bar->end[i] = g->start[i][lane];", ""),
+        "BEGIN_PATHS_BACK(bar, s)": ("memcpy(bar.end, s->x, sizeof bar.end);", ""),
+    },
+)
+
+GAINS = Choice(
+    "Corrections of the increments of a block, which sparse elimination has found already.",
+    ("SPARSE",),
+    {
+        "GAIN(model)": ("", "phi_lanes gained[PHI_DIM]; phi_gain(model, model->residual, gained);"),
+        "GAINED(model)": ("model->gained", "gained"),
+    },
+)
+
+RUN = Choice(
+    "The function that makes steps one by one, with its last argument: increments of the noise, or where the states"
+    " before the flows of each step go.",
+    ("BLOCKS", "NOISE", "SPLITTING && ADJOINT"),
+    {
+        "RUN": (
+            "static phi_status phi_single_steps",
+            "phi_status phi_integrate_along",
+            "static phi_status phi_integrate_leaving",
+            "phi_status phi_integrate",
+        ),
+        "AND_RECORD": ("", ", const double *dw", ", double (*kept)[PHI_DIM]", ""),
+        "ABOUT_RUN": (
+            "/* Steps one by one; those who call it update the attitude, if there is one. */",
+            "",
+            "/* phi_integrate, which writes the states before all flows to kept, unless that is NULL. */",
+            "",
+        ),
+    },
+)
+
+STEP = Choice(
+    "One step of a run.",
+    ("SPLITTING && ADJOINT", "COMPOSED || SPLITTING"),
+    {
+        "STEP_OF_RUN": ("phi_stages(s, kept)", "phi_stages(s)", "phi_stage(s)"),
+        "NEXT_RECORD": ("if (kept != NULL) kept += PHI_FLOWS;", "", ""),
+    },
+)
+
+ENDS = Choice(
+    "What is done before the first step of a run, and after the last, with its status: correctors, and the attitude.",
+    ("CORRECTED", "ATTITUDE && !BLOCKS"),
+    {
+        "BEFORE_RUN": ("const phi_solver before = *s;", "", ""),
+        "CORRECT_START": ("if (steps > 0 && phi_correct(s, 0) != PHI_OK) return PHI_NOT_FINITE;", "", ""),
+        "END_RUN(status)": ("phi_end_run(s, &before, status)", "phi_end_turning(s, status)", "status"),
+    },
+)
+
+CHAPTERS = Choice(
+    "Titles of chapters by the kind of step.",
+    ("GAUSS", "IMPLICIT", "SPLITTING"),
+    {
+        "CHAPTER_OF_ALGEBRA": (
+            "/* ---- Compensated sums ---- */",
+            "/* ---- Compensated sums, linear equations ---- */",
+            "/* ---- The explicit step ---- */",
+            "/* ---- The solver ---- */",
+        ),
+        "CHAPTER_OF_SOLVER": (*["/* ---- The solver ---- */"] * 3, ""),
+    },
+)
+
 ATTITUDE = Choice(
     "The body turns by the Casimirs taken from H too.",
     ("RATE_OF_GAUGE",),
-    {"AND_ASIDE(pointer)": (", PHI_AT_FIRST(pointer)", "")},
+    {
+        "AND_ASIDE(pointer)": (", PHI_AT_FIRST(pointer)", ""),
+        "AND_DOUBLE_ASIDE": (", const double *aside", ""),
+        "AND_ASIDE_OF_BLOCK": (", k == 0 ? s->aside_of_block : NULL", ""),
+    },
 )
 
 POSITION = Choice(
     "A body has a position beside its attitude.",
     ("POSITION",),
     {"AND_POSITION(position)": (", position", "")},
+)
+
+FRAME = Choice(
+    "Momenta are constant in space or in the body; the product of the factors of steps grows on the other side.",
+    ("SPATIAL",),
+    {
+        "INTO_CONSTANT_FRAME(q, element)": (
+            "const double q[4] = { element[0], -element[1], -element[2], -element[3] };",
+            "const double *q = element;",
+        ),
+        "READ_PRODUCT(s)": (
+            "phi_group_product(s->turned, s->first, s->attitude);",
+            "phi_group_product(s->first, s->turned, s->attitude);",
+        ),
+        "PRODUCT_WITH_TRANSPOSE(g, i, j, k, N)": ("g[i * N + k] * g[j * N + k]", "g[k * N + i] * g[k * N + j]"),
+    },
+)
+
+ASIDE = Choice(
+    "The gauge rotation of a block of steps.",
+    ("BLOCKS",),
+    {"SET_ASIDE_OF_BLOCK(s)": ("phi_uniform(s->rate, (double)PHI_AHEAD * s->h, s->aside_of_block);", "")},
 )
 
 SIDES = Choice(
@@ -270,6 +493,20 @@ PREDICTORS = Choice(
 )
 
 ALL = (
+    GAINS,
+    PATHS,
+    RENEWED,
+    RECOMPUTED,
+    PACKS,
+    BATCHES,
+    TAPE,
+    KICKS,
+    UNUSED_GROUP,
+    UNUSED_PARAMETERS,
+    ORDERS,
+    SWEPT,
+    ASIDE,
+    FRAME,
     STAGES,
     VALUES,
     TIME,
@@ -277,6 +514,11 @@ ALL = (
     LEVEL,
     OWN,
     NOISE,
+    PARAMETERS,
+    RUN,
+    STEP,
+    ENDS,
+    CHAPTERS,
     ATTITUDE,
     POSITION,
     SIDES,

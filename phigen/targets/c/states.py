@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from phigen.targets.c import structs
 from phigen.targets.c.row_state import LATTICE, ROW
 from phigen.targets.state import STATE, StateBlock, belongs
 
@@ -35,6 +36,13 @@ PARTS = {
     "state_placed.h": Part(LATTICE, 4, _reset),
     "state_of_row.h": Part(ROW, 4, _members),
     "state_row_begun.h": Part(ROW, 4, _reset),
+    "state_of_table.h": Part(structs.TABLE, 4, _members),
+    "state_of_model.h": Part(structs.MODEL, 4, _members),
+    "state_of_members.h": Part(structs.MEMBERS, 4, _members),
+    "state_of_cotangent.h": Part(structs.COTANGENT, 4, _members),
+    "state_of_pulled.h": Part(structs.PULLED, 4, _members),
+    "state_of_back_group.h": Part(structs.BACK_GROUP, 4, _members),
+    "state_of_traced.h": Part(structs.TRACED, 4, _members),
 }
 
 

@@ -6,6 +6,8 @@
 #include "adjoint_groups.c"
 #include "adjoint_members.c"
 
+size_t phi_trail_size_each(void) { return PHI_TRAIL_EACH; }
+
 phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, PHI_OWN_POINTER const double *h,
     size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
     double *trail, unsigned char *status)
@@ -13,9 +15,7 @@ phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t 
     phi_status result = PHI_OK;
     const int given = x0 != NULL && h != NULL && rows_bar != NULL && x0_bar != NULL && trail != NULL && stride > 0;
     if (members > 0 && !given) return PHI_BAD_ARGUMENT;
-#if PHI_TIMED
-    if (members > 0 && t0 == NULL) return PHI_BAD_ARGUMENT;
-#endif
+    PHI_ASK_FOR_OWN
     phi_pulled all;
     memset(&all, 0, sizeof all);
     all.params = params;
@@ -32,13 +32,8 @@ phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t 
     all.trail = trail;
     all.params_bar = params_bar;
     all.status = status;
-#if PHI_ABREAST
-    for (size_t m = 0; m < members; m += PHI_BACK_GROUP) {
-        const phi_status member = phi_pull_group(&all, m);
-#else
-    for (size_t m = 0; m < members; ++m) {
-        const phi_status member = phi_pull_member(&all, m);
-#endif
+    for (size_t m = 0; m < members; m += PHI_BACK_MEMBERS) {
+        const phi_status member = PHI_PULL_MEMBERS(&all, m);
         if (result == PHI_OK) result = member;
     }
     return result;

@@ -7,12 +7,10 @@
 #include "adjoint_kept.c"
 #include "model.h"
 
-/* What was found for a member. 0 where it has values that are not finite. */
-#if PHI_GAUGE
-static int phi_pull_end(const phi_group *group, const phi_back_group *bar, int m, const phi_pulled *all, size_t at)
-#else
-static int phi_pull_end(const phi_back_group *bar, int m, const phi_pulled *all, size_t at)
-#endif
+#include "adjoint_groups_parameters.c"
+
+/* The derivatives for a member, from its lane. 0 where it has values that are not finite. */
+static int phi_pull_end(const phi_back_group *bar, int m, const phi_pulled *all, size_t at PHI_AND_GAUGE(const phi_group *group))
 {
     const int k = m / PHI_LANES, lane = m % PHI_LANES;
     phi_cotangent own;
@@ -24,25 +22,8 @@ static int phi_pull_end(const phi_back_group *bar, int m, const phi_pulled *all,
         if (!phi_finite(coef, PHI_COEFFICIENTS)) return 0;
     }
     memcpy(all->x0_bar + at * PHI_DIM, own.x, sizeof own.x);
-#if PHI_PARAMETERS || PHI_MONITOR
-    phi_params *own_bar = all->params_bar != NULL ? all->params_bar + at : NULL;
-    phi_solver s;
-    memset(&s, 0, sizeof s);
-    s.h = all->h[at];
-    s.params = all->params != NULL ? all->params[at] : phi_default_params;
-#if PHI_GAUGE
-    memcpy(s.gauge, group->gauge[m], sizeof s.gauge);
-#endif
-#if PHI_MONITOR
-    double e_bar = 0.0;
-    phi_add_parameters(&s, &own, own_bar, &e_bar);
-    phi_pull_level(all, at, e_bar);
-#else
-    phi_add_parameters(&s, &own, own_bar);
-#endif
-#elif PHI_GAUGE
-    (void)group;
-#endif
+    phi_pull_parameters(all, &own, at PHI_AND_GAUGE(group->gauge[m]));
+    PHI_NO_GROUP(group)
     if (all->status != NULL) all->status[at] = PHI_OK;
     return 1;
 }
@@ -60,15 +41,9 @@ PHI_APART static phi_status phi_pull_group(const phi_pulled *all, size_t first)
     memset(&group, 0, sizeof group);
     memset(bar.x, 0, sizeof bar.x);
     memset(bar.coef, 0, sizeof bar.coef);
-#if PHI_PACKS
-    group.packs = (count + PHI_LANES - 1) / PHI_LANES;
-#endif
+    PHI_COUNT_PACKS(group, count)
     for (int m = 0; m < count; ++m) good[m] = together && phi_pull_join(&group, m, all, first);
-#if PHI_SPLITTING
-    together = together && phi_pull_forth(&group, count, all, first, &bar);
-#else
-    together = together && phi_pull_forth(&group, count, all, first);
-#endif
+    together = together && phi_pull_forth(&group, count, all, first PHI_AND_STARTS_OF_PACKS);
     for (int m = 0; m < count; ++m) {
         double x[PHI_DIM];
         phi_pull_state(&group, m, x);
@@ -76,11 +51,7 @@ PHI_APART static phi_status phi_pull_group(const phi_pulled *all, size_t first)
     }
     if (together) phi_pull_back(&group, count, all, first, &bar);
     for (int m = 0; m < count; ++m) {
-#if PHI_GAUGE
-        if (good[m] && phi_pull_end(&group, &bar, m, all, first + (size_t)m)) continue;
-#else
-        if (good[m] && phi_pull_end(&bar, m, all, first + (size_t)m)) continue;
-#endif
+        if (good[m] && phi_pull_end(&bar, m, all, first + (size_t)m PHI_AND_GAUGE(&group))) continue;
         const phi_status status = phi_pull_member(all, first + (size_t)m);
         if (result == PHI_OK) result = status;
     }

@@ -12,24 +12,12 @@
 /* ---- The transpose of steps in lanes ---- */
 /* What stages are linearised around is known before anything is pulled back. So the derivatives of several are computed at
    once, and a cotangent takes a small matrix through each. */
-#if PHI_PATH
-#define PHI_BACK_SETTLED 1e-15  /* accuracy of middles */
-#define PHI_BACK_ACCURACY 1e-17 /* of the derivatives of paths */
-#endif
 
 /* Stages that are gone back through at once, linearised: jacobian and gain are the transposes of the derivatives of alpha(y)
    and of the increment. A cotangent after of the end of one becomes after + change, where jacobian change = gain after;
    wrong is infinite where lanes do not suffice. */
 typedef struct {
-    phi_lanes *coef, y[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], gain[PHI_DIM * PHI_DIM];
-    phi_lanes after[PHI_DIM], change[PHI_DIM], wrong;
-#if PHI_PATH
-    phi_lanes start[PHI_DIM];
-    phi_expansion e;
-#endif
-#if PHI_RENEWED
-    double t[PHI_LANES];
-#endif
+#include "state_of_traced.h"
 } phi_traced;
 
 /* Solve matrix * solutions = sides, both overwritten, of so many sides in each row, by elimination without pivoting:
@@ -76,9 +64,7 @@ static void phi_load(phi_traced *g, int lane, const phi_solver *at PHI_AND_INT_S
 {
     for (int i = 0; i < PHI_DIM; ++i) g->y[i][lane] = y[i];
     for (int k = 0; k < PHI_COEFFICIENTS; ++k) g->coef[k][lane] = PHI_OF(at->coef, stage)[k];
-#if PHI_RENEWED
-    g->t[lane] = at->t + PHI_OF(phi_middles, stage) * at->h;
-#endif
+    PHI_NOTE_TIME_OF_LANE(g, at)
 }
 
 /* Pull a cotangent back through a stage that was linearised; where that was not possible, by itself. */
@@ -98,36 +84,18 @@ static phi_status phi_through(phi_traced *g, int lane, phi_cotangent *bar, doubl
     if (good) {
         for (int i = 0; i < PHI_DIM; ++i) {
             bar->x[i] += change[i];
-#if PHI_PATH
-            bar->end[i] = g->start[i][lane];
-#endif
+            PHI_NOTE_START(bar, g)
         }
     } else {
         double coef[PHI_COEFFICIENTS], y[PHI_DIM];
         for (int k = 0; k < PHI_COEFFICIENTS; ++k) coef[k] = g->coef[k][lane];
         for (int i = 0; i < PHI_DIM; ++i) y[i] = g->y[i][lane];
         status = phi_stage_adjoint(coef, y, bar, coef_bar);
-#if PHI_RENEWED
         phi_early(coef, coef_bar, g->t[lane]);
-#endif
     }
     return status;
 }
 
-/* Add up the cotangents of coefficients of the lanes that were linearised. */
-static void phi_gather(phi_traced *g, phi_lanes slopes[PHI_COEFFICIENTS], int lane, double coef_bar[PHI_COEFFICIENTS])
-{
-    if (g->wrong[lane] != 0.0) return;
-#if PHI_RENEWED
-    double coef[PHI_COEFFICIENTS], own[PHI_COEFFICIENTS];
-    for (int k = 0; k < PHI_COEFFICIENTS; ++k) {
-        coef[k] = g->coef[k][lane];
-        own[k] = slopes[k][lane];
-    }
-    phi_early(coef, own, g->t[lane]);
-    for (int k = 0; k < PHI_COEFFICIENTS; ++k) coef_bar[k] += own[k];
-#else
-    for (int k = 0; k < PHI_COEFFICIENTS; ++k) coef_bar[k] += slopes[k][lane];
-#endif
-}
+#include "adjoint_gather.c"
+#include "adjoint_gather_early.c"
 #endif

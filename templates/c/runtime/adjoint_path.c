@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 #include "adjoint_stage.c"
+#include "adjoint_path.h"
 
 #define PHI_BACK_NEGLIGIBLE 1e-18    /* terms that rounding hides in their sum, in sizes of start and sum */
 #define PHI_BACK_ROUNDED_SLOPE 1e-13 /* rounding of slopes, in sizes of the path and its slope */

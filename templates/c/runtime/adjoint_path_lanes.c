@@ -4,6 +4,9 @@
 #include <string.h>
 #include "adjoint_lanes.c"
 
+#define PHI_BACK_SETTLED 1e-15  /* accuracy of middles */
+#define PHI_BACK_ACCURACY 1e-17 /* of the derivatives of paths */
+
 #if PHI_ALONG
 /* The derivatives of the paths along the coefficients that pi depends on, by as many orders as those along p. */
 static void phi_vary_coefficients(phi_expansion *e)

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 #include "adjoint_stage.c"
+#include "adjoint_flows.h"
 
 /* Pull a cotangent back through a step whose flows began at y. */
 static phi_status phi_stage_adjoint(const double *coef, phi_kept y, phi_cotangent *bar,

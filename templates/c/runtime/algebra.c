@@ -5,15 +5,7 @@
 
 #include "model.h"
 
-#if PHI_GAUSS
-/* ---- Compensated sums ---- */
-#elif PHI_IMPLICIT
-/* ---- Compensated sums, linear equations ---- */
-#elif PHI_SPLITTING
-/* ---- The explicit step ---- */
-#else
-/* ---- The solver ---- */
-#endif
+PHI_CHAPTER_OF_ALGEBRA
 static int phi_finite(const double *values, int count)
 {
     while (count > 0 && isfinite(values[count - 1])) --count;

@@ -17,24 +17,13 @@ static void phi_group_product(const double a[PHI_ELEMENT], const double b[PHI_EL
         }
 }
 
-/* Make a factor, given less 1, that brings a matrix which is nearly orthogonal nearer to that. */
-static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT])
+/* Add the identity to an element. */
+static inline void phi_add_identity(double element[PHI_ELEMENT])
 {
-    enum { N = PHI_ROWS_OF_ATTITUDE };
-    double excess[PHI_ELEMENT], change[PHI_ELEMENT];
-    for (int i = 0; i < N; ++i)
-        for (int j = 0; j < N; ++j) {
-            double sum = i == j ? -1.0 : 0.0;
-#if PHI_SPATIAL
-            for (int k = 0; k < N; ++k) sum += g[i * N + k] * g[j * N + k];
-#else
-            for (int k = 0; k < N; ++k) sum += g[k * N + i] * g[k * N + j];
-#endif
-            excess[i * N + j] = 0.5 * sum;
-        }
-    PHI_ADDED_FACTOR(excess, factor, change);
-    for (int i = 0; i < PHI_ELEMENT; ++i) factor[i] -= excess[i] + change[i];
+    for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) element[i] += 1.0;
 }
+
+#include "attitude_orthogonal.c"
 
 /* By how many halvings P becomes so small that its exponential is a short sum. */
 static int phi_doublings(double square)
@@ -44,10 +33,8 @@ static int phi_doublings(double square)
     return doublings;
 }
 
-/* exp(P) - 1: that of P/2^k, doubled k times. */
-#if PHI_NORMALISE
-/* Rounding doubles as well: what it takes from orthogonality is put back each time. */
-#endif
+/* exp(P) - 1: that of P/2^k, doubled k times. Rounding errors double too; if the matrices are orthogonal, that is restored each
+   time. */
 static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[PHI_ELEMENT])
 {
     double small[PHI_COVECTOR], square[PHI_ELEMENT];
@@ -61,11 +48,7 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
     for (; doublings > 0; --doublings) {
         phi_group_product(element, element, square);
         for (int i = 0; i < PHI_ELEMENT; ++i) element[i] = 2.0 * element[i] + square[i];
-#if PHI_NORMALISE
-        memcpy(square, element, sizeof square);
-        for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) square[i] += 1.0;
-        phi_normalise(square, element);
-#endif
+        phi_make_orthogonal(element);
     }
 }
 
@@ -77,4 +60,15 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     p[PHI_COVECTOR - 1] = t * t * rate[PHI_COVECTOR - 1];
     phi_matrix_exponential(p, element);
 }
+
+/* Start from an element: s->turned is the product of all factors after it. */
+static void phi_take_element(phi_solver *s, const double first[PHI_ELEMENT])
+{
+    memmove(s->first, first, sizeof s->first);
+    memset(s->turned, 0, sizeof s->turned);
+    phi_add_identity(s->turned);
+}
+
+/* Update the attitude that users read. */
+static void phi_read_attitude(phi_solver *s) { PHI_READ_PRODUCT(s) }
 #endif

@@ -1,8 +1,13 @@
 #ifndef PHI_FILE_ATTITUDE_QUATERNIONS
 #define PHI_FILE_ATTITUDE_QUATERNIONS
+#include <float.h>
 #include <math.h>
 #include <string.h>
 #include "model.h"
+
+#include "attitude_position.c"
+#include "attitude_velocity_first.c"
+#include "attitude_velocity_last.c"
 
 /* The product of two quaternions. */
 static inline void phi_group_product(const double a[4], const double b[4], double product[4])
@@ -48,41 +53,20 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     const double sine = sin(quarter), scale = speed > 0.0 ? 2.0 * (sine * cos(quarter)) / speed : 0.0;
     element[0] = -2.0 * (sine * sine);
     for (int i = 0; i < 3; ++i) element[i + 1] = scale * rate[i];
-#if PHI_POSITION
-    const double *w = rate, *v = rate + 3, reach = speed > 0.0 ? 2.0 * (scale * (1.0 + element[0])) : t;
-    const double versine = 2.0 * (scale * scale), along = (w[0] * v[0] + w[1] * v[1]) + w[2] * v[2];
-    const double rest = speed > 0.0 ? (t - reach) / (speed * speed) * along : 0.0;
-    element[4] = reach * v[0] + versine * (w[1] * v[2] - w[2] * v[1]) + rest * w[0];
-    element[5] = reach * v[1] + versine * (w[2] * v[0] - w[0] * v[2]) + rest * w[1];
-    element[6] = reach * v[2] + versine * (w[0] * v[1] - w[1] * v[0]) + rest * w[2];
-#endif
+    phi_uniform_position(rate, t, speed, scale, element);
 }
 
 /* Take a rate to the frame where momenta are constant, by the element of the attitude. */
 static void phi_carry_rate(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
     double change[3];
-#if PHI_SPATIAL
-    const double q[4] = { element[0], -element[1], -element[2], -element[3] };
-#if PHI_POSITION
-    const double *p = element + 4, *w = rate;
-    rate[3] -= p[1] * w[2] - p[2] * w[1];
-    rate[4] -= p[2] * w[0] - p[0] * w[2];
-    rate[5] -= p[0] * w[1] - p[1] * w[0];
-#endif
-#else
-    const double *q = element;
-#endif
+    PHI_INTO_CONSTANT_FRAME(q, element)
+    phi_leave_position(element, rate);
     for (int k = 0; k < PHI_RATE; k += 3) {
         phi_rotation(q, rate + k, change);
         for (int i = 0; i < 3; ++i) rate[k + i] += change[i];
     }
-#if PHI_POSITION && !PHI_SPATIAL
-    const double *p = element + 4, *w = rate;
-    rate[3] += p[1] * w[2] - p[2] * w[1];
-    rate[4] += p[2] * w[0] - p[0] * w[2];
-    rate[5] += p[0] * w[1] - p[1] * w[0];
-#endif
+    phi_reach_position(element, rate);
 }
 
 /* By how much the square of the length of a quaternion is more than 1. What rounding leaves of that has no direction, and does
@@ -92,23 +76,33 @@ static inline double phi_excess(const double q[4])
     return ((q[0] * q[0] - 1.0) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
 }
 
-#if PHI_LENGTHENED
-/* Make a factor, given less 1, of which only the direction matters, one by which the length of q becomes 1. */
-static inline void phi_normalise(const double q[4], double factor[4])
+#include "attitude_direction.c"
+#include "attitude_length.c"
+
+/* Add the identity to an element. */
+static inline void phi_add_identity(double element[PHI_ELEMENT]) { element[0] += 1.0; }
+
+/* Start from an element. */
+static void phi_take_element(phi_solver *s, const double first[PHI_ELEMENT]) { memcpy(s->turned, first, sizeof s->turned); }
+
+/* Update the attitude that users read. */
+static void phi_read_attitude(phi_solver *s)
 {
-    const double own = (factor[0] * (2.0 + factor[0]) + factor[1] * factor[1])
-        + (factor[2] * factor[2] + factor[3] * factor[3]);
-    const double excess = own + phi_excess(q) * (1.0 + own), length = sqrt(1.0 + excess), per = 1.0 / length;
-    factor[0] = per * (factor[0] - excess / (1.0 + length));
-    for (int i = 1; i < 4; ++i) factor[i] *= per;
+    memcpy(s->attitude, s->turned, sizeof s->attitude);
+    phi_read_position(s);
 }
-#else
-/* Make a factor, given less 1, one by which the length of q comes nearer to 1. */
-static inline void phi_normalise(const double q[4], double factor[4])
+
+/* Divide a quaternion by its length, unless that is 1 to round-off; the size is its largest number. */
+static void phi_make_unit(double quaternion[PHI_ELEMENT], double size)
 {
-    const double half = 0.5 * phi_excess(q);
-    factor[0] -= half + half * factor[0];
-    for (int i = 1; i < 4; ++i) factor[i] -= half * factor[i];
+    double square = 0.0;
+    for (int i = 0; i < 4; ++i) square += quaternion[i] * quaternion[i];
+    if (fabs(square - 1.0) <= 4.0 * DBL_EPSILON) return;
+    square = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        quaternion[i] /= size;
+        square += quaternion[i] * quaternion[i];
+    }
+    for (int i = 0; i < 4; ++i) quaternion[i] /= sqrt(square);
 }
-#endif
 #endif

@@ -10,21 +10,11 @@
 #include "solver.c"
 
 /* ---- Blocks of steps ---- */
-#if PHI_COMPOSED && !PHI_PATH
-enum {
-    PHI_PAST = 8, /* slopes that a step by Adams' method goes on from */
-    PHI_SLOPES = PHI_PAST + PHI_LANES + 1 /* those where steps begin: of the last block, of this one, and where it ends */
-};
+#include "blocks_slopes.h"
 
-#endif
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
-    int PHI_OF(fits, PHI_STAGES); /* the fit that weight is of; -1 for none */
-    phi_lanes PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS], PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM];
-#if PHI_COMPOSED && !PHI_PATH
-    int marching; /* whether the last steps were a block, whose slopes these are */
-    double slope[PHI_DIM][PHI_SLOPES];
-#endif
+#include "state_of_table.h"
 } phi_table;
 
 /* phi_near for the points of all stages and lanes, seen from one value. */
@@ -85,38 +75,18 @@ static void phi_record_lanes(phi_history *history, phi_lanes y[restrict PHI_DIM]
     history->count += PHI_LANES;
 }
 
-#if PHI_TIMED
-/* The slope of the motion at x and the time t. */
-static void phi_slope(const phi_solver *s, double t, const double x[PHI_DIM], double slope[PHI_DIM])
+/* The vector field at x; with a monitor, per unit of tau. */
+static void phi_slope(const phi_solver *s PHI_AND_DOUBLE_T, const double x[PHI_DIM], double slope[PHI_DIM])
 {
-    phi_vector_field(&s->params, t, x, slope);
-#elif PHI_MONITOR
-/* The slope of the motion at x, in tau. */
-static void phi_slope(const phi_solver *s, const double x[PHI_DIM], double slope[PHI_DIM])
-{
-    const double rate = phi_monitor(&s->params, x);
-    phi_vector_field(&s->params, x, slope);
-    for (int i = 0; i < PHI_DIM; ++i) slope[i] *= rate;
-#else
-/* The slope of the motion at x. */
-static void phi_slope(const phi_solver *s, const double x[PHI_DIM], double slope[PHI_DIM])
-{
-    phi_vector_field(&s->params, x, slope);
-#endif
+    phi_vector_field(&s->params PHI_AND_T(t), x, slope);
+    phi_make_per_tau(&s->params, x, slope);
 }
 
-#if PHI_TIMED
-/* A step of size h by the classical Runge-Kutta method, from the time t. x becomes its end, mean the mean slope. */
-static void phi_runge_kutta(const phi_solver *s, double t, double h, double x[PHI_DIM], double mean[PHI_DIM])
-#else
 /* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
-static void phi_runge_kutta(const phi_solver *s, double h, double x[PHI_DIM], double mean[PHI_DIM])
-#endif
+static void phi_runge_kutta(const phi_solver *s PHI_AND_DOUBLE_T, double h, double x[PHI_DIM], double mean[PHI_DIM])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-#if PHI_TIMED
-    static const double after[4] = { 0.0, 0.5, 0.5, 1.0 };
-#endif
+    PHI_TIMES_OF_SLOPES
     double point[PHI_DIM], slope[PHI_DIM];
     memcpy(point, x, sizeof point);
     memset(mean, 0, PHI_DIM * sizeof mean[0]);
@@ -136,17 +106,10 @@ static void phi_runge_kutta(const phi_solver *s, double h, double x[PHI_DIM], do
 /* Guess the points of all stages and steps, by recurrences or else by a march. 0 if they are not near the state. */
 static int phi_guess(phi_solver *s, phi_table *table, phi_model *model)
 {
-#if PHI_COMPOSED
     if (!s->blocks.use_recurrences) phi_guess_by_march(s, table, model);
-#if !PHI_PATH
-    else table->marching = 0;
-#endif
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        if (s->blocks.use_recurrences) phi_foresee(&s->history[stage], table->weight[stage], model[stage].y);
-#else
-    if (s->blocks.use_recurrences) phi_foresee(&s->history, table->weight, model->y);
-    else phi_guess_by_march(s, table, model);
-#endif
+    if (s->blocks.use_recurrences) phi_end_march(table);
+    PHI_EACH_STAGE
+        if (s->blocks.use_recurrences) phi_foresee(&PHI_OF(s->history, stage), PHI_OF(table->weight, stage), PHI_IN(model, stage, y));
     return phi_near_lanes(model, s->x);
 }
 
@@ -162,9 +125,7 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
     phi_lanes unit[PHI_DIM], size, before, left;
     double x[PHI_DIM], carry[PHI_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-#if PHI_SWEPT
-    phi_lanes turn[PHI_DIM * PHI_DIM];
-#endif
+    PHI_TURN_OF_BLOCK
     if (!phi_guess(s, table, PHI_ADDRESS(model))) return 0;
     for (int lane = 0; lane < PHI_LANES; ++lane) size[lane] = HUGE_VAL;
     while (!solved) {
@@ -173,17 +134,9 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         memcpy(before, size, sizeof before);
-#if PHI_COMPOSED
-        if (matrices) phi_measure(model, PHI_STAGES, unit);
-#else
-        if (matrices) phi_measure(&model, unit);
-#endif
-#if PHI_SWEPT
+        if (matrices) phi_measure(PHI_ADDRESS(model) PHI_AND_STAGES, unit);
         if (matrices) phi_turn_residuals(model, turn);
-        phi_chain(model, turn, unit, x, carry, size);
-#else
-        phi_chain(PHI_ADDRESS(model), unit, x, carry, size);
-#endif
+        phi_chain(PHI_ADDRESS(model) PHI_AND_TURN, unit, x, carry, size);
         s->evaluations += PHI_ALL_STAGES(PHI_LANES);
         phi_leave(size, before, left);
         solved = phi_largest(left) <= PHI_TOLERANCE;
@@ -194,25 +147,14 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
     if (!phi_near_lanes(PHI_ADDRESS(model), s->x)) return 0;
     for (int i = 0; i < PHI_DIM; ++i)
         if (!isfinite(x[i])) return 0;
-#if PHI_MONITOR
-    phi_lanes elapsed, lost;
-    if (!phi_elapse(s, table, PHI_ADDRESS(model), elapsed, lost)) return 0;
-#endif
+    PHI_ELAPSED_OF_BLOCK
+    PHI_ELAPSE
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
-#if PHI_MONITOR
-    for (int lane = 0; lane < PHI_LANES; ++lane) {
-        s->t_carry += lost[lane];
-        phi_pass(s, elapsed[lane]);
-    }
-#endif
+    phi_pass_lanes(s, elapsed, lost);
     s->steps += PHI_LANES;
-#if !PHI_MONITOR
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-#endif
-#if PHI_ATTITUDE
+    PHI_COUNT_TIME(s)
     phi_turn_block(s, table, PHI_ADDRESS(model));
-#endif
     PHI_EACH_STAGE {
         phi_history *history = &PHI_OF(s->history, stage);
         phi_record_lanes(history, PHI_OF(model, stage).y);
@@ -248,13 +190,8 @@ static void phi_choose_guess(phi_solver *s, size_t steps)
         }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < PHI_REPAY_BLOCKS && s->steps < PHI_REPAY) return;
-#if PHI_COMPOSED
     s->blocks.use_recurrences = 1;
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        s->blocks.use_recurrences = s->blocks.use_recurrences && phi_fit(&s->history[stage]);
-#else
-    s->blocks.use_recurrences = phi_fit(&s->history);
-#endif
+    PHI_EACH_STAGE s->blocks.use_recurrences = s->blocks.use_recurrences && phi_fit(&PHI_OF(s->history, stage));
     s->blocks.single_steps = PHI_LANES;
     if (!s->blocks.use_recurrences) phi_give_up(s);
 }
@@ -294,31 +231,30 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     phi_table table;
     phi_status status = phi_single_steps(s, h, 0); /* makes all that depends on h */
     PHI_EACH_STAGE PHI_OF(table.fits, stage) = -1;
-#if PHI_COMPOSED && !PHI_PATH
-    table.marching = 0;
-#endif
+    phi_end_march(&table);
     while (status == PHI_OK && steps > 0) {
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) phi_choose_guess(s, steps);
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) {
             PHI_EACH_STAGE phi_refresh(s PHI_AND_STAGE, &table);
-#if PHI_RENEWED
             phi_renew_lanes(s, &table);
-#endif
             const int passes = phi_block(s, &table, (int)((double)PHI_PASSES * s->blocks.evaluations_per_stage + 0.5));
             phi_learn_from(s, passes);
             if (passes > 0) steps -= PHI_LANES;
         } else {
             if (s->blocks.single_steps > 0) --s->blocks.single_steps;
             status = phi_single(s);
-#if PHI_COMPOSED && !PHI_PATH
-            table.marching = 0;
-#endif
+            phi_end_march(&table);
             if (status == PHI_OK) --steps;
         }
     }
-#if PHI_ATTITUDE
     if (s != NULL) phi_read_attitude(s);
-#endif
+    return status;
+}
+
+phi_status phi_step(phi_solver *s, double h)
+{
+    const phi_status status = phi_single_steps(s, h, 1);
+    if (status == PHI_OK) phi_read_attitude(s);
     return status;
 }
 #endif

@@ -12,17 +12,16 @@ enum {
 #define PHI_ASTRAY 1e-3 /* how far a prediction may be from its correction, in sizes of the value and of the step */
 #define PHI_FADING 0.4  /* how much of what was found out from a stage still counts after the next */
 
+/* The next steps are no block: slopes are computed anew in the next one. */
+static void phi_end_march(phi_table *table) { table->marching = 0; }
+
 /* A step by the Runge-Kutta method, of one size or the other, from the time t. */
 static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM])
 {
     double mean[PHI_DIM];
-#if PHI_TIMED
-    for (int part = 0; part < PHI_STRIDES; ++part)
-        phi_runge_kutta(s, t + part * h / (double)PHI_STRIDES, h / (double)PHI_STRIDES, x, mean);
-#else
     (void)t;
-    for (int part = 0; part < PHI_STRIDES; ++part) phi_runge_kutta(s, h / (double)PHI_STRIDES, x, mean);
-#endif
+    for (int part = 0; part < PHI_STRIDES; ++part)
+        phi_runge_kutta(s PHI_AND_T(t + part * h / (double)PHI_STRIDES), h / (double)PHI_STRIDES, x, mean);
 }
 
 /* The slope at x, where so many steps are done, counted from those of the last block. */
@@ -140,11 +139,7 @@ static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_model 
     memset(missed, 0, sizeof missed);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_model *this_stage = model + stage;
-#if PHI_CENTRED
-        const double power = phi_fractions[stage] * phi_fractions[stage] * phi_fractions[stage];
-#else
-        const double power = phi_fractions[stage] * phi_fractions[stage];
-#endif
+        const double power = PHI_POWER_OF_STAGE(phi_fractions[stage]);
         phi_travel(s, table, stage, moved);
         phi_begin_stage(this_stage, begin, moved, missed, stage > 0 ? power / weight : 0.0);
         for (int meeting = stage > 0; meeting <= PHI_MEETINGS; ++meeting) phi_meet(table->coef[stage], this_stage, begin);

@@ -25,4 +25,13 @@ static int phi_elapse(const phi_solver *s, phi_table *table, phi_model *model, p
     }
     return !(phi_largest(wrong) > 0.0);
 }
+
+/* Add the times of the steps of a block to the physical time, one after the other. */
+static void phi_pass_lanes(phi_solver *s, phi_lanes elapsed, phi_lanes lost)
+{
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        s->t_carry += lost[lane];
+        phi_pass(s, elapsed[lane]);
+    }
+}
 #endif

@@ -20,26 +20,15 @@ static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
 static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     double x[PHI_DIM], mean[PHI_DIM];
-#if PHI_TIMED
-    double begin = s->t;
-#endif
+    PHI_BEGIN_OF_STAGES(s)
     memcpy(x, s->x, sizeof x);
-#if PHI_COMPOSED
-    for (int k = 0; k < (int)PHI_STAGES * PHI_LANES; ++k) {
-        const int lane = k / PHI_STAGES;
-        const int stage = k % PHI_STAGES;
-        const double h = phi_fractions[stage] * s->h;
-#else
-    const double h = s->h;
-    for (int lane = 0; lane < PHI_LANES; ++lane) {
-#endif
+    for (int k = 0; k < PHI_ALL_STAGES(PHI_LANES); ++k) {
+        const int lane = PHI_STEP_OF(k);
+        PHI_TAKE_STAGE_OF(k)
+        const double h = PHI_FRACTION(s->h);
         for (int i = 0; i < PHI_DIM; ++i) PHI_IN(model, stage, y)[i][lane] = x[i];
-#if PHI_TIMED
-        phi_runge_kutta(s, begin, h, x, mean);
-        begin += h;
-#else
-        phi_runge_kutta(s, h, x, mean);
-#endif
+        phi_runge_kutta(s PHI_AND_T(begin), h, x, mean);
+        PHI_NEXT_BEGIN(h)
         for (int i = 0; i < PHI_DIM; ++i) PHI_IN(model, stage, y)[i][lane] += 0.5 * h * mean[i];
     }
     PHI_EACH_STAGE phi_from_means(PHI_OF(table->coef, stage), PHI_TO(model, stage));

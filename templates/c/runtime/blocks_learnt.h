@@ -1,5 +1,7 @@
 #ifndef PHI_FILE_BLOCKS_LEARNT_H
 #define PHI_FILE_BLOCKS_LEARNT_H
+#include <limits.h>
+
 /* Measurements that decide when several steps are solved together, as a block in SIMD registers, and when one by one. They
    affect the speed only. */
 typedef struct {

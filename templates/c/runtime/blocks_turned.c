@@ -11,37 +11,16 @@ static void phi_take_stage(phi_lanes turns[PHI_ELEMENT] PHI_AND_INT_STAGE, doubl
         for (int i = 0; i < PHI_ELEMENT; ++i) sequence[PHI_STAGE_OF_LANE][i] = turns[i][lane];
 }
 
-#if PHI_TURNED_BY_COVECTOR
-/* phi_matrix_exponential in all lanes. */
-static void phi_matrix_exponential_lanes(phi_lanes p[PHI_COVECTOR], phi_lanes element[PHI_ELEMENT])
-{
-    const int doublings = phi_doublings(phi_largest(p[PHI_COVECTOR - 1]));
-    if (doublings == 0) {
-        phi_exponential_lanes(p, element);
-        return;
-    }
-    for (int lane = 0; lane < PHI_LANES; ++lane) {
-        double one[PHI_COVECTOR], made[PHI_ELEMENT];
-        for (int i = 0; i < PHI_COVECTOR; ++i) one[i] = p[i][lane];
-        phi_matrix_exponential(one, made);
-        for (int i = 0; i < PHI_ELEMENT; ++i) element[i][lane] = made[i];
-    }
-}
+#include "blocks_covector.c"
+#include "blocks_element.c"
 
-#endif
 /* The elements of a block that was solved, one after the other. */
 static void phi_turn_block(phi_solver *s, phi_table *table, phi_model *model)
 {
     phi_lanes turns[PHI_ELEMENT];
     double sequence[PHI_ALL_STAGES(PHI_LANES)][PHI_ELEMENT];
     PHI_EACH_STAGE {
-#if PHI_TURNED_BY_COVECTOR
-        phi_lanes p[PHI_COVECTOR];
-        phi_turn_lanes(PHI_OF(table->coef, stage), PHI_IN(model, stage, y), p);
-        phi_matrix_exponential_lanes(p, turns);
-#else
-        phi_turn_lanes(PHI_OF(table->coef, stage), PHI_IN(model, stage, y), turns);
-#endif
+        phi_factor_lanes(PHI_OF(table->coef, stage), PHI_IN(model, stage, y), turns);
         phi_take_stage(turns PHI_AND_STAGE, sequence);
     }
     phi_turn_sequence(s, sequence, PHI_ALL_STAGES(PHI_LANES));

@@ -10,4 +10,6 @@ static void phi_pass(phi_solver *s, double elapsed)
     s->t = sum + small;
     s->t_carry = small - (s->t - sum);
 }
+
+double phi_solver_time(const phi_solver *s) { return s->t + s->t_carry; }
 #endif

@@ -30,9 +30,7 @@ typedef struct {
     int slow_steps_allowed; /* how many of those before recurrences are fitted again */
     int active[PHI_LANES];  /* whether the lane has a member that has not failed */
     size_t steps_left[PHI_LANES]; /* that are still to be made, where one has */
-#if PHI_GAUGE
-    double gauge[PHI_LANES][PHI_GAUGES]; /* of each member */
-#endif
+    PHI_GAUGES_OF_MEMBERS
 } phi_group;
 
 /* The past values of a stage, the latest for k = 0. */
@@ -191,11 +189,7 @@ static int phi_group_solve(phi_group *group PHI_AND_INT_STAGE, phi_model *model)
         memcpy(before, size, sizeof size);
         const int matrices = largest > PHI_FROZEN;
         phi_update(PHI_OF(group->coef, stage), model, matrices);
-#if PHI_COMPOSED
-        if (matrices) phi_measure(model, 1, unit);
-#else
-        if (matrices) phi_measure(model, unit);
-#endif
+        if (matrices) phi_measure(model PHI_AND_ONE_STAGE, unit);
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane)
@@ -215,20 +209,13 @@ static int phi_group_solve(phi_group *group PHI_AND_INT_STAGE, phi_model *model)
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void phi_group_advance(phi_lanes x[restrict PHI_DIM], phi_lanes carry[restrict PHI_DIM], phi_model *model)
 {
-#if !PHI_SPARSE
-    phi_lanes gained[PHI_DIM];
-    phi_gain(model, model->residual, gained);
-#endif
+    PHI_GAIN(model)
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
             const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
-#if PHI_SPARSE
-            const double small = lost + (carry[i][lane] - model->gained[i][lane]);
-#else
-            const double small = lost + (carry[i][lane] - gained[i][lane]);
-#endif
+            const double small = lost + (carry[i][lane] - PHI_GAINED(model)[i][lane]);
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
         }
@@ -300,9 +287,7 @@ static phi_status phi_group_join(phi_group *group, int lane, const phi_members *
     if (status != PHI_OK) return status;
     PHI_EACH_STAGE
         for (int k = 0; k < PHI_COEFFICIENTS; ++k) PHI_OF(group->coef, stage)[k][lane] = PHI_OF(s.coef, stage)[k];
-#if PHI_GAUGE
-    memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
-#endif
+    PHI_COPY_GAUGE(group->gauge[lane], s.gauge)
     group->active[lane] = 1;
     return status;
 }

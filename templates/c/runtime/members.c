@@ -16,20 +16,7 @@ typedef struct {
     size_t members, steps, own;
     const phi_params *params; /* NULL for the defaults */
     const double *h;
-#if PHI_TIMED
-    const double *t0;
-#endif
-#if PHI_GAUGE
-    const double *gauge; /* NULL to choose it */
-#endif
-#if PHI_ATTITUDES
-    double *attitude; /* as x is given; NULL where nobody asks for it */
-    double *attitudes; /* NULL for none */
-#endif
-#if PHI_ATTITUDES && PHI_NOISE
-    uint64_t seed, first_step;
-    uint32_t first_member;
-#endif
+#include "state_of_members.h"
     size_t stride; /* 0 where there are no frames */
     double *frames; /* NULL for none */
     unsigned char *status; /* NULL for none */
@@ -88,9 +75,7 @@ static phi_status phi_end_member(const phi_members *all, size_t m, size_t done, 
         if (status == PHI_OK) status = phi_integrate(s, s->h, steps);
         done += steps;
         phi_put_frame(all, m, done, status == PHI_OK ? s->x : NULL);
-#if PHI_ATTITUDES
         phi_put_attitude(all, m, done, status == PHI_OK ? s : NULL);
-#endif
     }
     return status;
 }

@@ -15,44 +15,20 @@
 
 /* A stage in all lanes, linearised around y. */
 typedef struct {
-    phi_lanes y[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM], residual[PHI_DIM];
-#if PHI_SPARSE
-    /* of the Jacobian of alpha(y); that of the increment; what corrections take from the increment */
-    phi_lanes factor[PHI_FACTORS], slope[PHI_DIM * PHI_DIM], gained[PHI_DIM];
-#elif PHI_CENTRED
-    phi_lanes inverse[PHI_DIM * PHI_DIM]; /* a residual r of alpha(y) = x takes inverse r from y */
-#else
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    phi_lanes inverse[PHI_DIM * PHI_DIM], gain[PHI_DIM * PHI_DIM];
-#endif
-#if PHI_PATH
-    phi_lanes middle[PHI_DIM]; /* of the path, less y */
-    phi_lanes alpha_y[PHI_DIM * PHI_DIM], increment_y[PHI_DIM * PHI_DIM]; /* of alpha and beta - alpha, with p held fixed */
-#endif
+#include "state_of_model.h"
 } phi_model;
 
-#if PHI_COMPOSED
-/* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in phi_size, or larger: by the
-   least that a component is in so many stages. */
-static void phi_measure(const phi_model *model, int stages, phi_lanes unit[restrict PHI_DIM])
-#else
-/* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in phi_size. */
-static void phi_measure(const phi_model *model, phi_lanes unit[restrict PHI_DIM])
-#endif
+#include "newton_stages.c"
+
+/* Units of corrections of y, so that matrices are reused down to the same relative size as in phi_size, or larger: the least
+   that a component is in the stages. */
+static void phi_measure(const phi_model *model PHI_AND_INT_STAGES, phi_lanes unit[restrict PHI_DIM])
 {
     phi_lanes norm = { 0.0 };
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) unit[i][lane] = fabs(model->y[i][lane]);
-#if PHI_COMPOSED
-        for (int stage = 1; stage < stages; ++stage) {
-            PHI_EACH_LANE
-            for (int lane = 0; lane < PHI_LANES; ++lane) {
-                const double here = fabs(model[stage].y[i][lane]);
-                unit[i][lane] = here < unit[i][lane] ? here : unit[i][lane];
-            }
-        }
-#endif
+        phi_take_least(model, stages, i, unit[i]);
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
             const double least = PHI_FLOOR * unit[i][lane];

@@ -20,6 +20,8 @@ static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double no
     }
 }
 
+#include "noise_of_flows.c"
+
 /* The increments of the next step: those given, or random ones. 0 if one is not finite. */
 static int phi_draw(phi_solver *s, const double *given)
 {
@@ -29,13 +31,7 @@ static int phi_draw(phi_solver *s, const double *given)
         phi_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
         const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h); /* so that a step of -h undoes one of h */
         for (int k = 0; k < PHI_DRAWS; ++k) s->dw[k] *= size;
-#if PHI_SPLITTING
-        for (int k = 0; k < PHI_SOURCES && s->h < 0.0; ++k) { /* what was last in the step of h comes first */
-            const double late = s->dw[PHI_SOURCES + k];
-            s->dw[PHI_SOURCES + k] = s->dw[k];
-            s->dw[k] = late;
-        }
-#endif
+        phi_order_draws(s);
     }
     for (int k = 0; k < PHI_DRAWS; ++k)
         if (!isfinite(s->dw[k])) return 0;
@@ -50,4 +46,6 @@ phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t
     s->first_step = step - s->steps;
     return PHI_OK;
 }
+
+phi_status phi_integrate(phi_solver *s, double h, size_t steps) { return phi_integrate_along(s, h, steps, NULL); }
 #endif

@@ -1,0 +1,25 @@
+#ifndef PHI_FILE_ADJOINT_BACK
+#define PHI_FILE_ADJOINT_BACK
+#include "adjoint.c"
+
+/* The reverse pass of the step that led to s, from its tape; s becomes the solver before it, but for the state. */
+static phi_status phi_back_step(phi_solver *s, phi_kept trail, phi_cotangent *bar)
+{
+    phi_go_back(s);
+    const phi_status status = PHI_STEP_BACK(s, trail, bar);
+    phi_all_early(s, bar);
+    return status;
+}
+
+/* The reverse pass of a run that ended at s, from its tape. */
+static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const double *rows_bar,
+    phi_kept *trail, phi_cotangent *bar)
+{
+    phi_status status = PHI_OK;
+    for (size_t done = steps; done > 0 && status == PHI_OK; --done) {
+        phi_join(bar, rows_bar, done, steps, stride);
+        status = phi_back_step(s, trail[done - 1], bar);
+    }
+    return status;
+}
+#endif

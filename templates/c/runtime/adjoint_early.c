@@ -1,0 +1,18 @@
+#ifndef PHI_FILE_ADJOINT_EARLY
+#define PHI_FILE_ADJOINT_EARLY
+#include <string.h>
+
+#include "adjoint_stage.c"
+
+/* Transform the derivatives by coefficients that are functions of the time into derivatives by the others of their row. */
+static void phi_early(const double *coef, double *coef_bar, double t)
+{
+    double found[PHI_PREPARED + 1];
+    phi_at_time_adjoint(coef, t, coef_bar + PHI_PREPARED, found);
+    for (int k = 0; k < PHI_PREPARED; ++k) coef_bar[k] += found[k];
+    memset(coef_bar + PHI_PREPARED, 0, PHI_RENEWED_OF_ROW * sizeof coef_bar[0]);
+}
+
+#include "adjoint_early_flows.c"
+#include "adjoint_early_stages.c"
+#endif

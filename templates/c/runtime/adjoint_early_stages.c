@@ -1,0 +1,11 @@
+#ifndef PHI_FILE_ADJOINT_EARLY_STAGES
+#define PHI_FILE_ADJOINT_EARLY_STAGES
+#include "adjoint_early.c"
+
+/* The same for all coefficients of a step, which begins at the time of s. */
+static void phi_all_early(const phi_solver *s, phi_cotangent *bar)
+{
+    PHI_EACH_STAGE
+        phi_early(PHI_OF(s->coef, stage), PHI_OF(bar->coef, stage), s->t + PHI_OF(phi_middles, stage) * s->h);
+}
+#endif

@@ -1,0 +1,11 @@
+#ifndef PHI_FILE_ADJOINT_GATHER
+#define PHI_FILE_ADJOINT_GATHER
+#include "adjoint_lanes.c"
+
+/* Add up the cotangents of coefficients of the lanes that were linearised. */
+static void phi_gather(phi_traced *g, phi_lanes slopes[PHI_COEFFICIENTS], int lane, double coef_bar[PHI_COEFFICIENTS])
+{
+    if (g->wrong[lane] != 0.0) return;
+    for (int k = 0; k < PHI_COEFFICIENTS; ++k) coef_bar[k] += slopes[k][lane];
+}
+#endif

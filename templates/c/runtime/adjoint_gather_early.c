@@ -1,0 +1,17 @@
+#ifndef PHI_FILE_ADJOINT_GATHER_EARLY
+#define PHI_FILE_ADJOINT_GATHER_EARLY
+#include "adjoint_lanes.c"
+
+/* Add up the cotangents of coefficients of the lanes that were linearised. */
+static void phi_gather(phi_traced *g, phi_lanes slopes[PHI_COEFFICIENTS], int lane, double coef_bar[PHI_COEFFICIENTS])
+{
+    if (g->wrong[lane] != 0.0) return;
+    double coef[PHI_COEFFICIENTS], own[PHI_COEFFICIENTS];
+    for (int k = 0; k < PHI_COEFFICIENTS; ++k) {
+        coef[k] = g->coef[k][lane];
+        own[k] = slopes[k][lane];
+    }
+    phi_early(coef, own, g->t[lane]);
+    for (int k = 0; k < PHI_COEFFICIENTS; ++k) coef_bar[k] += own[k];
+}
+#endif

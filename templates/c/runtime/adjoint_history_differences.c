@@ -1,0 +1,16 @@
+#ifndef PHI_FILE_ADJOINT_HISTORY_DIFFERENCES
+#define PHI_FILE_ADJOINT_HISTORY_DIFFERENCES
+#include <string.h>
+
+#include "adjoint_stage.c"
+
+#define PHI_AT_ONCE ((size_t)1) /* steps after which their solutions are read from the predictors */
+
+/* Read the solution of the last step from the predictor of a stage. 0 for more steps. */
+static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_kept *trail)
+{
+    if (steps > 1) return 0;
+    memcpy(PHI_OF(trail[0], stage), history->difference[0], PHI_DIM * sizeof(double));
+    return 1;
+}
+#endif

@@ -1,0 +1,17 @@
+#ifndef PHI_FILE_ADJOINT_HISTORY_RECURRENCES
+#define PHI_FILE_ADJOINT_HISTORY_RECURRENCES
+#include <string.h>
+
+#include "adjoint_stage.c"
+
+#define PHI_AT_ONCE ((size_t)PHI_REMEMBERED) /* steps after which their solutions are read from the predictors */
+
+/* Read the solutions of the last steps from the predictor of a stage. 0 if it has fewer. */
+static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_kept *trail)
+{
+    const size_t count = (size_t)history->count;
+    if (count < steps) return 0;
+    for (size_t k = 0; k < steps; ++k) memcpy(PHI_OF(trail[k], stage), history->past[count - steps + k], PHI_DIM * sizeof(double));
+    return 1;
+}
+#endif

@@ -1,0 +1,26 @@
+#ifndef PHI_FILE_ADJOINT_NEWTON_GENERAL
+#define PHI_FILE_ADJOINT_NEWTON_GENERAL
+#include <string.h>
+
+#include "adjoint_lanes.c"
+#include "adjoint_newton_sparse.c"
+
+/* Linearise the stages. */
+static void phi_linearise_back(phi_traced *g)
+{
+    phi_lanes displacement[PHI_DIM], increment[PHI_DIM], jacobian[PHI_DIM * PHI_DIM];
+    phi_lanes slope[PHI_DIM * PHI_DIM];
+    phi_clear_zeros(jacobian, slope);
+    phi_linearise_lanes(g->coef, g->y, displacement, increment, jacobian, slope);
+    memset(g->wrong, 0, sizeof g->wrong);
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int j = 0; j < PHI_DIM; ++j) {
+            const int to = i * PHI_DIM + j, from = j * PHI_DIM + i;
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) {
+                g->jacobian[to][lane] = jacobian[from][lane];
+                g->gain[to][lane] = slope[from][lane];
+            }
+        }
+}
+#endif

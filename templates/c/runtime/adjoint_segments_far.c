@@ -1,0 +1,30 @@
+#ifndef PHI_FILE_ADJOINT_SEGMENTS_FAR
+#define PHI_FILE_ADJOINT_SEGMENTS_FAR
+#include <string.h>
+
+#include "adjoint_segments.c"
+
+/* Whether all values are finite. */
+static int phi_pull_finite(const phi_group *group)
+{
+    phi_lanes sum = { 0.0 };
+    for (int k = 0; k < group->packs; ++k)
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) sum[lane] += 0.0 * group->pack[k].x[i][lane];
+        }
+    return phi_finite(sum, PHI_LANES);
+}
+
+/* Make steps. If values are not finite, go back to the start of all, from where functions for arguments of any size are used,
+   and return 0. */
+static int phi_pull_steps(phi_group *group, int steps, const phi_back_group *bar)
+{
+    if (group->far) phi_steps_far_lanes(group, steps);
+    else phi_steps_lanes(1, group, steps);
+    if (group->far || phi_pull_finite(group)) return 1;
+    memcpy(group->pack, bar->start, sizeof bar->start);
+    group->far = 1;
+    return 0;
+}
+#endif

@@ -1,0 +1,16 @@
+#ifndef PHI_FILE_ADJOINT_STARTS
+#define PHI_FILE_ADJOINT_STARTS
+#include <string.h>
+
+#include "adjoint_stage.c"
+
+/* Compute the starts of the other stages of a step from that of the first. */
+static void phi_find_starts(const phi_solver *s, phi_kept trail)
+{
+    double change[PHI_DIM];
+    for (int stage = 1; stage < PHI_STAGES; ++stage) {
+        phi_explicit(s->coef[stage - 1], trail[stage - 1], change);
+        for (int i = 0; i < PHI_DIM; ++i) trail[stage][i] = trail[stage - 1][i] + change[i];
+    }
+}
+#endif

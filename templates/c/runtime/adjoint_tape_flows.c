@@ -1,0 +1,17 @@
+#ifndef PHI_FILE_ADJOINT_TAPE_FLOWS
+#define PHI_FILE_ADJOINT_TAPE_FLOWS
+#include "adjoint.c"
+
+phi_status phi_integrate(phi_solver *s, double h, size_t steps) { return phi_integrate_leaving(s, h, steps, NULL); }
+
+#define PHI_AT_ONCE ((size_t)-1) /* any number of steps writes its tape as it is made */
+
+/* Make a few steps, and write their tape. On failure *s is unchanged. */
+static phi_status phi_leave_few(phi_solver *s, size_t steps, phi_kept *trail)
+{
+    const phi_solver before = *s;
+    const phi_status status = phi_integrate_leaving(s, s->h, steps, trail[0]);
+    if (status != PHI_OK) *s = before;
+    return status;
+}
+#endif

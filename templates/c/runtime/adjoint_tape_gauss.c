@@ -1,0 +1,19 @@
+#ifndef PHI_FILE_ADJOINT_TAPE_GAUSS
+#define PHI_FILE_ADJOINT_TAPE_GAUSS
+#include <string.h>
+
+#include "adjoint.c"
+
+#define PHI_AT_ONCE ((size_t)1) /* the predictor stores the changes of the stages of the last step only */
+
+/* Make a step, and write its tape. On failure *s is unchanged. */
+static phi_status phi_leave_few(phi_solver *s, size_t steps, phi_kept *trail)
+{
+    const phi_solver before = *s;
+    const phi_status status = phi_integrate(s, s->h, steps);
+    memcpy(trail[0], before.x, sizeof before.x);
+    memcpy(trail[0] + PHI_DIM, s->history.moves, sizeof s->history.moves);
+    if (status != PHI_OK) *s = before;
+    return status;
+}
+#endif

@@ -1,0 +1,32 @@
+#ifndef PHI_FILE_ATTITUDE_GAUGE
+#define PHI_FILE_ATTITUDE_GAUGE
+#include "model.h"
+#include "attitude_matrices.c"
+#include "attitude_quaternions.c"
+
+/* ---- Gauge rotation: in the frame where momenta are constant, the Casimirs subtracted from H turn the body uniformly ---- */
+/* Take the gauge rotation of a step, less the identity, into an element and its compensation term; NULL for none. */
+static inline void phi_add_aside(phi_solver *s, const double *aside, double element[PHI_ELEMENT], double carry[PHI_ELEMENT])
+{
+    double change[PHI_ELEMENT];
+    if (aside == NULL) return;
+    PHI_ADDED_ASIDE(s->turned, aside, change);
+    for (int i = 0; i < PHI_ELEMENT; ++i) element[i] += change[i];
+    for (int i = 0; i < PHI_ELEMENT; ++i) carry[i] += change[i];
+}
+
+/* Compute the gauge rotation of one step, and of a block of steps, if there are blocks. */
+static void phi_set_aside(phi_solver *s)
+{
+    phi_uniform(s->rate, s->h, s->aside);
+    PHI_SET_ASIDE_OF_BLOCK(s)
+}
+
+/* Compute the rate of the gauge rotation, after x or the attitude has been set. */
+static void phi_take_rate(phi_solver *s)
+{
+    phi_rate(&s->params PHI_AND_GAUGE(s->gauge), s->x, s->rate);
+    phi_carry_rate(s->turned, s->rate);
+    phi_set_aside(s);
+}
+#endif

@@ -1,0 +1,30 @@
+#ifndef PHI_FILE_ATTITUDE_ORTHOGONAL
+#define PHI_FILE_ATTITUDE_ORTHOGONAL
+#include <string.h>
+
+#include "attitude_matrices.c"
+
+/* Correct a factor, less the identity, so that its product with a nearly orthogonal matrix is nearer to an orthogonal one. */
+static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT])
+{
+    enum { N = PHI_ROWS_OF_ATTITUDE };
+    double excess[PHI_ELEMENT], change[PHI_ELEMENT];
+    for (int i = 0; i < N; ++i)
+        for (int j = 0; j < N; ++j) {
+            double sum = i == j ? -1.0 : 0.0;
+            for (int k = 0; k < N; ++k) sum += PHI_PRODUCT_WITH_TRANSPOSE(g, i, j, k, N);
+            excess[i * N + j] = 0.5 * sum;
+        }
+    PHI_ADDED_FACTOR(excess, factor, change);
+    for (int i = 0; i < PHI_ELEMENT; ++i) factor[i] -= excess[i] + change[i];
+}
+
+/* The same for a nearly orthogonal matrix itself, less the identity. */
+static void phi_make_orthogonal(double element[PHI_ELEMENT])
+{
+    double whole[PHI_ELEMENT];
+    memcpy(whole, element, sizeof whole);
+    phi_add_identity(whole);
+    phi_normalise(whole, element);
+}
+#endif

@@ -1,0 +1,13 @@
+#ifndef PHI_FILE_ATTITUDE_VELOCITY_FIRST
+#define PHI_FILE_ATTITUDE_VELOCITY_FIRST
+#include "model.h"
+
+/* The velocity of another point of the body, in body coordinates: before the rate is rotated to these. */
+static inline void phi_leave_position(const double element[PHI_ELEMENT], double rate[PHI_RATE])
+{
+    const double *p = element + 4, *w = rate;
+    rate[3] -= p[1] * w[2] - p[2] * w[1];
+    rate[4] -= p[2] * w[0] - p[0] * w[2];
+    rate[5] -= p[0] * w[1] - p[1] * w[0];
+}
+#endif

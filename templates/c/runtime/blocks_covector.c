@@ -1,0 +1,28 @@
+#ifndef PHI_FILE_BLOCKS_COVECTOR
+#define PHI_FILE_BLOCKS_COVECTOR
+#include "blocks.c"
+
+/* phi_matrix_exponential in all lanes. */
+static void phi_matrix_exponential_lanes(phi_lanes p[PHI_COVECTOR], phi_lanes element[PHI_ELEMENT])
+{
+    const int doublings = phi_doublings(phi_largest(p[PHI_COVECTOR - 1]));
+    if (doublings == 0) {
+        phi_exponential_lanes(p, element);
+        return;
+    }
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        double one[PHI_COVECTOR], made[PHI_ELEMENT];
+        for (int i = 0; i < PHI_COVECTOR; ++i) one[i] = p[i][lane];
+        phi_matrix_exponential(one, made);
+        for (int i = 0; i < PHI_ELEMENT; ++i) element[i][lane] = made[i];
+    }
+}
+
+/* The factors of a stage in all lanes. */
+static void phi_factor_lanes(phi_lanes *coef, phi_lanes *y, phi_lanes turns[PHI_ELEMENT])
+{
+    phi_lanes p[PHI_COVECTOR];
+    phi_turn_lanes(coef, y, p);
+    phi_matrix_exponential_lanes(p, turns);
+}
+#endif

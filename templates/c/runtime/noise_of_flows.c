@@ -1,0 +1,14 @@
+#ifndef PHI_FILE_NOISE_OF_FLOWS
+#define PHI_FILE_NOISE_OF_FLOWS
+#include "solver.h"
+
+/* Steps of -h recompute those of h in the opposite order: the last increments of a step come first. */
+static void phi_order_draws(phi_solver *s)
+{
+    for (int k = 0; k < PHI_SOURCES && s->h < 0.0; ++k) {
+        const double late = s->dw[PHI_SOURCES + k];
+        s->dw[PHI_SOURCES + k] = s->dw[k];
+        s->dw[k] = late;
+    }
+}
+#endif
