@@ -12,11 +12,47 @@ from dataclasses import replace
 from fractions import Fraction
 
 from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.steps import Ends
 from phigen.symbolic.expression import ZERO, Expression, substitute, symbol
 from phigen.symbolic.symbols import HERE, THERE, Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
 _OTHER = {"a": "b", "b": "a"}
+
+
+#: The bonds of a site at the other end of those that begin or end at another, and how these are chosen.
+_OPPOSITE = {"": "", "a": "b", "b": "a"}
+_CHOSEN = {"": "", "here": "there", "there": "here"}
+
+
+def transposed_at_ends(
+    places: Mapping[str, tuple[str, str]], ends: Ends, opposite: Collection[str], back: Kernel, *, summed: bool
+) -> list[tuple[str, Ends, Kernel]]:
+    """Return the ends at which a site is, with the bonds or pairs that it runs over there, and the kernels.
+
+    Each site collects the cotangents that it receives, so that no two sites write to one place. Where bonds are alike
+    from both ends, it runs over them once, as both ends; the kernel computes the sums too if these are to be
+    ``summed``. Else it runs over them as the end b, which reads the cotangents of other sites, and as the end a.
+    """
+    if ends.of_all:
+        whole = paired(places, ends.kernel, back, opposite)
+        sums = [o for o in ends.kernel.outputs if summed]
+        transposes = [("a", ends, replace(whole, outputs=(*whole.outputs, *sums)))]
+    else:
+        turned = replace(ends, end=_OPPOSITE[ends.end], chosen=_CHOSEN[ends.chosen])
+        transposes = [(end, bonds, _at_end(places, back, end)) for end, bonds in (("b", turned), ("a", ends))]
+    return [(end, bonds, kernel) for end, bonds, kernel in transposes if any(not e.is_zero for e in kernel.roots)]
+
+
+def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Kernel:
+    """Restrict a kernel to the cotangents of the site at an end; those of bonds and shared values belong to b."""
+    outputs = []
+    for o in kernel.outputs:
+        names = kernel.inputs["site"] if o.name == "site_bar" else ()
+        selected = [ends[n][1] == end for n in names] if names else [end == "b"] * len(o.values)
+        values = tuple(e if keep else ZERO for e, keep in zip(o.values, selected, strict=True))
+        outputs.append(replace(o, values=values))
+    return replace(kernel, outputs=tuple(outputs))
 
 
 def paired(ends: Mapping[str, tuple[str, str]], kernel: Kernel, back: Kernel, opposite: Collection[str] = ()) -> Kernel:

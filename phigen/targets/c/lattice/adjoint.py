@@ -4,7 +4,7 @@ A sweep is gone back through in two goes, so that every site is written by itsel
 first, each site finds what it gives to the values that it has read. What is its own it adds at once; what belongs to
 others it puts into arrays, one for each value that is ``handed``. In the second, each site adds what it is handed. On
 grids the second go is made by the same loops as the first one of the flow before, see `layout.takes`.
-So it is with the kernels of the equation of a stage, see `adjoint_stages`.
+So it is with the kernels of the equation of a stage, see `stage_kernels`.
 """
 
 from __future__ import annotations
@@ -33,20 +33,29 @@ from phigen.ir.row_drivers import (
     member,
 )
 from phigen.lanes.in_lanes import Rows
+from phigen.scheme.bond_ends import over_ends
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
+from phigen.scheme.stage_kernels import KERNELS, restricted
 from phigen.scheme.steps import BACK, Adjoint, Ends, Gather, Sweep, Sweeps
+from phigen.scheme.sweep_facts import (
+    beside_seams,
+    first_kind,
+    givers,
+    handed_apart,
+    reads_sums,
+    starts_are_read,
+    takes,
+    ways,
+)
 from phigen.scheme.sweep_inverse import apart, can_recompute_fields, transposes
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets.c.kernels import function, members
 from phigen.targets.c.lattice.adjoint_loops import First, Seeds, handed_by
-from phigen.targets.c.lattice.adjoint_stages import KERNELS, restricted
-from phigen.targets.c.lattice.ends import over_ends
-from phigen.targets.c.lattice.layout import Layout, givers, handed_apart, layout_of, starts_are_read, takes, ways
-from phigen.targets.c.lattice.loops import RowLoops, beside_seams, code, first_kind
+from phigen.targets.c.lattice.layout import Layout, layout_of
+from phigen.targets.c.lattice.loops import RowLoops, code
 from phigen.targets.c.lattice.loops import printed as loop_text
-from phigen.targets.c.lattice.partners_back import gathering_back
 from phigen.targets.c.lattice.parts import calls_of, driver_text, drivers
 from phigen.targets.rendering import render
 
@@ -191,8 +200,8 @@ class _Reverse:
                 moved = sweep.moved if undone else ()
                 alike = len(ends) == 1 and ends[0][0].of_all
                 transposed, undo = (alike and apart(kernel)) or (kernel, None)
-                before = tuple(self._gathered(sweep)) if _reads_sums(transposed) else ()
-                kind = first_kind(layout, sweep)
+                before = tuple(self._gathered(sweep)) if reads_sums(transposed) else ()
+                kind = first_kind(step.sites, sweep)
                 before += (member("window", ir.Constant(float(kind))),) if kind is not None else ()
                 if received:
                     transposed = replace(transposed, name=f"{transposed.name}_after{after + 1}")
@@ -213,14 +222,15 @@ class _Reverse:
         """Yield the two traversals of each kernel of the reverse pass of a stage; the first computes the sums."""
         layout, fields, gather = self.layout, self.program.coordinates, self.layout.partners.field
         transposed = [
-            restricted(layout, fields, self.kernels[of + BACK], outputs, name) for name, of, outputs in KERNELS
+            restricted(layout.step.sites, fields, self.kernels[of + BACK], outputs, name)
+            for name, of, outputs in KERNELS
         ]
-        summed = any(map(_reads_sums, transposed))
+        summed = any(map(reads_sums, transposed))
         for number, (kernel, (name, _, outputs)) in enumerate(zip(transposed, KERNELS, strict=True)):
             seed = next(array for array in kernel.inputs if array.endswith("_bar"))
             read = gather if kernel.inputs["gathered"] else None
             ends = tuple(
-                (e, opposite, restricted(layout, fields, back, outputs, f"{e.kernel.name}_{name}"))
+                (e, opposite, restricted(layout.step.sites, fields, back, outputs, f"{e.kernel.name}_{name}"))
                 for e, opposite, back in self._ends_back(read)
             )
             before = tuple(ir.Call(e.kernel.name, (SEGMENT,)) for e, _ in over_ends(gather))
@@ -255,7 +265,7 @@ class _Reverse:
             fields = [self.program.coordinates[f] for f in one.undone]
             first += [*one.before, *(self._cleared(listed) if one.sweep and beside_seams(one.sweep) else ())]
             first += over_sites(one, one.kernel, listed, () if one.undo else fields)
-            bonds = [loop for e in one.ends for loop in gathering_back(self.loops, *e, arrays, summed=bool(one.undo))]
+            bonds = [loop for e in one.ends for loop in self.loops.transposed_sums(*e, arrays, summed=bool(one.undo))]
             loops += bonds
             second += map(called, bonds)
             second += over_sites(one, one.undo, (), fields) if one.undo else ()
@@ -293,11 +303,6 @@ class _Reverse:
 
 
 _HANDED = ir.Member(ROW, "handed")
-
-
-def _reads_sums(kernel: Kernel) -> bool:
-    """Whether a kernel reads what bonds or pairs add up, and not only their cotangents."""
-    return not set(kernel.inputs["gathered"]).isdisjoint(symbols_of(*kernel.roots))
 
 
 def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iterable[Kernel]) -> str:

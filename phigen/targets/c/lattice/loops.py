@@ -8,29 +8,27 @@ from dataclasses import dataclass, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
-from phigen.ir.passes import row_loops
+from phigen.ir.passes import row_loops, row_transposes
 from phigen.ir.passes.by_rows import RowLayout
 from phigen.ir.passes.forms import FULL_RANGE, IN_LANES, calling, forms_of
 from phigen.ir.passes.open_ends import divided_at_ends
 from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries
 from phigen.lanes.in_lanes import Rows
-from phigen.scheme.kernel import Kernel, Output, Role
+from phigen.scheme.bond_ends import over_ends
+from phigen.scheme.kernel import Kernel, Role
+from phigen.scheme.pair_transposes import transposed_at_ends
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends, Gather, Sweep
-from phigen.symbolic.expression import ZERO, gradient
-from phigen.symbolic.symbols import Symbol
-from phigen.targets.c.lattice.ends import over_ends
-from phigen.targets.c.lattice.layout import Layout, chosen_ends
+from phigen.scheme.sweep_facts import chosen_ends
+from phigen.symbolic.symbols import HERE, Symbol
+from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.c.layout import comment
 from phigen.targets.c.loops import function
 from phigen.targets.header import plain, sentence
 
 #: The name of a part of H.
 _PART = re.compile(r"\bH_\d+")
-
-#: The kernel of the derivatives of a sweep along the fields at the site itself.
-BLOCK = "own_slope"
 
 #: Doubles that the densities of observables take, unless there are more observables: two pages, a quarter of the
 #: nearest cache.
@@ -154,6 +152,25 @@ class RowLoops:
     ) -> row_loops.BondLoop:
         return row_loops.BondLoop(calling(temporaries(self.sites.sums(ends)), versions), oriented, arguments)
 
+    def transposed_sums(
+        self, ends: Ends, oriented: frozenset[str], kernel: Kernel, first: int, *, summed: bool
+    ) -> Iterator[ir.Function]:
+        """Yield the transposes of loops that sum over bonds or pairs; see `transposed_at_ends`.
+
+        The cotangents of the sums are in arrays from ``first`` on.
+        """
+        places = self.layout.step.sites.ends
+        for end, bonds, transpose in transposed_at_ends(places, ends, oriented, kernel, summed=summed):
+            built = calling(temporaries(self.sites.transposed_sums(bonds, transpose)), self.versions)
+            name, purpose = kernel.name, "what a site gets of cotangents of sums, its own and those of others"
+            if not ends.of_all:
+                receiver = "the site where the sum is" if end == "a" else "the other site"
+                name, purpose = f"{kernel.name}_{end}", f"what {receiver} gets of cotangents of sums"
+            of_bonds = row_transposes.BondTranspose(
+                replace(built, name=name, doc=purpose), end, first, len(transpose.inputs[HERE]), oriented
+            )
+            yield row_transposes.transposed_sums(of_bonds, self.rows)
+
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function that fills arrays over the sites with the values of a kernel.
 
@@ -167,30 +184,6 @@ class RowLoops:
             sums = [self._bond_loop(ends, oriented, {}) for ends, oriented in meant]
             return row_loops.observable_with_bonds(built, self.rows, sums, apart)
         return row_loops.observable(built, self.rows, [ends.kernel.name for ends, _ in meant], apart)
-
-
-def site_block(program: Program, layout: Layout, relax: Kernel) -> Kernel:
-    """Return the kernel of the derivatives of a sweep along y at the site: for each field those along all fields."""
-    places = layout.step.sites.places
-    at_site = {places[s][0]: s for s in relax.inputs["site"] if not any(places[s][1])}
-    slopes = [gradient(e, [at_site[f]])[0] if f in at_site else ZERO for e in relax.roots for f in program.coordinates]
-    return replace(
-        relax,
-        name=BLOCK,
-        purpose="how y at a site follows y there",
-        outputs=(Output(BLOCK, tuple(slopes)),),
-        role=Role.OWN_SLOPE,
-    )
-
-
-def beside_seams(sweep: Sweep) -> bool:
-    """Whether a sweep has loops for sites away from boundary seams only, or near them only."""
-    return sweep.inside or sweep.window is not None
-
-
-def first_kind(layout: Layout, sweep: Sweep) -> int | None:
-    """Return the first of the kinds of sites on the seams that a sweep is for."""
-    return None if sweep.window is None else sweep.window * layout.step.sites.colours
 
 
 def observables(program: Program, loops: RowLoops) -> Sequence[str]:

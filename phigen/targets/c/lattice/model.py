@@ -8,6 +8,7 @@ from phigen.ir.lattice_loops import bounds
 from phigen.scheme.policies import LatticeNewtonPolicy, LatticeSweepPolicy
 from phigen.scheme.program import MAX_NORMAL_VARIATE, Program
 from phigen.scheme.steps import Sweeps
+from phigen.scheme.sweep_facts import band, reach
 from phigen.spec.model import Parameter, Reduction
 from phigen.spec.names import OVER, REDUCTIONS
 from phigen.targets.c.kernels import function, members
@@ -179,8 +180,8 @@ def _constants(
         yield "SIDES", 2 if layout.slopes else 3, "y before and after a sweep" + ", and varied" * (not layout.slopes)
         yield "MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take"
         if has["BANDED"]:
-            yield "REACH", layout.reach, "sites that y at a site depends on, to each side"
-            yield "BAND", layout.band, "diagonals beside that of the matrix of Newton's method"
+            yield "REACH", reach(step), "sites that y at a site depends on, to each side"
+            yield "BAND", band(step), "diagonals beside that of the matrix of Newton's method"
     else:
         yield "FLOWS", len(step.schedule.flows), "in a step"
     if has["WAVES"]:

@@ -23,24 +23,23 @@ from phigen.ir.row_drivers import (
     at,
 )
 from phigen.lanes.in_lanes import Rows
+from phigen.scheme.bond_ends import over_ends
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.program import Program
+from phigen.scheme.reordered_sweeps import orders, other_ways, turned, turned_increments
+from phigen.scheme.stage_kernels import site_block
 from phigen.scheme.steps import Sweep, Sweeps
+from phigen.scheme.sweep_facts import beside_seams, first_kind, wide
 from phigen.symbolic.special import SPECIAL
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import members
-from phigen.targets.c.lattice.ends import over_ends
-from phigen.targets.c.lattice.layout import Layout, layout_of, switches, wide
+from phigen.targets.c.lattice.layout import Layout, layout_of, switches
 from phigen.targets.c.lattice.loops import (
     RowLoops,
-    beside_seams,
     code,
-    first_kind,
     observables,
     printed,
-    site_block,
 )
-from phigen.targets.c.lattice.turned import orders, other_ways, turned, turned_increments
 from phigen.targets.c.loops import function
 from phigen.targets.rendering import render
 
@@ -63,7 +62,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     if equation:
         texts += _of_equation(loops, equation.relax, rows, end=equation.advance)
         if switches(program, step, layout)["SITE_BLOCKS"]:
-            texts += _of_equation(loops, site_block(program, layout, equation.relax))
+            texts += _of_equation(loops, site_block(step, program.coordinates, equation.relax))
         for kernel in (equation.slope, *equation.tangents) if layout.slopes else ():
             texts += _of_equation(loops, kernel)
     return "\n".join([*texts, *observables(program, loops)])
@@ -216,9 +215,9 @@ class _PartLoops:
             yield _Call(loop, None, arguments(k, (), 1.0), others=tuple(others))
         loops = self.loops.sweep(sweep, form, versions)
         swept = not self.loops.fast and layout.leaves_out(sweep.colour) and not sweep.is_tangent
-        colour, window = sweep.colour if swept else None, first_kind(layout, sweep)
+        colour, window = sweep.colour if swept else None, first_kind(layout.step.sites, sweep)
         called = calls_of(loops, sweep)
-        if len(loops) == 1 and wide(layout, sweep):
+        if len(loops) == 1 and wide(layout.step.sites, sweep):
             up = row_drivers.whole_vectors(ir.Binary("+", LENGTH, ir.Constant(row_drivers.VECTOR - 1)))
             called, colour, window = [(loops[0], (ir.Constant(0), up))], None, None
         fields = [program.coordinates[i] for i in sweep.moved]

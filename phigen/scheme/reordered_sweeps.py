@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations
 
+from phigen.scheme.bond_ends import over_ends
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.steps import Gather, Sites, Sweep
 from phigen.symbolic.expression import natural_key, substitute, symbol
 from phigen.symbolic.symbols import GATHERED, Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
-from phigen.targets.c.lattice.ends import over_ends
 
 #: Most fields of a site whose orders are tried: there are 6 of 3.
 MOST_FIELDS = 3

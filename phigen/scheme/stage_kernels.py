@@ -1,13 +1,16 @@
-"""Transposed kernels of the reverse pass through a stage of the series, restricted to some of their cotangents."""
+"""Kernels derived from those of a stage of the series: transposes of some of its values, and blocks at sites."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from phigen.scheme.kernel import Kernel
-from phigen.symbolic.expression import ZERO
-from phigen.targets.c.lattice.layout import Layout
+from phigen.scheme.kernel import Kernel, Output, Role
+from phigen.scheme.steps import Sites, Sweeps
+from phigen.symbolic.expression import ZERO, gradient
+
+#: The kernel of the derivatives of a sweep along the fields at the site itself.
+_BLOCK = "own_slope"
 
 #: Whether cotangents of fields around are found, and all others.
 _ALL, _FIELDS, _OTHERS = (True, True), (True, False), (False, True)
@@ -17,11 +20,8 @@ _ALL, _FIELDS, _OTHERS = (True, True), (True, False), (False, True)
 KERNELS = (("advance_back", "increment", _ALL), ("slope_back", "relax", _FIELDS), ("relax_back", "relax", _OTHERS))
 
 
-def restricted(
-    layout: Layout, fields: Sequence[str], kernel: Kernel, selection: tuple[bool, bool], name: str
-) -> Kernel:
+def restricted(sites: Sites, fields: Sequence[str], kernel: Kernel, selection: tuple[bool, bool], name: str) -> Kernel:
     """Restrict a transposed kernel to the cotangents of fields, or to the others; those of sums are in both."""
-    places, ends = layout.step.sites.places, layout.step.sites.ends
     of_fields, of_others = selection
     outputs = []
     for o in kernel.outputs:
@@ -29,10 +29,24 @@ def restricted(
         if array == "gathered":
             selected = [True] * len(o.values)
         elif array == "site":
-            bases = [(ends if "sums_bar" in kernel.inputs else places)[s][0] for s in kernel.inputs["site"]]
+            bases = [(sites.ends if "sums_bar" in kernel.inputs else sites.places)[s][0] for s in kernel.inputs["site"]]
             selected = [of_fields if base in fields else of_others for base in bases]
         else:
             selected = [of_others] * len(o.values)
         values = tuple(e if keep else ZERO for e, keep in zip(o.values, selected, strict=True))
         outputs.append(replace(o, values=values))
     return replace(kernel, name=name, outputs=tuple(outputs))
+
+
+def site_block(step: Sweeps, fields: Sequence[str], relax: Kernel) -> Kernel:
+    """Return the kernel of the derivatives of a sweep along y at the site: for each field those along all fields."""
+    places = step.sites.places
+    at_site = {places[s][0]: s for s in relax.inputs["site"] if not any(places[s][1])}
+    slopes = [gradient(e, [at_site[f]])[0] if f in at_site else ZERO for e in relax.roots for f in fields]
+    return replace(
+        relax,
+        name=_BLOCK,
+        purpose="how y at a site follows y there",
+        outputs=(Output(_BLOCK, tuple(slopes)),),
+        role=Role.OWN_SLOPE,
+    )

@@ -1,0 +1,127 @@
+"""Facts on the sweeps of a lattice that decide what code it gets: elimination, blocking, reverse passes."""
+
+from __future__ import annotations
+
+from phigen.scheme.kernel import Kernel, Role
+from phigen.scheme.program import Program
+from phigen.scheme.staging import TABLE
+from phigen.scheme.steps import Sites, Sweep, Sweeps
+from phigen.scheme.sweep_inverse import can_recompute_fields, once, transposes
+from phigen.symbolic.expression import symbols_of
+from phigen.symbolic.symbols import AROUND
+
+#: Diagonals of a matrix beside its own that elimination is for.
+MAX_DIAGONALS = 64
+
+
+def reach(step: Sweeps) -> int:
+    """Return the distance of the farthest neighbour in the equation of a stage, on a lattice with one axis."""
+    relax = step.equation.relax if step.equation else None
+    places = [step.sites.places[s] for s in relax.inputs["site"]] if relax else []
+    return max((abs(offset[-1]) for f, offset in places if f not in step.sites.parameters), default=0)
+
+
+def band(step: Sweeps) -> int:
+    """Return the diagonals beside that of the matrix of a stage, site by site; 0 if elimination does not solve it."""
+    if not step.equation or step.partners or len(step.sites.axes) > 1:
+        return 0
+    diagonals = (reach(step) + 1) * len(step.equation.relax.roots) - 1
+    return diagonals if diagonals <= MAX_DIAGONALS else 0
+
+
+def beside_seams(sweep: Sweep) -> bool:
+    """Whether a sweep has loops for sites away from boundary seams only, or near them only."""
+    return sweep.inside or sweep.window is not None
+
+
+def first_kind(sites: Sites, sweep: Sweep) -> int | None:
+    """Return the first of the kinds of sites on the seams that a sweep is for."""
+    return None if sweep.window is None else sweep.window * sites.colours
+
+
+def wide(sites: Sites, sweep: Sweep) -> bool:
+    """Whether a sweep over a row may go on to the end of its last vector, since what lies beside is copied afresh."""
+    return len(sites.axes) > 1 and sites.colours == 1 and not sweep.gather and not sweep.is_tangent
+
+
+def chosen_ends(step: Sweeps) -> set[str]:
+    """At which ends of the bonds that sweeps add up there may be the sites of a colour."""
+    gathers = (sweep.gather for part in step.parts for sweep in part if sweep.gather)
+    return {ends.chosen for gather in gathers for ends in gather.ends}
+
+
+def site_blocks(program: Program, step: Sweeps) -> bool:
+    """Whether Krylov spaces are those of the matrix times the inverses of its blocks at sites: for grids."""
+    return step.equation is not None and step.partners is None and not band(step) and program.profile == "fast"
+
+
+def waves(program: Program, step: Sweeps) -> bool:
+    """Whether several flows are made at once: of grids, where what a flow reads lies beside."""
+    split = step.equation is None and step.partners is None and not step.sites.seams
+    return split and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
+
+
+@once
+def hands(program: Program, step: Sweeps) -> list[bool]:
+    """Tell for each part of H whether its transpose passes cotangents to other sites."""
+    passes: list[bool] = []
+    if step.equation and step.adjoint:
+        kernels = [kernel for kernel in step.adjoint.steps if "sums_bar" not in kernel.inputs]
+        read = [pair for kernel in kernels for pair in kernel.along("site")]
+        summed = any(kernel.inputs["gathered"] for kernel in kernels)
+        return [summed or any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)]
+    for part, kernels in zip(step.parts, transposes(program, step), strict=False):
+        read = [(s, e) for kernel in kernels for s, e in kernel.along("site")]
+        beside = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)
+        passes.append(beside or any(sweep.gather for sweep in part))
+    return passes
+
+
+def takes(program: Program, step: Sweeps) -> bool:
+    """Whether what a flow hands to sites of a grid on the way back is taken by the loop of the next: in long code."""
+    if program.profile == "small" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
+        return False
+    kernels = [kernel for part in transposes(program, step) for kernel in part]
+    alone = all(len(part) == 1 for part in step.parts) and not any(kernel.inputs.get(AROUND) for kernel in kernels)
+    return alone and any(hands(program, step))
+
+
+def handed_apart(program: Program, step: Sweeps) -> list[bool]:
+    """Tell for each part of H whether separate loops add the cotangents that its sweeps pass to other sites.
+
+    Where the loop of the next flow adds them, that is the first flow only, which is the last in the reverse pass."""
+    first = step.schedule.flows[0][0] if takes(program, step) else None
+    return [passes and first in (None, k) for k, passes in enumerate(hands(program, step))]
+
+
+def ways(step: Sweeps) -> list[tuple[int, int]]:
+    """List for each flow of a step its part and the part of the flow after it.
+
+    The first flow is listed once more, for where it is merged with the last flow of the step before."""
+    parts = [part for part, _ in step.schedule.flows]
+    after = [*parts[1:], parts[1 % len(parts)]]
+    return [*zip(parts, after, strict=True), (parts[0], parts[1 % len(parts)])]
+
+
+def shares(step: Sweeps) -> bool:
+    """Whether loops over sites have shares in sums over all of them: the cotangents of coefficients, or parameters."""
+    kernels = step.adjoint.steps if step.adjoint else ()
+    kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)
+    summed = [kernel.along(array) for kernel in kernels for array in (TABLE, "params") if array in kernel.inputs]
+    return any(not e.is_zero for along in summed for _, e in along)
+
+
+def givers(step: Sweeps) -> bool:
+    """Whether rows that hand something to a row are not those that it reads, since beyond open ends there are none."""
+    return any(step.sites.open[:-1])
+
+
+def starts_are_read(step: Sweeps) -> bool:
+    """Whether the transpose of a stage reads x at its start, beside y."""
+    relax = next((k for k in step.adjoint.steps if k.role is Role.TRANSPOSED_RELAX), None) if step.adjoint else None
+    return relax is not None and not {*relax.inputs.get("start", ())}.isdisjoint(symbols_of(*relax.roots))
+
+
+def reads_sums(kernel: Kernel) -> bool:
+    """Whether a transposed kernel reads sums over bonds or pairs, and not only their cotangents."""
+    return not set(kernel.inputs["gathered"]).isdisjoint(symbols_of(*kernel.roots))
