@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from phigen.api import compile, formulas, load
     from phigen.errors import (
         CheckError,
+        DeviceError,
         LimitError,
         MissingPackageError,
         ParameterError,
@@ -45,6 +46,7 @@ _HOMES = {
     "solve_ivp": "phigen.runtime.habits",
     "Trajectory": "phigen.runtime.trajectory",
     "CheckError": "phigen.errors",
+    "DeviceError": "phigen.errors",
     "LimitError": "phigen.errors",
     "MissingPackageError": "phigen.errors",
     "ParameterError": "phigen.errors",
@@ -57,6 +59,7 @@ _HOMES = {
 
 __all__ = [
     "CheckError",
+    "DeviceError",
     "LatticeSolver",
     "LatticeSystem",
     "LatticeTrajectory",

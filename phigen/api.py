@@ -92,7 +92,8 @@ def compile(
 ) -> Any:
     """A solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled one.
 
-    ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy with a `PhigenWarning`. ``order``
+    ``target`` is ``c``, ``numpy``, ``opencl``, ``cuda``, or ``auto``: C if there is a compiler, else NumPy with a
+    `PhigenWarning`. On ``opencl`` and ``cuda``, ensembles run on a device, see `Solver.device`. ``order``
     overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``gauss``, ``auto``) its scheme; ``tangent``
     asks for `Solver.step_tangent`, ``adjoint`` for `Solver.pullback` and `Solver.jacobian`, beside what the spec asks
     for. The code is that of the profile ``fast``, or of ``profile``: the one of a spec is about what ``phigen build``
@@ -101,7 +102,7 @@ def compile(
     `ToolchainError` if C was asked for in vain, or by naming a compiler in CC that does not work.
     """
     if target != "auto" and not registry.find(target).loader:
-        runnable = ", ".join(registry.LOADABLE)
+        runnable = ", ".join(registry.RUNNABLE)
         raise ValueError(f"Python cannot run the target {target!r}; it can run {runnable}")
     compilation = compilation_of(source, order=order, scheme=scheme, tangent=tangent, adjoint=adjoint, profile=profile)
     return (lattice_solver_of if compilation.spec.lattice else solver_of)(compilation, target)
@@ -170,8 +171,12 @@ def lattice_solver_of(compilation: Compilation, target: str = "auto") -> Lattice
 def _loaded(program: Program, target: str) -> tuple[Any, Any]:
     """The back end of a program, and its interface."""
     interface = interface_of(program)
-    files = emit(program, chosen_target(target, _warn), f"phigen build {program.name}.yaml")
-    return backend_of(files, interface), interface
+    command = f"phigen build {program.name}.yaml"
+    if target in registry.DEVICES:
+        device = registry.find(target)
+        files = {**emit(program, chosen_target("auto", _warn), command), **emit(program, target, command)}
+        return device.load(files, interface), interface
+    return backend_of(emit(program, chosen_target(target, _warn), command), interface), interface
 
 
 def _warn(message: str) -> None:

@@ -110,6 +110,12 @@ class ToolchainError(PhigenError):
     exit_code = 6
 
 
+class DeviceError(ToolchainError):
+    """There is no usable device, or it failed; ``trajectory`` has the results until then, NaN where there are none."""
+
+    trajectory: Any = None
+
+
 class MissingPackageError(PhigenError):
     """A Python package that a request needs is not installed."""
 

@@ -7,7 +7,7 @@ generated files, what can be loaded. It imports what emits and what loads a targ
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
@@ -24,7 +24,8 @@ class Target:
     ``emitter`` is the module whose ``emit(program, command)`` gives file names and their contents; it takes
     ``single_file`` too if that is offered. ``loader`` is the module whose ``load(files, interface)`` makes a back end
     of them, empty if Python cannot run them. ``suffixes`` are those of all files, the first that of the main one.
-    Specs that name no targets get those of ``default``.
+    Specs that name no targets get those of ``default``. A ``device`` is where Python runs the files of the target
+    device, beside those of another target for what runs on the host.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Target:
     default: bool = False
     single_file: bool = False
     compiled: bool = False
+    device: bool = False
 
     def emit(self, program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
         """File names and contents; ``command`` is what regenerates them."""
@@ -64,19 +66,33 @@ _LISTED = (
         compiled=True,
     ),
     Target("numpy", "NumPy", (".py",), "phigen.targets.numpy.emitter", "phigen.runtime.numpy_solver", default=True),
+    Target("device", "OpenCL, CUDA and HIP", ("_device.h",), "phigen.targets.device.emitter"),
     Target("js", "JavaScript", (".mjs",), "phigen.targets.js.emitter"),
 )
 
 #: All targets by name.
 TARGETS: Mapping[str, Target] = {target.name: target for target in _LISTED}
 
+_DEVICE = TARGETS["device"]
+
+#: Where Python runs the files of the target device.
+DEVICES: Mapping[str, Target] = {
+    name: replace(_DEVICE, name=name, title=title, loader=f"phigen.runtime.devices.{name}", device=True)
+    for name, title in (("opencl", "OpenCL"), ("cuda", "CUDA"))
+}
+
 #: What a spec gets that asks for none, and what Python can run.
 DEFAULT = tuple(target.name for target in _LISTED if target.default)
 LOADABLE = tuple(target.name for target in _LISTED if target.loader)
 
+#: The names of all that Python can run a solver on.
+RUNNABLE = (*LOADABLE, *DEVICES)
+
 
 def find(name: str) -> Target:
-    """The target of that name. Raises `ValueError` with a hint if there is none."""
+    """The target or device of that name. Raises `ValueError` with a hint if there is none."""
+    if name in DEVICES:
+        return DEVICES[name]
     if name not in TARGETS:
         listed = {word: t.name for t in _LISTED for word in (t.name, t.title.lower())}
         from difflib import get_close_matches

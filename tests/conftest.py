@@ -42,6 +42,7 @@ def pytest_configure(config):
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if not toolchain.available():
         raise pytest.UsageError("the tests need a C compiler; on Debian: apt-get install gcc libc6-dev")
+    config.addinivalue_line("markers", "exhaustive: left out unless --corpus is given, or the test is named by `::`")
     config.addinivalue_line("markers", "slow: long; left out unless --all or -m is given, or the test is named by `::`")
     config.addinivalue_line(
         "markers", "corpus: of the corpus, systems beside `systems.QUICK` are slow, and those like others need --corpus"
@@ -80,7 +81,9 @@ def _thinned(items):
 
 
 def _is_alike(item):
-    return bool(item.get_closest_marker("corpus")) and not _texts(item).isdisjoint(ALIKE)
+    return bool(item.get_closest_marker("exhaustive")) or (
+        bool(item.get_closest_marker("corpus")) and not _texts(item).isdisjoint(ALIKE)
+    )
 
 
 def _texts(item):
@@ -92,7 +95,11 @@ def _is_slow(item):
     given = _texts(item)
     thinned = [(QUICK, NAMES)] if item.get_closest_marker("corpus") else []
     thinned += [(mark.args, mark.kwargs["of"]) for mark in item.iter_markers("few")]
-    return item.get_closest_marker("slow") or any(given & {*of} - {*few} for few, of in thinned)
+    return (
+        item.get_closest_marker("slow")
+        or item.get_closest_marker("exhaustive")
+        or any(given & {*of} - {*few} for few, of in thinned)
+    )
 
 
 def pytest_sessionfinish():

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: f90240e9d0626b1dc95107f6a52ebc00bcfd74c9852cd21dbc13430e517503cb
+ * body-sha256: 6db1797c5daed388f5f5262b05adf4c01d99d8c30dbf40807a5f11e0d9655f57
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -517,7 +517,7 @@ static int guiding_centre_path(const double *coef, const double x[guiding_centre
 {
     for (int pieces = 1; pieces <= guiding_centre_LONGEST_PATH; pieces *= 2) {
         double q[guiding_centre_DIM], point[guiding_centre_DIM], shift[guiding_centre_DIM],
-            local[guiding_centre_DIM];
+            piece_mean[guiding_centre_DIM];
         int good = 1;
         for (int i = 0; i < guiding_centre_DIM; ++i) {
             q[i] = p[i] / (double)pieces;
@@ -525,10 +525,10 @@ static int guiding_centre_path(const double *coef, const double x[guiding_centre
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < guiding_centre_DIM; ++i) point[i] = x[i] + change[i];
-            good = guiding_centre_piece(coef, q, point, shift, local);
+            good = guiding_centre_piece(coef, q, point, shift, piece_mean);
             ++*made;
             for (int i = 0; i < guiding_centre_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / (double)pieces;
+                mean[i] += (change[i] + piece_mean[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: d1f0b34bee14462d1b73f8164236fc9d6a7d571ac8baf9e6ac600a010326f9f4
+ * body-sha256: a1d232b8a82a585d466b416ec7a77678e66955dc845154ddfeec4bbfdb131689
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -752,7 +752,7 @@ static int quaternion_top_path(const double *coef, const double x[quaternion_top
 {
     for (int pieces = 1; pieces <= quaternion_top_LONGEST_PATH; pieces *= 2) {
         double q[quaternion_top_DIM], point[quaternion_top_DIM], shift[quaternion_top_DIM],
-            local[quaternion_top_DIM];
+            piece_mean[quaternion_top_DIM];
         int good = 1;
         for (int i = 0; i < quaternion_top_DIM; ++i) {
             q[i] = p[i] / (double)pieces;
@@ -760,10 +760,10 @@ static int quaternion_top_path(const double *coef, const double x[quaternion_top
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < quaternion_top_DIM; ++i) point[i] = x[i] + change[i];
-            good = quaternion_top_piece(coef, q, point, shift, local);
+            good = quaternion_top_piece(coef, q, point, shift, piece_mean);
             ++*made;
             for (int i = 0; i < quaternion_top_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / (double)pieces;
+                mean[i] += (change[i] + piece_mean[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

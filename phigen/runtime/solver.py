@@ -67,6 +67,11 @@ class Solver(Named[Backend, Interface]):
         self.interface = interface
         self.spec = spec
 
+    @property
+    def device(self) -> Any:
+        """The device that ensembles run on, with its ``name`` and ``memory`` in bytes; None for other targets."""
+        return getattr(self.backend, "device", None)
+
     def __repr__(self) -> str:
         about = self.interface
         return f"<Solver {about.name}: order {about.order}, target {self.target}, ({', '.join(about.coordinates)})>"

@@ -35,6 +35,10 @@ explicit export false friend mutable namespace new noexcept not not_eq operator 
 reinterpret_cast requires static_assert static_cast template this thread_local throw true try typeid typename using
 virtual wchar_t xor xor_eq fortran far near main size_t ptrdiff_t"""
 
+# Keywords and types of OpenCL C, in which parameters have the names that they have in C.
+_OPENCL = """constant event_t generic global half kernel local pipe quad read_only read_write sampler_t uchar uint ulong
+uniform ushort write_only"""
+
 # Macros of the standard headers, and of those that they include, which belong to no family below.
 _C_MACROS = """AIO_PRIO_DELTA_MAX BC_BASE_MAX BC_DIM_MAX BC_SCALE_MAX BC_STRING_MAX BIG_ENDIAN
 BITINT_MAXWIDTH BUFSIZ BYTE_ORDER CHARCLASS_NAME_MAX CHAR_BIT CLOCKS_PER_SEC COLL_WEIGHTS_MAX CPU_SETSIZE CSIGNAL
@@ -81,11 +85,13 @@ _C_FAMILIES = (
     rf"SIG({'|'.join(_SIGNALS.split())})",
     rf"si_({'|'.join(_SIGINFO.split())})",
     rf"atomic_({_ATOMIC})(_explicit)?",
+    r"(bool|u?(char|short|int|long)|half|float|double)(2|3|4|8|16)",
 )
 
-#: Keywords of C and C++ up to C23 and C++26, and what the standard headers make a macro of, on Linux and elsewhere.
+#: Keywords of C and C++ up to C23 and C++26, and of OpenCL C, and what the standard headers make a macro of, on Linux
+#: and elsewhere.
 C_RESERVED = Reserved(
-    frozenset([*_C.split(), *_C_MACROS.split(), *(f"E{e}" for e in _ERRNO.split())]),
+    frozenset([*_C.split(), *_OPENCL.split(), *_C_MACROS.split(), *(f"E{e}" for e in _ERRNO.split())]),
     re.compile("|".join(_C_FAMILIES)),
 )
 

@@ -35,12 +35,12 @@ class StateBlock:
         numbers = [f"{member} = s->{member}" for member, size in self.saved if not size]
         yield from [f"double {', '.join(arrays)};"] if arrays else []
         yield from [f"const double {', '.join(numbers)};"] if numbers else []
-        yield from (f"memcpy({member}, s->{member}, sizeof {member});" for member, size in self.saved if size)
+        yield from (f"PHI_COPY({member}, s->{member}, {member}, {size});" for member, size in self.saved if size)
 
     def restore(self) -> Iterator[str]:
         """The state from its copies."""
         for member, size in self.saved:
-            yield f"memcpy(s->{member}, {member}, sizeof {member});" if size else f"s->{member} = {member};"
+            yield f"PHI_COPY(s->{member}, {member}, {member}, {size});" if size else f"s->{member} = {member};"
 
 
 _COEFFICIENTS = "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS];"
@@ -180,7 +180,7 @@ STATE = (
         "history",
         "GUESSED",
         ("phi_history PHI_OF(history, PHI_STAGES); /* predictor of the starting value of the iteration */",),
-        reset=("memset(&s->history, 0, sizeof s->history);",),
+        reset=("PHI_FORGET(s->history);",),
     ),
     StateBlock(
         "recurrence",

@@ -23,8 +23,8 @@ def test_what_is_mostly_zero_is_cleared_and_the_rest_is_stored():
     sparse = kernel(x, *[ZERO] * 7, x * y)
     text = kernels.function(PROGRAM, sparse)
     assert "= 0.0;" not in text
-    assert re.findall(r"memset.*|matrix\[\d\] =", text) == [
-        "memset(matrix, 0, 9 * sizeof matrix[0]);",
+    assert re.findall(r"PHI_CLEAR.*|matrix\[\d\] =", text) == [
+        "PHI_CLEAR_FIRST(matrix, 9);",
         "matrix[0] =",
         "matrix[8] =",
     ]
@@ -37,7 +37,7 @@ def test_what_is_mostly_zero_is_cleared_and_the_rest_is_stored():
 
 
 def test_few_zeros_are_stored_like_all_else():
-    assert "memset" not in kernels.function(PROGRAM, kernel(x, ZERO, y))
+    assert "PHI_CLEAR" not in kernels.function(PROGRAM, kernel(x, ZERO, y))
 
 
 @pytest.mark.parametrize("size", [1, 3])
@@ -45,5 +45,5 @@ def test_a_kernel_in_parts_is_cleared_before_the_first_of_them(size, monkeypatch
     monkeypatch.setattr(kernels, "LONGEST_FUNCTION", size)
     text = kernels.function(PROGRAM, kernel(x, *[ZERO] * 20, x * y, x + y))
     *parts, whole = text.split("\nstatic void ")
-    assert not any("memset" in part for part in parts)
-    assert whole.index("memset(matrix, 0, 23") < whole.index("_part1(")
+    assert not any("PHI_CLEAR" in part for part in parts)
+    assert whole.index("PHI_CLEAR_FIRST(matrix, 23") < whole.index("_part1(")

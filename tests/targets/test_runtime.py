@@ -23,6 +23,8 @@ WARNINGS = ("all", "extra", "pedantic", "conversion", "double-promotion", "shado
 OF_LATTICES = ("lattice", "rows", "graph")
 #: The layer of FMUs is written for one model; tests/fmu compile it with the same warnings.
 OF_MODELS = ("fmu",)
+#: That of devices is compiled with its languages by tests/devices.
+OF_DEVICES = ("device",)
 STRICT = ["-std=c99", *(f"-W{warning}" for warning in WARNINGS)]
 
 #: -O1 would take four times as long, sums of pointers with numbers a third more: tests/generated/test_compilers.py has
@@ -135,7 +137,7 @@ def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
 
 @pytest.mark.parametrize(
     "path",
-    [p for p in sorted(RUNTIME.glob("*.c")) if not p.name.startswith(OF_LATTICES + OF_MODELS)],
+    [p for p in sorted(RUNTIME.glob("*.c")) if not p.name.startswith(OF_LATTICES + OF_MODELS + OF_DEVICES)],
     ids=lambda p: p.name,
 )
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):

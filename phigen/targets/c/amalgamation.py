@@ -9,7 +9,7 @@ that nothing calls (`phigen.targets.c.unused`). Other directives remain.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from phigen import resources
@@ -41,9 +41,12 @@ class Amalgam:
         """Files of the runtime that the solver does not include → their include guards."""
         return left_out(self.switches)
 
-    def text(self, file: str) -> str:
-        """Return a file with all files that it includes and that were not included before."""
-        return _spaced(without_unused(self._expanded(file), f"{self.name}_"))
+    def text(self, file: str, spelt: Callable[[Sequence[str]], Sequence[str]] = lambda lines: lines) -> str:
+        """Return a file with all files that it includes and that were not included before.
+
+        ``spelt`` spells its lines in another dialect of C.
+        """
+        return _spaced(spelt(without_unused(self._expanded(file), f"{self.name}_")))
 
     def texts(self, header: str, code: str) -> tuple[str, str]:
         """Return the texts of a header and a source that includes it, as `text` does."""
@@ -56,7 +59,7 @@ class Amalgam:
         if file in self.printed:
             done = file in self._defined
             self._defined.add(file)
-            return [] if done else ["", *self.printed[file].splitlines(), ""]
+            return [] if done else ["", *self._printed(self.printed[file].splitlines()), ""]
         lines: list[str] = []
         pending: list[str] = []
         for line in self._selected((resources.templates() / "c/runtime" / file).read_text(encoding="utf-8")):
@@ -108,10 +111,19 @@ class Amalgam:
     def _holds(self, condition: str) -> bool:
         return holds(condition.replace("PHI_", ""), self.switches)
 
+    def _printed(self, lines: Sequence[str]) -> list[str]:
+        """Return lines that were printed for the solver with macros expanded; names of the model stay as they are."""
+        spelt = [line for line in lines if "PHI_" in line]
+        replaced = dict(zip(spelt, map(self._macros.expanded, ([line] for line in spelt)), strict=True))
+        return [self._prefixed(text) if text != line else text for line in lines for text in replaced.get(line, [line])]
+
+    def _prefixed(self, line: str) -> str:
+        return re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line)
+
     def _own(self, lines: Sequence[str]) -> list[str]:
         """Return lines of the runtime with macros expanded, and with the prefix of the solver."""
         lines = [line for line in lines if not self._not_called.match(line)]
-        return [re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line) for line in self._macros.expanded(lines)]
+        return [self._prefixed(line) for line in self._macros.expanded(lines)]
 
 
 #: Line between header and source while both are processed as one text.

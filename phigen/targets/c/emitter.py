@@ -47,7 +47,7 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
     written = single if program.single else str
     declarations, definitions = amalgam.texts(header, code)
     declared = written(declarations) + "\n#ifdef __cplusplus\n}\n#endif\n"
-    defined = _unrestricted(program, written(definitions))
+    defined = unrestricted(program, written(definitions))
     headers = "\n".join(sorted(amalgam.headers))
     if single_file:
         body = fitted(f"{headers}\n{declared}\n{defined}")
@@ -58,7 +58,7 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
     return {f"{name}.h": _sealed(_declared_lines(program), header), f"{name}.c": _sealed(lines, body)}
 
 
-def _unrestricted(program: Program, code: str) -> str:
+def unrestricted(program: Program, code: str) -> str:
     """Return code that compilers without ``restrict`` accept too.
 
     Only loops over lanes and sites become faster by it. Other code loses the word.
@@ -72,10 +72,10 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     """Return the assembly of a solver, and the files of the runtime from which header and source start."""
     lanes = in_lanes(program)
     has = switches(program, lanes)
-    policies = _policies(program)
+    constants = policies(program)
     step = program.step.swept
     if step is None:
-        return Amalgam(program.name, has, policies | printed(program, lanes, has)), "solver.h", "runtime.c"
+        return Amalgam(program.name, has, constants | printed(program, lanes, has)), "solver.h", "runtime.c"
     from phigen.targets.c.lattice import adjoint as lattice_adjoint
     from phigen.targets.c.lattice import layout as lattice_layout
     from phigen.targets.c.lattice import model as lattice_model
@@ -93,14 +93,14 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     }
     if step.adjoint:
         texts["adjoint_sweeps.h"] = lattice_adjoint.printed(program, step, step.adjoint, lanes)
-    return Amalgam(program.name, has, policies | texts), "lattice.h", "lattice.c"
+    return Amalgam(program.name, has, constants | texts), "lattice.h", "lattice.c"
 
 
-def _policies(program: Program) -> dict[str, str]:
-    """The headers with the constants of policies; sizes of arrays are declared with the solver."""
+def policies(program: Program) -> dict[str, str]:
+    """Return the headers with the constants of policies; sizes of arrays are declared with the solver."""
     sizes = ("DIFFERENCES", "DIRECTIONS")
-    policies = policies_of(program) | ({"gauss_policy": SINGLE_POLICY} if program.single else {})
-    texts = {f"{name}.h": C.text(policy, sizes) for name, policy in policies.items()}
+    policy_by_name = policies_of(program) | ({"gauss_policy": SINGLE_POLICY} if program.single else {})
+    texts = {f"{name}.h": C.text(policy, sizes) for name, policy in policy_by_name.items()}
     return {file: text.replace("PHI_", f"{program.name}_") for file, text in texts.items()}
 
 
@@ -127,11 +127,12 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"] or has["STAGED"]):
         packed = partial(text_of(program).packed, program, step)
         texts["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes, packed))
-    declarations = render("c", "declarations.h", _declarations(program, lanes, has))
-    return {"declarations.h": declarations, "model.h": _model(program, lanes, has, texts.values()), **texts}
+    declarations = render("c", "declarations.h", declared_values(program, lanes, has))
+    return {"declarations.h": declarations, "model.h": model(program, lanes, has, texts.values()), **texts}
 
 
-def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
+def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
+    """Return the values of the template of declarations."""
     member, step = members(program), program.step
     sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
     also = f", and of {_renewing(program)}" if program.step.refresh else ""
@@ -170,6 +171,7 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         "version": program.version,
         "sha256": program.about.spec_sha256,
         "coordinates": ", ".join(program.coordinates),
+        "defaults": _defaults(program),
         "casimirs": f" /* {', '.join(program.casimirs)} */" if program.casimirs else "",
         "members": [(f"double {member[p.name]};", _about(p, member[p.name])) for p in program.parameters]
         or [("char unused;", "this system has no parameters")],
@@ -241,6 +243,11 @@ def _of_attitude(attitude: Attitude) -> Sizes:
     return sizes + ([("RATE", len(rate.roots), "numbers of the rotation rate of the gauge")] if rate else [])
 
 
+def _defaults(program: Program) -> str:
+    """Return the default parameters as an initialiser."""
+    return ", ".join(repr(float(p.value)) for p in program.parameters) or "0"
+
+
 def _about(parameter: Parameter, member: str) -> str:
     """Return the comment on a member of the struct, with the name in the spec if the member has another one."""
     comment = plain(parameter.description) or f"default {float(parameter.value)!r}"
@@ -283,7 +290,8 @@ def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
     return lanes.reverse_packs if isinstance(lanes, Packs) else 1
 
 
-def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
+def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
+    """Return the constants and the functions of the model; ``others`` are further texts printed for it."""
     step = program.step
     body = functions.called(program)
     kernels_of_step = text_of(program).kernels(step, has)
@@ -312,7 +320,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     schedule, solve = step.flow_schedule, step.inner_solve
     values = {
         "NAME": program.name,
-        "defaults": ", ".join(repr(float(p.value)) for p in program.parameters) or "0",
+        "defaults": "" if has["DEVICE"] else _defaults(program),
         "constants": _constants(program, lanes, has),
         "tolerance": repr(solve.tolerance) if solve and (has["NEWTON"] or has["BLOCKS"]) else "",
         "asked": " && ".join(asked),

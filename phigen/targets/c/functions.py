@@ -158,7 +158,8 @@ def _phi(program: Program, f: str) -> Mapping[str, object]:
 def _table(name: str, numbers: Sequence[float]) -> list[str]:
     """Return the declaration of a table, in lines."""
     text = f"static const double {name}[{len(numbers)}] = {{ {', '.join(map(repr, numbers))} }};"
-    return textwrap.wrap(text, WIDTH - 4, subsequent_indent="    ", break_on_hyphens=False)
+    first, *rest = textwrap.wrap(text, WIDTH - 4, subsequent_indent="    ", break_on_hyphens=False)
+    return [first.replace("static const", "PHI_LOCAL_TABLE", 1), *rest]
 
 
 def _values(program: Program, f: str) -> dict[str, object]:

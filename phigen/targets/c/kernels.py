@@ -129,7 +129,7 @@ def function(
     head += [f"    {full_name}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
     head += _exponentials(program, kernel)
     if exported:
-        head.append("    return value[0];" if returning else "    memcpy(out, value, sizeof value);")
+        head.append("    return value[0];" if returning else f"    PHI_COPY(out, value, value, {len(kernel.roots)});")
     return "\n".join([*texts, *head, "}"]) + "\n"
 
 
@@ -257,7 +257,7 @@ def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]
 
 def _default_parameters(program: Program, kernel: Kernel, form: Form) -> list[str]:
     optional = form.exported and "params" in kernel.inputs
-    return [f"    if (params == NULL) params = &{program.name}_default_params;"] if optional else []
+    return ["    PHI_DEFAULT_PARAMETERS"] if optional else []
 
 
 def _bound(program: Program, kernel: Kernel, form: Form, code: Code, scope: Scope) -> list[str]:
@@ -304,7 +304,7 @@ def _statements(
 
 
 def _clear(array: str, size: int) -> str:
-    return f"    memset({array}, 0, {size} * sizeof {array}[0]);"
+    return f"    PHI_CLEAR_FIRST({array}, {size});"
 
 
 def _declared(assignments: Iterable[tuple[str, str]]) -> Iterator[str]:

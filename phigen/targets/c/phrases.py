@@ -486,6 +486,67 @@ FAR = Choice(
     },
 )
 
+MEMORY = Choice(
+    "Arrays, and the parameters by default. Languages of devices have no functions for memory, tables in another"
+    " address space, and no pointer to the defaults. COPY copies a number of entries, in C the size of an array.",
+    ("DEVICE",),
+    {
+        "COPY(to, from, array, count)": ("phi_copy(to, from, count)", "memcpy(to, from, sizeof array)"),
+        "COPY_FIRST(to, from, count)": ("phi_copy(to, from, count)", "memcpy(to, from, count * sizeof to[0])"),
+        "COPY_ENTRIES(to, from, count)": (
+            "phi_copy(to, from, count)",
+            "memcpy(to, from, (size_t)count * sizeof to[0])",
+        ),
+        "CLEAR_FIRST(array, count)": ("phi_clear(array, count)", "memset(array, 0, count * sizeof array[0])"),
+        "COPY_STAGES(to, from, array)": (
+            "phi_copy(to[0], from[0], PHI_UNKNOWNS * PHI_WIDTH)",
+            "memcpy(to, from, sizeof array)",
+        ),
+        "CLEAR_STAGES(z)": ("phi_clear(z[0], PHI_UNKNOWNS * PHI_WIDTH)", "memset(z, 0, sizeof z)"),
+        "CLEAR_STAGE(array)": ("phi_clear(array, PHI_WIDTH)", "memset(array, 0, sizeof array)"),
+        "TAKE_INCREMENTS(to, from)": ("phi_copy(to, from, PHI_DRAWS)", "memmove(to, from, sizeof to)"),
+        "LOCAL_TABLE": ("const", "static const"),
+        "TABLE": ("PHI_TABLE_POINTER", "const"),
+        "FORGET(history)": (
+            "PHI_EACH_STAGE phi_forget(&PHI_OF(history, stage))",
+            "memset(&history, 0, sizeof history)",
+        ),
+        "EMPTY(s)": ("phi_empty(&s);", "memset(&s, 0, sizeof s);"),
+        "DIFFERS(a, b)": ("!(a == b)", "memcmp(&a, &b, sizeof a) != 0"),
+        "DEFAULT_PARAMETERS": ("", "if (params == NULL) params = &phi_default_params;"),
+    },
+)
+
+DEVICE_STARTS = Choice(
+    "Members of an ensemble on a device have a start of their own in time, or a gauge.",
+    ("TIMED", "GAUGE"),
+    {
+        "OWN_STARTS": (
+            "PHI_GLOBAL const double *t0, int own_start,",
+            "PHI_GLOBAL const double *gauge, int own_start,",
+            "",
+        ),
+        "GAUGE_OF_MEMBER(level)": (
+            "",
+            "double level[PHI_GAUGES]; phi_gauge_of(&member, start,"
+            " gauge != NULL && own_start ? gauge + m * PHI_GAUGES : gauge, level);",
+            "",
+        ),
+    },
+)
+
+DEVICE_NOISE = Choice(
+    "The random numbers of a member on a device.",
+    ("NOISE",),
+    {"SET_NOISE(s)": ("phi_set_noise(s, seed, first_member + (uint32_t)m, first_step);", "")},
+)
+
+DEVICE_PREDICTOR = Choice(
+    "What a predictor of a device forgets.",
+    ("GAUSS",),
+    {"FORGET_ORDER(history)": ("", "history->order = 0;")},
+)
+
 PREDICTORS = Choice(
     "Each stage has a predictor of its own, if there are any.",
     ("GUESSES",),
@@ -532,6 +593,10 @@ ALL = (
     JOINED,
     FAR,
     PREDICTORS,
+    MEMORY,
+    DEVICE_STARTS,
+    DEVICE_NOISE,
+    DEVICE_PREDICTOR,
 )
 
 

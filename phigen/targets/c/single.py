@@ -36,12 +36,12 @@ _FUNCTION = re.compile(
 _LEAST, _MOST = 2.0**-126, (2.0 - 2.0**-23) * 2.0**127
 
 
-def single(text: str) -> str:
-    """Return C in single precision from C in double precision."""
-    return "".join(_rewritten(text))
+def single(text: str, *, overloaded: bool = False) -> str:
+    """Return C in single precision from C in double precision; functions that are ``overloaded`` keep their names."""
+    return "".join(_rewritten(text, overloaded))
 
 
-def _rewritten(text: str) -> Iterator[str]:
+def _rewritten(text: str, overloaded: bool) -> Iterator[str]:
     naming = False  # whether this is the line of a #define
     for match in _TOKEN.finditer(text):
         token, kind = match[0], match.lastgroup
@@ -51,7 +51,7 @@ def _rewritten(text: str) -> Iterator[str]:
             yield literal(threshold(value) if naming and 0.0 < value < _THRESHOLD else value)
         elif kind == "name" and token in _NAMES:
             yield _NAMES[token]
-        elif kind == "name" and _FUNCTION.fullmatch(token) and text.startswith("(", match.end()):
+        elif kind == "name" and not overloaded and _FUNCTION.fullmatch(token) and text.startswith("(", match.end()):
             yield f"{token}f"
         else:
             naming = (naming or token == "define") and "\n" not in token

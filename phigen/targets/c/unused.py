@@ -26,7 +26,7 @@ class Function:
 def without_unused(lines: Sequence[str], prefix: str) -> list[str]:
     """The lines without static functions that no other code calls, directly or through such functions, and without
     declarations of functions that are not among the lines, if their names have the prefix of the solver."""
-    functions = [f for f in _functions(lines) if f.name.startswith(prefix)]
+    functions = [f for f in functions_of(lines) if f.name.startswith(prefix)]
     static = [f for f in functions if f.static]
     inside = {k for f in static for k in range(f.begin, f.end)} | _declared(functions)
     reached = _reached(_words(line for k, line in enumerate(lines) if k not in inside), static, lines)
@@ -53,7 +53,8 @@ def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str])
     return reached
 
 
-def _functions(lines: Sequence[str]) -> Iterator[Function]:
+def functions_of(lines: Sequence[str]) -> Iterator[Function]:
+    """Yield the functions that lines declare or define."""
     k = 0
     while k < len(lines):
         end = k

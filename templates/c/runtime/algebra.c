@@ -24,8 +24,8 @@ static int phi_advance(phi_solver *s, const double *change, const double *small)
         carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
+    PHI_COPY(s->x, x, x, PHI_DIM);
+    PHI_COPY(s->carry, carry, carry, PHI_DIM);
     return 1;
 }
 
@@ -53,6 +53,8 @@ static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double mo
 #define PHI_LARGEST_RECIPROCAL 1e3 /* Newton matrices are I + O(h): a pivot with a larger one is far from 1 */
 
 #endif
+#include "device_linear.c"
+#if !PHI_DEVICE
 /* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 #if PHI_UNROLLED
 static int phi_solve_pivoting(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
@@ -86,6 +88,7 @@ static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
     return 1;
 }
 
+#endif
 #if PHI_UNROLLED
 /* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
    does unless a pivot is far from 1. 0 if singular. */

@@ -11,7 +11,7 @@
 static int phi_take_gauge(phi_solver *s, const double gauge[PHI_GAUGES])
 {
     if (gauge == NULL) phi_choose_gauge(&s->params, s->x, s->gauge);
-    else memcpy(s->gauge, gauge, sizeof s->gauge);
+    else PHI_COPY(s->gauge, gauge, s->gauge, PHI_GAUGES);
     return phi_finite(s->gauge, PHI_GAUGES);
 }
 #endif

@@ -22,7 +22,7 @@ typedef double phi_lanes[PHI_WIDTH]; /* a value at each stage */
 /* Where a step starts: the coordinates, and the time if H depends on it. */
 static void phi_start(const phi_solver *s, double point[PHI_POINT])
 {
-    memcpy(point, s->x, sizeof s->x);
+    PHI_COPY(point, s->x, s->x, PHI_DIM);
 #if PHI_TIMED
     point[PHI_DIM] = s->t;
 #endif
@@ -84,7 +84,7 @@ static void phi_seen(const phi_solver *s, phi_lanes *seen)
 #if PHI_FRAMED
     double end[PHI_UNKNOWNS];
     phi_lanes moves[PHI_UNKNOWNS];
-    memcpy(moves, s->history.moves, sizeof moves); /* which need not be aligned as lanes are */
+    PHI_COPY_STAGES(moves, s->history.moves, moves); /* which need not be aligned as lanes are */
     phi_end(moves, end);
 #if PHI_STAGED
     phi_next_frame_lanes(s->coef, end, moves, seen);
@@ -97,7 +97,7 @@ static void phi_seen(const phi_solver *s, phi_lanes *seen)
     }
 #endif
 #else
-    memcpy(seen, s->history.moves, sizeof s->history.moves); /* which need not be aligned as lanes are */
+    PHI_COPY_STAGES(seen, s->history.moves, s->history.moves); /* which need not be aligned as lanes are */
 #endif
 }
 
@@ -116,7 +116,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
         phi_seen(s, next);
         phi_mixed(phi_prediction, next, z);
     } else {
-        memset(z, 0, sizeof z);
+        PHI_CLEAR_STAGES(z);
         past->rate = 0.5;
         past->sweeps = 2;
     }
@@ -131,7 +131,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
         }
         phi_slopes(s, point, weights, z, next);
         const double change = phi_change_of(square, moves, next), rate = change / last;
-        memcpy(moves, next, sizeof next);
+        PHI_COPY_STAGES(moves, next, next);
         if (!isfinite(change)) return PHI_NOT_FINITE;
         if (rate > 0.0 && rate < 1.0 && change > PHI_NEARLY_ROUNDING) past->rate = 0.7 * past->rate + 0.3 * rate;
         const int solved = change * past->rate <= PHI_SOLVED;
@@ -191,7 +191,7 @@ static phi_status phi_attempt(phi_solver *s)
 #endif
     if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
     PHI_PASS(s, elapsed)
-    memcpy(past->moves, moves, sizeof moves);
+    PHI_COPY_STAGES(past->moves, moves, moves);
     past->count = 1;
     return PHI_OK;
 }

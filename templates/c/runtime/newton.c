@@ -36,9 +36,9 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
     double jacobian[PHI_DIM * PHI_DIM], slope[PHI_DIM * PHI_DIM];
     double previous = HUGE_VAL;
 #if PHI_GUESSED
-    if (!phi_predict(&PHI_OF(s->history, stage), y)) memcpy(y, s->x, sizeof y);
+    if (!phi_predict(&PHI_OF(s->history, stage), y)) PHI_COPY(y, s->x, y, PHI_DIM);
 #else
-    memcpy(y, s->x, sizeof y);
+    PHI_COPY(y, s->x, y, PHI_DIM);
 #endif
     for (int iteration = 1; iteration <= PHI_MAX_ITERATIONS; ++iteration) {
         phi_linearise(PHI_OF(s->coef, stage), y, displacement, increment, jacobian, slope);

@@ -26,7 +26,7 @@ static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double no
 static int phi_draw(phi_solver *s, const double *given)
 {
     if (given != NULL) {
-        memmove(s->dw, given, sizeof s->dw);
+        PHI_TAKE_INCREMENTS(s->dw, given);
     } else {
         phi_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
         const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h); /* so that a step of -h undoes one of h */

@@ -64,7 +64,7 @@ static int phi_path(const double *coef, const double x[PHI_DIM], const double p[
     double mean[PHI_DIM], int *made)
 {
     for (int pieces = 1; pieces <= PHI_LONGEST_PATH; pieces *= 2) {
-        double q[PHI_DIM], point[PHI_DIM], shift[PHI_DIM], local[PHI_DIM];
+        double q[PHI_DIM], point[PHI_DIM], shift[PHI_DIM], piece_mean[PHI_DIM];
         int good = 1;
         for (int i = 0; i < PHI_DIM; ++i) {
             q[i] = p[i] / (double)pieces;
@@ -72,10 +72,10 @@ static int phi_path(const double *coef, const double x[PHI_DIM], const double p[
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < PHI_DIM; ++i) point[i] = x[i] + change[i];
-            good = phi_piece(coef, q, point, shift, local);
+            good = phi_piece(coef, q, point, shift, piece_mean);
             ++*made;
             for (int i = 0; i < PHI_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / (double)pieces;
+                mean[i] += (change[i] + piece_mean[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }
@@ -105,7 +105,7 @@ static int phi_differences(phi_solver *s, const double *coef, const double p[PHI
     double q[PHI_DIM], y[PHI_DIM], moved[PHI_DIM], change[PHI_DIM], unused[PHI_DIM * PHI_DIM], norm = DBL_MIN;
     for (int i = 0; i < PHI_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < PHI_DIM; ++j) {
-        memcpy(q, p, sizeof q);
+        PHI_COPY(q, p, q, PHI_DIM);
         q[j] += PHI_DIFFERENCE * norm;
         if (!phi_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < PHI_DIM; ++i) jacobian[i * PHI_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
@@ -120,9 +120,9 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
     const double *coef = PHI_OF(s->coef, stage);
     double p[PHI_DIM], y[PHI_DIM], residual[PHI_DIM], change[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], previous = HUGE_VAL;
 #if PHI_GUESSED
-    if (!phi_predict(&PHI_OF(s->history, stage), y)) memcpy(y, s->x, sizeof y);
+    if (!phi_predict(&PHI_OF(s->history, stage), y)) PHI_COPY(y, s->x, y, PHI_DIM);
 #else
-    memcpy(y, s->x, sizeof y);
+    PHI_COPY(y, s->x, y, PHI_DIM);
 #endif
     phi_generate(coef, y, p, jacobian);
     for (int iteration = 0, made = 0; iteration < PHI_MAX_ITERATIONS && made <= PHI_MOST_PIECES; ++iteration) {

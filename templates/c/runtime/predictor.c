@@ -10,5 +10,6 @@
 
 #include "predictor_recurrences.c"
 #include "predictor_differences.c"
+#include "device_predictor.c"
 
 #endif

@@ -22,12 +22,12 @@ PHI_CHAPTER_OF_SOLVER
 phi_status PHI_INIT_FROM(phi_solver *s, const phi_params *params, const double x0[PHI_DIM] PHI_AND_START)
 {
     if (s == NULL || x0 == NULL PHI_OR_NO_T0) return PHI_BAD_ARGUMENT;
-    if (params == NULL) params = &phi_default_params;
+    PHI_DEFAULT_PARAMETERS
     phi_solver fresh;
-    memset(&fresh, 0, sizeof fresh);
+    PHI_EMPTY(fresh)
     fresh.h = (double)NAN;
     fresh.params = *params;
-    memcpy(fresh.x, x0, sizeof fresh.x);
+    PHI_COPY(fresh.x, x0, fresh.x, PHI_DIM);
     PHI_BEGIN_AT_T0(fresh)
     PHI_TRY_PARAMETERS(fresh)
     if (!phi_finite(fresh.x, PHI_DIM) PHI_OR_BAD_PARAMETERS(fresh))
@@ -44,6 +44,7 @@ phi_status PHI_INIT_FROM(phi_solver *s, const phi_params *params, const double x
 #include "renewed_flows.c"
 #include "renewed_noise.c"
 #include "stage_predicted.c"
+#include "device_stage.c"
 #include "stage_alone.c"
 #include "stages.c"
 
@@ -51,7 +52,7 @@ PHI_ABOUT_RUN
 PHI_RUN(phi_solver *s, double h, size_t steps PHI_AND_RECORD)
 {
     if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
+    if (PHI_DIFFERS(h, s->h)) { /* coefficients and predictors belong to one step size */
         PHI_EACH_STAGE
             phi_prepare(&s->params PHI_AND_GAUGE(s->gauge), PHI_FRACTION(h), PHI_OF(s->coef, stage));
 #include "state_reset.h"
@@ -76,6 +77,5 @@ PHI_RUN(phi_solver *s, double h, size_t steps PHI_AND_RECORD)
 
 #include "status.c"
 
-size_t phi_solver_size(void) { return sizeof(phi_solver); }
-size_t phi_solver_steps_done(const phi_solver *s) { return s->steps; }
+#include "sizes.c"
 #endif

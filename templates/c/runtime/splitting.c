@@ -39,9 +39,9 @@ static phi_status phi_stages(phi_solver *s)
 #endif
 {
     double x[PHI_ALONG] = { 0.0 }, moved[PHI_ALONG] = { 0.0 }, start[PHI_ALONG] = { 0.0 };
-    memcpy(x, s->x, sizeof s->x);
-    memcpy(start, s->x, sizeof s->x);
-    memcpy(moved, s->carry, sizeof s->carry);
+    PHI_COPY(x, s->x, s->x, PHI_DIM);
+    PHI_COPY(start, s->x, s->x, PHI_DIM);
+    PHI_COPY(moved, s->carry, s->carry, PHI_DIM);
 #if PHI_ATTITUDE && PHI_ADJOINT
     double element[PHI_ELEMENT] = { 0.0 };
     phi_flows(s->coef, x, moved, start, element, kept);
@@ -73,8 +73,8 @@ static phi_status phi_stages(phi_solver *s)
 #endif
 {
     double x[PHI_DIM], moved[PHI_DIM];
-    memcpy(x, s->x, sizeof x);
-    memcpy(moved, s->carry, sizeof moved);
+    PHI_COPY(x, s->x, x, PHI_DIM);
+    PHI_COPY(moved, s->carry, moved, PHI_DIM);
 #if PHI_ATTITUDE && PHI_ADJOINT
     double element[PHI_ELEMENT] = { 0.0 };
     phi_flows(s->coef, x, moved, s->x, element, kept);
@@ -102,8 +102,8 @@ static phi_status phi_stages(phi_solver *s)
 static phi_status phi_correct(phi_solver *s, int after)
 {
     double x[PHI_DIM], moved[PHI_DIM];
-    memcpy(x, s->x, sizeof x);
-    memcpy(moved, s->carry, sizeof moved);
+    PHI_COPY(x, s->x, x, PHI_DIM);
+    PHI_COPY(moved, s->carry, moved, PHI_DIM);
     phi_corrector(after, s->coef, x, moved, s->x);
     if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
     phi_settle(s->x, s->carry, moved);

@@ -1,0 +1,110 @@
+"""NVIDIA's cards, by CuPy."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+from phigen.errors import DeviceError, MissingPackageError
+from phigen.runtime.devices.device import GROUP_SIZE, OutOfMemoryError, choose
+from phigen.runtime.interface import Interface
+
+Result = TypeVar("Result")
+
+#: Products and sums are rounded one by one, as those of C: results have the same bits.
+_OPTIONS = ("--fmad=false",)
+
+
+class CUDADevice:
+    """A card of NVIDIA."""
+
+    target = "cuda"
+    double = True
+
+    def __init__(self, cupy: Any, index: int) -> None:
+        self._cupy, self._index = cupy, index
+        facts = cupy.cuda.runtime.getDeviceProperties(index)
+        self.name, self.units = facts["name"].decode(), facts["multiProcessorCount"]
+        self.memory = self.largest = facts["totalGlobalMem"]
+
+    def __repr__(self) -> str:
+        return f"<CUDA device: {self.name}, {self.memory >> 20} MiB>"
+
+    def compiled(self, text: str) -> Any:
+        """See `phigen.runtime.devices.device.Device`."""
+        with self._cupy.cuda.Device(self._index):
+            module = self._cupy.RawModule(code=text, options=_OPTIONS)
+            try:
+                module.compile()
+            except self._cupy.cuda.compiler.CompileException as error:
+                raise DeviceError(f"{self.name}: NVRTC refuses the generated code\n{error}") from error
+            return module
+
+    def kernel(self, program: Any, name: str) -> Any:
+        """See `phigen.runtime.devices.device.Device`."""
+        return program.get_function(name)
+
+    def empty(self, size: int) -> Any:
+        """See `phigen.runtime.devices.device.Device`."""
+        return self._tried(lambda: self._cupy.empty(max(1, size), dtype=np.uint8))
+
+    def write(self, buffer: Any, array: Any) -> None:
+        """See `phigen.runtime.devices.device.Device`."""
+        if array.nbytes:
+            self._tried(lambda: buffer[: array.nbytes].set(array.view(np.uint8).reshape(-1)))
+
+    def read(self, buffer: Any, array: Any) -> None:
+        """See `phigen.runtime.devices.device.Device`."""
+        if array.nbytes:
+            self._tried(lambda: buffer[: array.nbytes].get(out=array.view(np.uint8).reshape(-1)))
+
+    def launch(self, kernel: Any, items: int, arguments: Sequence[Any], group: int = GROUP_SIZE) -> None:
+        """See `phigen.runtime.devices.device.Device`."""
+        passed = tuple(np.uint64(0) if argument is None else argument for argument in arguments)  # a null pointer
+        self._tried(lambda: kernel((-(-items // group),), (group,), passed))
+
+    def _tried(self, call: Callable[[], Result]) -> Result:
+        """Return the result of a call of CUDA, with its errors as those of the protocol."""
+        cuda = self._cupy.cuda
+        try:
+            with cuda.Device(self._index):
+                return call()
+        except cuda.memory.OutOfMemoryError as error:
+            raise OutOfMemoryError(str(error)) from error
+        except (cuda.driver.CUDADriverError, cuda.runtime.CUDARuntimeError) as error:
+            if "OUT_OF_RESOURCES" in str(error) or "MemoryAllocation" in str(error):
+                raise OutOfMemoryError(str(error)) from error
+            raise DeviceError(f"{self.name}: the device was lost, or its driver failed: {error}") from error
+
+
+#: The device of each process: contexts do not survive a fork.
+_OPENED: dict[int, CUDADevice] = {}
+
+
+def device() -> CUDADevice:
+    """Return the device of this process. Raises `MissingPackageError` without CuPy, `DeviceError` without a driver."""
+    if os.getpid() not in _OPENED:
+        try:
+            import cupy
+        except ImportError as error:
+            raise MissingPackageError("target cuda needs CuPy: pip install 'phigen[cuda]'") from error
+        try:
+            runtime = cupy.cuda.runtime
+            names = [runtime.getDeviceProperties(k)["name"].decode() for k in range(runtime.getDeviceCount())]
+        except cupy.cuda.runtime.CUDARuntimeError as error:
+            raise DeviceError(f"CUDA has no driver, or its driver finds no card ({error}); {_HINT}") from error
+        _OPENED[os.getpid()] = CUDADevice(cupy, choose(names, "CUDA"))
+    return _OPENED[os.getpid()]
+
+
+_HINT = "install NVIDIA's driver, or take target opencl, which runs on processors too"
+
+
+def load(files: Mapping[str, str], interface: Interface) -> Any:
+    """Return the back end of generated files; see `phigen.registry`."""
+    from phigen.runtime.devices.loading import backend
+
+    return backend(files, interface, "cuda")

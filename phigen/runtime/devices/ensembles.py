@@ -1,0 +1,224 @@
+"""Solvers of ordinary systems on devices: ensembles run there, single trajectories and observables on the host."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phigen.errors import DeviceError
+from phigen.runtime.backend import Backend
+from phigen.runtime.devices.device import GROUP_SIZE, Device, OutOfMemoryError
+from phigen.runtime.devices.loading import backend, device_of
+from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface, status_name
+from phigen.runtime.members import Members
+from phigen.runtime.session import Session
+
+#: Part of the memory of a device that a batch of members may take; the rest is for other programs and for spills.
+_SHARE = 0.5
+
+#: Steps of members in one launch for each compute unit: about a second. Between launches Python delivers keyboard
+#: interrupts, and systems that stop long kernels have no reason to.
+_STEPS_PER_UNIT = 1 << 24
+
+#: Least members of a launch for each compute unit, so that it has enough to do while others wait for memory.
+_MEMBERS_PER_UNIT = 2048
+
+
+class DeviceSolver:
+    """Back end over a generated header for devices, and over a back end for the host.
+
+    ``group_size`` is the number of work items in a group, on which results do not depend.
+    """
+
+    group_size = GROUP_SIZE
+
+    def __init__(
+        self,
+        files: Mapping[str, str],
+        interface: Interface,
+        target: str,
+        host: Backend,
+        gauge: Floats | None = None,
+    ) -> None:
+        self.interface, self.target = interface, target
+        self._files, self._host, self._gauge = dict(files), host, gauge
+        self._real: Any = np.float32 if interface.single else np.float64
+
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
+        return _loaded_again, (self._files, self.interface, self.target, self._gauge)
+
+    @property
+    def device(self) -> Device:
+        """The device of this process."""
+        return device_of(self.target)
+
+    @property
+    def identity(self) -> str:
+        """See `phigen.runtime.backend.Backend`."""
+        text = f"{self._files[f'{self.interface.name}_device.h']}\n{self.device.name}\n{self._host.identity}"
+        return hashlib.sha256(text.encode()).hexdigest()[:40]
+
+    def with_gauge(self, gauge: Floats) -> DeviceSolver:
+        """See `phigen.runtime.backend.Backend`."""
+        host = self._host.with_gauge(gauge)
+        return DeviceSolver(self._files, self.interface, self.target, host, np.ascontiguousarray(gauge))
+
+    def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`; ``threads`` is without effect.
+
+        Members are integrated in batches that fit into the memory of the device. Raises `DeviceError` if it fails; the
+        ``trajectory`` of the error holds the results so far, NaN for other members.
+        """
+        if turned is not None:
+            raise TypeError(f"target {self.target} computes no attitudes of ensembles; compile for target c")
+        if not len(members):
+            return self._host.ensemble(members, threads)  # it checks the parameters
+        frames, final = members.frames() if members.stride else None, np.full(members.x0.shape, np.nan)
+        if frames is not None:
+            frames[1:] = np.nan
+        status, done, batch = np.zeros(len(members), dtype=np.uint8), 0, self._batch(members)
+        while done < len(members):
+            part = slice(done, min(done + batch, len(members)))
+            try:
+                self._integrate(members.part(part), final[part], status[part], frames, part)
+                done = part.stop
+            except OutOfMemoryError as error:
+                if batch <= self.group_size:
+                    raise self._failure(
+                        f"too little memory for {batch} members: {error}", final, frames, done
+                    ) from None
+                batch //= 2
+            except DeviceError as error:
+                raise self._failure(str(error), final, frames, done) from error
+        failures = {int(m): status_name(int(status[m])) for m in np.flatnonzero(status)}
+        if frames is not None and members.steps % members.stride:
+            frames[-1] = np.where(status[:, np.newaxis] == 0, final, np.nan)
+        return members.checked(final if frames is None else frames, failures)
+
+    def _failure(self, message: str, final: Floats, frames: Floats | None, done: int) -> DeviceError:
+        hint = (
+            f"members from {done} on were not integrated; take fewer, or a larger stride"
+            if done or frames is not None
+            else "take fewer members"
+        )
+        failed = DeviceError(f"{self.interface.name}: {message}\n  hint: {hint}")
+        failed.trajectory = final if frames is None else frames
+        return failed
+
+    def _batch(self, members: Members) -> int:
+        """Return the number of members in a launch."""
+        device, rows = self.device, members.steps // members.stride if members.stride else 0
+        size = np.dtype(self._real).itemsize
+        of_member = size * (self.interface.dimension * (rows + 1) + len(members.parameters) + 3) + 1
+        frames = max(1, size * self.interface.dimension * rows)
+        fitting = int(min(device.memory * _SHARE // of_member, device.largest // frames))
+        short = max(device.units * _MEMBERS_PER_UNIT, device.units * _STEPS_PER_UNIT // max(1, members.steps))
+        return max(1, min(fitting, short, len(members)))
+
+    def _integrate(
+        self, members: Members, final: Floats, status: NDArray[np.uint8], frames: Floats | None, part: slice
+    ) -> None:
+        """Integrate the members of one launch, and put their results in place."""
+        device, count, size = self.device, len(members), np.dtype(self._real).itemsize
+        x = np.ascontiguousarray(members.x0.T, dtype=self._real)
+        rows = members.steps // members.stride if frames is not None else 0
+        states, ended = self._written(x), device.empty(count)
+        out = device.empty(rows * x.size * size) if rows else None
+        arguments: list[Any] = [np.uint64(count), *self._shared_or_each(self._parameters(members)), states]
+        if self.interface.time:
+            arguments += self._shared_or_each(np.atleast_1d(members.t0))
+        elif self._holds_gauge:
+            gauge = self._gauge
+            arguments += [None if gauge is None else self._written(np.array(gauge, self._real)), np.int32(0)]
+        arguments += [*self._shared_or_each(np.atleast_1d(members.h)), np.uint64(members.steps)]
+        if self.interface.noise:
+            first = np.uint32(members.paths[0])
+            arguments += [np.uint64(members.draws.seed), first, np.uint64(members.draws.step)]
+        arguments += [np.uint64(max(1, members.stride)), out, ended]
+        device.launch(self._kernel, count, arguments, self.group_size)
+        device.read(ended, status)
+        device.read(states, x)
+        final[:] = x.T
+        if rows and frames is not None:
+            stored_rows = np.empty((rows, *x.shape), self._real)
+            device.read(out, stored_rows)
+            frames[1 : rows + 1, part] = stored_rows.transpose(0, 2, 1)
+
+    @cached_property
+    def _kernel(self) -> Any:
+        name = self.interface.name
+        program = self.device.compiled(self._files[f"{name}_device.h"])
+        return self.device.kernel(program, f"{name}_ensemble_kernel")
+
+    @cached_property
+    def _holds_gauge(self) -> bool:
+        return f"{self.interface.name}_GAUGES" in self._files[f"{self.interface.name}_device.h"]
+
+    def _parameters(self, members: Members) -> Floats:
+        """Return the parameters (members or 1, parameters); a system without any has one unused number."""
+        values = list(members.parameters.values()) or [np.zeros(())]
+        count = len(members) if any(np.ndim(v) for v in values) else 1
+        return np.stack([np.broadcast_to(v, (count,)) for v in values], axis=-1)
+
+    def _shared_or_each(self, values: Floats) -> list[Any]:
+        """Return a buffer of values for all members, or for each, and 1 if they are for each."""
+        return [self._written(np.ascontiguousarray(values, dtype=self._real)), np.int32(len(values) > 1)]
+
+    def _written(self, array: NDArray[Any]) -> Any:
+        buffer = self.device.empty(array.nbytes)
+        self.device.write(buffer, array)
+        return buffer
+
+    def start(
+        self,
+        x0: Floats,
+        parameters: Mapping[str, float],
+        t0: float = 0.0,
+        first: Floats | None = None,
+        draws: Draws = FIRST_DRAWS,
+    ) -> Session:
+        """See `phigen.runtime.backend.Backend`; a trajectory of its own runs on the host."""
+        return self._host.start(x0, parameters, t0, first, draws)
+
+    def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
+        """See `phigen.runtime.backend.Backend`."""
+        return self._host.restored(saved, parameters)
+
+    def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
+        """See `phigen.runtime.backend.Backend`; on the host."""
+        return self._host.pullback(members, bars, threads)
+
+    def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        return self._host.hamiltonian(x, parameters, t)
+
+    def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        return self._host.casimirs(x, parameters)
+
+    def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        return self._host.vector_field(x, parameters, t)
+
+    def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        return self._host.observables(x, parameters, t)
+
+    def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        return self._host.noise_fields(x, parameters, t)
+
+    def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        return self._host.rate(x, parameters)
+
+
+def _loaded_again(files: Mapping[str, str], interface: Interface, target: str, gauge: Floats | None) -> DeviceSolver:
+    """Return a solver that was pickled, on the device of this process."""
+    solver: DeviceSolver = backend(files, interface, target)
+    return solver if gauge is None else solver.with_gauge(gauge)

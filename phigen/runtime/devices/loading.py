@@ -1,0 +1,33 @@
+"""Back ends of generated files for devices, beside those for the host."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
+
+from phigen import registry
+from phigen.errors import DeviceError
+from phigen.runtime.devices.device import Device
+from phigen.runtime.interface import Interface
+
+#: The modules of devices by target.
+DEVICES = {"opencl": "phigen.runtime.devices.opencl", "cuda": "phigen.runtime.devices.cuda"}
+
+
+def device_of(target: str) -> Device:
+    """Return the device of a target in this process. Raises `DeviceError` or `MissingPackageError`."""
+    opened: Device = import_module(DEVICES[target]).device()
+    return opened
+
+
+def backend(files: Mapping[str, str], interface: Interface, target: str) -> Any:
+    """Return the back end of generated files: what runs on the host is of another target among the files."""
+    from phigen.runtime.devices.ensembles import DeviceSolver
+
+    host = registry.target_of([file for file in files if not file.endswith("_device.h")], interface.name)
+    device = device_of(target)
+    if not (device.double or interface.single):
+        hint = "say real: float in the spec, or take another device, which PHIGEN_DEVICE names"
+        raise DeviceError(f"{device.name} has no numbers in double precision; {hint}")
+    return DeviceSolver(files, interface, target, host.load(files, interface))

@@ -1,0 +1,122 @@
+"""Devices of OpenCL, by pyopencl."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from phigen.errors import DeviceError, MissingPackageError
+from phigen.runtime.devices.device import GROUP_SIZE, OutOfMemoryError, choose
+from phigen.runtime.interface import Interface
+
+Result = TypeVar("Result")
+
+#: Without relaxed arithmetic, results have the same bits as those of C. Kernels are short: warnings of drivers about
+#: unrolled loops say nothing.
+_OPTIONS = ["-w"]
+
+_MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY", "INVALID_BUFFER_SIZE")
+_LOST = "the device was lost, or its driver failed"
+
+
+class OpenCLDevice:
+    """A device of OpenCL, with a queue."""
+
+    target = "opencl"
+
+    def __init__(self, cl: Any, device: Any) -> None:
+        self._cl = cl
+        self._context = cl.Context([device])
+        self._queue = cl.CommandQueue(self._context)
+        self.name, self.units = f"{device.name.strip()}, {device.platform.name.strip()}", device.max_compute_units
+        self.memory, self.largest = device.global_mem_size, device.max_mem_alloc_size
+        self.double = bool(device.double_fp_config)
+
+    def __repr__(self) -> str:
+        return f"<OpenCL device: {self.name}, {self.memory >> 20} MiB>"
+
+    def compiled(self, text: str) -> Any:
+        """See `phigen.runtime.devices.device.Device`."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # logs of successful compilations
+            try:
+                return self._cl.Program(self._context, text).build(options=_OPTIONS)
+            except self._cl.Error as error:
+                raise DeviceError(f"{self.name}: the driver refuses the generated code\n{error}") from error
+
+    def kernel(self, program: Any, name: str) -> Any:
+        """See `phigen.runtime.devices.device.Device`."""
+        return self._cl.Kernel(program, name)
+
+    def empty(self, size: int) -> Any:
+        """See `phigen.runtime.devices.device.Device`."""
+        return self._tried(lambda: self._cl.Buffer(self._context, self._cl.mem_flags.READ_WRITE, max(1, size)))
+
+    def write(self, buffer: Any, array: Any) -> None:
+        """See `phigen.runtime.devices.device.Device`."""
+        if array.nbytes:
+            self._tried(lambda: self._cl.enqueue_copy(self._queue, buffer, array))
+
+    def read(self, buffer: Any, array: Any) -> None:
+        """See `phigen.runtime.devices.device.Device`."""
+        if array.nbytes:
+            self._tried(lambda: self._cl.enqueue_copy(self._queue, array, buffer))
+
+    def launch(self, kernel: Any, items: int, arguments: Sequence[Any], group: int = GROUP_SIZE) -> None:
+        """See `phigen.runtime.devices.device.Device`."""
+        size = min(group, kernel.get_work_group_info(self._cl.kernel_work_group_info.WORK_GROUP_SIZE, self._device))
+        self._tried(lambda: kernel(self._queue, (-(-items // size) * size,), (size,), *arguments))
+
+    @property
+    def _device(self) -> Any:
+        return self._context.devices[0]
+
+    def _tried(self, call: Callable[[], Result]) -> Result:
+        """Return the result of a call of OpenCL, with its errors as those of the protocol."""
+        try:
+            return call()
+        except self._cl.Error as error:
+            if isinstance(error, self._cl.MemoryError) or any(word in str(error) for word in _MEMORY):
+                raise OutOfMemoryError(str(error)) from error
+            raise DeviceError(f"{self.name}: {_LOST}: {error}") from error
+
+
+#: The device of each process: contexts do not survive a fork.
+_OPENED: dict[int, OpenCLDevice] = {}
+
+
+def device() -> OpenCLDevice:
+    """Return the device of this process.
+
+    Raises `MissingPackageError` without pyopencl, `DeviceError` without a driver.
+    """
+    if os.getpid() not in _OPENED:
+        try:
+            import pyopencl as cl
+        except ImportError as error:
+            raise MissingPackageError("target opencl needs pyopencl: pip install 'phigen[opencl]'") from error
+        devices = _listed(cl)
+        _OPENED[os.getpid()] = OpenCLDevice(cl, devices[choose([d.name for d in devices], "OpenCL")])
+    return _OPENED[os.getpid()]
+
+
+def _listed(cl: Any) -> list[Any]:
+    """Return all devices, graphics cards first. Raises `DeviceError` if there are none."""
+    try:
+        devices = [d for platform in cl.get_platforms() for d in platform.get_devices()]
+    except cl.Error:
+        devices = []
+    if not devices:
+        hint = "install that of the card, or for the processor: pip install 'pyopencl[pocl]'"
+        raise DeviceError(f"OpenCL has no driver, or its driver finds no device; {hint}")
+    order = [cl.device_type.GPU, cl.device_type.ACCELERATOR]
+    return sorted(devices, key=lambda d: next((k for k, kind in enumerate(order) if d.type & kind), len(order)))
+
+
+def load(files: Mapping[str, str], interface: Interface) -> Any:
+    """Return the back end of generated files; see `phigen.registry`."""
+    from phigen.runtime.devices.loading import backend
+
+    return backend(files, interface, "opencl")

@@ -1,0 +1,1 @@
+"""The target device: one header for OpenCL, CUDA and HIP."""

@@ -1,0 +1,73 @@
+"""A program as `NAME_device.h`, one source for OpenCL C, CUDA and HIP.
+
+It is the C of profile small in a dialect: the runtime of ``templates/c/runtime`` with the switch ``DEVICE``, whose
+prelude names what the languages spell differently, and a kernel for ensembles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from functools import partial
+from typing import Any
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.scheme.program import Program
+from phigen.targets.c import emitter as c
+from phigen.targets.c.amalgamation import Amalgam
+from phigen.targets.c.features import switches
+from phigen.targets.c.layout import fitted
+from phigen.targets.c.single import single
+from phigen.targets.c.step_text import text_of
+from phigen.targets.device.dialect import qualified
+from phigen.targets.header import header_lines, sealed
+from phigen.targets.rendering import render
+
+#: The end of the name of a generated file.
+SUFFIX = "_device.h"
+
+
+def emit(program: Program, command: str) -> dict[str, str]:
+    """File names and their contents."""
+    expect_offered(program)
+    name = program.name
+    lines = [*header_lines(program, command), *_READING]
+    return {f"{name}{SUFFIX}": sealed(lines, text_of_device(for_devices(program)))}
+
+
+def expect_offered(program: Program) -> None:
+    """Raise `SpecError` for lattices."""
+    if program.step.kind.sites:
+        message = f"target device: {program.name} is a lattice; there are kernels of ordinary systems only"
+        raise SpecError([Diagnostic(message, hint="take target c")])
+
+
+_READING = (
+    "OpenCL C, CUDA and HIP read this file; the kernels are at its end. A compiler for the host sees types and sizes.",
+)
+
+
+def for_devices(program: Program) -> Program:
+    """Return a program without the parts that no kernel calls: derivatives of steps, the modified H, attitudes."""
+    left_out: dict[str, Any] = {"adjoint": None, "tangent": None, "tangents": ()}
+    parts = {f.name for f in fields(program.step)}
+    step = replace(program.step, **{part: none for part, none in left_out.items() if part in parts})
+    extras = replace(program.extras, tangent=False, adjoint=False, modified_hamiltonian=0)
+    return replace(program, step=step, extras=extras, modified=None, attitude=None, lanes=False, profile="small")
+
+
+def text_of_device(program: Program) -> str:
+    """Return the text of a file but its first comment."""
+    has = switches(program, None) | {"DEVICE": True, "KICKED": False}
+    language = render("c", "device_language.h", {"NAME": program.name, "double": not program.single})
+    texts = {"device_language.h": language} | text_of(program).texts(program, program.step, None, has)
+    declarations = render("c", "device_declarations.h", c.declared_values(program, None, has))
+    texts |= {"device_declarations.h": declarations, "model.h": c.model(program, None, has, texts.values())}
+    amalgam = Amalgam(program.name, has, c.policies(program) | texts)
+    body = c.unrestricted(program, amalgam.text("device.c", partial(qualified, name=program.name)))
+    body = _guarded(program.name, body)
+    return fitted(single(body, overloaded=True) if program.single else body)
+
+
+def _guarded(name: str, text: str) -> str:
+    guard = f"{name.upper()}_DEVICE_H"
+    return f"#ifndef {guard}\n#define {guard}\n{text}#endif /* {guard} */\n"

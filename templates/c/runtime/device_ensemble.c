@@ -1,0 +1,51 @@
+#ifndef PHI_FILE_DEVICE_ENSEMBLE
+#define PHI_FILE_DEVICE_ENSEMBLE
+#include "device_solver.c"
+#include "device_gauge.c"
+
+/* ---- The kernel of ensembles ---- */
+/* Each work item integrates one member; work items beyond members do nothing, so that any size of work groups or blocks
+   gives the same results. x[i * members + m] is coordinate i of member m, first at the start, then at the end; failed
+   members have the last good state. Where own_params is 1, member m has the parameters params[m], where it is 0 all have
+   params[0]; own_h says the same of h. */
+#if PHI_TIMED
+/* So does own_start of the initial times t0. */
+#elif PHI_GAUGE
+/* So does own_start of gauge, PHI_GAUGES numbers for a member; gauge may be NULL: chosen at the initial states. */
+#endif
+/* frames, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
+   coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before. status[m] is a phi_status. */
+#if PHI_NOISE
+/* Member m takes the random numbers of first_member + m, from the step first_step on, as phi_ensemble_of does. */
+#endif
+PHI_KERNEL void phi_ensemble_kernel(uint64_t members, PHI_GLOBAL const phi_params *params, int own_params,
+    PHI_GLOBAL double *x,
+    PHI_OWN_STARTS
+    PHI_GLOBAL const double *h, int own_h, uint64_t steps,
+    PHI_RANDOM_NUMBERS
+    uint64_t stride, PHI_GLOBAL double *frames, PHI_GLOBAL unsigned char *status)
+{
+    const uint64_t m = PHI_WORK_ITEM;
+    phi_solver s;
+    double start[PHI_DIM];
+    if (m >= members) return;
+    for (int i = 0; i < PHI_DIM; ++i) start[i] = x[i * members + m];
+    const phi_params member = params[own_params ? m : 0];
+    PHI_GAUGE_OF_MEMBER(level)
+    phi_status ended = PHI_INIT_OWN(&s, &member, start, t0[own_start ? m : 0], level);
+    const int begun = ended == PHI_OK;
+    PHI_SET_NOISE(&s)
+    uint64_t done = 0;
+    PHI_NO_UNROLL
+    do {
+        const uint64_t left = steps - done, next = frames != NULL && stride - done % stride < left ? stride - done % stride : left;
+        if (ended == PHI_OK) ended = phi_integrate(&s, h[own_h ? m : 0], next);
+        done += next;
+        if (frames != NULL && done > 0 && done % stride == 0)
+            for (int i = 0; i < PHI_DIM; ++i)
+                frames[((done / stride - 1) * PHI_DIM + i) * members + m] = ended == PHI_OK ? s.x[i] : (double)NAN;
+    } while (done < steps);
+    for (int i = 0; i < PHI_DIM; ++i) x[i * members + m] = begun ? s.x[i] : start[i];
+    status[m] = (unsigned char)ended;
+}
+#endif

@@ -1,0 +1,48 @@
+#ifndef PHI_FILE_DEVICE_PREDICTOR
+#define PHI_FILE_DEVICE_PREDICTOR
+#include "model.h"
+#include "predictor_policy.h"
+
+/* All loops have constant bounds, and selections in place of branches, so that a compiler can keep all values in
+   registers. */
+
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the equation of
+   a step has solutions that have nothing to do with the motion. */
+static int phi_predict(const phi_history *history, double value[PHI_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    PHI_UNROLL
+    for (int i = 0; i < PHI_DIM; ++i) {
+        value[i] = 0.0;
+        PHI_UNROLL
+        for (int k = 0; k < PHI_DIFFERENCES; ++k) value[i] = k < history->order ? value[i] + history->difference[k][i] : value[i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= PHI_REACH * size;
+}
+
+/* Take in a solved value. The guess of order k missed it by its k-th difference: the next has the best. */
+static void phi_remember(phi_history *history, const double value[PHI_DIM])
+{
+    double least = HUGE_VAL, next[PHI_DIM];
+    phi_copy(next, value, PHI_DIM);
+    PHI_UNROLL
+    for (int k = 0; k < PHI_DIFFERENCES; ++k) {
+        const int known = k <= history->count;
+        double size = 0.0;
+        PHI_UNROLL
+        for (int i = 0; i < PHI_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = known ? next[i] : last;
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        const int better = known && k > 0 && size < least;
+        least = better ? size : least;
+        history->order = better ? k : history->order;
+    }
+    history->order = history->count == 0 ? 1 : history->order;
+    history->count += history->count < PHI_DIFFERENCES;
+}
+#endif

@@ -1,0 +1,25 @@
+#ifndef PHI_FILE_DEVICE_STAGE
+#define PHI_FILE_DEVICE_STAGE
+#include "device_solver.h"
+
+/* Forget the solutions from which the starting values of the next iterations are extrapolated. */
+static void phi_forget(phi_history *history)
+{
+    history->count = 0;
+    PHI_FORGET_ORDER(history)
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
+{
+    phi_status status = PHI_OK;
+    PHI_NO_UNROLL
+    for (int attempt = 0; attempt < 2; ++attempt) {
+        status = phi_attempt(s PHI_AND_STAGE);
+        if (status == PHI_OK || PHI_OF(s->history, stage).count == 0) break;
+        phi_forget(&PHI_OF(s->history, stage));
+    }
+    return status;
+}
+
+#endif

@@ -1,0 +1,32 @@
+"""Generated code as CUDA, by NVIDIA's compilers: they need no card."""
+
+import nvrtc
+import pytest
+from support import COMMAND
+
+from phigen.api import compilation_of
+from phigen.compiler import emit
+
+pytestmark = pytest.mark.skipif(not nvrtc.is_installed(), reason="the wheels of NVRTC and ptxas are not installed")
+
+
+def resources_of(name, architecture, folder):
+    """The resources of the kernel of ensembles."""
+    (text,) = emit(compilation_of(name, profile="small").program, "device", COMMAND).values()
+    compiled = nvrtc.assembled(nvrtc.ptx(text, architecture), architecture, folder)
+    return compiled[f"{name}_ensemble_kernel"]
+
+
+@pytest.mark.parametrize("architecture", nvrtc.ARCHITECTURES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "pendulum_euler",
+        pytest.param("rigid_body", marks=pytest.mark.slow),
+        pytest.param("kepler_eccentric", marks=pytest.mark.slow),
+        pytest.param("kowalevski_gauss", marks=pytest.mark.slow),
+        pytest.param("nambu_pendulum", marks=pytest.mark.slow),
+    ],
+)
+def test_code_compiles_for_two_generations_of_cards(name, architecture, tmp_path):
+    assert 0 < resources_of(name, architecture, tmp_path).registers <= 255

@@ -1,0 +1,196 @@
+"""Ensembles on devices, by OpenCL on the processor, against C."""
+
+import importlib.util
+import pickle
+
+import numpy as np
+import pytest
+from support import compile_text
+from systems import spec_of
+
+import phigen
+from phigen import resources
+from phigen.api import compilation_of
+from phigen.errors import DeviceError, MissingPackageError
+from phigen.runtime.devices import opencl
+from phigen.runtime.devices.device import OutOfMemoryError
+from phigen.symbolic.expression import topological
+
+pytest.importorskip("pyopencl")
+
+#: Functions that libraries round in their own ways; all else has the same bits everywhere.
+TRANSCENDENTAL = {"exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "atan", "anomaly"}
+
+CORPUS = sorted(path.stem for path in resources.bundled_specs().glob("*.yaml"))
+BODY = """
+coordinates: [x1, x2, x3]
+parameters: {I1: 1, I2: 2}
+poisson:
+  brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}
+hamiltonian: (x1**2/I1 + x2**2/I2 + x3**2/3)/2
+casimirs: {C: x1**2 + x2**2 + x3**2}
+order: 2
+"""
+#: Of each kind of step, of time, of noise, and of a monitor.
+QUICK = ("pendulum_euler",)
+LONGER = (
+    "kepler_eccentric",
+    "rigid_body",
+    "nambu_pendulum",
+    "kowalevski_gauss",
+    "seasonal_predator_prey",
+    "thermal_spin",
+    "double_well",
+)
+
+
+def cases():
+    for name in CORPUS:
+        mark = () if name in QUICK else pytest.mark.slow if name in LONGER else pytest.mark.exhaustive
+        yield pytest.param(name, marks=mark)
+
+
+def both(source):
+    """The solvers of a source by OpenCL and by C, whose steps are the same."""
+    compilation = compilation_of(source, profile="small")
+    return [phigen.compile(compilation, target, profile="small") for target in ("opencl", "c")]
+
+
+def starts(name, members):
+    run = next(iter(spec_of(name).runs.values()))
+    start = np.array([float(v) for v in run.initial])
+    return start * (1 + 1e-3 * np.random.default_rng(1).standard_normal((members, len(start)))), float(run.step)
+
+
+@pytest.mark.parametrize("name", [*cases()])
+def test_members_are_those_of_c(name):
+    """Bit by bit without functions of a library; noise by the same numbers."""
+    device, c = both(name)
+    x0, h = starts(name, 5)
+    drawn = {"seed": 7} if c.interface.noise else {}
+    frames, expected = (solver.ensemble(x0, h, 40, stride=7, **drawn) for solver in (device, c))
+    program = compilation_of(name, profile="small").program
+    called = {e.op for kernel in program.kernels for e in topological([*kernel.roots])}
+    if called.isdisjoint(TRANSCENDENTAL) and not c.interface.noise:
+        np.testing.assert_array_equal(frames, expected)
+    np.testing.assert_allclose(frames, expected, rtol=0, atol=1e-14 * np.abs(expected).max())
+
+
+@pytest.fixture(scope="module")
+def body():
+    return both(compile_text(BODY))
+
+
+@pytest.fixture
+def x0():
+    return np.random.default_rng(2).standard_normal((100, 3)) + 1
+
+
+def test_members_have_parameters_and_steps_of_their_own(body, x0):
+    device, c = body
+    own = {"h": np.linspace(0.01, 0.1, 100), "I1": np.linspace(1, 2, 100)}
+    np.testing.assert_array_equal(device.ensemble(x0, steps=20, **own), c.ensemble(x0, steps=20, **own))
+
+
+@pytest.mark.parametrize("size", [1, 256])
+def test_bits_do_not_depend_on_the_size_of_work_groups(body, x0, size, monkeypatch):
+    device, _ = body
+    expected = device.ensemble(x0, 0.1, 20, stride=4)
+    monkeypatch.setattr(device.backend, "group_size", size, raising=False)
+    np.testing.assert_array_equal(device.ensemble(x0, 0.1, 20, stride=4), expected)
+
+
+def test_failed_members_have_the_statuses_of_c(body, x0):
+    x0[3], x0[50] = 1e200, 1e60
+    errors = []
+    for solver in body:
+        with pytest.raises(phigen.StepError) as raised:
+            solver.ensemble(x0, 0.1, 20, stride=5)
+        errors.append(raised.value)
+    assert errors[0].members == errors[1].members == (3, 50)
+    assert errors[0].status == errors[1].status
+    np.testing.assert_array_equal(errors[0].trajectory, errors[1].trajectory)
+
+
+def test_ensembles_that_exceed_the_memory_are_divided(body, x0, monkeypatch):
+    device, _ = body
+    expected = device.ensemble(x0, 0.1, 20, stride=4)
+    monkeypatch.setattr(device.device, "memory", 20_000)
+    assert 1 < device.backend._batch(device._members(x0, 0.1, 20, 4, None, {}, None, {})) < 100
+    np.testing.assert_array_equal(device.ensemble(x0, 0.1, 20, stride=4), expected)
+
+
+def test_a_launch_without_memory_is_divided(body, x0, monkeypatch):
+    device, _ = body
+    expected, launch, sizes = device.ensemble(x0, 0.1, 20), device.device.launch, []
+
+    def limited(kernel, items, *rest):
+        sizes.append(items)
+        if items > 64:
+            raise OutOfMemoryError("CL_OUT_OF_RESOURCES")
+        launch(kernel, items, *rest)
+
+    monkeypatch.setattr(device.device, "launch", limited)
+    np.testing.assert_array_equal(device.ensemble(x0, 0.1, 20), expected)
+    assert sizes == [100, 50, 50]
+
+
+def test_a_lost_device_leaves_the_members_that_are_done(body, x0, monkeypatch):
+    device, _ = body
+    expected, launch, launches = device.ensemble(x0, 0.1, 20), device.device.launch, []
+
+    def lost(*arguments):
+        launches.append(arguments)
+        if len(launches) > 1:
+            raise DeviceError("the device was lost")
+        launch(*arguments)
+
+    monkeypatch.setattr(device.backend, "_batch", lambda members: 40, raising=False)
+    monkeypatch.setattr(device.device, "launch", lost)
+    with pytest.raises(DeviceError, match="members from 40 on were not integrated") as raised:
+        device.ensemble(x0, 0.1, 20)
+    np.testing.assert_array_equal(raised.value.trajectory[:40], expected[:40])
+    assert np.isnan(raised.value.trajectory[40:]).all()
+
+
+def test_a_machine_without_a_driver_is_told_what_to_install(monkeypatch):
+    cl = pytest.importorskip("pyopencl")
+    monkeypatch.setattr(opencl, "_OPENED", {})
+    monkeypatch.setattr(cl, "get_platforms", list)
+    with pytest.raises(DeviceError, match="pip install 'pyopencl"):
+        phigen.compile("pendulum_euler", "opencl")
+
+
+def test_a_device_without_double_precision_is_refused(monkeypatch):
+    monkeypatch.setattr(opencl.device(), "double", False)
+    with pytest.raises(DeviceError, match="real: float"):
+        phigen.compile("pendulum_euler", "opencl")
+
+
+def test_an_unknown_device_is_refused_with_those_there_are(monkeypatch):
+    monkeypatch.setattr(opencl, "_OPENED", {})
+    monkeypatch.setenv("PHIGEN_DEVICE", "voodoo")
+    with pytest.raises(DeviceError, match="PHIGEN_DEVICE is 'voodoo', but OpenCL has the devices 0: "):
+        phigen.compile("pendulum_euler", "opencl")
+
+
+def test_cuda_without_its_package_is_told_what_to_install():
+    if importlib.util.find_spec("cupy"):
+        pytest.skip("CuPy is installed")
+    with pytest.raises(MissingPackageError, match=r"pip install 'phigen\[cuda\]'"):
+        phigen.compile("pendulum_euler", "cuda")
+
+
+def test_solvers_are_pickled_and_tell_their_device(body, x0):
+    device, _ = body
+    again = pickle.loads(pickle.dumps(device))
+    np.testing.assert_array_equal(again.ensemble(x0, 0.1, 3), device.ensemble(x0, 0.1, 3))
+    assert device.device.name == again.device.name
+    assert device.device.memory > 0
+
+
+def test_trajectories_and_observables_are_those_of_the_host(body):
+    device, c = body
+    ours, theirs = (solver.integrate([1, 0.2, 0.1], 0.1, 10) for solver in (device, c))
+    np.testing.assert_allclose(ours.x, theirs.x, atol=1e-14)
+    np.testing.assert_allclose(ours.energy, theirs.energy, atol=1e-14)
