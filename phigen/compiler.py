@@ -39,6 +39,7 @@ from phigen.scheme.order import plan_order
 from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
 from phigen.spec.model import Overrides, Spec
+from phigen.splitting.bodies import split_bodies
 from phigen.splitting.forces import force_flows
 from phigen.splitting.parts import SplitHamiltonian, split
 
@@ -259,6 +260,8 @@ def _split(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
 
 def _parts(spec: Spec, system: System) -> SplitHamiltonian:
     """The parts of H. A monitor takes T and V, and a composition that is named composes two parts."""
+    if spec.coordinates_from:
+        return split_bodies(system, spec.coordinates_from)
     if spec.monitor:
         return replace(split(system, motions=False), small=None)
     parts = split(system)

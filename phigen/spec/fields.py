@@ -35,6 +35,7 @@ from phigen.spec.names import (
     REALS,
     RECONSTRUCTIONS,
     REDUCTIONS,
+    RELATIVE,
     SCHEMES,
     SPEC_NAME,
     STRUCTURES,
@@ -473,6 +474,11 @@ SPEC = Record(
             _switch("structure", *STRUCTURES),
             "scheme gauss: whether steps are exact Poisson maps, or to truncation only",
             default="exact",
+        ),
+        RecordKey(
+            "coordinates_from",
+            _switch("coordinates_from", *RELATIVE),
+            "scheme splitting: attracting bodies are split in their motions in these coordinates and a small remainder",
         ),
         RecordKey(
             "profile",

@@ -349,7 +349,8 @@ class Record(Kind):
         known = [f.key for f in self.fields]
         key = intended(name, known, MEANT)
         if key in node.entries and key != MEANT.get(name):
-            key = intended(name, [k for k in known if k not in node.entries], MEANT) or key
+            others = [k for k in known if k not in node.entries and not k.startswith(f"{key}_")]
+            key = intended(name, others, MEANT) or key
         return key
 
     def _hint(self, name: str, node: MappingNode) -> str:

@@ -445,6 +445,7 @@ class Spec:
     monitor: str | Expression | None = None  # log, or g of dt = g dτ
     scheme: str = "auto"
     structure: str = "exact"  # of a Gauss method: exact, to truncation
+    coordinates_from: str = ""  # of bodies in a splitting: jacobi, democratic_heliocentric
     profile: str = "fast"
     solver: SolverOptions = SolverOptions()
     extras: Extras = NO_EXTRAS

@@ -138,5 +138,7 @@ LOGARITHMIC = "log"
 SCHEMES = ("auto", "series", "splitting", "gauss")
 #: What a Gauss method is: an exact Poisson map, or one up to its truncation error.
 STRUCTURES = ("exact", "to truncation")
+#: Relative coordinates of attracting bodies, in which a splitting finds its parts.
+RELATIVE = ("jacobi", "democratic_heliocentric")
 #: Classical methods a run can be compared with.
 CLASSICAL_METHODS = ("euler", "rk2", "rk4", "implicit-midpoint", "dop853")

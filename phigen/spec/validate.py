@@ -108,6 +108,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "monitor": _monitor(raw.get("monitor"), declared),
         "scheme": raw.get("scheme", "auto"),
         "structure": raw.get("structure", "exact"),
+        "coordinates_from": raw.get("coordinates_from", ""),
         "profile": raw.get("profile", "small" if raw.get("real") == "float" else "fast"),
         "solver": _solver(raw.get("solver", {}), declared),
         "targets": without_repetition(raw.get("targets", DEFAULT), ("targets",), declared),
@@ -178,11 +179,17 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
     for key, harmless in NOT_OF_LATTICES.items() if raw.get("lattice") is not None else ():
         if raw.get(key) is not None and raw[key] not in harmless:
             problems.add(f"{key}: not available for lattices", reader.locations[key,])
+    if raw.get("coordinates_from") is not None and raw.get("lattice") is not None:
+        hint = "phigen show --expand RUN writes the bodies of a run as an ordinary spec, which takes coordinates_from"
+        problems.add("coordinates_from: not available for lattices", reader.locations["coordinates_from",], hint)
     if raw.get("real") == "float" and raw.get("profile") == "fast":
         problems.add("profile: real: float needs profile: small", reader.locations["profile",], "remove profile")
     if raw.get("structure") is not None and raw.get("scheme") != "gauss":
         message = "structure belongs to scheme: gauss; other schemes are exact Poisson maps"
         problems.add(message, reader.locations["structure",], "remove structure, or scheme: gauss")
+    if raw.get("coordinates_from") is not None and raw.get("scheme") != "splitting":
+        message = "coordinates_from belongs to scheme: splitting, whose parts are motions in these coordinates"
+        problems.add(message, reader.locations["coordinates_from",], "scheme: splitting, or remove coordinates_from")
     how = WITHOUT_SERIES.get(raw.get("scheme", ""))
     if how is None:
         return

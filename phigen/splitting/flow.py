@@ -18,6 +18,7 @@ from phigen.splitting.exponential import NoClosedFormError
 from phigen.splitting.integrals import reduced
 from phigen.splitting.kepler import KeplerMotion
 from phigen.splitting.matrices import MatrixExponential
+from phigen.splitting.relative import RelativeMotions
 from phigen.splitting.ring import TIME, Ring
 from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, symbol, symbols_of, topological, total
 from phigen.symbolic.symbols import Symbol
@@ -41,15 +42,15 @@ class Flow:
     """The flow of ``hamiltonian`` for the time `TIME`: x + ``increment``; ``manner`` describes the motion in words.
 
     For a ``force``, a vector field, the Hamiltonian is 0. ``pieces`` are the commuting flows that compose it, if
-    there are several; a single Kepler ``motion`` has no pieces. ``exponentials`` are the matrices whose entries are
-    in the increments, as symbols.
+    there are several; one ``motion`` of bodies has no pieces. ``exponentials`` are the matrices whose entries are in
+    the increments, as symbols.
     """
 
     hamiltonian: Expression
     increment: tuple[Expression, ...]
     manner: str
     force: tuple[Expression, ...] = field(default=(), kw_only=True)
-    motion: KeplerMotion | None = field(default=None, kw_only=True)
+    motion: KeplerMotion | RelativeMotions | None = field(default=None, kw_only=True)
     pieces: tuple[Flow, ...] = field(default=(), kw_only=True)
     exponentials: tuple[MatrixExponential, ...] = field(default=(), kw_only=True)
 
@@ -60,7 +61,7 @@ class Flow:
 
     @property
     def has_motion(self) -> bool:
-        """Whether the flow is a Kepler motion, or some of its pieces are."""
+        """Whether the flow is one of Kepler motions, or some of its pieces are."""
         return any(flow.motion for flow in (self, *self.pieces))
 
     def vector_field(self, system: System) -> tuple[Expression, ...]:
@@ -122,9 +123,7 @@ def _flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool) -> Flow:
 
 def _flow_of_motion(ring: Ring, term: Term, motion: KeplerMotion) -> Flow:
     """Return the flow of a Kepler motion."""
-    names = ", ".join(ring.coordinates[i] for i in (*motion.positions, *motion.momenta))
-    manner = f"{names} {motion.manner}"
-    return Flow(term.expression, tuple(motion.increments(ring.coordinates)), manner, motion=motion)
+    return Flow(term.expression, tuple(motion.increments(ring.coordinates)), motion.manner, motion=motion)
 
 
 def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:

@@ -26,49 +26,65 @@ Vector = Sequence[Expression]
 
 @dataclass(frozen=True)
 class KeplerMotion:
-    """w|p|²/2 − k/|q| for the coordinates with the indices ``positions`` and ``momenta``.
+    """w|p|²/2 − k/|q| for a ``position`` q and a ``momentum`` p, coordinates or linear forms of coordinates.
 
     ``inverse_mass`` is w, ``strength`` k; both depend on parameters only.
     """
 
-    positions: tuple[int, ...]
-    momenta: tuple[int, ...]
+    position: tuple[Expression, ...]
+    momentum: tuple[Expression, ...]
     inverse_mass: Expression
     strength: Expression
 
-    manner = "moved along a conic section"
+    @property
+    def hamiltonian(self) -> Expression:
+        """w|p|²/2 − k/|q|."""
+        return self.inverse_mass / 2 * square(self.momentum) - self.strength * inverse_length(self.position)
 
-    def hamiltonian(self, coordinates: Sequence[str]) -> Expression:
-        """Return w|p|²/2 − k/|q|."""
-        q, p = self.vectors(coordinates)
-        return self.inverse_mass / 2 * _square(p) - self.strength * power(sqrt(_square(q)), -1)
+    @property
+    def manner(self) -> str:
+        """The motion of coordinates in words."""
+        return f"{', '.join(map(str, (*self.position, *self.momentum)))} moved along a conic section"
+
+    def rates(self) -> tuple[list[Expression], list[Expression]]:
+        """Return the rates of q and p, wp and −kq/|q|³."""
+        pull = self.strength * self.cube
+        return [self.inverse_mass * e for e in self.momentum], [-(pull * e) for e in self.position]
+
+    @property
+    def cube(self) -> Expression:
+        """1/|q|³."""
+        return power(sqrt(square(self.position)), -3)
+
+    def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
+        """Return expressions as they are compared in proofs."""
+        return [*roots]
+
+    def changes(self) -> tuple[list[Expression], list[Expression]]:
+        """Return the changes of q and p in the time of the flow."""
+        orbit = _Orbit.through(self.position, self.momentum, self.inverse_mass, self.strength)
+        s = call(ANOMALY, symbol(TIME), orbit.distance, orbit.moment, orbit.beta, orbit.mu, orbit.spin)
+        z = orbit.beta * s**2 / 4
+        return orbit.changes(call("cosroot", z), s * call("sinroot", z) / 2)
 
     def field(self, coordinates: Sequence[str]) -> list[Expression]:
-        """Return the rates of all coordinates, wp and −kq/|q|³."""
-        q, p = self.vectors(coordinates)
-        pull = self.strength * power(sqrt(_square(q)), -3)
-        rates: list[Expression] = [ZERO] * len(coordinates)
-        for i, j, a, b in zip(self.positions, self.momenta, q, p, strict=True):
-            rates[i], rates[j] = self.inverse_mass * b, -(pull * a)
-        return rates
-
-    def vectors(self, coordinates: Sequence[str]) -> tuple[list[Expression], list[Expression]]:
-        """Return q and p."""
-        q, p = ([symbol(coordinates[i]) for i in places] for places in (self.positions, self.momenta))
-        return q, p
+        """Return the rates of all coordinates, those of the motion as its position and momentum."""
+        return self._placed(coordinates, self.rates())
 
     def increments(self, coordinates: Sequence[str]) -> list[Expression]:
         """Return the increments of all coordinates in the time of the flow."""
-        q, p = self.vectors(coordinates)
-        orbit = _Orbit.through(q, p, self.inverse_mass, self.strength)
-        s = call(ANOMALY, symbol(TIME), orbit.distance, orbit.moment, orbit.beta, orbit.mu, orbit.spin)
-        z = orbit.beta * s**2 / 4
-        changes = orbit.changes(call("cosroot", z), s * call("sinroot", z) / 2)
-        increments: list[Expression] = [ZERO] * len(coordinates)
-        for places, change in zip((self.positions, self.momenta), changes, strict=True):
-            for i, e in zip(places, change, strict=True):
-                increments[i] = e
-        return increments
+        return self._placed(coordinates, self.changes())
+
+    def residuals(self) -> Iterator[tuple[str, Expression]]:
+        """Yield the residuals that vanish if the changes are the motion."""
+        yield from identities()
+
+    def _placed(
+        self, coordinates: Sequence[str], values: tuple[list[Expression], list[Expression]]
+    ) -> list[Expression]:
+        names = [e.value for e in (*self.position, *self.momentum)]
+        placed = dict(zip(names, [*values[0], *values[1]], strict=True))
+        return [placed.get(name, ZERO) for name in coordinates]
 
 
 @dataclass(frozen=True)
@@ -87,9 +103,9 @@ class _Orbit:
     @classmethod
     def through(cls, q: Vector, p: Vector, w: Expression, k: Expression) -> _Orbit:
         """Return the orbit with this state."""
-        distance, mu = sqrt(_square(q)), w * k
+        distance, mu = sqrt(square(q)), w * k
         moment = w * total(a * b for a, b in zip(q, p, strict=True))
-        beta = 2 * mu * power(distance, -1) - w**2 * _square(p)
+        beta = 2 * mu * power(distance, -1) - w**2 * square(p)
         return cls(q, p, distance, moment, beta, mu, w, k)
 
     @property
@@ -146,5 +162,11 @@ def identities() -> Iterator[tuple[str, Expression]]:
     yield from zip(residuals, substitute(list(residuals.values()), circle), strict=True)
 
 
-def _square(vector: Vector) -> Expression:
+def square(vector: Vector) -> Expression:
+    """Return |v|²."""
     return total(e**2 for e in vector)
+
+
+def inverse_length(vector: Vector) -> Expression:
+    """Return 1/|v|."""
+    return power(sqrt(square(vector)), -1)

@@ -14,6 +14,7 @@ from phigen.splitting.flow import Term
 from phigen.splitting.kepler import KeplerMotion
 from phigen.splitting.ring import Ring
 from phigen.splitting.terms import joined, monomial_terms
+from phigen.symbolic.expression import symbol
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.tower import Generator, Poly
 
@@ -34,7 +35,7 @@ def with_motions(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
     motions = list(_motions(ring, terms))
     if not motions:
         return None
-    motion_terms = [Term(motion.hamiltonian(ring.coordinates), element, motion) for motion, element in motions]
+    motion_terms = [Term(motion.hamiltonian, element, motion) for motion, element in motions]
     return [*motion_terms, *_remaining(ring, terms, motion_terms)]
 
 
@@ -108,8 +109,8 @@ def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, 
     size = len(ring.tower.gens)
     supports = [{*ring.support(t.element)} for t in terms]
     for generator in ring.tower.generators:
-        positions = _distance_from(ring, generator.arguments) if _is_inverse_distance(generator) else ()
-        momenta = [j for i in positions if (j := _conjugate(ring, i)) is not None]
+        positions = _distance_from(ring, generator.arguments) if is_inverse_distance(generator) else ()
+        momenta = [j for i in positions if (j := conjugate(ring, i)) is not None]
         if not positions or len(momenta) < len(positions):
             continue
         elements = [t.element for t, inside in zip(terms, supports, strict=True) if inside <= {*positions, *momenta}]
@@ -119,12 +120,14 @@ def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, 
         squares: list[Poly] = [coefficients.get(_exponents(size, place, 2), ring.tower.zero) for place in places]
         if pull is None or squares[0] == 0 or any(square != squares[0] for square in squares):
             continue
-        motion = KeplerMotion(positions, tuple(momenta), ring.expression(2 * squares[0]), ring.expression(-pull))
+        q, p = (tuple(symbol(ring.coordinates[i]) for i in of) for of in (positions, momenta))
+        motion = KeplerMotion(q, p, ring.expression(2 * squares[0]), ring.expression(-pull))
         kinetic = [squares[0] * ring.tower.gens[place] ** 2 for place in places]
         yield motion, ring.tower.combine([*kinetic, pull * ring.tower.variable(generator.name)])
 
 
-def _is_inverse_distance(generator: Generator) -> bool:
+def is_inverse_distance(generator: Generator) -> bool:
+    """Whether a generator is one over a square root."""
     return generator.kind == "root" and generator.degree == 2 and generator.inverse
 
 
@@ -135,7 +138,7 @@ def _distance_from(ring: Ring, arguments: Sequence[Poly]) -> tuple[int, ...]:
     return inside if len(inside) in _DIMENSIONS and arguments[0] == squares else ()
 
 
-def _conjugate(ring: Ring, i: int) -> int | None:
+def conjugate(ring: Ring, i: int) -> int | None:
     """Return the coordinate p with {q, p} = 1, if neither has a bracket with another coordinate."""
     partners = ring.brackets_of[i]
     alone = len(partners) == 1 and ring.brackets_of[partners[0]] == [i]

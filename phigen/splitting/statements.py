@@ -11,8 +11,9 @@ from dataclasses import replace
 
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.splitting.flow import Flow, composed
-from phigen.splitting.kepler import KeplerMotion, identities
+from phigen.splitting.kepler import KeplerMotion
 from phigen.splitting.parts import SplitHamiltonian
+from phigen.splitting.relative import RelativeMotions
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.expression import (
     ONE,
@@ -165,18 +166,20 @@ def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Ex
         yield f"composition for {c}", a - b
 
 
-def _motion_residuals(system: System, flow: Flow, motion: KeplerMotion) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of a Kepler motion.
+def _motion_residuals(
+    system: System, flow: Flow, motion: KeplerMotion | RelativeMotions
+) -> Iterator[tuple[str, Expression]]:
+    """Yield the residuals of Kepler motions.
 
-    π∇H is its field, and the increments are those proved by `phigen.splitting.kepler.identities`.
+    π∇H is their field, and the increments are those proved by `phigen.splitting.kepler.identities`.
     """
     names = system.coordinates
     field = flow.vector_field(system)
-    for c, a, b in zip(names, field, motion.field(names), strict=True):
-        yield f"rate of {c}", a - b
+    rates = [a - b for a, b in zip(field, motion.field(names), strict=True)]
+    yield from zip((f"rate of {c}" for c in names), motion.opaque(rates), strict=True)
     for c, a, b in zip(names, flow.increment, motion.increments(names), strict=True):
         yield f"increment of {c}", a - b
-    yield from identities()
+    yield from motion.residuals()
 
 
 def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:

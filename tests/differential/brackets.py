@@ -55,6 +55,15 @@ def canonical(source: random.Random, most: int = 3) -> Structure:
     return Structure("canonical", coordinates, form, pi, spare, tuple(zip(q, p, strict=True)))
 
 
+def paired(pairs: Sequence[tuple[str, str]]) -> Structure:
+    """Return the canonical structure of named pairs, positions first."""
+    n = len(pairs)
+    q, p = (symbols(names) for names in zip(*pairs, strict=True))
+    pi = sympy.Matrix(sympy.BlockMatrix([[sympy.zeros(n), sympy.eye(n)], [-sympy.eye(n), sympy.zeros(n)]]))
+    form = {"canonical": {"q": [str(v) for v in q], "p": [str(v) for v in p]}}
+    return Structure("canonical", (*q, *p), form, pi, (), tuple(zip(q, p, strict=True)))
+
+
 def constant(source: random.Random) -> Structure:
     """Draw a constant skew matrix, which may be singular."""
     n = source.randint(2, 5)

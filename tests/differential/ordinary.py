@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import sympy
-from differential.brackets import Structure, draw_structure
+from differential.brackets import Structure, draw_structure, paired
 from differential.formulas import TIME, Expr, Symbol, bounded, gradient, linear, monomial, numeric, small, text
 from differential.reference import Floats
 
@@ -236,6 +236,8 @@ def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:
     options |= {"scheme": "splitting", "order": options["order"] + options["order"] % 2}
     q, p = zip(*drawn.structure.pairs, strict=True)
     way = source.choices(["", "linear", "Kepler"], [40, 15, 45])[0]
+    if source.random() < 0.2:
+        return _bodies(source, drawn, options)
     if way == "linear":
         terms = [linear(source, (*q, *p)) ** 2 / 3 for _ in range(source.randint(2, 4))]
         return replace(drawn, terms=(*terms, small(source) * q[0] * p[-1]), options=options)
@@ -253,6 +255,36 @@ def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:
         corrected = name.startswith("wisdom")
         options["composition"] = "saba-6-2" if corrected and differentiated else name + "-5" * corrected
     return replace(drawn, terms=tuple(terms), options=options)
+
+
+def _bodies(source: random.Random, drawn: Ordinary, options: dict[str, Any]) -> Ordinary:
+    """Draw two or three bodies in a plane about the first one, in relative coordinates."""
+    count, change = source.choice([2, 3, 3]), source.choice(["jacobi", "jacobi", "democratic_heliocentric"])
+    names = [f"{axis}{i}" for axis in "xy" for i in range(count)]
+    if source.random() < 0.5:
+        names = [f"{axis}{i}" for i in range(count) for axis in "xy"]
+    structure = paired([(name, f"p{name}") for name in names])
+    mass = {str(i): 1 + abs(small(source)) if i == 0 else abs(small(source)) / 60 for i in range(count)}
+    start, terms, at = dict[str, float](), [], Symbol
+    for i, m in enumerate(mass.values()):
+        terms.append((at(f"px{i}") ** 2 + at(f"py{i}") ** 2) / (2 * m))
+        angle, radius = source.uniform(0, 6), source.uniform(0.9, 1.1) * i**1.5
+        speed = float(sympy.sqrt(mass["0"] / radius)) * source.uniform(0.9, 1.1) if i else 0.0
+        c, s = float(sympy.cos(angle)), float(sympy.sin(angle))
+        start |= {f"x{i}": radius * c + 0.3, f"y{i}": radius * s - 0.2}
+        start |= {f"px{i}": float(m) * (0.1 - speed * s), f"py{i}": float(m) * speed * c}
+        for j in range(i):
+            between = (at(f"x{i}") - at(f"x{j}")) ** 2 + (at(f"y{i}") - at(f"y{j}")) ** 2
+            terms.append(-m * mass[str(j)] / sympy.sqrt(between))
+    if change == "jacobi" and source.random() < 0.4:
+        terms.append(small(source) * at("x1") ** 2 * at(f"y{count - 1}") / 400)
+    given = {"scheme": "splitting", "coordinates_from": change, "order": source.choice([2, 4])}
+    if count == 3 and source.random() < 0.5:
+        given["composition"] = source.choice({2: ["saba-4-2", "wisdom-holman"], 4: ["aba-8-4"]}[given["order"]])
+    state = tuple(start[str(v)] for v in structure.coordinates)
+    return replace(
+        drawn, structure=structure, terms=tuple(terms), start=state, parameters={}, options={**options, **given}
+    )
 
 
 def _any_terms(source: random.Random, structure: Structure, weight: Callable[[], Expr]) -> list[Expr]:
@@ -411,7 +443,7 @@ def _extras(source: random.Random, drawn: Ordinary) -> Ordinary:
 
 
 #: Options of other schemes.
-_NOT_OF_GAUSS = ("birealisation", "composition", "reconstruct", "solver")
+_NOT_OF_GAUSS = ("birealisation", "composition", "coordinates_from", "reconstruct", "solver")
 
 
 def _collocated(source: random.Random, drawn: Ordinary) -> Ordinary:

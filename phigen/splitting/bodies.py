@@ -1,0 +1,187 @@
+"""Splittings of attracting bodies in relative coordinates: Kepler motions, and the small remainder.
+
+H is Σ p_i²/2m_i − Σ k_ij/|q_i − q_j| and further terms. Those without the coordinates of the bodies, such as the free
+rotation of one of them, belong to A, all others to B.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.splitting.conflicts import Conflicts
+from phigen.splitting.exponential import SHIFTED
+from phigen.splitting.flow import Flow, NoFlowError, Term, composed, flow_of
+from phigen.splitting.near_integrable import conjugate, is_inverse_distance
+from phigen.splitting.parts import SplitHamiltonian
+from phigen.splitting.relative import CHANGES, AttractingBodies
+from phigen.splitting.ring import TIME, Monomial, Ring, ring_of
+from phigen.splitting.statements import bracket
+from phigen.splitting.terms import hamiltonian_terms
+from phigen.symbolic.expression import Expression, gradient, power, symbol, total
+from phigen.symbolic.readable import shortened
+from phigen.symbolic.tower import Generator, Poly
+from phigen.symbolic.verdict import PROVED, decide_zero
+
+#: The key of specs.
+KEY = "coordinates_from"
+
+_FORM = (
+    "H = sum of p_i**2/(2*m_i) - k_ij/sqrt((x_i - x_j)**2 + (y_i - y_j)**2 [+ (z_i - z_j)**2]) over bodies and pairs"
+)
+_HINT = "the first body is the heaviest, the others follow from the inside out, along each axis in the same order"
+
+
+class _NoBodiesError(Exception):
+    """H is not that of attracting bodies; the text is the reason."""
+
+
+def split_bodies(system: System, change: str) -> SplitHamiltonian:
+    """Return the two parts of H in the relative coordinates of this name. Raises `SpecError`, located at the key."""
+    listed = hamiltonian_terms(system)
+    ring = ring_of(system, listed)
+    terms = [Term(e, ring.tower.convert(e)) for e in listed]
+    try:
+        bodies, others = _bodies(ring, terms)
+        motions, remainder = CHANGES[change](bodies)
+        alone, coupled = _divided(ring, bodies, others)
+        flow = Flow(motions.hamiltonian, tuple(motions.increments(ring.coordinates)), motions.manner, motion=motions)
+        a = _with_others(ring, flow, alone)
+        b = _remainder(system, ring, remainder, coupled, _positions(ring, bodies), moving=change != "jacobi")
+    except _NoBodiesError as error:
+        place = system.locations.get((KEY,)) or system.locations.get(("hamiltonian",))
+        raise SpecError([Diagnostic(f"{KEY}: {change} needs {_FORM}: {error}", place, _HINT)]) from None
+    return SplitHamiltonian((a,)) if b is None else SplitHamiltonian((a, b), small=1)
+
+
+@dataclass(frozen=True)
+class _Distance:
+    """1/|q_a − q_b|, a variable of the ring: pairs of coordinates, one for each axis."""
+
+    variable: int
+    pairs: tuple[tuple[int, int], ...]
+
+
+def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[Term]]:
+    """Return the bodies, and the terms that are neither their kinetic energies nor attractions of pairs."""
+    distances = [d for g in ring.tower.generators if is_inverse_distance(g) for d in [_distance(ring, g)] if d]
+    if not distances:
+        raise _NoBodiesError("no attraction of two bodies was found")
+    axes = _axes(pair for d in distances for pair in d.pairs)
+    if len(axes) not in (2, 3) or len({len(axis) for axis in axes}) > 1:
+        raise _NoBodiesError(f"distances are along {len(axes)} axes with {', '.join(str(len(a)) for a in axes)} bodies")
+    body_of = {c: i for axis in axes for i, c in enumerate(axis)}
+    momenta = [[conjugate(ring, c) for c in axis] for axis in axes]
+    if any(j is None for axis in momenta for j in axis):
+        raise _NoBodiesError("a position has no conjugate momentum")
+    coefficients = ring.terms(ring.tower.combine(t.element for t in terms), ring.state)
+    known: set[Monomial] = set()
+    strengths: dict[tuple[int, int], Expression] = {}
+    for d in distances:
+        monomial = _power(ring, d.variable, 1)
+        ends = {(body_of[b], body_of[a]) for a, b in d.pairs}
+        if monomial not in coefficients or len(ends) > 1 or len(d.pairs) < len(axes):
+            continue
+        known.add(monomial)
+        strengths[ends.pop()] = ring.expression(-coefficients[monomial])
+    masses = []
+    for i in range(len(axes[0])):
+        places = [ring.tower.names.index(ring.coordinates[axis[i] or 0]) for axis in momenta]
+        squares = [_power(ring, place, 2) for place in places]
+        weights: list[Poly] = [coefficients.get(square, ring.tower.zero) for square in squares]
+        name = ring.coordinates[axes[0][i]]
+        if weights[0] == 0 or any(weight != weights[0] for weight in weights):
+            raise _NoBodiesError(f"the body at {name} has no kinetic energy p**2/(2*m)")
+        if i and not any((i, j) in strengths for j in range(i)):
+            raise _NoBodiesError(f"the body at {name} is not attracted by those before it")
+        known.update(squares)
+        masses.append(power(ring.expression(2 * weights[0]), -1))
+    positions, conjugates = (
+        tuple(zip(*([ring.coordinates[c or 0] for c in axis] for axis in of), strict=True)) for of in (axes, momenta)
+    )
+    bodies = AttractingBodies(positions, conjugates, tuple(masses), strengths)
+    return bodies, [t for t in terms if not known.issuperset(ring.terms(t.element, ring.state))]
+
+
+def _distance(ring: Ring, generator: Generator) -> _Distance | None:
+    """Return the distance of a generator, if its argument is a sum of squares of differences of two coordinates."""
+    (argument,) = generator.arguments
+    inside, tower = ring.support(argument), ring.tower
+    pairs = []
+    for monomial, coefficient in ring.terms(argument, ring.state).items():
+        places = [v for v, exponent in enumerate(monomial) if exponent]
+        if len(places) == 2 and coefficient == -2:
+            a, b = (ring.coordinates.index(tower.names[v]) for v in places)
+            pairs.append((min(a, b), max(a, b)))
+    squares = tower.combine(
+        (tower.variable(ring.coordinates[a]) - tower.variable(ring.coordinates[b])) ** 2 for a, b in pairs
+    )
+    return _Distance(tower.names.index(generator.name), tuple(pairs)) if inside and argument == squares else None
+
+
+def _axes(pairs: Iterator[tuple[int, int]]) -> list[list[int]]:
+    """Return the coordinates along each axis, which differences connect, in the order of the coordinates."""
+    axes: list[set[int]] = []
+    for pair in pairs:
+        joined = {*pair}.union(*(axis for axis in axes if not axis.isdisjoint(pair)))
+        axes = [*(axis for axis in axes if axis.isdisjoint(pair)), joined]
+    return sorted(map(sorted, axes))
+
+
+def _power(ring: Ring, variable: int, exponent: int) -> Monomial:
+    return tuple(exponent * (k == variable) for k in range(len(ring.tower.gens)))
+
+
+def _divided(ring: Ring, bodies: AttractingBodies, others: Sequence[Term]) -> tuple[list[Term], list[Term]]:
+    """Return the terms that commute with all coordinates of the bodies, and the others."""
+    inside = {ring.coordinates.index(name) for name in bodies.names}
+    partners = {j for i in inside for j in (i, *ring.brackets_of[i])}
+    alone = [t for t in others if partners.isdisjoint(ring.support(t.element))]
+    return alone, [t for t in others if t not in alone]
+
+
+def _with_others(ring: Ring, flow: Flow, terms: Sequence[Term]) -> Flow:
+    """Return the composition of a flow with that of terms that commute with it."""
+    return composed(ring.coordinates, [flow, _flow(ring, terms)]) if terms else flow
+
+
+def _flow(ring: Ring, terms: Sequence[Term]) -> Flow:
+    """Return the flow of terms. Raises `_NoBodiesError` if they do not commute, or have none."""
+    conflicts = Conflicts(ring).grouped(terms)
+    if len(conflicts) > 1:
+        first, second = (shortened(group[0].expression) for group in conflicts[:2])
+        raise _NoBodiesError(f"the further terms {first} and {second} do not commute")
+    try:
+        return flow_of(ring, terms)
+    except NoFlowError as error:
+        raise _NoBodiesError(f"the further term {shortened(error.term.expression)} has no flow: {error}") from None
+
+
+def _remainder(
+    system: System, ring: Ring, remainder: Expression, terms: Sequence[Term], positions: frozenset[int], *, moving: bool
+) -> Flow | None:
+    """Return the flow of B, or None where B is 0; a ``moving`` remainder contains momenta."""
+    shifting = [t for t in terms if positions.issuperset(ring.support(t.element))]
+    others = [t for t in terms if t not in shifting]
+    if moving and not remainder.is_zero and terms:
+        raise _NoBodiesError(f"the further term {shortened(terms[0].expression)} may not commute with p_0**2/(2*m_0)")
+    h = total([remainder, *(t.expression for t in shifting)])
+    if h.is_zero and not others:
+        return None
+    if h.is_zero:
+        return _flow(ring, others)
+    for term in others:
+        if decide_zero("", [("", bracket(system, h, term.expression))]).verdict != PROVED:
+            raise _NoBodiesError(f"the further term {shortened(term.expression)} does not commute with the attractions")
+    slope = gradient(symbol(TIME) * h, system.coordinates)
+    moved = hamiltonian_vector_field(system.poisson, slope)
+    names = [c for c, e in zip(system.coordinates, moved, strict=True) if not e.is_zero]
+    flow = Flow(h, tuple(moved), f"{', '.join(names)} {SHIFTED}")
+    return _with_others(ring, flow, others)
+
+
+def _positions(ring: Ring, bodies: AttractingBodies) -> frozenset[int]:
+    """Return the positions of the bodies, as indices."""
+    return frozenset(ring.coordinates.index(name) for body in bodies.positions for name in body)

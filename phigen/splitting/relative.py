@@ -1,0 +1,258 @@
+"""Kepler motions of bodies in relative coordinates, written in the Cartesian ones: a linear canonical change.
+
+Bodies 0, …, N have masses m_i, positions q_i and momenta p_i; k_ij is the strength of the attraction −k_ij/|q_i − q_j|,
+M_i = m_0 + … + m_i, and M is the mass of all. A is the sum of w_i|P_i|²/2 − K_i/|Q_i| over i ≥ 1 and of
+|p_0 + … + p_N|²/2M, the motion of the centre of mass.
+
+- *Jacobi*: Q_i = q_i − (m_0 q_0 + … + m_{i−1} q_{i−1})/M_{i−1} and P_i = p_i − (m_i/M_i)(p_0 + … + p_i), with w_i =
+  M_i/(m_i M_{i−1}) and K_i = Σ_{j<i} k_ij. The kinetic energy is that of the Q_i and of the centre of mass.
+- *Democratic heliocentric*: Q_i = q_i − q_0 and P_i = p_i − (m_i/M)(p_0 + … + p_N), with w_i = 1/m_i and K_i = k_i0.
+  The kinetic energy has one term more, |p_0 − (m_0/M)(p_0 + … + p_N)|²/2m_0.
+
+J. Wisdom, M. Holman, Symplectic maps for the n-body problem, Astronomical Journal 102 (1991); M. J. Duncan, H. F.
+Levison, M. H. Lee, A multiple time step symplectic algorithm for integrating close encounters, Astronomical Journal 116
+(1998).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from operator import add
+
+from phigen.splitting.kepler import KeplerMotion, Vector, identities, inverse_length, square
+from phigen.splitting.ring import TIME
+from phigen.symbolic.expression import ZERO, Expression, fold, power, rebuild, substitute, symbol, total
+from phigen.symbolic.symbols import Symbol
+
+
+@dataclass(frozen=True)
+class AttractingBodies:
+    """Attracting bodies: names of positions and momenta along each axis, masses, and strengths k_ij for i > j."""
+
+    positions: tuple[tuple[str, ...], ...]
+    momenta: tuple[tuple[str, ...], ...]
+    masses: tuple[Expression, ...]
+    strengths: Mapping[tuple[int, int], Expression]
+
+    @property
+    def axes(self) -> int:
+        """The dimension of space."""
+        return len(self.positions[0])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The coordinates of all bodies, positions first."""
+        return tuple(name for of in (self.positions, self.momenta) for body in of for name in body)
+
+    @property
+    def kinetic(self) -> Expression:
+        """The kinetic energy."""
+        return total(square(p) * power(m, -1) / 2 for p, m in zip(map(_vector, self.momenta), self.masses, strict=True))
+
+    def attraction(self, i: int, j: int) -> Expression:
+        """Return −k_ij/|q_i − q_j|, 0 for bodies that do not attract one another."""
+        strength = self.strengths.get((i, j), ZERO)
+        return ZERO if strength.is_zero else -strength * inverse_length(self.between(i, j))
+
+    def between(self, i: int, j: int) -> list[Expression]:
+        """Return q_i − q_j."""
+        return _difference(_vector(self.positions[i]), _vector(self.positions[j]))
+
+
+@dataclass(frozen=True)
+class RelativeMotions:
+    """The motion of A: ``kepler`` motions in linear forms of the coordinates, and that of the centre of mass.
+
+    ``hamiltonian`` is A in the coordinates; ``total_momentum`` and ``inverse_mass`` are those of all bodies. ``spread``
+    has the changes of the coordinates, by name, in the symbols of those of the Q_i, the P_i and the centre of mass.
+    ``masses`` are pairs of masses m_i, or sums M_i, with symbols for proofs.
+    """
+
+    hamiltonian: Expression
+    kepler: tuple[KeplerMotion, ...]
+    total_momentum: Vector
+    inverse_mass: Expression
+    spread: Mapping[str, Expression]
+    masses: tuple[tuple[Expression, Expression], ...] = ()
+
+    @property
+    def manner(self) -> str:
+        """The motion in words."""
+        return f"{len(self.kepler)} relative positions moved along conic sections, the centre of mass shifted"
+
+    def field(self, names: Sequence[str]) -> list[Expression]:
+        """Return the rates of all coordinates."""
+        return self._spread(names, [motion.rates() for motion in self.kepler], self.drift)
+
+    def increments(self, names: Sequence[str]) -> list[Expression]:
+        """Return the increments of all coordinates in the time of the flow."""
+        shift = [symbol(TIME) * e for e in self.drift]
+        return self._spread(names, [motion.changes() for motion in self.kepler], shift)
+
+    def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
+        """Return expressions with symbols for each |Q_i|⁻³ and M_i, and M_i − M_{i−1} for m_i.
+
+        An expression that vanishes with these symbols vanishes for all bodies.
+        """
+        cubes = [(motion.cube, symbol(Symbol("cube", i))) for i, motion in enumerate(self.kepler, 1)]
+        by_node = {id(node): value for node, value in (*cubes, *self.masses)}
+        return fold(roots, lambda e, args: by_node.get(id(e)) or rebuild(e, args))
+
+    def residuals(self) -> Iterator[tuple[str, Expression]]:
+        """Yield the residuals that vanish if changes of the coordinates change the forms as their symbols say."""
+        for i, motion in enumerate(self.kepler, 1):
+            forms = substitute([*motion.position, *motion.momentum], self.spread)
+            axes = len(motion.position)
+            for form, change in zip(forms, [*changes_of("Q", i, axes), *changes_of("P", i, axes)], strict=True):
+                yield f"change of body {i}", form - change
+        for form in substitute(self.total_momentum, self.spread):
+            yield "change of the total momentum", form
+        yield from identities()
+
+    @property
+    def drift(self) -> list[Expression]:
+        """The velocity of the centre of mass."""
+        return [self.inverse_mass * e for e in self.total_momentum]
+
+    def _spread(
+        self, names: Sequence[str], values: Sequence[tuple[list[Expression], list[Expression]]], of_centre: Vector
+    ) -> list[Expression]:
+        """Return the changes of all coordinates for changes of the relative ones."""
+        axes = len(of_centre)
+        changes: dict[str, Expression] = dict(zip(_names("R", 0, axes), of_centre, strict=True))
+        for i, both in enumerate(values, 1):
+            for kind, of in zip("QP", both, strict=True):
+                changes |= dict(zip(_names(kind, i, axes), of, strict=True))
+        listed = [self.spread.get(name, ZERO) for name in names]
+        return substitute(listed, changes)
+
+
+def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
+    """Return the motion of A in Jacobi coordinates, and B."""
+    masses = bodies.masses
+    q, p = (list(map(_vector, names)) for names in (bodies.positions, bodies.momenta))
+    mass = list(accumulate(masses, add))
+    inverse = [power(m, -1) for m in mass]
+    share = [m * r for m, r in zip(masses, inverse, strict=True)]
+    moments = list(accumulate(([m * e for e in of] for m, of in zip(masses, q, strict=True)), _sum))
+    momenta = list(accumulate(p, _sum))
+    count = len(q)
+    centres = [q[0], *([r * e for e in of] for r, of in zip(inverse[1:], moments[1:], strict=True))]
+    forms = [_difference(q[i], centres[i - 1]) for i in range(1, count)]
+    conjugate = [_difference(p[i], [share[i] * e for e in momenta[i]]) for i in range(1, count)]
+    weights = [mass[i] * inverse[i - 1] * power(masses[i], -1) for i in range(1, count)]
+    strengths = [total(bodies.strengths.get((i, j), ZERO) for j in range(i)) for i in range(1, count)]
+
+    motions = [
+        KeplerMotion(tuple(a), tuple(b), w, k) for a, b, w, k in zip(forms, conjugate, weights, strengths, strict=True)
+    ]
+    attractions = [-k * inverse_length(form) for k, form in zip(strengths, forms, strict=True)]
+    a = bodies.kinetic + total(attractions)
+    pairs = [bodies.attraction(i, j) for i in range(2, count) for j in range(i)]
+    b = total([*pairs, *(-e for e in attractions[1:])])
+    spread = _spread_from_jacobi(bodies, mass)
+    return RelativeMotions(a, tuple(motions), momenta[-1], inverse[-1], spread, tuple(_independent(masses, mass))), b
+
+
+def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> Iterator[tuple[Expression, Expression]]:
+    """Yield the M_i with symbols, and the m_i with the differences of these symbols, unless m_i is a number."""
+    before = ZERO
+    for i, (m, sum_of_masses) in enumerate(zip(masses, mass, strict=True)):
+        if m.is_number:
+            before = before + m
+            continue
+        value = symbol(Symbol("mass", i))
+        yield from ((sum_of_masses, value), (m, value - before))
+        before = value
+
+
+def democratic_heliocentric(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
+    """Return the motion of A in democratic heliocentric coordinates, and B."""
+    axes, masses = range(bodies.axes), bodies.masses
+    q, p = (list(map(_vector, names)) for names in (bodies.positions, bodies.momenta))
+    inverse = power(total(masses), -1)
+    shares = [m * inverse for m in masses]
+    momentum = [total(of[axis] for of in p) for axis in axes]
+    count = len(q)
+    forms = [_difference(q[i], q[0]) for i in range(1, count)]
+    conjugate = [_difference(p[i], [shares[i] * e for e in momentum]) for i in range(1, count)]
+    strengths = [bodies.strengths.get((i, 0), ZERO) for i in range(1, count)]
+
+    motions = [
+        KeplerMotion(tuple(a), tuple(b), power(m, -1), k)
+        for a, b, m, k in zip(forms, conjugate, masses[1:], strengths, strict=True)
+    ]
+    of_star = [a - shares[0] * b for a, b in zip(p[0], momentum, strict=True)]
+    b = square(of_star) * power(masses[0], -1) / 2 + total(
+        bodies.attraction(i, j) for i in range(2, count) for j in range(1, i)
+    )
+    kinetic = total(m.inverse_mass / 2 * square(m.momentum) for m in motions) + inverse / 2 * square(momentum)
+    a = kinetic + total(bodies.attraction(i, 0) for i in range(1, count))
+    return RelativeMotions(a, tuple(motions), momentum, inverse, _spread_from_star(bodies, shares)), b
+
+
+def _spread_from_jacobi(bodies: AttractingBodies, mass: Sequence[Expression]) -> dict[str, Expression]:
+    """Return the changes of the coordinates for those of Jacobi coordinates, from the last body to the first.
+
+    q_i is R_i + (M_{i−1}/M_i) Q_i with the centre of mass R_i of the bodies up to i, R_{i−1} = R_i − (m_i/M_i) Q_i; and
+    p_i is P_i + (m_i/M) p − m_i Σ P_a/M_{a−1} over a > i, where p is the total momentum.
+    """
+    spread = dict[str, Expression]()
+    centre: list[Expression] = changes_of("R", 0, bodies.axes)
+    pull: list[Expression] = [ZERO] * bodies.axes
+    for i in range(len(mass) - 1, 0, -1):
+        inverse, before = power(mass[i], -1), power(mass[i - 1], -1)
+        of_q, of_p = changes_of("Q", i, bodies.axes), changes_of("P", i, bodies.axes)
+        position = [c + mass[i - 1] * inverse * d for c, d in zip(centre, of_q, strict=True)]
+        spread |= zip(bodies.positions[i], position, strict=True)
+        spread |= zip(
+            bodies.momenta[i], [d - bodies.masses[i] * u for d, u in zip(of_p, pull, strict=True)], strict=True
+        )
+        centre = [c - bodies.masses[i] * inverse * d for c, d in zip(centre, of_q, strict=True)]
+        pull = [u + before * d for u, d in zip(pull, of_p, strict=True)]
+    spread |= zip(bodies.positions[0], centre, strict=True)
+    return spread | dict(zip(bodies.momenta[0], [-(bodies.masses[0] * u) for u in pull], strict=True))
+
+
+def _spread_from_star(bodies: AttractingBodies, shares: Sequence[Expression]) -> dict[str, Expression]:
+    """Return the changes of the coordinates for those of democratic heliocentric coordinates."""
+    axes, spread, others = bodies.axes, dict[str, Expression](), range(1, len(shares))
+    of_q, of_p = ([changes_of(kind, i, axes) for i in others] for kind in "QP")
+    weighted = [total(m * d[axis] for m, d in zip(shares[1:], of_q, strict=True)) for axis in range(axes)]
+    star = _difference(changes_of("R", 0, axes), weighted)
+    spread |= zip(bodies.positions[0], star, strict=True)
+    spread |= zip(bodies.momenta[0], [-total(d[axis] for d in of_p) for axis in range(axes)], strict=True)
+    for i in others:
+        spread |= zip(bodies.positions[i], _sum(star, of_q[i - 1]), strict=True)
+        spread |= zip(bodies.momenta[i], of_p[i - 1], strict=True)
+    return spread
+
+
+def changes_of(kind: str, body: int, axes: int) -> list[Expression]:
+    """Return the symbols of the change of Q_i, of P_i, or of the centre of mass R."""
+    return [symbol(name) for name in _names(kind, body, axes)]
+
+
+def _names(kind: str, body: int, axes: int) -> list[Symbol]:
+    return [Symbol("change", kind, body, axis) for axis in range(axes)]
+
+
+#: The changes of coordinates by their names in specs.
+CHANGES: Mapping[str, Callable[[AttractingBodies], tuple[RelativeMotions, Expression]]] = {
+    "jacobi": jacobi,
+    "democratic_heliocentric": democratic_heliocentric,
+}
+
+
+def _vector(names: Sequence[str]) -> list[Expression]:
+    return [symbol(name) for name in names]
+
+
+def _sum(a: Vector, b: Vector) -> list[Expression]:
+    return [x + y for x, y in zip(a, b, strict=True)]
+
+
+def _difference(a: Vector, b: Vector) -> list[Expression]:
+    return [x - y for x, y in zip(a, b, strict=True)]

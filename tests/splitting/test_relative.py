@@ -1,0 +1,189 @@
+"""Bodies in Jacobi and democratic heliocentric coordinates: parts, proofs, orders and errors, with Cartesian states."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from support import TARGETS, compile_text, javascript, solver
+
+from phigen import SpecError, spec
+from phigen.compiler import examine
+from phigen.geometry.system import system_from_spec
+from phigen.spec.names import RELATIVE
+from phigen.splitting.bodies import split_bodies
+from phigen.splitting.parts import SplitHamiltonian
+from phigen.splitting.statements import check
+
+AXES = {2: "xy", 3: "xyz"}
+
+
+def text(count, axes=2, more="", masses="", change="jacobi"):
+    """Bodies of a system with planets of a thousandth; coordinates body by body."""
+    bodies, names = range(count), AXES[axes]
+    q = [f"{a}{i}" for i in bodies for a in names]
+    masses = masses or "m0: 1.5, " + ", ".join(f"m{i}: {{value: 0.00{i}, positive: true}}" for i in bodies[1:])
+    kinetic = [f"({' + '.join(f'p{a}{i}**2' for a in names)})/(2*m{i})" for i in bodies]
+    pairs = [
+        f"G*m{i}*m{j}/sqrt({' + '.join(f'({a}{i} - {a}{j})**2' for a in names)})" for i in bodies for j in range(i)
+    ]
+    return (
+        f"coordinates: [{', '.join([*q, *(f'p{c}' for c in q)])}]\n"
+        f"poisson: {{canonical: {{q: [{', '.join(q)}], p: [{', '.join(f'p{c}' for c in q)}]}}}}\n"
+        f"parameters: {{G: 1, {masses}}}\n"
+        f"hamiltonian: {' + '.join(kinetic)} - {' - '.join(pairs)}{more}\n"
+        f"scheme: splitting\ncoordinates_from: {change}\n"
+    )
+
+
+@cache
+def compiled(count, change, composition="auto", order=4, axes=2, **options):
+    return compile_text(text(count, axes, change=change) + f"composition: {composition}\n", order, **options)
+
+
+def start(count, axes=2):
+    """Planets at 1, 2.8, … with speeds near those of circles, about the centre of mass; some motion of all."""
+    masses = np.array([1.5, *(0.001 * i for i in range(1, count))])
+    q, v = np.zeros((2, count, axes))
+    for i in range(1, count):
+        radius, angle = i**1.5, 2.0 * i
+        q[i, :2] = radius * np.array([np.cos(angle), np.sin(angle)])
+        v[i, :2] = np.sqrt(1.5 / radius) * np.array([-np.sin(angle), 1.05 * np.cos(angle)])
+    if axes == 3:
+        q[1:, 2] = 0.1 * np.arange(1, count)
+    q, v = (e - masses @ e / masses.sum() for e in (q, v))
+    return np.concatenate([(q + 0.4).ravel(), (masses[:, np.newaxis] * (v + 0.01)).ravel()])
+
+
+def reference(count, axes, until):
+    """Newton's equations of all bodies by a Runge–Kutta method."""
+    masses = np.array([1.5, *(0.001 * i for i in range(1, count))])
+
+    def rate(_, y):
+        q, p = y.reshape(2, count, axes)
+        between = q[np.newaxis] - q[:, np.newaxis]
+        cubes = (np.square(between).sum(axis=-1) + np.eye(count)) ** 1.5
+        force = (masses[:, np.newaxis] * masses / cubes)[..., np.newaxis] * between
+        return np.concatenate([(p / masses[:, np.newaxis]).ravel(), force.sum(axis=1).ravel()])
+
+    return solve_ivp(rate, (0, until), start(count, axes), "DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+
+
+@pytest.mark.parametrize("change", RELATIVE)
+@pytest.mark.parametrize(("count", "axes"), [(3, 2), (3, 3), pytest.param(5, 3, marks=pytest.mark.slow)])
+def test_states_are_cartesian_and_follow_newton(change, count, axes):
+    made = solver(compiled(count, change, "aba-10-6-4", axes=axes), "c")
+    end = made.integrate(start(count, axes), 0.1, 60).x[-1]
+    np.testing.assert_allclose(end, reference(count, axes, 6), rtol=0, atol=2e-11)
+
+
+@pytest.mark.parametrize("change", RELATIVE)
+def test_targets_agree(change):
+    made = compiled(3, change, "saba-8-2", order=2)
+    ends = [solver(made, target).integrate(start(3), 0.2, 50).x[-1] for target in TARGETS]
+    ends.append(javascript(made, f"x0: {start(3).tolist()}", "s.integrate(0.2, 50)", "[...s.x]"))
+    np.testing.assert_allclose(ends, ends[:1] * len(ends), rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("change", RELATIVE)
+def test_the_parts_and_their_flows_are_proved(change):
+    examination = examine(spec.loads("phigen: 1\nname: bodies\n" + text(3, 3, change=change)))
+    statements = [s for group in examination.groups.values() for s in group]
+    assert [s.name for s in statements if s.verdict != "proved"] == ["rank of π"]
+    assert [bool(flow.motion) for flow in examination.compilation.splitting.flows] == [True, False]
+
+
+def test_a_wrong_change_of_coordinates_is_refuted():
+    """One momentum changes by a little more than its motion says."""
+    system = system_from_spec(spec.loads("phigen: 1\nname: bodies\n" + text(3)))
+    parts = split_bodies(system, "jacobi")
+    motion = parts.flows[0].motion
+    wrong = replace(motion, spread=motion.spread | {"px2": motion.spread["px2"] * 2})
+    flow = replace(parts.flows[0], motion=wrong, increment=tuple(wrong.increments(system.coordinates)))
+    statements = [*check(system, SplitHamiltonian((flow, parts.flows[1])))]
+    assert [s.verdict for s in statements] == ["proved", "refuted", "proved"]
+
+
+@pytest.mark.parametrize("change", RELATIVE)
+def test_a_step_is_a_poisson_map(change):
+    made = solver(compiled(3, change, "wisdom-holman-5", order=2, tangent=True), "c")
+    n = 6
+    canonical = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
+    _, tangent = made.step_tangent(start(3), 0.3)
+    assert np.abs(tangent @ canonical @ tangent.T - canonical).max() < 2e-13 * np.abs(tangent).max() ** 2
+
+
+def test_two_bodies_in_jacobi_coordinates_move_exactly():
+    """Along a conic section and with their centre of mass, in one step of any size."""
+    made = compiled(2, "jacobi")
+    assert len(made.splitting.flows) == 1
+    once, often = (solver(made, "c").integrate(start(2), 50 / n, n).x[-1] for n in (1, 500))
+    np.testing.assert_allclose(once, often, rtol=0, atol=1e-12)
+
+
+def test_total_momentum_and_angular_momentum_are_kept_to_rounding():
+    run = solver(compiled(4, "jacobi", "wisdom-holman-17", order=2), "c").integrate(start(4), 0.2, 2000, stride=200)
+    q, p = (run.x[:, k * 8 : (k + 1) * 8].reshape(-1, 4, 2) for k in (0, 1))
+    assert np.ptp(p.sum(axis=1), axis=0).max() < 1e-16
+    turning = (q[..., 0] * p[..., 1] - q[..., 1] * p[..., 0]).sum(axis=1)
+    assert np.ptp(turning) < 1e-14 * abs(turning[0])
+
+
+def test_jacobi_coordinates_have_the_smaller_errors():
+    """The star's momentum is a part of B in the others: 10 times the error, with a corrector."""
+    errors = {}
+    for change in RELATIVE:
+        made = solver(compiled(3, change, "wisdom-holman-17", order=2), "c")
+        energy = made.integrate(start(3), 0.2, 4000, stride=100).energy
+        errors[change] = np.ptp(energy)
+    assert errors["jacobi"] < errors["democratic_heliocentric"] / 5
+
+
+SPIN = ", L1, L2, L3"
+
+
+def test_a_body_that_rotates_has_its_rotation_among_the_motions():
+    """A symmetric top beside the bodies, coupled to a position: its rotation is in A, the torque in B."""
+    lines = text(2, 3, more=" + L3**2/5 + 0.001*L1*x1").replace("pz1]\n", f"pz1{SPIN}]\n", 1)
+    q = "x0, y0, z0, x1, y1, z1"
+    lines = lines.replace(
+        f"{{canonical: {{q: [{q}], p: [{', '.join('p' + c for c in q.split(', '))}]}}}}",
+        "{brackets: {"
+        + ", ".join(f"{c}: {{p{c}: 1}}" for c in q.split(", "))
+        + ", L1: {L2: -L3, L3: L2}, L2: {L3: -L1}}}",
+    )
+    made = compile_text(lines, 4)
+    a, b = made.splitting.flows
+    assert sorted(bool(piece.motion) for piece in a.pieces) == [False, True]
+    assert made.program.step.composition == "aba-10-6-4"
+    verdicts = [s.verdict for s in check(made.system, made.splitting)]
+    assert verdicts == ["proved"] * len(verdicts)
+    x = [*start(2, 3), 0.3, -0.2, 0.5]
+    run = solver(made, "c").integrate(x, 0.1, 400, stride=40)
+    assert np.ptp(run.energy) < 1e-9
+    assert np.ptp(np.linalg.norm(run.x[:, -3:], axis=1)) < 1e-15
+    assert b.moving == 1 + 2
+
+
+REFUSED = {
+    "no pairs": (text(2).replace("(x1 - x0)**2 + (y1 - y0)**2", "x1**2 + y1**2"), "no attraction of two bodies"),
+    "unequal masses along the axes": (text(2).replace("py1**2", "2*py1**2"), "no kinetic energy"),
+    "one that nothing attracts": (text(3).replace("G*m1*m0", "0"), "at x1 is not attracted"),
+    "further terms that do not commute": (
+        text(2, more=" + x1*x0 + px1*py0/9"),
+        "does not commute with the attractions",
+    ),
+    "momenta of the star": (text(3, more=" + x1**2", change="democratic_heliocentric"), "may not commute with p_0"),
+    "another scheme": (text(2).replace("scheme: splitting\n", ""), "belongs to scheme: splitting"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_other_systems_are_refused_at_the_key(case):
+    lines, said = REFUSED[case]
+    with pytest.raises(SpecError, match=said) as refused:
+        compile_text(lines, 4)
+    (diagnostic,) = refused.value.diagnostics
+    assert diagnostic.location is not None
+    assert diagnostic.hint
