@@ -41,6 +41,7 @@ class _Compiled(ABC):
     order: Order
     program: Program
     seconds: Mapping[str, float] = field(default_factory=dict)
+    choice: str = ""  # the reason for the scheme, where ``scheme: auto`` chose it
 
     def __repr__(self) -> str:
         return f"<Compilation of {self.spec.name}: order {self.order.order}, {self.label}>"
@@ -106,12 +107,13 @@ class _Compiled(ABC):
     @property
     def reasons(self) -> Mapping[str, str]:
         """The choices of the compiler that have a reason of their own, with it."""
-        return {}
+        return {"scheme chosen": self.choice} if self.choice else {}
 
     @property
     def notes(self) -> list[str]:
         """Decisions of the compiler that the user may not expect, a line each."""
-        return [self.order.note] if self.order.note else []
+        chosen = f"scheme: auto chose {self.choice}" if self.choice else ""
+        return [*filter(None, [chosen, self.order.note])]
 
     @property
     def monitor(self) -> Expression | None:
@@ -261,7 +263,7 @@ class CompiledSeries(_CompiledSystem):
         why, automatic = self.realisation.explanation, f"auto picked {self.realisation.kind}, "
         if why.startswith(automatic):
             why = "chosen by phigen, " + why.removeprefix(automatic)
-        return {"bi-realisation": f"{self.label}, {why}"}
+        return {**super().reasons, "bi-realisation": f"{self.label}, {why}"}
 
     @property
     def has_series(self) -> bool:

@@ -12,8 +12,9 @@ it, and of the method that was compiled.
 
 from __future__ import annotations
 
+import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar, Unpack
@@ -27,6 +28,7 @@ from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
 from phigen.realisations.catalogue import realise
 from phigen.realisations.protocol import BiRealisation
+from phigen.scheme import efficiency
 from phigen.scheme.assemble import build_program
 from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.choosing import planned as plan_without_kicks
@@ -48,6 +50,9 @@ if TYPE_CHECKING:
     from phigen.lattice.cell import Cell
 
 T = TypeVar("T")
+
+#: The order of the series whose operations show what those of higher orders take at least.
+PREVIEW_ORDER = 4
 
 #: Lattices of so many sites are worth a warning where they are typed out.
 SITES = 8
@@ -191,7 +196,7 @@ def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation 
     that the proofs tell better.
     """
     as_it_is = isinstance(spec.gauge, str) and not (spec.monitor or source.forces or source.noise)
-    if spec.scheme in ("splitting", "gauss") or not as_it_is or not is_large(source):
+    if spec.scheme != "series" or not as_it_is or not is_large(source):
         return None
     try:
         realisation = clock.timed("bi-realisation", lambda: realise(source, spec.birealisation))
@@ -202,7 +207,9 @@ def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation 
 
 
 def _compiled(spec: Spec, source: System, clock: _Clock, early: BiRealisation | None = None) -> Compilation:
-    """Compile a system, by the series or to a splitting; ``early`` is what `_realised_early` has found."""
+    """Compile a system by its scheme; ``early`` is what `_realised_early` has found."""
+    if spec.scheme == "auto":
+        return _cheapest(spec, source, clock)
     if spec.scheme == "splitting":
         return _split(spec, source, clock)
     if spec.scheme == "gauss":
@@ -226,6 +233,58 @@ def _compiled(spec: Spec, source: System, clock: _Clock, early: BiRealisation | 
         spec=spec, system=source, order=plan, program=program, gauge=gauged.gauge, seconds=clock.seconds,
         realisation=realisation, gauged=gauged, scheme=reached,
     )  # fmt: skip
+
+
+def _cheapest(spec: Spec, source: System, clock: _Clock) -> Compilation:
+    """Compile by the scheme whose steps are expected to reach the accuracy of the order at the least cost.
+
+    A series is not tried if its operations at a lower order show that it costs more than another scheme. Raises the
+    error of the series if no scheme applies.
+    """
+    compilations: dict[str, Compilation] = {}
+    failures: dict[str, SpecError] = {}
+    for scheme in ("series",) if _is_of_series(spec) else ("splitting", "gauss", "series"):
+        alone = replace(spec, scheme=scheme)
+        least = min(map(_expected, compilations.values()), default=math.inf)
+        try:
+            if scheme != "series" or not _is_dearer(alone, source, least):
+                compilations[scheme] = _compiled(alone, source, clock)
+        except SpecError as error:
+            failures[scheme] = error
+    if not compilations:
+        raise failures["series"]
+    best = min(compilations, key=lambda scheme: _expected(compilations[scheme]))
+    return replace(compilations[best], spec=spec, choice=_choice(best, compilations, failures))
+
+
+def _is_of_series(spec: Spec) -> bool:
+    """Whether options name parts of the series."""
+    named = spec.birealisation.kind != "auto" or spec.terms is not None
+    return named or spec.extras.modified_hamiltonian > 0
+
+
+def _choice(best: str, compilations: Mapping[str, Compilation], failures: Mapping[str, SpecError]) -> str:
+    """Return the reason for a scheme: what is expected of the others."""
+    least = _expected(compilations[best])
+    if least == 0:
+        return f"{best}: one exact flow"
+    others = [f"{_expected(c) / least:.1f} times the time for {s}" for s, c in compilations.items() if s != best]
+    others += [f"{s} does not apply" for s in failures]
+    others += ["more for series"] * ("series" not in {*compilations, *failures} and bool(compilations))
+    return f"{best}; expected: {', '.join(others)}" if others else f"{best}, which its options name"
+
+
+def _expected(compilation: Compilation) -> float:
+    return efficiency.cost(compilation.program)
+
+
+def _is_dearer(spec: Spec, source: System, least: float) -> bool:
+    """Whether a series of a high order costs more than ``least``, by its operations at a low order."""
+    order = spec.order or 0
+    if math.isinf(least) or order <= PREVIEW_ORDER:
+        return False
+    low = replace(spec, order=PREVIEW_ORDER, birealisation=replace(spec.birealisation, order=PREVIEW_ORDER))
+    return efficiency.series_bound(_compiled(low, source, _Clock()).program, order) > least
 
 
 def _split(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:

@@ -140,6 +140,7 @@ def _lattice(
     local, far = _brackets(spec, poisson, names)
     casimirs, kinds = _casimirs(spec, names)
     lattice_spec = Spec(
+        scheme="auto",
         name=spec.name,
         coordinates=names.fields,
         poisson=MatrixForm(tuple(tuple(local.get((f, g), ZERO) for g in names.fields) for f in names.fields)),

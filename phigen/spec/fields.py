@@ -468,7 +468,12 @@ SPEC = Record(
             default="auto",
         ),
         RecordKey("monitor", FORMULA, "equal steps of τ, dt = g dτ: g > 0, or log for a splitting"),
-        RecordKey("scheme", _switch("scheme", *SCHEMES), "how the one-step map is made", default="auto"),
+        RecordKey(
+            "scheme",
+            _switch("scheme", *SCHEMES),
+            "how the one-step map is made; auto chooses by the expected cost",
+            default="series, of lattices auto",
+        ),
         RecordKey(
             "structure",
             _switch("structure", *STRUCTURES),

@@ -443,7 +443,7 @@ class Spec:
     composition: str = "auto"
     gauge: str | Mapping[str, Expression] = "auto"  # or the multiple of each Casimir
     monitor: str | Expression | None = None  # log, or g of dt = g dτ
-    scheme: str = "auto"
+    scheme: str = "series"
     structure: str = "exact"  # of a Gauss method: exact, to truncation
     coordinates_from: str = ""  # of bodies in a splitting: jacobi, democratic_heliocentric
     profile: str = "fast"

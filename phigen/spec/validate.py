@@ -106,7 +106,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "composition": raw.get("composition", "auto"),
         "gauge": _gauge(raw.get("gauge", "auto"), declared),
         "monitor": _monitor(raw.get("monitor"), declared),
-        "scheme": raw.get("scheme", "auto"),
+        "scheme": raw.get("scheme", "series" if lattice is None else "auto"),
         "structure": raw.get("structure", "exact"),
         "coordinates_from": raw.get("coordinates_from", ""),
         "profile": raw.get("profile", "small" if raw.get("real") == "float" else "fast"),

@@ -4,6 +4,7 @@ import pytest
 
 from phigen.lanes.in_lanes import LOWERINGS
 from phigen.scheme import steps
+from phigen.scheme.efficiency import STEP_TIMES
 from phigen.scheme.step_kinds import STEP_KINDS
 from phigen.targets.c.files import CONDITIONS
 from phigen.targets.c.step_text import STEP_TEXTS
@@ -22,6 +23,10 @@ def test_each_target_has_the_text_of_each_kind(table):
 
 def test_each_kind_is_lowered_to_lanes_or_left_alone_by_a_rule():
     assert set(LOWERINGS) == set(STEP_KINDS)
+
+
+def test_each_kind_has_an_estimate_of_its_time():
+    assert {kind.name for kind in STEP_TIMES} == set(STEP_KINDS)
 
 
 def test_each_kind_has_a_switch_of_the_runtimes():

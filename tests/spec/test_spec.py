@@ -40,7 +40,12 @@ def form(written: str) -> PoissonForm:
 def test_defaults() -> None:
     found = spec()
     assert (found.order, found.terms, found.license, found.targets) == (4, None, "0BSD", ("c", "numpy"))
-    assert (found.composition, found.gauge, found.scheme, found.birealisation.kind) == ("auto", "auto", "auto", "auto")
+    assert (found.composition, found.gauge, found.scheme, found.birealisation.kind) == (
+        "auto",
+        "auto",
+        "series",
+        "auto",
+    )
     assert (found.solver.method, found.solver.tolerance, found.solver.max_iterations) == ("auto", None, 20)
     assert not found.runs
     assert found.dimension == 3

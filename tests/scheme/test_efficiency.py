@@ -1,0 +1,80 @@
+"""``scheme: auto`` chooses by expected costs; what it compiles is what the scheme by its name gives."""
+
+from dataclasses import replace
+
+import pytest
+from support import BODY, SPECIES, compile_text, slow_but, spec_of
+
+from phigen.compiler import compile_spec
+from phigen.errors import SpecError
+from phigen.spec import loads
+
+#: The fastest scheme at an orbit error of 10^(−order), measured: in all of these cases by more than 1.3.
+FASTEST = {
+    ("rigid_body", 4): "series", ("henon_heiles", 4): "splitting", ("henon_heiles", 8): "splitting",
+    ("henon_heiles", 12): "gauss", ("so4_manakov", 4): "splitting", ("so4_manakov", 8): "gauss",
+    ("kowalevski_top", 8): "splitting", ("kowalevski_top", 12): "gauss", ("pendulum", 8): "series",
+    ("maxwell_bloch", 4): "splitting",
+}  # fmt: skip
+FAST = [("rigid_body", 4), ("henon_heiles", 8), ("henon_heiles", 12)]
+
+
+def automatic(name, order, **more):
+    spec = replace(spec_of(name), scheme="auto", composition="auto", **more)
+    return compile_spec(spec.overridden(order=order))
+
+
+@pytest.mark.parametrize(("name", "order"), slow_but(FAST, FASTEST))
+def test_the_choice_is_the_fastest(name, order):
+    assert automatic(name, order).scheme_name == FASTEST[name, order]
+
+
+def test_the_program_is_that_of_the_scheme():
+    compilation = automatic("henon_heiles", 8)
+    named = compile_spec(replace(compilation.spec, scheme="splitting"))
+    assert compilation.program == named.program
+    assert compilation.choice.startswith("splitting; expected: ")
+    assert "times the time for gauss" in compilation.choice
+    assert any("auto chose splitting" in note for note in compilation.notes)
+    assert named.notes == []
+
+
+def test_the_exact_flow_is_the_cheapest():
+    assert automatic("kepler", 4).choice == "splitting: one exact flow"
+
+
+OF_SERIES = ("terms: 3\n", "birealisation: cayley\n", "modified_hamiltonian: 1\n")
+
+
+@pytest.mark.parametrize("option", OF_SERIES)
+def test_options_of_the_series_choose_it(option):
+    compilation = compile_text(f"{BODY}{option}scheme: auto\n", None)
+    assert compilation.scheme_name == "series"
+    assert compilation.choice == "series, which its options name"
+
+
+def test_schemes_that_do_not_apply_are_left_out():
+    """No exact Gauss method is known for a log-canonical bracket; and none of the three takes this one."""
+    compilation = compile_text(f"{SPECIES}scheme: auto\n", 4)
+    assert "gauss does not apply" in compilation.choice
+    text = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: z}}}\nhamiltonian: x**2 + exp(y*x) + sin(x*z*y)\n"
+    spec = loads(f"phigen: 1\nname: t\n{text}scheme: auto\ncomposition: suzuki\nmonitor: log\n")
+    with pytest.raises(SpecError):
+        compile_spec(spec)
+
+
+def test_the_series_is_the_default():
+    """But for lattices, which have a choice of their own."""
+    assert loads(f"phigen: 1\nname: t\n{BODY}").scheme == "series"
+    assert spec_of("toda3").scheme == "series"
+    text = "coordinates: [q, p]\nlattice: {axes: [i]}\npoisson: {canonical: {q: [q], p: [p]}}\n"
+    assert loads(f"phigen: 1\nname: t\n{text}hamiltonian: p**2/2 + (q[i+1] - q)**2/2\n").scheme == "auto"
+
+
+@pytest.mark.slow
+def test_noise_and_attitudes_are_taken_by_those_who_have_them():
+    noisy = compile_text(f"{BODY}noise: {{w: {{hamiltonian: x1}}}}\nscheme: auto\n", 2)
+    assert "gauss does not apply" in noisy.choice
+    turning = compile_text(f"{BODY}reconstruct: quaternion\nscheme: auto\n", 4)
+    assert "gauss does not apply" in turning.choice
+    assert turning.program.attitude is not None
