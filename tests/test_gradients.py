@@ -44,3 +44,21 @@ def test_hamiltonian_is_learned_to_the_noise():
     coefficients, losses = module.main()
     assert np.abs(coefficients - module.TRUE).max() < 0.005
     assert losses[-1] < module.NOISE**2
+
+
+@pytest.mark.slow
+def test_network_with_the_bracket_stays_on_the_leaf_without_learning_anything(monkeypatch):
+    jax = pytest.importorskip("jax")
+    module = task("learned_network")
+    monkeypatch.setattr(module, "LONG", 100.0)
+    monkeypatch.setattr(module, "HELD_OUT", 10.0)
+    monkeypatch.setattr(module, "RECORDS", 8)
+    # gradients of flows and of solvers have tests of their own
+    monkeypatch.setattr(module, "fitted", lambda records: module.TRUE)
+    monkeypatch.setattr(module, "trained", lambda run, weights, *_: (weights, [0.0]))
+    with jax.enable_x64(True):
+        results, _ = module.main()
+    by_bracket, by_field, by_formula = results.values()
+    assert by_bracket[2] < 1e-12
+    assert by_field[2] > 1e-2
+    assert by_formula[0] < 1e-12

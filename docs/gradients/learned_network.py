@@ -1,16 +1,19 @@
-"""The Hamiltonian of a top learned from noisy orbits, by a network: python docs/gradients/learned_network.py [FIGURE]
+"""The Hamiltonian of a top learned from noisy orbits: python docs/gradients/learned_network.py [ITERATIONS]
 
-The bracket is that of se(3)*, angular momentum m and direction g of gravity in the body. Three models are fitted to the same
-records: a network for H with the bracket (`phigen.jax.flow`), a network of the same size for the vector field, with
-Runge and Kutta's method (a neural ODE), and the formula of H with five unknown parameters (`phigen.jax.propagator`).
+The bracket is that of se(3)*, for the angular momentum m and the direction g of gravity in the body. Three models are
+fitted to the same records: a network for H with the bracket (`phigen.jax.flow`), a network of the same size for the
+vector field, with Runge and Kutta's method (a neural ODE), and the formula of H with five unknown parameters
+(`phigen.jax.propagator`).
 """
 
 import sys
 import time
+from itertools import pairwise
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.optimize import minimize
 
 import phigen
 from phigen.jax import flow, propagator
@@ -50,7 +53,7 @@ def true_energy(x):
 def layers(key, outputs):
     """Weights of a network with two hidden layers."""
     sizes, rng = (6, HIDDEN, HIDDEN, outputs), np.random.default_rng(key)
-    return [(rng.normal(size=(m, n)) / np.sqrt(m), np.zeros(n)) for m, n in zip(sizes, sizes[1:], strict=False)]
+    return [(rng.normal(size=(m, n)) / np.sqrt(m), np.zeros(n)) for m, n in pairwise(sizes)]
 
 
 def network(x, weights):
@@ -116,7 +119,7 @@ def trained(run, weights, records, iterations):
 
 
 def fitted(records):
-    """The five parameters of the formula, from the same windows, by Gauss and Newton's method."""
+    """The five parameters of the formula, from the same windows, by BFGS."""
     solver = phigen.compile(phigen.spec.loads(SPEC), adjoint=True, target="numpy")
     windows = records[:, : ROWS - ROWS % (WINDOW - 1) + 1]
     starts = windows[:, : -1 : WINDOW - 1].reshape(-1, 6)
@@ -126,8 +129,6 @@ def fitted(records):
 
     def loss(values):
         return jnp.mean((f(starts, dict(zip(NAMES, values, strict=True)))[:, 1:] - targets) ** 2)
-
-    from scipy.optimize import minimize
 
     slope = jax.value_and_grad(loss)
     result = minimize(lambda v: [np.asarray(r, float) for r in slope(v)], [1, 1, 1, 0, 0.5], jac=True, method="BFGS",
@@ -146,9 +147,8 @@ def measured(rows_of, starts, truth):
     return orbit, drift[0], max(drift[1:])
 
 
-def main(path=None, iterations=3000):
+def main(iterations=6000):
     """Fit the three models, and compare them."""
-    jax.config.update("jax_enable_x64", True)
     rng, spec = np.random.default_rng(3), phigen.spec.loads(SPEC)
     solver = phigen.compile(spec)
     parameters = dict(zip(NAMES, TRUE, strict=True))
@@ -176,8 +176,9 @@ def main(path=None, iterations=3000):
     for name, rows_of in models.items():
         results[name] = measured(rows_of, unseen, truth)
         print("{:32} orbit {:.3f}, energy {:.1e}, Casimirs {:.1e}".format(name, *results[name]))
-    return results
+    return results, values
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    with jax.enable_x64(True):
+        main(*map(int, sys.argv[1:]))

@@ -162,6 +162,8 @@ def remarks(tuning: Tuning) -> Iterator[str]:
     if tuning.sizes:
         sites = "×".join(map(str, tuning.sizes))
         yield f"Measured on {sites} sites. Classical methods are in NumPy, with the vector field of the solver."
+    if tuning.automatic:
+        yield _automatic(tuning)
     for label, peer in ((p.curve.label, p) for p in tuning.peers if p.cost < best.cost):
         share = peer.cost / best.cost
         yield f"{label} is cheaper: {share:.2g} of the time. It conserves neither Casimirs nor the Poisson structure."
@@ -170,6 +172,15 @@ def remarks(tuning: Tuning) -> Iterator[str]:
         yield f"Not measured: {'; '.join(settings)}: {reason}."
     if not tuning.finished:
         yield "The time budget ended before all promising candidates were tried; a larger --budget tries more."
+
+
+def _automatic(tuning: Tuning) -> str:
+    """The scheme that ``scheme: auto`` would take, beside what was measured."""
+    assert tuning.winner is not None
+    ratio, text = tuning.automatic_ratio, f"scheme: auto takes {tuning.automatic} at order {tuning.winner.curve.order}"
+    if not math.isfinite(ratio):
+        return f"{text}, of which no method that was measured has the accuracy."
+    return f"{text}; the best of that scheme takes {ratio:.2g} times the time of the best of all."
 
 
 def _extrapolated(tuning: Tuning) -> str:
@@ -249,6 +260,7 @@ def described(tuning: Tuning, spec: Spec, run: Run) -> dict[str, Any]:
         "present": _finalist(tuning.present) if tuning.present else None,
         "curves": [_curve(c) for c in tuning.curves],
         "not_measured": {s.described(): why for s, why in tuning.refused.items()},
+        "automatic": {"scheme": tuning.automatic, "ratio": tuning.automatic_ratio} if tuning.automatic else None,
         "monitors": _monitors(tuning.monitors) if tuning.monitors else None,
     }
     cleaned: dict[str, Any] = finite(data)

@@ -36,7 +36,7 @@ from phigen.symbolic.numeric import DomainError
 from phigen.tuning.building import Built, Refusal, build_all
 from phigen.tuning.problem import ROWS, Problem
 from phigen.tuning.scales import MOST_TURN, fastest_rate, motion
-from phigen.tuning.settings import SPLITTING, Setting
+from phigen.tuning.settings import GAUSS, SPLITTING, Setting
 from phigen.tuning.trials import ROUNDING
 
 #: Monitors are tried where the largest speed is at least this multiple of the median.
@@ -69,7 +69,10 @@ class Trial:
 
 @dataclass(frozen=True)
 class Monitors:
-    """Gains of monitors over a ``span`` of time: steps equal in t, and all monitors that were tried, the best first."""
+    """Gains of monitors over a ``span`` of time: steps equal in t, and all monitors that were tried, the fastest first.
+
+    Steps of different schemes differ in cost.
+    """
 
     span: float
     plain: Trial
@@ -158,14 +161,16 @@ def _is_positive(b: Expression, columns: Mapping[str, Floats | float]) -> bool:
 
 
 def settings(current: Setting, order: int, monitors: Sequence[Expression]) -> list[Setting]:
-    """The settings to be built: steps equal in t, and each monitor, at the same order."""
+    """The settings to be built: steps equal in t, and each monitor, by the series and by Gauss, at the same order."""
     order = min(order + order % 2, HIGHEST)
     series = (
         Setting("auto", order, "none") if current.scheme != "series" else replace(current, order=order, gauge="none")
     )
     series = replace(series, composition="auto")
     explicit = Setting(SPLITTING, order, "none", "auto", monitor=LOGARITHMIC)
-    return [series, explicit, *(replace(series, monitor=str(g)) for g in dict.fromkeys(monitors))]
+    gauss = Setting(GAUSS, order, "none")
+    monitored = (replace(s, monitor=str(g)) for g in dict.fromkeys(monitors) for s in (series, gauss))
+    return [series, explicit, *dict.fromkeys(monitored)]
 
 
 def compare(
@@ -197,7 +202,7 @@ def compare(
         elif isinstance(outcome, Refusal) and not outcome.inapplicable:
             refused[setting.monitor] = outcome.reason
     reached = [t for t in trials if math.isfinite(t.steps)]
-    return Monitors(span, first, tuple(sorted(reached, key=lambda t: t.steps)), refused)
+    return Monitors(span, first, tuple(sorted(reached, key=lambda t: t.seconds)), refused)
 
 
 def _trial(

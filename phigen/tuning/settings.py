@@ -30,6 +30,9 @@ SPLITTING = "splitting"
 GAUSS = "gauss"
 GAUSS_ORDERS = (4, 8, 12, 16)
 
+#: So does the choice among the schemes by their expected cost.
+AUTO = "auto scheme"
+
 #: Methods for near-integrable systems that are tried, with their orders: the best of each set of errors, by powers of
 #: ε and h, and the one with a corrector, whose steps are the cheapest.
 NEAR_INTEGRABLE = (("saba-8-2", 2), ("wisdom-holman-17", 2), ("aba-8-4", 4), ("aba-10-6-4", 4))
@@ -96,7 +99,7 @@ class Setting:
     @property
     def scheme(self) -> str:
         """Its scheme, as in specs."""
-        return self.kind if self.kind in (SPLITTING, GAUSS) else "series"
+        return "auto" if self.kind == AUTO else self.kind if self.kind in (SPLITTING, GAUSS) else "series"
 
     def lines(self) -> list[str]:
         """The top-level lines of a spec that ask for it; what is `OWN` stays as it is there."""

@@ -9,12 +9,14 @@ from dataclasses import dataclass, field, replace
 from statistics import median
 
 from phigen.compilation import Compilation
+from phigen.compiler import compile_spec
+from phigen.errors import SpecError
 from phigen.study.conservation import Unit
 from phigen.tuning import search
 from phigen.tuning.monitors import Monitors, candidates, compare, is_uneven, settings
 from phigen.tuning.problem import ROWS, Candidate, Problem, steps_in
 from phigen.tuning.search import Curve
-from phigen.tuning.settings import Setting
+from phigen.tuning.settings import AUTO, Setting, own_setting
 from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import Point
 from phigen.tuning.tuner import Notify, TimeBudget, Tuner
@@ -75,6 +77,14 @@ class Tuning:
     monitors: Monitors | None = None
     sizes: tuple[int, ...] = ()
     clock: str = "t"
+    automatic: str = ""  # the scheme that ``scheme: auto`` takes at the order of the proposal
+
+    @property
+    def automatic_ratio(self) -> float:
+        """The time of the best method by that scheme, in times of the proposal; infinite if none has the accuracy."""
+        costs = [c.cost(self.accuracy) for c in self.curves if c.setting and c.setting.scheme == self.automatic]
+        best = min((c.cost(self.accuracy) for c in self.curves if c.setting), default=math.inf)
+        return min(costs, default=math.inf) / best
 
     @property
     def winner(self) -> Finalist | None:
@@ -114,7 +124,7 @@ def tune(
         next((f for f in ranked if f.curve is current), None), timed[-1] if present else None, tuple(peers),
         {s: why for s, why in tuner.refused.items() if why}, finished,
         tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None, problem.unit,
-        monitored(tuner, current), problem.sizes, problem.clock,
+        monitored(tuner, current), problem.sizes, problem.clock, automatic(tuner.compilation, ranked),
     )  # fmt: skip
 
 
@@ -135,6 +145,18 @@ def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
     requested = settings(setting, current.order, list(candidates(compilation.system, problem.parameters, states)))
     deadline = time.perf_counter() + MONITORS * tuner.clock.budget
     return compare(spec, compilation.system, requested, problem, states, tuner.piece, tuner.accuracy, deadline)
+
+
+def automatic(compilation: Compilation, ranked: Sequence[Finalist]) -> str:
+    """The scheme that ``scheme: auto`` takes at the order of the best; empty for a lattice, and without a best."""
+    if not ranked or compilation.spec.lattice:
+        return ""
+    setting = replace(ranked[0].curve.setting or own_setting(compilation), kind=AUTO, composition="auto", gauge="auto")
+    try:
+        chosen = compile_spec(setting.applied(compilation.spec), system=compilation.known_system)
+    except SpecError:
+        return ""
+    return chosen.scheme_name
 
 
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:

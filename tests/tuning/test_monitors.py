@@ -116,3 +116,10 @@ def test_the_lines_of_the_best_monitor_are_printed(capsys):
     assert "Not measured: q1**2: late." in text
     assert "monitor: 1/(1 + q1**2)\n" in text
     assert "    step: 0.0505\n    until: 13.0" in text
+
+
+def test_each_monitor_is_tried_by_the_series_and_by_gauss():
+    spec = specs.loads(KEPLER)
+    compilation = compile_spec(spec)
+    requested = monitors.settings(own_setting(compilation), 4, [spec.hamiltonian])
+    assert [s.scheme for s in requested if s.monitor == str(spec.hamiltonian)] == ["series", "gauss"]

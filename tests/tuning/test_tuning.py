@@ -23,7 +23,7 @@ from phigen.tuning.problem import SystemProblem
 from phigen.tuning.references import agreed, orbit_error
 from phigen.tuning.search import Curve, cheapest_step, proposals, scan, step_for
 from phigen.tuning.settings import OWN, SPLITTING, Setting, charts, own_setting, variants
-from phigen.tuning.study import Finalist, confirmed, ranking
+from phigen.tuning.study import Finalist, Tuning, automatic, confirmed, ranking
 from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import MARKS, Point, energy_measure, marks, orbit_measure
 from phigen.tuning.tuner import expected_seconds
@@ -209,6 +209,21 @@ def tuner_of(grows, budget=1e6):
         accuracy=1e-6, methods={curve.key: None}, measures={True: measure}, piece=100.0, referring=False,
         problem=SimpleNamespace(horizon=1e4), clock=SimpleNamespace(budget=budget),
     )  # fmt: skip
+
+
+def test_choice_of_the_model_is_compared_with_what_was_measured():
+    ladder = [0.5**k for k in range(12)]
+    by_kind = {kind: Setting(kind, 4, "none") for kind in ("constant", "splitting", "gauss")}
+    curves = tuple(
+        Curve(kind, 4, points(4, ladder, nanoseconds=cost), by_kind[kind])
+        for kind, cost in (("constant", 100.0), ("splitting", 50.0), ("gauss", 300.0))
+    )
+    tuning = Tuning("energy", 1e-8, 10.0, 10.0, curves, (), None, None, automatic="series")
+    assert tuning.automatic_ratio == pytest.approx(2.0)
+    assert replace(tuning, automatic="gauss").automatic_ratio == pytest.approx(6.0)
+    best = [Finalist(curves[0], curves[0].points[0])]
+    assert automatic(compiled("henon_heiles", 4), best) == "splitting"
+    assert automatic(compiled("henon_heiles", 4), []) == ""
 
 
 @pytest.mark.parametrize("grows", [1.0, 2.0, 5.0])
