@@ -92,8 +92,12 @@ class Experiment:
         if self.times is not None:
             last = self.times[-1] if self.times else self.begin
             return begun + len(self.times) + (abs(self.until - last) > 1e-9 * abs(self.until - self.begin))
-        part = bool(self.end and self.end.part)
-        return begun + self.run.steps // self.run.stride + (self.run.steps % self.run.stride > 0) + part
+        return begun + self.run.steps // self.run.stride + (self.has_part or self.run.steps % self.run.stride > 0)
+
+    @property
+    def has_part(self) -> bool:
+        """Whether a part of a step follows the whole steps."""
+        return bool(self.end and self.end.part)
 
 
 def expect_system(spec: Spec) -> None:

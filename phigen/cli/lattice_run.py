@@ -263,6 +263,10 @@ def told_steps(trajectory: LatticeTrajectory) -> str:
     return f"{trajectory.steps} steps of {trajectory.h:.9g}" + (" and a part of one" if part else "")
 
 
+def _shown(error: float) -> str:
+    return f"{error:.1e}" if error else "0"
+
+
 def section_text(run: Run) -> str:
     """The expression of a section, for people."""
     from phigen.symbolic.readable import readable
@@ -287,8 +291,13 @@ def _print(
     out(f"  {sizes} sites; {told_steps(trajectory)}, t = {trajectory.t[0]:.9g} … {trajectory.t[-1]:.9g}; {method}\n")
     kinds = dict.fromkeys(spec.casimirs, "at the worst site") | {name: unit.kind for name, unit in units.items()}
     kinds |= dict.fromkeys((ENERGY, BALANCE, CHANGE), units["energy"].kind)
-    rows = [["largest change" if CHANGE in errors else "largest error", "", ""]]
-    rows += [[name, f"{error:.1e}" if error else "0", kinds[name]] for name, error in errors.items()]
+    rows = [["largest" if BALANCE in errors else "largest change" if CHANGE in errors else "largest error", "", ""]]
+    if BALANCE in errors:
+        change = float(units["energy"].errors(trajectory.energy, float(trajectory.energy[0])).max())
+        rows.append([CHANGE, _shown(change), units["energy"].kind])
+    for name, error in errors.items():
+        label = name if BALANCE not in errors else f"{'error of the' if name == BALANCE else 'change of'} {name}"
+        rows.append([label, _shown(error), kinds[name]])
     for line in table(rows, right=[1]):
         out(f"  {line}")
     out(f"  {stated(units)}")

@@ -349,9 +349,8 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
     label = f"{recorder.solver.interface.name}, order {recorder.solver.order}"
     with _kept(recorder), interruptible() as stop, console.progress(label, run.steps) as progress:
         see_tangent = growth.see if growth else None
-        pieces = march(
-            session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent, begun=recorder.watch.begun
-        )
+        flags = {"begun": recorder.watch.begun, "goes_on": experiment.has_part}
+        pieces = march(session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent, **flags)
         if experiment.times is not None:
             pieces = _at_times(recorder, session, see_tangent)
         done = False
@@ -405,7 +404,7 @@ def _compared_rows(experiment: Experiment, h: float) -> _Rows:
         numbers = [0.0, *(span / h for span in experiment.spans)]
         return _Rows([*numbers, *([last] if experiment.rows > len(numbers) else [])], experiment.rows)
     whole = range(0, run.steps + 1, run.stride)
-    ends = [float(run.steps)] * (run.steps % run.stride > 0) + [last] * (last > run.steps * (1 + 1e-9))
+    ends = [last] if experiment.has_part else [float(run.steps)] * (run.steps % run.stride > 0)
     return _Rows(chain(whole, ends), len(whole) + len(ends))
 
 

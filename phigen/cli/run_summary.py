@@ -68,8 +68,12 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
     first = summaries[0]
     driven = first.is_balance
     noisy = first.energy.unit.moves and not driven
-    rows = [["largest change" if noisy else "largest error", *(s.method for s in summaries), ""]]
-    energy = "energy balance" if driven else "energy"
+    heading_of_all = "largest" if driven else "largest change" if noisy else "largest error"
+    rows = [[heading_of_all, *(s.method for s in summaries), ""]]
+    if first.change:
+        changes = [_shown(s.change) for s in summaries if s.change]
+        rows.append(["change of the energy", *changes, first.change.unit.kind])
+    energy = "error of the energy balance" if driven else "energy"
     rows.append([energy, *(_shown(s.energy) for s in summaries), first.energy.unit.kind])
     if driven:
         rows.append(["  the integral, work done", *(f"{s.work:.4g}" for s in summaries), ""])
@@ -79,7 +83,8 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
         rows.append(["  last tenth/first", *growth, "1 is no drift"])
     for kind, noun in (("casimirs", "Casimir"), ("invariants", "invariant")):
         for name, drift in getattr(first, kind).items():
-            label = f"change of the {noun} {name}" if drift.unit.moves and not noisy else f"{noun} {name}"
+            moves, label = drift.unit.moves and not noisy, f"{noun} {name}"
+            label = f"{'change' if moves else 'error'} of the {label}" if driven or moves else label
             rows.append([label, *(_shown(getattr(s, kind)[name]) for s in summaries), drift.unit.kind])
     if first.exact:
         rows.append(["against closed form", *(_shown(s.exact) for s in summaries if s.exact), "relative"])

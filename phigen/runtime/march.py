@@ -47,8 +47,11 @@ def march(
     see_tangent: Callable[[Floats], None] | None = None,
     *,
     begun: bool = False,
+    goes_on: bool = False,
 ) -> Iterator[Piece]:
     """Advance a session to ``steps`` steps of size h, and yield every ``stride``-th state and the last, in pieces.
+
+    If a part of a step follows, so that the run ``goes_on``, the last whole step is no last state.
 
     The length of a piece depends on the speed of the machine, the rows do not. ``see_tangent`` receives the derivative
     (DIM, DIM) of each step. ``begun`` is true if the initial state was yielded before. Raises `BackendError` after a
@@ -71,7 +74,7 @@ def march(
                 rows |= {number + k: row for k, row in enumerate(here) if (number + k) % stride == 0}
         except BackendError as error:
             failure = error
-        if session.steps == steps or (failure and session.steps):
+        if (session.steps == steps and not goes_on) or (failure and session.steps):
             rows[session.steps] = session.state(), (session.time(), session.element())
         x = np.array([state for state, _ in rows.values()]).reshape(len(rows), len(session.state()))
         passed = np.array([time for _, (time, _) in rows.values()])

@@ -44,7 +44,8 @@ class Summary:
     """Errors of one method; ``exact`` is the largest error against the closed form, None if there is none.
 
     ``good`` rows of the states are finite; the numbers are about these. Where H is no invariant, ``energy`` is
-    about H − ``work``, an integral that may be ``off`` by so much in the same unit.
+    about H − ``work``, an integral that may be ``off`` by so much in the same unit, and ``change`` is the largest
+    change of H itself.
     """
 
     method: str
@@ -57,6 +58,7 @@ class Summary:
     rows: int
     off: float = math.nan
     work: float = 0.0
+    change: Drift | None = None
 
     @property
     def is_balance(self) -> bool:
@@ -112,6 +114,7 @@ class Watch:
         self._powers = powers(system)
         if self._powers:  # the last time with the powers there; the work since the start, and how far that may be off
             self.state |= {"instant": np.full(1 + len(self._powers), np.nan), "work": np.zeros(2)}
+            self.state |= {"change": np.zeros(())}
         if system.driven:
             self.state["since"] = np.zeros(())
 
@@ -145,7 +148,7 @@ class Watch:
         values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, known)]
         if self._powers:
             done[:count] = self._work(t, [np.broadcast_to(a, t.shape) for a in evaluate(self._powers, known)])
-            values[0] = values[0] - done[:count]
+            energies, values[0] = values[0], values[0] - done[:count]
         if good == 0:
             state |= {"first": x[0].copy(), "start": np.array([v[0] for v in values])}
         state["good"] = np.asarray(good + count)
@@ -153,6 +156,9 @@ class Watch:
         for k, (v, unit) in enumerate(zip(values, self._units(), strict=True)):
             with np.errstate(invalid="ignore"):  # where the start has no value, errors have none
                 np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
+        if self._powers:  # the balance begins with the energy
+            changes = self._units()[0].errors(energies, float(state["start"][0]))
+            state["change"] = np.maximum(state["change"], np.max(changes))
         self._see_turns(x, windows)
         if self._run and self._run.exact:
             off = _against_exact(self._system, self._run, self._parameters, state["first"], t, x)
@@ -190,6 +196,7 @@ class Watch:
             good=int(state["good"]),
             rows=rows,
             work=float(state["work"][0]) if self._powers else 0.0,
+            change=Drift(float(state["change"]), named[ENERGY]["H"].unit) if self._powers else None,
             off=float(state["work"][1]) / named[ENERGY]["H"].unit.size if self._powers else math.nan,
         )
 

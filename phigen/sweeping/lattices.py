@@ -86,13 +86,11 @@ class _Member:
     ) -> None:
         self.plan, self.solver, self.kept = plan, solver, dict[str, Any]()
         h, t0 = member_values.pop("step", plan.h), member_values.pop("start", plan.t0)
-        numbers = {name: value for name, value in plan.parameters.items() if np.ndim(start.parameters[name]) == 0}
-        call_arguments = {**start.arguments, **numbers, **member_values}
         self.status = _REFUSED
         if not (np.isfinite(h) and h != 0 and np.isfinite(t0)):
             return
         try:
-            values = solver.values(call_arguments, {}, start.sizes)
+            values = _values(plan, solver, start, member_values)
             draws = (Draws(plan.noise, number),) if solver.interface.noise else ()
             self.session = solver.backend.start(start.state, values, t0, *draws)
             self.status, results = 0, self._made(start.state, h, t0)
@@ -158,6 +156,28 @@ class _Member:
         energy, casimirs = self._seen()
         changes = [float(np.abs(a - b).max()) for a, b in zip(casimirs, before[1], strict=True)]
         return {"energy_error": abs(energy - before[0]), "casimir_error": max(changes, default=0.0)}
+
+
+def _values(plan: Plan, solver: LatticeSolver, start: Start, member_values: Mapping[str, float]) -> dict[str, Any]:
+    """The parameters of a member. Raises `ValueError` for those that are refused."""
+    numbers = {name: value for name, value in plan.parameters.items() if np.ndim(start.parameters[name]) == 0}
+    return solver.values({**start.arguments, **numbers, **member_values}, {}, start.sizes)
+
+
+def energies_at_start(
+    job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], count: int
+) -> tuple[Floats, Floats]:
+    """The energies of members at their starts, and the sums of the magnitudes of the energies of their sites."""
+    energies = np.full((2, count), np.nan)
+    for m in range(count):
+        member_values = {name: float(values[m]) for name, values in varied.items() if name != "step"}
+        start, t0 = _start(job, int(member_values.pop("seed", 0))), member_values.pop("start", job.plan.t0)
+        try:
+            session = solver.backend.start(start.state, _values(job.plan, solver, start, member_values), t0)
+        except (BackendError, ValueError):  # numbers that are refused
+            continue
+        energies[:, m] = session.hamiltonian(), np.abs(session.density()).sum()
+    return energies[0], energies[1]
 
 
 def exponent(session: LatticeSession, h: float, steps: int) -> float:

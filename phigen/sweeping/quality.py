@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import prod
-from typing import Any
 
 import numpy as np
 
 from phigen.geometry.system import System
+from phigen.lattice.cell import Cell
 from phigen.study.conservation import SMALL, value_and_terms
 from phigen.sweeping.store import Job
+from phigen.symbolic.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -26,21 +28,41 @@ def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
 
     Members that failed, or wait, do not count, and none does where time, forces or noise change the energy.
     """
-    if "energy_error" not in job.plan.keep or system.driven:
+
+    def at_start(varied: Mapping[str, Floats], count: int) -> tuple[Floats, Floats]:
+        starts = dict(zip(job.plan.coordinates, job.plan.initial, strict=True))
+        values = {**job.plan.parameters, **starts, **varied}
+        return value_and_terms(system.hamiltonian, system.coordinates, values)
+
+    return EnergyErrors() if system.driven else _counted(job, at_start, limit)
+
+
+def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
+    """The same for a sweep of a lattice, whose starts are made again."""
+    if cell.driven or "energy_error" not in job.plan.keep:
+        return EnergyErrors()
+    from phigen.runtime.lattice import LatticeSolver
+    from phigen.sweeping.lattices import energies_at_start
+
+    solver = LatticeSolver(job.backend(), job.interface)  # type: ignore[arg-type]
+    return _counted(job, lambda varied, count: energies_at_start(job, solver, varied, count), limit)
+
+
+def _counted(
+    job: Job, at_start: Callable[[Mapping[str, Floats], int], tuple[Floats, Floats]], limit: float
+) -> EnergyErrors:
+    """Count the large errors; ``at_start`` returns the energies of members and their terms."""
+    if "energy_error" not in job.plan.keep:
         return EnergyErrors()
     count, largest = 0, 0.0
     for number in range(prod(job.plan.boxes)):
         region = job.plan.region(number)
         listed = {name: job.root[name][region] for name in job.plan.listed}
-        values: dict[str, Any] = {
-            **job.plan.parameters,
-            **dict(zip(job.plan.coordinates, job.plan.initial, strict=True)),
-        }
-        values |= job.plan.varied(region, listed)
+        errors = job.root["energy_error"][region].reshape(-1)
         with np.errstate(all="ignore"):
-            value, terms = value_and_terms(system.hamiltonian, system.coordinates, values)
+            value, terms = at_start(job.plan.varied(region, listed), len(errors))
             scale = np.where(np.abs(value) > SMALL * terms, np.abs(value), terms)
-            relative = job.root["energy_error"][region].reshape(-1) / scale
+            relative = errors / scale
         relative = relative[np.isfinite(relative)]
         count += int(np.count_nonzero(relative > limit))
         largest = max(largest, float(relative.max(initial=0.0)))

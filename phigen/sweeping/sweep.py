@@ -27,7 +27,7 @@ from phigen.spec.problems import did_you_mean
 from phigen.study.conservation import LARGE_ENERGY_ERROR
 from phigen.sweeping import cluster, lattices, store
 from phigen.sweeping.plan import Plan, chunk_of
-from phigen.sweeping.quality import EnergyErrors, energy_errors
+from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_errors
 
 #: Seconds that a chunk should take: long beside what scheduling and storing cost, short beside a coffee.
 _SECONDS = 4.0
@@ -110,7 +110,10 @@ def made(
             cluster.make_all(client, slots, *place, chunks, count)
         store.imported("zarr").consolidate_metadata(str(setting.output))
     dims = dict(zip(plan.dims, plan.shape, strict=True))
-    energy = EnergyErrors() if spec.lattice else energy_errors(job, compilation.system, LARGE_ENERGY_ERROR)
+    if spec.lattice:
+        energy = lattice_energy_errors(job, compilation.by_sweeps().cell, LARGE_ENERGY_ERROR)
+    else:
+        energy = energy_errors(job, compilation.system, LARGE_ENERGY_ERROR)
     return Outcome(int(counts[0]), int(counts[1]), plan.size, dims, compilation.order.order, energy)
 
 

@@ -457,3 +457,17 @@ def test_times_of_a_spec_are_those_of_the_command_line(phigen, swing):
     assert solver.run("listed").t == pytest.approx([0, 0.25, 1.3, 2, 2.05], rel=1e-14)
     assert solver.run("past").t == pytest.approx([0, -0.5, -1.33, -np.pi / 2], abs=1e-11)
     np.testing.assert_allclose(solver.run("listed").x, rows[:, 1:3], atol=1e-14)
+
+
+@pytest.mark.parametrize("until", ["6.05", "6.0", "6.3"])
+@pytest.mark.parametrize(("text", "run"), [(SWING, "until"), (BODY, "tumbling"), (SWING, "stopped")])
+def test_the_command_and_python_have_the_same_rows(text, run, until, phigen, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = text.replace("until: 6.05", f"until: {until}").replace("until: 5,", f"until: {until},")
+    text = text.replace("every: 0.3", f"stride: {4 if until == '6.05' else 9}")
+    Path("s.yaml").write_text(text)
+    ran(phigen, "s.yaml", "--run", run, "--output", "run.npz")
+    stored, trajectory = np.load("run.npz"), compiled("s.yaml", target="numpy").run(run)
+    assert len(stored["t"]) == len(trajectory.t)
+    np.testing.assert_allclose(stored["t"], trajectory.t, rtol=1e-13)
+    np.testing.assert_allclose(stored["x"], trajectory.x, rtol=0, atol=1e-12)

@@ -87,7 +87,11 @@ def test_a_run_begins_at_its_time(tmp_path):
     mine, other = (m["energy"]["error"] for m in told["methods"])
     assert 0 < mine < other
     shown = runner.invoke(group, ["run", str(path)])
-    assert "energy balance" in shown.output
+    rows = dict(line.strip().split("  ", 1) for line in shown.output.splitlines() if " of the energy" in line[:30])
+    assert [*rows] == ["change of the energy", "error of the energy balance"]
+    assert "largest error" not in shown.output
+    changes = told["methods"][0]["change"]["error"]
+    assert changes == pytest.approx(np.abs(stored["energy"] - stored["energy"][0]).max() / abs(stored["energy"][0]))
     assert "t = 0.7 … 6.7" in shown.output
 
 

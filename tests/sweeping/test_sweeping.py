@@ -538,3 +538,38 @@ def test_logarithmic_axes_and_large_energy_errors_are_seen(cluster, tmp_path, mo
     low, high = axes.get_ylim()
     assert 0.001 < low < 0.01
     assert 3 < high < 30
+
+
+QUARTIC_CHAIN = """\
+phigen: 1
+name: stiffening
+lattice: {axes: [i]}
+coordinates: [q, p]
+parameters: {k: 1}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + k*(q[i+1] - q)**2/2 + q**4/4
+order: 2
+runs: {r: {sizes: [16], initial: {q: {random: normal, seed: 3, scale: 0.5}, p: 0}, step: 0.38, steps: 60}}
+sweeps: {s: {over: {k: {from: 0.1, to: 3, count: 3}, seed: {count: 2}}, keep: [energy_error]}}
+"""
+
+
+def test_large_energy_errors_of_lattices_are_counted_in_the_unit_of_runs(cluster, tmp_path):
+    from phigen.cli import group
+
+    (tmp_path / "s.yaml").write_text(QUARTIC_CHAIN)
+    arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "s.zarr"), "-t", "numpy"]
+    done = CliRunner().invoke(group, [*arguments, "--scheduler", cluster.scheduler_address])
+    assert done.exit_code == 0, done.output
+    data, large, largest = xarray.open_zarr(tmp_path / "s.zarr").load(), 0, 0.0
+    for number, seed in enumerate((3, 4)):
+        text = QUARTIC_CHAIN.replace("seed: 3", f"seed: {seed}")
+        solver = phigen.compile(phigen.spec.loads(text), target="numpy")
+        for k in data.k.values:
+            relative = float(data.energy_error.sel(k=k)[number]) / solver.run(k=float(k), steps=1).energy_scale
+            large, largest = large + (relative > 0.1), max(largest, relative)
+    assert 0 < large < 6
+    expected = (
+        f"warning: {large} of 6 members have an energy error above 10% of their energy, the largest {largest:.0%}"
+    )
+    assert expected in done.stderr
