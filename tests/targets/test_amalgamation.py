@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import pytest
 from support import run, spec_of, tool, write
@@ -16,6 +17,7 @@ from phigen.targets.c.macros import Macros
 from phigen.targets.c.unused import without_unused
 
 RUNTIME = resources.templates() / "c/runtime"
+PACKAGE = Path(phrases.__file__).parents[2]
 
 
 def expanded(lines, *definitions):
@@ -100,7 +102,8 @@ def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, pro
     write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{made.name}_", text) for f, text in own.items()})
     printed = {"phrases.h": phrases.header(), **{file: states.header(file) for file in states.PARTS}}
     write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{made.name}_", text) for f, text in printed.items()})
-    write(tmp_path, {f: f"#ifndef {f[:-2]}_h\n#define {f[:-2]}_h\n{text}\n#endif" for f, text in made.printed.items()})
+    spelt = {f: re.sub(r"\bPHI_", f"{made.name}_", text) for f, text in made.printed.items()}
+    write(tmp_path, {f: f"#ifndef {f[:-2]}_h\n#define {f[:-2]}_h\n{text}\n#endif" for f, text in spelt.items()})
     made_text = made.text(code)
     write(tmp_path, {"made.c": made_text})
     write(tmp_path / "none", dict.fromkeys(re.findall("#include <(.*)>", "".join(own.values())), ""))
@@ -186,8 +189,10 @@ def test_functions_that_statements_may_not_call_are_of_the_runtime():
         assert re.search(rf"^ +((if|for) \([^\n]*\) )?{function}\([^\n]*\);$", text, re.M), function
 
 
-def test_every_phrase_is_used_by_the_runtime():
-    text = "".join(file.read_text(encoding="utf-8") for file in RUNTIME.glob("*.[ch]")) + phrases.header()
+def test_every_phrase_is_used_by_the_runtime_or_printed():
+    printing = [PACKAGE / "targets/state.py", *RUNTIME.parent.glob("*.jinja"), *(PACKAGE / "targets/c").glob("*.py")]
+    files = [*RUNTIME.glob("*.[ch]"), *(f for f in printing if f.name != "phrases.py")]
+    text = "".join(file.read_text(encoding="utf-8") for file in files) + phrases.header()
     for choice in phrases.ALL:
         for name in choice.phrases:
             word = f"PHI_{name.split('(')[0]}"
