@@ -16,6 +16,9 @@ LARGEST_CIRCLE = 2
 #: Lines of preprocessor conditions among the non-blank lines of the runtime in C, in percent.
 CONDITIONS = 7.9
 
+#: The same for lines ``// #if``, ``// #else`` and ``// #endif`` of the runtime in JavaScript.
+JAVASCRIPT_CONDITIONS = 2.9
+
 #: Tests on the kind of a step or of a compilation: ``isinstance``, class patterns, and comparisons of the records of
 #: kinds or of their names. Kinds differ by facts in their records, entries in tables, and methods.
 KIND_TESTS = 0
@@ -84,6 +87,13 @@ def conditions() -> tuple[int, int]:
     return counted, total
 
 
+def javascript_conditions() -> tuple[int, int]:
+    """Lines of conditions in the runtime in JavaScript, and all that are not blank."""
+    files = (resources.templates() / "js/runtime").glob("*.mjs")
+    lines = [line for f in files for line in f.read_text(encoding="utf-8").splitlines() if line.strip()]
+    return sum(1 for line in lines if re.match(r"\s*(//|\*) #(if|else|endif)", line)), len(lines)
+
+
 def kind_tests(tree: ast.AST) -> list[int]:
     """The lines of a module that ask for the kind of a step, a plan, or a compilation."""
     imported = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module in KINDS)
@@ -117,6 +127,11 @@ def test_conditions_in_the_runtime_do_not_grow():
     assert 100.0 * counted / total <= CONDITIONS
 
 
+def test_conditions_in_the_runtime_in_javascript_do_not_grow():
+    counted, total = javascript_conditions()
+    assert 0 < 100.0 * counted / total <= JAVASCRIPT_CONDITIONS
+
+
 def test_circles_are_found():
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set()}
     assert circles(graph) == [{"a", "b", "c"}]
@@ -148,3 +163,4 @@ if __name__ == "__main__":
     print([len(circle) for circle in circles(imports())], "modules in circles")
     print(sum(map(len, all_kind_tests().values())), "tests on kinds of steps and compilations")
     print("{} of {} lines of the runtime in C are conditions".format(*conditions()))
+    print("{} of {} lines of the runtime in JavaScript are conditions".format(*javascript_conditions()))

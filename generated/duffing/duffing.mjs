@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 301de8f6a179b0d02af55dcde32cd26d2335ddb36531cd2d4319b9bc4d9b54f8
+ * body-sha256: 76bd3e1ce9bba931c0addb426ff07c2dca00680c3000b348e6036161ef9c23b6
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -234,14 +234,11 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
+// The parts of some systems only:
+
 // ---- The solver ----
 
 const number = new Float64Array(1);
-
-/** Return a table of coefficients for each stage. */
-function emptyTables() {
-  return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
-}
 
 /**
  * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
@@ -256,7 +253,7 @@ function admitted(given) {
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
   }
   const [table] = emptyTables();
-  prepare(params, PROBE_STEP, table);
+  prepareProbe(params, table);
   if (![table].flat().every((row) => row.every(Number.isFinite))) {
     throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
   }
@@ -288,11 +285,11 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size, then of the time too. */
+  /** Coefficients of each stage: functions of parameters and step size, then of the time or noise too. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h: the time is a multiple of h from there. */
+  /** Steps and time at the last change of h, from which the time is counted if steps are equal in it. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -307,7 +304,7 @@ export class Solver {
   constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
-    [this.t] = finite([options.t0 ?? 0], 1, "t0");
+    takeTime(this, options);
   }
 
   /** Compute the coefficients for a step size, if it has changed. */
@@ -315,19 +312,12 @@ export class Solver {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
-      prepare(this.params, fraction * h, this.coef[stage]);
-      this.history[stage].clear();
+      prepareStage(this, fraction * h, this.coef[stage]);
+      clearHistory(this, stage);
     });
     this.h = h;
     this.#timeBefore = this.t;
     this.#stepsBefore = this.steps;
-  }
-
-  /** Compute the coefficients that depend on the time of the next step. */
-  #renew() {
-    this.coef.forEach((coef, stage) => {
-      refresh(coef, this.t + MIDDLES[stage] * this.h, coef.subarray(PREPARED));
-    });
   }
 
   /**
@@ -338,10 +328,12 @@ export class Solver {
    */
   step(h) {
     this.#setStep(h);
-    this.#renew();
+    renew(this);
+    const before = FRACTIONS.length > 1 ? savedState(this) : null;
     for (let stage = 0; stage < FRACTIONS.length; stage++) {
       const status = makeStage(this, stage);
       if (status === "OK") continue;
+      if (before) restoreState(this, before);
       throw new StepError(status, this.steps);
     }
     this.steps++;
@@ -407,27 +399,28 @@ export class Solver {
 
   /** Replace the state by x + carry. */
   #place(x, carry) {
-    for (const history of this.history) history.move(this.x, x);
+    moveHistory(this, x);
     this.x.set(x);
     this.carry.set(carry);
     return this;
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h
-   * and what is in options may be arrays in place of numbers, with one for each member.
+   * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
+   * good value. h and the values of options may be arrays, with a number for each state.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: object, t0?: number | ArrayLike<number>}} [options] as in the constructor
-   * @returns {{x: Float64Array[], status: string[]}} the last state of each member, and "OK" or a status
+   * @param {object} [options] as in the constructor; member is that of the first state
+   * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
     const ends = Array.from(members, (x0, m) => {
       const own = (value) => (typeof value === "object" && value !== null ? value[m] : value);
       const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(value)]);
       const chosen = { ...options, params: Object.fromEntries(given), t0: own(options.t0), x0 };
+      chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);
@@ -444,7 +437,7 @@ export class Solver {
 
   /** The Hamiltonian, at x and its time or elsewhere. */
   hamiltonian(x = this.x, t = this.t) {
-    energy(this.params, t, x, number);
+    energyAt(this.params, t, x, number);
     return number[0];
   }
 
@@ -458,8 +451,55 @@ export class Solver {
   /** The vector field dx/dt at a state and a time. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
-    vectorField(this.params, t, x, out);
+    vectorFieldAt(this.params, t, x, out);
     return out;
+  }
+}
+
+/** The Hamiltonian at x and the time t. */
+function energyAt(params, t, x, out) {
+  energy(params, t, x, out);
+}
+
+/** The vector field dx/dt at x and the time t. */
+function vectorFieldAt(params, t, x, out) {
+  vectorField(params, t, x, out);
+}
+
+/** Take the time of the initial state from the options of a solver, 0 by default. */
+function takeTime(solver, options) {
+  [solver.t] = finite([options.t0 ?? 0], 1, "t0");
+}
+
+/** Compute the coefficients of a stage of size h. */
+function prepareStage({ params }, h, table) {
+  prepare(params, h, table);
+}
+
+/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+function prepareProbe(params, table) {
+  prepare(params, PROBE_STEP, table);
+}
+
+/** Return a table of coefficients for each stage. */
+function emptyTables() {
+  return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
+}
+
+/** The names of what a step changes. */
+const SAVED = ["x", "carry", "t"];
+
+/** Return copies of what a step changes. */
+function savedState(solver) {
+  const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
+  return Object.fromEntries(copies);
+}
+
+/** Set what a step changes to copies. */
+function restoreState(solver, copies) {
+  for (const [name, value] of Object.entries(copies)) {
+    if (value.slice) solver[name].set(value);
+    else solver[name] = value;
   }
 }
 
@@ -499,7 +539,7 @@ function attempt(solver, stage) {
   const { x, carry } = solver;
   const history = solver.history[stage];
   let previous = Infinity;
-  if (!history.predict(y)) y.set(x);
+  startFrom(history, x, y);
   for (let iteration = 1; iteration <= MAX_ITERATIONS; iteration++) {
     linearise(solver.coef[stage], y, displacement, increment, jacobian, incrementJacobian);
     solver.evaluations++;
@@ -531,6 +571,31 @@ function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }
 
+/** The coefficients that are functions of the time. */
+function refreshAt(row, t, dw, out) {
+  refresh(row, t, out);
+}
+
+/** Compute the coefficients of the next step that are functions of the time or of the noise. */
+function renew({ coef, t, h, dw }) {
+  coef.forEach((row, stage) => refreshAt(row, t + MIDDLES[stage] * h, dw, row.subarray(PREPARED)));
+}
+
+/** Clear the predictor of a stage. */
+function clearHistory(solver, stage) {
+  solver.history[stage].clear();
+}
+
+/** Move the predictors of all stages with the state, to x. */
+function moveHistory(solver, x) {
+  for (const history of solver.history) history.move(solver.x, x);
+}
+
+/** Set y to the value that the predictor gives for the next solution, or to x if it gives none. */
+function startFrom(history, x, y) {
+  if (!history.predict(y)) y.set(x);
+}
+
 // ---- Starting guesses, and whether a solution may be right ----
 
 /**
@@ -558,6 +623,11 @@ class History {
    */
   move(from, to) {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
+  }
+
+  /** The last value. */
+  last() {
+    return Float64Array.from(this.#difference[0]);
   }
 
   /**
@@ -610,6 +680,7 @@ class History {
 
 const speed = new Float64Array(DIM);
 const point = new Float64Array(DIM);
+const value = new Float64Array(1);
 
 /**
  * Whether an increment is that of the motion. Where the step is too large, the equation may have been
@@ -629,22 +700,17 @@ function plausible(solver, stage, increment) {
     size += Math.abs(x[i]);
   }
   if (moved <= PLAUSIBLE * size) return true;
-  vectorField(params, solver.t, x, speed);
+  vectorFieldAt(params, solver.t, x, speed);
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * speed[i]);
+  size += sizeOfNoise(solver);
   if (moved <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
-    return energyAt(params, solver.t, point);
+    energyAt(params, solver.t, point, value);
+    return value[0];
   });
   const energy = Math.abs(before) + Math.abs(middle) + Math.abs(after);
   return Math.abs(after - before) <= MAX_ENERGY_CHANGE * energy;
-}
-
-const value = new Float64Array(1);
-
-function energyAt(params, t, x) {
-  energy(params, t, x, value);
-  return value[0];
 }
 
 /**
@@ -663,10 +729,12 @@ function retried(solver, stage, attempt) {
   return attempt(solver, stage);
 }
 
-// ---- Compensated sums, linear equations ----
+/** The size of the increments of the state by the noise: there is none. */
+function sizeOfNoise() {
+  return 0;
+}
 
-/** The smallest normal number: keeps quotients of sizes finite. */
-const TINY = 2.2250738585072014e-308;
+// ---- Compensated sums, linear equations ----
 
 const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
@@ -693,6 +761,9 @@ function advance({ x, carry }, change, small) {
   carry.set(rests);
   return true;
 }
+
+/** The smallest normal number: keeps quotients of sizes finite. */
+const TINY = 2.2250738585072014e-308;
 
 /**
  * Solve matrix · solution = side, both overwritten, by elimination with partial pivoting.

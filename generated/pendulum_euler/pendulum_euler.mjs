@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: feb5a78d086afb8f825e3a05709f61681195e330d5713cd833e4f843361fc8ab
+ * body-sha256: 8dad40c92e4ae16b983b6e38fd03e10f7b8ac05933474622e54f00e601f68928
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -123,14 +123,11 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
+// The parts of some systems only:
+
 // ---- The solver ----
 
 const number = new Float64Array(1);
-
-/** Return a table of coefficients for each stage. */
-function emptyTables() {
-  return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
-}
 
 /**
  * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
@@ -145,7 +142,7 @@ function admitted(given) {
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
   }
   const [table] = emptyTables();
-  prepare(params, PROBE_STEP, table);
+  prepareProbe(params, table);
   if (![table].flat().every((row) => row.every(Number.isFinite))) {
     throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
   }
@@ -179,7 +176,7 @@ export class Solver {
   params;
   /** Coefficients of each stage: functions of parameters and step size. */
   coef = emptyTables();
-  /** Steps and time at the last change of h: the time is a multiple of h from there. */
+  /** Steps and time at the last change of h, from which the time is counted if steps are equal in it. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -200,7 +197,7 @@ export class Solver {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
-      prepare(this.params, fraction * h, this.coef[stage]);
+      prepareStage(this, fraction * h, this.coef[stage]);
     });
     this.h = h;
     this.#timeBefore = this.t;
@@ -215,9 +212,11 @@ export class Solver {
    */
   step(h) {
     this.#setStep(h);
+    const before = FRACTIONS.length > 1 ? savedState(this) : null;
     for (let stage = 0; stage < FRACTIONS.length; stage++) {
       const status = makeStage(this, stage);
       if (status === "OK") continue;
+      if (before) restoreState(this, before);
       throw new StepError(status, this.steps);
     }
     this.steps++;
@@ -289,20 +288,21 @@ export class Solver {
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h
-   * and what is in options may be arrays in place of numbers, with one for each member.
+   * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
+   * good value. h and the values of options may be arrays, with a number for each state.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: object}} [options] as in the constructor
-   * @returns {{x: Float64Array[], status: string[]}} the last state of each member, and "OK" or a status
+   * @param {object} [options] as in the constructor; member is that of the first state
+   * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
     const ends = Array.from(members, (x0, m) => {
       const own = (value) => (typeof value === "object" && value !== null ? value[m] : value);
       const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(value)]);
       const chosen = { ...options, params: Object.fromEntries(given), t0: own(options.t0), x0 };
+      chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);
@@ -317,9 +317,9 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
-  /** The Hamiltonian, at x or elsewhere. */
-  hamiltonian(x = this.x) {
-    energy(this.params, x, number);
+  /** The Hamiltonian, at x and its time or elsewhere. */
+  hamiltonian(x = this.x, t = this.t) {
+    energyAt(this.params, t, x, number);
     return number[0];
   }
 
@@ -330,11 +330,53 @@ export class Solver {
     return out;
   }
 
-  /** The vector field dx/dt at a state. */
-  vectorField(x = this.x) {
+  /** The vector field dx/dt at a state and a time. */
+  vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
-    vectorField(this.params, x, out);
+    vectorFieldAt(this.params, t, x, out);
     return out;
+  }
+}
+
+/** The Hamiltonian at x and the time t. */
+function energyAt(params, t, x, out) {
+  energy(params, x, out);
+}
+
+/** The vector field dx/dt at x and the time t. */
+function vectorFieldAt(params, t, x, out) {
+  vectorField(params, x, out);
+}
+
+/** Compute the coefficients of a stage of size h. */
+function prepareStage({ params }, h, table) {
+  prepare(params, h, table);
+}
+
+/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+function prepareProbe(params, table) {
+  prepare(params, PROBE_STEP, table);
+}
+
+/** Return a table of coefficients for each stage. */
+function emptyTables() {
+  return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
+}
+
+/** The names of what a step changes. */
+const SAVED = ["x", "carry", "t"];
+
+/** Return copies of what a step changes. */
+function savedState(solver) {
+  const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
+  return Object.fromEntries(copies);
+}
+
+/** Set what a step changes to copies. */
+function restoreState(solver, copies) {
+  for (const [name, value] of Object.entries(copies)) {
+    if (value.slice) solver[name].set(value);
+    else solver[name] = value;
   }
 }
 

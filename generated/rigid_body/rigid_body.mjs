@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 77e0322b17183de205a3cc3f72a32c3fd387a146f83b680b466dbd91dadbbe13
+ * body-sha256: 91e5f1e8b2113b1e70b7e033175151caf803b48b13f808b17788acc32463b9ac
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -535,14 +535,11 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
+// The parts of some systems only:
+
 // ---- The solver ----
 
 const number = new Float64Array(1);
-
-/** Return a table of coefficients for each stage. */
-function emptyTables() {
-  return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
-}
 
 /**
  * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
@@ -557,7 +554,7 @@ function admitted(given) {
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
   }
   const [table] = emptyTables();
-  prepare(params, new Float64Array(GAUGE.length), PROBE_STEP, table);
+  prepareProbe(params, table);
   if (![table].flat().every((row) => row.every(Number.isFinite))) {
     throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
   }
@@ -595,7 +592,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h: the time is a multiple of h from there. */
+  /** Steps and time at the last change of h, from which the time is counted if steps are equal in it. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -611,8 +608,7 @@ export class Solver {
   constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
-    const { gauge } = options;
-    this.gauge = gauge ? finite(gauge, GAUGE.length, "gauge") : chooseGauge(this.params, this.x);
+    takeGauge(this, options);
   }
 
   /** Compute the coefficients for a step size, if it has changed. */
@@ -620,8 +616,8 @@ export class Solver {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
-      prepare(this.params, this.gauge, fraction * h, this.coef[stage]);
-      this.history[stage].clear();
+      prepareStage(this, fraction * h, this.coef[stage]);
+      clearHistory(this, stage);
     });
     this.h = h;
     this.#timeBefore = this.t;
@@ -636,9 +632,11 @@ export class Solver {
    */
   step(h) {
     this.#setStep(h);
+    const before = FRACTIONS.length > 1 ? savedState(this) : null;
     for (let stage = 0; stage < FRACTIONS.length; stage++) {
       const status = makeStage(this, stage);
       if (status === "OK") continue;
+      if (before) restoreState(this, before);
       throw new StepError(status, this.steps);
     }
     this.steps++;
@@ -704,27 +702,28 @@ export class Solver {
 
   /** Replace the state by x + carry. */
   #place(x, carry) {
-    for (const history of this.history) history.move(this.x, x);
+    moveHistory(this, x);
     this.x.set(x);
     this.carry.set(carry);
     return this;
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h
-   * and what is in options may be arrays in place of numbers, with one for each member.
+   * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
+   * good value. h and the values of options may be arrays, with a number for each state.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: object}} [options] as in the constructor
-   * @returns {{x: Float64Array[], status: string[]}} the last state of each member, and "OK" or a status
+   * @param {object} [options] as in the constructor; member is that of the first state
+   * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
     const ends = Array.from(members, (x0, m) => {
       const own = (value) => (typeof value === "object" && value !== null ? value[m] : value);
       const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(value)]);
       const chosen = { ...options, params: Object.fromEntries(given), t0: own(options.t0), x0 };
+      chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);
@@ -739,9 +738,9 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
-  /** The Hamiltonian, at x or elsewhere. */
-  hamiltonian(x = this.x) {
-    energy(this.params, x, number);
+  /** The Hamiltonian, at x and its time or elsewhere. */
+  hamiltonian(x = this.x, t = this.t) {
+    energyAt(this.params, t, x, number);
     return number[0];
   }
 
@@ -752,11 +751,53 @@ export class Solver {
     return out;
   }
 
-  /** The vector field dx/dt at a state. */
-  vectorField(x = this.x) {
+  /** The vector field dx/dt at a state and a time. */
+  vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
-    vectorField(this.params, x, out);
+    vectorFieldAt(this.params, t, x, out);
     return out;
+  }
+}
+
+/** The Hamiltonian at x and the time t. */
+function energyAt(params, t, x, out) {
+  energy(params, x, out);
+}
+
+/** The vector field dx/dt at x and the time t. */
+function vectorFieldAt(params, t, x, out) {
+  vectorField(params, x, out);
+}
+
+/** Compute the coefficients of a stage of size h. */
+function prepareStage({ params, gauge }, h, table) {
+  prepare(params, gauge, h, table);
+}
+
+/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+function prepareProbe(params, table) {
+  prepare(params, new Float64Array(GAUGE.length), PROBE_STEP, table);
+}
+
+/** Return a table of coefficients for each stage. */
+function emptyTables() {
+  return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
+}
+
+/** The names of what a step changes. */
+const SAVED = ["x", "carry", "t"];
+
+/** Return copies of what a step changes. */
+function savedState(solver) {
+  const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
+  return Object.fromEntries(copies);
+}
+
+/** Set what a step changes to copies. */
+function restoreState(solver, copies) {
+  for (const [name, value] of Object.entries(copies)) {
+    if (value.slice) solver[name].set(value);
+    else solver[name] = value;
   }
 }
 
@@ -796,7 +837,7 @@ function attempt(solver, stage) {
   const { x, carry } = solver;
   const history = solver.history[stage];
   let previous = Infinity;
-  if (!history.predict(y)) y.set(x);
+  startFrom(history, x, y);
   for (let iteration = 1; iteration <= MAX_ITERATIONS; iteration++) {
     linearise(solver.coef[stage], y, displacement, increment, jacobian, incrementJacobian);
     solver.evaluations++;
@@ -828,6 +869,21 @@ function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }
 
+/** Clear the predictor of a stage. */
+function clearHistory(solver, stage) {
+  solver.history[stage].clear();
+}
+
+/** Move the predictors of all stages with the state, to x. */
+function moveHistory(solver, x) {
+  for (const history of solver.history) history.move(solver.x, x);
+}
+
+/** Set y to the value that the predictor gives for the next solution, or to x if it gives none. */
+function startFrom(history, x, y) {
+  if (!history.predict(y)) y.set(x);
+}
+
 // ---- Starting guesses, and whether a solution may be right ----
 
 /**
@@ -855,6 +911,11 @@ class History {
    */
   move(from, to) {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
+  }
+
+  /** The last value. */
+  last() {
+    return Float64Array.from(this.#difference[0]);
   }
 
   /**
@@ -907,6 +968,7 @@ class History {
 
 const speed = new Float64Array(DIM);
 const point = new Float64Array(DIM);
+const value = new Float64Array(1);
 
 /**
  * Whether an increment is that of the motion. Where the step is too large, the equation may have been
@@ -926,22 +988,17 @@ function plausible(solver, stage, increment) {
     size += Math.abs(x[i]);
   }
   if (moved <= PLAUSIBLE * size) return true;
-  vectorField(params, x, speed);
+  vectorFieldAt(params, solver.t, x, speed);
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * speed[i]);
+  size += sizeOfNoise(solver);
   if (moved <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
-    return energyAt(params, solver.t, point);
+    energyAt(params, solver.t, point, value);
+    return value[0];
   });
   const energy = Math.abs(before) + Math.abs(middle) + Math.abs(after);
   return Math.abs(after - before) <= MAX_ENERGY_CHANGE * energy;
-}
-
-const value = new Float64Array(1);
-
-function energyAt(params, t, x) {
-  energy(params, x, value);
-  return value[0];
 }
 
 /**
@@ -958,6 +1015,16 @@ function retried(solver, stage, attempt) {
   if (status === "OK" || history.count === 0) return status;
   history.clear();
   return attempt(solver, stage);
+}
+
+/** The size of the increments of the state by the noise: there is none. */
+function sizeOfNoise() {
+  return 0;
+}
+
+/** Take the gauge from the options of a solver, else choose it at the initial state. */
+function takeGauge(solver, { gauge }) {
+  solver.gauge = gauge ? finite(gauge, GAUGE.length, "gauge") : chooseGauge(solver.params, solver.x);
 }
 
 // ---- The choice of the gauge: multiples of Casimirs taken from H ----
@@ -1072,9 +1139,6 @@ function chooseGauge(params, x) {
 
 // ---- Compensated sums, linear equations ----
 
-/** The smallest normal number: keeps quotients of sizes finite. */
-const TINY = 2.2250738585072014e-308;
-
 const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
@@ -1100,6 +1164,9 @@ function advance({ x, carry }, change, small) {
   carry.set(rests);
   return true;
 }
+
+/** The smallest normal number: keeps quotients of sizes finite. */
+const TINY = 2.2250738585072014e-308;
 
 /**
  * Solve matrix · solution = side, both overwritten, by elimination with partial pivoting.

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 986d0904419e2f3e862e420ca51f3af4e418e7eca7af969f52dfb984a7431f9c
+ * body-sha256: f7924a7f61919898cad80bb2dfefcaebf005c304c15957dd1cbc286757aa0706
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -329,14 +329,11 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
+// The parts of some systems only:
+
 // ---- The solver ----
 
 const number = new Float64Array(1);
-
-/** Return a table of coefficients for each stage. */
-function emptyTables() {
-  return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
-}
 
 /**
  * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
@@ -351,7 +348,7 @@ function admitted(given) {
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
   }
   const [table] = emptyTables();
-  prepare(params, PROBE_STEP, table);
+  prepareProbe(params, table);
   if (![table].flat().every((row) => row.every(Number.isFinite))) {
     throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
   }
@@ -389,11 +386,11 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size, then of the time too. */
+  /** Coefficients of each stage: functions of parameters and step size, then of the time or noise too. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h: the time is a multiple of h from there. */
+  /** Steps and time at the last change of h, from which the time is counted if steps are equal in it. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -410,7 +407,7 @@ export class Solver {
   constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
-    Object.assign(this, drawsOf(options));
+    takeDraws(this, options);
   }
 
   /** Compute the coefficients for a step size, if it has changed. */
@@ -418,19 +415,12 @@ export class Solver {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
-      prepare(this.params, fraction * h, this.coef[stage]);
-      this.history[stage].clear();
+      prepareStage(this, fraction * h, this.coef[stage]);
+      clearHistory(this, stage);
     });
     this.h = h;
     this.#timeBefore = this.t;
     this.#stepsBefore = this.steps;
-  }
-
-  /** Compute the coefficients that depend on the increments of the next step. */
-  #renew() {
-    this.coef.forEach((coef, stage) => {
-      refresh(coef, this.dw, coef.subarray(PREPARED));
-    });
   }
 
   /**
@@ -442,12 +432,13 @@ export class Solver {
    */
   step(h) {
     this.#setStep(h);
-    const [, dw] = arguments;
-    if (!draw(this, dw)) throw new StepError("BAD_ARGUMENT", this.steps, `the increments are ${dw}`);
-    this.#renew();
+    drawStep(this, arguments[1]);
+    renew(this);
+    const before = FRACTIONS.length > 1 ? savedState(this) : null;
     for (let stage = 0; stage < FRACTIONS.length; stage++) {
       const status = makeStage(this, stage);
       if (status === "OK") continue;
+      if (before) restoreState(this, before);
       throw new StepError(status, this.steps);
     }
     this.steps++;
@@ -514,22 +505,21 @@ export class Solver {
 
   /** Replace the state by x + carry. */
   #place(x, carry) {
-    for (const history of this.history) history.move(this.x, x);
+    moveHistory(this, x);
     this.x.set(x);
     this.carry.set(carry);
     return this;
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h
-   * and what is in options may be arrays in place of numbers, with one for each member.
+   * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
+   * good value. h and the values of options may be arrays, with a number for each state.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: object}} [options] as in the constructor
-   * also seed, step0, and member, that of the first member
-   * @returns {{x: Float64Array[], status: string[]}} the last state of each member, and "OK" or a status
+   * @param {object} [options] as in the constructor; member is that of the first state
+   * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
     const ends = Array.from(members, (x0, m) => {
@@ -551,9 +541,9 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
-  /** The Hamiltonian, at x or elsewhere. */
-  hamiltonian(x = this.x) {
-    energy(this.params, x, number);
+  /** The Hamiltonian, at x and its time or elsewhere. */
+  hamiltonian(x = this.x, t = this.t) {
+    energyAt(this.params, t, x, number);
     return number[0];
   }
 
@@ -565,17 +555,59 @@ export class Solver {
   }
 
   /** sigma pi(x) grad g(x) of each source of noise, one after the other. */
-  noiseFields(x = this.x) {
+  noiseFields(x = this.x, t = this.t) {
     const out = new Float64Array(SOURCES.length * DIM);
-    noiseFields(this.params, x, out);
+    noiseFieldsAt(this.params, t, x, out);
     return out;
   }
 
-  /** The vector field dx/dt at a state. */
-  vectorField(x = this.x) {
+  /** The vector field dx/dt at a state and a time. */
+  vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
-    vectorField(this.params, x, out);
+    vectorFieldAt(this.params, t, x, out);
     return out;
+  }
+}
+
+/** The Hamiltonian at x and the time t. */
+function energyAt(params, t, x, out) {
+  energy(params, x, out);
+}
+
+/** The vector field dx/dt at x and the time t. */
+function vectorFieldAt(params, t, x, out) {
+  vectorField(params, x, out);
+}
+
+/** Compute the coefficients of a stage of size h. */
+function prepareStage({ params }, h, table) {
+  prepare(params, h, table);
+}
+
+/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+function prepareProbe(params, table) {
+  prepare(params, PROBE_STEP, table);
+}
+
+/** Return a table of coefficients for each stage. */
+function emptyTables() {
+  return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
+}
+
+/** The names of what a step changes. */
+const SAVED = ["x", "carry", "t"];
+
+/** Return copies of what a step changes. */
+function savedState(solver) {
+  const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
+  return Object.fromEntries(copies);
+}
+
+/** Set what a step changes to copies. */
+function restoreState(solver, copies) {
+  for (const [name, value] of Object.entries(copies)) {
+    if (value.slice) solver[name].set(value);
+    else solver[name] = value;
   }
 }
 
@@ -615,7 +647,7 @@ function attempt(solver, stage) {
   const { x, carry } = solver;
   const history = solver.history[stage];
   let previous = Infinity;
-  y.set(x); // earlier steps say nothing of the noise of this one
+  startFrom(history, x, y);
   for (let iteration = 1; iteration <= MAX_ITERATIONS; iteration++) {
     linearise(solver.coef[stage], y, displacement, increment, jacobian, incrementJacobian);
     solver.evaluations++;
@@ -703,6 +735,11 @@ function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   return { seed, member, step0 };
 }
 
+/** Take the selection of random numbers from the options of a solver. */
+function takeDraws(solver, options) {
+  Object.assign(solver, drawsOf(options));
+}
+
 // ---- Noise ----
 
 /** Normal variates of variance 1, in pairs: all increments of a step. */
@@ -732,6 +769,41 @@ function draw(solver, given) {
   return dw.every(Number.isFinite);
 }
 
+/** Take the increments of the next step. Throws StepError if they are given and not admissible. */
+function drawStep(solver, given) {
+  if (!draw(solver, given)) throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${given}`);
+}
+
+/** The vector fields of the sources of noise at x and the time t. */
+function noiseFieldsAt(params, t, x, out) {
+  noiseFields(params, x, out);
+}
+
+/** The coefficients that are functions of the increments dw of the noise, and of the time if H is one. */
+function refreshAt(row, t, dw, out) {
+  refresh(row, dw, out);
+}
+
+/** Compute the coefficients of the next step that are functions of the time or of the noise. */
+function renew({ coef, t, h, dw }) {
+  coef.forEach((row, stage) => refreshAt(row, t + MIDDLES[stage] * h, dw, row.subarray(PREPARED)));
+}
+
+/** Clear the predictor of a stage. */
+function clearHistory(solver, stage) {
+  solver.history[stage].clear();
+}
+
+/** Move the predictors of all stages with the state, to x. */
+function moveHistory(solver, x) {
+  for (const history of solver.history) history.move(solver.x, x);
+}
+
+/** Set y to x: earlier solutions predict nothing of a step with noise. */
+function startFrom(history, x, y) {
+  y.set(x);
+}
+
 // ---- Starting guesses, and whether a solution may be right ----
 
 /**
@@ -759,6 +831,11 @@ class History {
    */
   move(from, to) {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
+  }
+
+  /** The last value. */
+  last() {
+    return Float64Array.from(this.#difference[0]);
   }
 
   /**
@@ -811,7 +888,7 @@ class History {
 
 const speed = new Float64Array(DIM);
 const point = new Float64Array(DIM);
-const fields = new Float64Array(SOURCES.length * DIM);
+const value = new Float64Array(1);
 
 /**
  * Whether an increment is that of the motion. Where the step is too large, the equation may have been
@@ -831,26 +908,17 @@ function plausible(solver, stage, increment) {
     size += Math.abs(x[i]);
   }
   if (moved <= PLAUSIBLE * size) return true;
-  vectorField(params, x, speed);
+  vectorFieldAt(params, solver.t, x, speed);
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * speed[i]);
-  noiseFields(params, x, fields);
-  fields.forEach((field, k) => {
-    size += Math.abs(solver.dw[Math.floor(k / DIM)] * field);
-  });
+  size += sizeOfNoise(solver);
   if (moved <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
-    return energyAt(params, solver.t, point);
+    energyAt(params, solver.t, point, value);
+    return value[0];
   });
   const energy = Math.abs(before) + Math.abs(middle) + Math.abs(after);
   return Math.abs(after - before) <= MAX_ENERGY_CHANGE * energy;
-}
-
-const value = new Float64Array(1);
-
-function energyAt(params, t, x) {
-  energy(params, x, value);
-  return value[0];
 }
 
 /**
@@ -869,10 +937,15 @@ function retried(solver, stage, attempt) {
   return attempt(solver, stage);
 }
 
-// ---- Compensated sums, linear equations ----
+const fields = new Float64Array(SOURCES.length * DIM);
 
-/** The smallest normal number: keeps quotients of sizes finite. */
-const TINY = 2.2250738585072014e-308;
+/** The size of the increments of the state by the noise of a step. */
+function sizeOfNoise({ params, t, x, dw }) {
+  noiseFieldsAt(params, t, x, fields);
+  return fields.reduce((sum, field, k) => sum + Math.abs(dw[Math.floor(k / DIM)] * field), 0);
+}
+
+// ---- Compensated sums, linear equations ----
 
 const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
@@ -899,6 +972,9 @@ function advance({ x, carry }, change, small) {
   carry.set(rests);
   return true;
 }
+
+/** The smallest normal number: keeps quotients of sizes finite. */
+const TINY = 2.2250738585072014e-308;
 
 /**
  * Solve matrix · solution = side, both overwritten, by elimination with partial pivoting.

@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 77d960dfb4092724eccebe76cf849774bab7a3e0f79bb2ea6cf30ecd90797503
+ * body-sha256: ab3efcd8297fbd3689b7ef05c9753bd26a2929234dc74e9e5cd6c8c027c9dc2c
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -199,7 +199,7 @@ function sumOf(values) {
 
 /** The coefficients of all flows or stages of a step: a row for each time. */
 function prepareStep(params, h, rows) {
-  TIMES.forEach((time, k) => prepare(params, time * h, rows[k]));
+  TIMES.forEach((time, k) => prepareRow(params, time, h, rows[k], k));
   return rows;
 }
 
@@ -294,6 +294,7 @@ export class Solver {
   step(h) {
     this.#setStep(h);
     this.before.set(this.x);
+    this.sites.t = this.t;
     const status = makeStep(this);
     if (status !== "OK") {
       this.x.set(this.before);
@@ -317,9 +318,10 @@ export class Solver {
     return march(this, h, count);
   }
 
-  /** The density of the Hamiltonian at each site, of x or of another state. */
-  density(x = this.x) {
+  /** The density of the Hamiltonian at each site, of x and its time or of others. */
+  density(x = this.x, t = this.t) {
     const out = new Float64Array(this.sites.count);
+    this.sites.t = t;
     energy(this.params, x, this.sites, out);
     return out;
   }
@@ -339,12 +341,18 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H(x), laid out as x. */
-  vectorField(x = this.x) {
+  /** The right-hand side pi(x) grad H at x and its time or at others, laid out as x. */
+  vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(x.length);
+    this.sites.t = t;
     vectorField(this.params, x, this.sites, out);
     return out;
   }
+}
+
+/** Compute the coefficients of a flow or stage. */
+function prepareRow(params, time, h, row) {
+  prepare(params, time * h, row);
 }
 
 // ---- The sites ----

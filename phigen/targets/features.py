@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from phigen.scheme.program import Program
@@ -65,6 +65,14 @@ FEATURES = (
     Feature("ENSEMBLE", part="ensemble"),
     *(Feature(f"TAYLOR_{kind.upper()}", _sums(kind)) for kind in ("product", "chain", "power")),
 )
+
+
+def holds(condition: str, switches: Mapping[str, bool]) -> bool:
+    """Whether a condition holds: alternatives (``||``) of switches or their negations that hold together (``&&``)."""
+    return any(
+        all(switches[s.removeprefix("!")] != s.startswith("!") for s in part.split(" && "))
+        for part in condition.split(" || ")
+    )
 
 
 def switches(program: Program, further: Iterable[Feature] = ()) -> dict[str, bool]:

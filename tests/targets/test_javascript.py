@@ -33,6 +33,7 @@ from phigen.compiler import compile_spec, emit
 from phigen.scheme import steps as kinds
 from phigen.spec.model import BirealisationChoice
 from phigen.targets.header import is_edited
+from phigen.targets.js.files import HOOKS, LATTICE_MODULES, MEMBERS, MODULES
 from phigen.targets.js.runtime import resolved
 
 pytestmark = pytest.mark.corpus
@@ -394,13 +395,31 @@ def test_the_runtime_is_javascript_as_it_lies_there(tmp_path):
         assert max(map(len, path.read_text(encoding="utf-8").splitlines())) <= 110
 
 
+def test_modules_of_the_runtime_import_what_others_export():
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in RUNTIME}
+    exported = {m: set(re.findall(r"^export \w+ (\w+)", text, re.MULTILINE)) for m, text in texts.items()}
+    for text in texts.values():
+        for names, module in re.findall(r'import \{ (.*) \} from "\./(\w+)\.mjs"', text):
+            if module in exported:
+                assert set(names.split(", ")) <= exported[module], names
+
+
+def test_tables_of_modules_and_hooks_name_what_is_there():
+    text = "\n".join(path.read_text(encoding="utf-8") for path in RUNTIME)
+    members = {f"members_{name}" for name in MEMBERS}
+    assert {path.stem for path in RUNTIME} == {*MODULES, *LATTICE_MODULES, *members}
+    for function in HOOKS:
+        assert re.search(rf"^export function {function}\(", text, re.MULTILINE), function
+        assert re.search(rf"^ +{function}\(.*\);$", text, re.MULTILINE), function
+
+
 def test_modules_that_meet_declare_no_name_twice():
     declared = {
         path.stem: set(re.findall(r"^(?:export )?(?:const|function|class) (\w+)", path.read_text(), re.MULTILINE))
         for path in RUNTIME
     }
     lattices = [["errors", "lattice", "sites", *step] for step in (["flows"], ["sweeps", "krylov"])]
-    others = ["tangent", "errors", "solver", "gauge", "guess", "algebra", "taylor"]
+    others = ["tangent", "errors", "solver", "gauge", "guess", "algebra", "linear", "saving", "autonomous"]
     steps = [[s, f"tangent_{s}", *others] for s in ("newton", "path", "explicit", "splitting")]
     turned = [[*met, "attitude", f"attitude_{kind}"] for met in steps for kind in ("matrices", "quaternions")]
     for met in [*lattices, *turned]:

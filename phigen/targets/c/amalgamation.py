@@ -14,9 +14,10 @@ from dataclasses import dataclass, field
 
 from phigen import resources
 from phigen.targets.c import phrases, states
-from phigen.targets.c.files import calls_left_out, holds, left_out
+from phigen.targets.c.files import calls_left_out, left_out
 from phigen.targets.c.macros import Macros
 from phigen.targets.c.unused import without_unused
+from phigen.targets.features import holds
 
 
 @dataclass

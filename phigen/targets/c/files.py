@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from phigen.targets.features import holds
+
 #: Conditions on switches (`phigen.targets.c.features`) by files.
 CONDITIONS = {
     "adjoint.c": "ADJOINT",
@@ -250,14 +252,6 @@ CALLS = {
     "phi_turn_residuals": "SWEPT",
     "phi_uniform_position": "POSITION",
 }
-
-
-def holds(condition: str, switches: Mapping[str, bool]) -> bool:
-    """Whether a condition holds: alternatives (``||``) of switches or their negations that hold together (``&&``)."""
-    return any(
-        all(switches[s.removeprefix("!")] != s.startswith("!") for s in part.split(" && "))
-        for part in condition.split(" || ")
-    )
 
 
 def guard(file: str) -> str:

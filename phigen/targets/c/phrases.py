@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from phigen.targets.c.files import holds
+from phigen.targets.features import holds
 
 
 @dataclass(frozen=True)

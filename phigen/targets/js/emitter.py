@@ -14,6 +14,7 @@ from phigen.scheme.steps import Sweeps
 from phigen.targets import special
 from phigen.targets.features import switches
 from phigen.targets.header import facts, header_lines, sealed
+from phigen.targets.js.files import LATTICE_MODULES, MODULES, chosen
 from phigen.targets.js.functions import definitions
 from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
 from phigen.targets.js.runtime import assembled
@@ -40,27 +41,18 @@ def _lattice(program: Program, step: Sweeps) -> str:
     """Return the body of the module of a lattice."""
     from phigen.targets.js import lattice
 
+    features = lattice.features(program, step)
     early = [_function(kernel) for kernel in (step.prepare, step.refresh) if kernel]
     pieces = [lattice.tables(program, step), *early, *_functions(program)]
     model = "\n\n".join(piece.strip("\n") for piece in (*pieces, *lattice.kernels(program, step)))
-    return f"{model}\n\n{assembled(lattice.modules(program, step), lattice.features(program, step), POLICIES)}\n"
+    return f"{model}\n\n{assembled(chosen(LATTICE_MODULES, features), features, POLICIES)}\n"
 
 
 def _system_of_coordinates(program: Program) -> str:
     """Return the body of the module of an ordinary system."""
-    step, features = program.step, switches(program)
-    text, kind = STEP_MODULES[step.kind.name], step.kind.name
-    modules = ["errors", "march", "solver", kind, *text.modules]
-    modules += ["philox", "noise"] if program.noise else []
-    modules += ["guess"] if features["IMPLICIT"] else []
-    modules += ["gauge" if program.searches_gauge else "gauge_formula"] if program.gauge else []
-    modules += ["level"] if program.monitor else []
-    modules += ["attitude", "attitude_matrices" if features["MATRICES"] else "attitude_quaternions"] * features[
-        "ATTITUDE"
-    ]
-    modules += ["tangent", f"tangent_{kind}"] if program.extras.tangent else []
-    algebra = text.algebra or program.searches_gauge or program.extras.tangent
-    modules += ["algebra"] if algebra else []
+    choice = {"GAUGE_CHOSEN": bool(program.gauge), "GAUGE_SEARCHED": program.searches_gauge}
+    features = switches(program) | choice
+    modules = chosen(MODULES, features)
     return f"{_model(program)}\n\n{assembled(modules, features, policies_of(program))}\n"
 
 

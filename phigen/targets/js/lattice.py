@@ -22,17 +22,6 @@ from phigen.targets.rendering import render
 #: A space at which no line is broken.
 _FIXED = "\N{NO-BREAK SPACE}"
 
-#: The runtime of lattices; after it what makes a step.
-MODULES = ("errors", "march", "lattice", "sites")
-
-
-def modules(program: Program, step: Sweeps) -> list[str]:
-    """Return the names of the modules of the runtime."""
-    noise = ["philox", "site_noise"] if program.noise else []
-    if step.equation is None:
-        return [*MODULES, *noise, "flows"]
-    return [*MODULES, *noise, "sweeps", "krylov", *["site_tangent"] * program.extras.tangent]
-
 
 def features(program: Program, step: Sweeps) -> dict[str, bool]:
     """Return the switches of the runtime, including those of lattices."""

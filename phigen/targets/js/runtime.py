@@ -1,8 +1,10 @@
 """The runtime of a solver in JavaScript, assembled from the modules of `templates/js/runtime` for one system.
 
-The modules are valid JavaScript. Lines ``// #if NAME`` or ``// #if !NAME``, ``// #else`` and ``// #endif`` include
-parts; in comments of several lines ``*`` replaces ``//``. ``// #state copied`` is replaced by the statements of
-`phigen.targets.state`. Imports and exports between the modules are removed.
+The modules are valid JavaScript; `phigen.targets.js.files` says which solvers have which, and which statements call
+functions that only some have. Lines ``// #if NAME`` or ``// #if !NAME``, ``// #else`` and ``// #endif`` include
+parts; in comments of several lines ``*`` replaces ``//``. ``// #state NAME`` is replaced by lines of
+`phigen.targets.js.state`, ``// #members NAME`` by the members of a class. Imports and exports between the modules are
+removed.
 """
 
 from __future__ import annotations
@@ -12,7 +14,8 @@ from collections.abc import Mapping
 
 from phigen import resources
 from phigen.scheme.policies import Policy
-from phigen.targets import state
+from phigen.targets.js import state
+from phigen.targets.js.files import HOOKS, MEMBERS, chosen
 from phigen.targets.policies import JAVASCRIPT
 
 _IMPORT = re.compile(r'import .* from "\./(\w+)\.mjs";')
@@ -47,12 +50,9 @@ def resolved(text: str, features: Mapping[str, bool]) -> list[str]:
     lines, open_ = list[str](), [True]
     for line in text.splitlines():
         directive = _DIRECTIVE.fullmatch(line)
-        if line.strip() == "// #state copied":
-            indent = line[: line.index("/")]
-            lines += [indent + statement for statement in state.copied(features)]
-        elif not directive:
+        if not directive:
             if all(open_):
-                lines.append(line)
+                lines += _included(line, features)
         elif directive[1] == "if":
             open_.append(features[directive[3]] != bool(directive[2]))
         elif directive[1] == "else":
@@ -60,3 +60,34 @@ def resolved(text: str, features: Mapping[str, bool]) -> list[str]:
         else:
             open_.pop()
     return lines
+
+
+def _included(line: str, features: Mapping[str, bool]) -> list[str]:
+    """Return the lines that a line stands for, none for a call that the features leave out."""
+    indent, word, name = _parts(line)
+    if word == "#state":
+        return [indent + statement for statement in state.part(name, features)]
+    if word == "#members":
+        return [*_members(name, features), ""] if name in chosen(MEMBERS, features) else []
+    function, _, rest = line.strip().partition("(")
+    return [] if function in HOOKS and rest.endswith(");") and not _is_chosen(function, features) else [line]
+
+
+def _parts(line: str) -> tuple[str, str, str]:
+    """Return the indentation of a directive, with the beginning of a comment of several lines, and its two words."""
+    words = line.split()
+    indent = line[: len(line) - len(line.lstrip())]
+    if len(words) == 3 and words[0] in ("//", "*") and words[1] in ("#state", "#members"):
+        return indent + "* " * (words[0] == "*"), words[1], words[2]
+    return "", "", ""
+
+
+def _members(name: str, features: Mapping[str, bool]) -> list[str]:
+    """Return the members of the class of a module."""
+    lines = _lines(f"members_{name}", features)
+    begin = next(k for k, line in enumerate(lines) if line.startswith("export class "))
+    return lines[begin + 1 : lines.index("}", begin)]
+
+
+def _is_chosen(function: str, features: Mapping[str, bool]) -> bool:
+    return function in chosen({function: HOOKS[function]}, features)

@@ -23,15 +23,12 @@ class StepModule:
     """The text of one kind of step.
 
     ``constants`` stand before the kernels and ``series`` after them; ``kernels`` are those that the runtime calls, for
-    which the kernels of attitudes may stand in. ``modules`` are parts of the runtime beside the one of the kind's name,
-    ``algebra`` tells that it always solves linear equations.
+    which the kernels of attitudes may stand in. `phigen.targets.js.files` has the parts of the runtime.
     """
 
     kernels: Callable[[Program, Any], Sequence[Kernel | None]]
     constants: Callable[[Program, Any], list[str]] = lambda program, step: []
     series: Callable[[Program, Any], list[str]] = lambda program, step: []
-    modules: tuple[str, ...] = ()
-    algebra: bool = True
 
 
 def _implicit(step: Newton | Path) -> list[str]:
@@ -123,12 +120,10 @@ STEP_MODULES: Mapping[str, StepModule] = {
         kernels=_path_kernels,
         constants=lambda program, step: _implicit(step),
         series=_path_series,
-        modules=("taylor",),
     ),
     "gauss": StepModule(kernels=lambda program, step: step.kernels, constants=_collocation),
     "splitting": StepModule(
         kernels=_splitting_kernels,
         constants=lambda program, step: _schedule(step, program.attitude),
-        algebra=False,
     ),
 }

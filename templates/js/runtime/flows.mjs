@@ -1,11 +1,7 @@
 import { FLOWS } from "./model.mjs";
-// #if NOISE
 import { SOURCES } from "./model.mjs";
 import { drawAtSites } from "./site_noise.mjs";
-// #endif
-// #if TANGENT
 import { TANGENTS } from "./model.mjs";
-// #endif
 import { allFinite } from "./sites.mjs";
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----

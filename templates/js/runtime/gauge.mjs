@@ -1,4 +1,4 @@
-import { TINY } from "./algebra.mjs";
+import { TINY } from "./linear.mjs";
 import { CLOSE_CALL, DEGREE, FIRST_REACH, GRIDS, MESH, SAMPLES } from "./gauge_search.mjs";
 import { REACH_OF_GRID, SAMPLE_LENGTH, SWEEPS } from "./gauge_search.mjs";
 import { DIM, GAUGE, guide, products, vectorField } from "./model.mjs";

@@ -2,12 +2,9 @@ import { advance } from "./algebra.mjs";
 import { MOST_RISING, NEARLY_ROUNDING, ROUNDING, SOLVED, STALLED } from "./gauss_policy.mjs";
 import { DIM, MAX_SWEEPS, MIXING, PLAIN, POINT, PREDICTION, UNKNOWNS, WEIGHTS } from "./model.mjs";
 import { stageChange, stageField } from "./model.mjs";
-// #if MONITOR
-import { pass, timeOfStep } from "./level.mjs";
-// #endif
-// #if FRAMED
-import { nextFrame } from "./model.mjs";
-// #endif
+import { keepMove } from "./gauss_framed.mjs";
+import { pass } from "./level.mjs";
+import { timeOfStep } from "./level_gauss.mjs";
 
 // ---- The implicit step, by Gauss collocation ----
 
@@ -32,13 +29,11 @@ export class History {
   clear() {
     this.count = 0;
   }
-  // #if KICKED
 
   /** The state has been moved: forget everything. */
   move() {
     this.clear();
   }
-  // #endif
 }
 
 const point = new Float64Array(POINT);
@@ -155,14 +150,8 @@ function attempt(solver, stage) {
   if (Number.isNaN(time)) return "NOT_FINITE";
   // #endif
   if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
-  // #if MONITOR
   pass(solver, time);
-  // #endif
-  // #if FRAMED
-  work.now.forEach((move, i) => nextFrame(solver.coef[stage], end, move, history.moves[i]));
-  // #else
-  work.now.forEach((move, i) => history.moves[i].set(move));
-  // #endif
+  work.now.forEach((move, i) => keepMove(solver.coef[stage], end, move, history.moves[i]));
   history.count = 1;
   return "OK";
 }

@@ -1,12 +1,9 @@
 import { MAX_ENERGY_CHANGE, PLAUSIBLE } from "./plausibility_policy.mjs";
 import { DIFFERENCES, REACH } from "./predictor_policy.mjs";
-import { DIM, FRACTIONS, energy, vectorField } from "./model.mjs";
-// #if NOISE
-import { SOURCES, noiseFields } from "./model.mjs";
-// #endif
-// #if MONITOR
-import { rateAt } from "./level.mjs";
-// #endif
+import { energyAt, vectorFieldAt } from "./autonomous.mjs";
+import { makePerTau } from "./level.mjs";
+import { sizeOfNoise } from "./noise_none.mjs";
+import { DIM, FRACTIONS } from "./model.mjs";
 
 // ---- Starting guesses, and whether a solution may be right ----
 
@@ -27,7 +24,6 @@ export class History {
     for (const row of this.#difference) row.fill(0);
   }
 
-  // #if KICKED
   /**
    * The state has been moved: the last value moves with it, and its differences stay.
    *
@@ -38,14 +34,11 @@ export class History {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
   }
 
-  // #endif
-  // #if TANGENT
   /** The last value. */
   last() {
     return Float64Array.from(this.#difference[0]);
   }
 
-  // #endif
   /**
    * The guess for the next value: the sum of the differences.
    *
@@ -96,9 +89,7 @@ export class History {
 
 const speed = new Float64Array(DIM);
 const point = new Float64Array(DIM);
-// #if NOISE
-const fields = new Float64Array(SOURCES.length * DIM);
-// #endif
+const value = new Float64Array(1);
 
 /**
  * Whether an increment is that of the motion. Where the step is too large, the equation may have been
@@ -118,45 +109,18 @@ export function plausible(solver, stage, increment) {
     size += Math.abs(x[i]);
   }
   if (moved <= PLAUSIBLE * size) return true;
-  // #if TIMED
-  vectorField(params, solver.t, x, speed);
-  // #else
-  vectorField(params, x, speed);
-  // #endif
-  // #if MONITOR
-  const rate = rateAt(params, x);
-  for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * rate * speed[i]);
-  // #else
+  vectorFieldAt(params, solver.t, x, speed);
+  makePerTau(params, x, speed);
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * speed[i]);
-  // #endif
-  // #if NOISE
-  // #if TIMED
-  noiseFields(params, solver.t, x, fields);
-  // #else
-  noiseFields(params, x, fields);
-  // #endif
-  fields.forEach((field, k) => {
-    size += Math.abs(solver.dw[Math.floor(k / DIM)] * field);
-  });
-  // #endif
+  size += sizeOfNoise(solver);
   if (moved <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
-    return energyAt(params, solver.t, point);
+    energyAt(params, solver.t, point, value);
+    return value[0];
   });
   const energy = Math.abs(before) + Math.abs(middle) + Math.abs(after);
   return Math.abs(after - before) <= MAX_ENERGY_CHANGE * energy;
-}
-
-const value = new Float64Array(1);
-
-function energyAt(params, t, x) {
-  // #if TIMED
-  energy(params, t, x, value);
-  // #else
-  energy(params, x, value);
-  // #endif
-  return value[0];
 }
 
 /**

@@ -3,22 +3,12 @@ import { StepError, finite } from "./errors.mjs";
 import { march } from "./march.mjs";
 import { CASIMIRS, CASIMIR_KINDS, COORDINATES, DEFAULT_PARAMETERS, DIM, NAME, ORDER } from "./model.mjs";
 import { AXES, COEFFICIENTS, SPEC_SHA256, TIMES, VERSION } from "./model.mjs";
-import { casimirs, energy, prepare, vectorField } from "./model.mjs";
-// #if OBSERVED
-import { OBSERVABLES, REDUCTIONS, observables } from "./model.mjs";
-// #endif
-// #if OBSERVED_FIELDS
-import { OBSERVED_FIELDS, observedFields } from "./model.mjs";
-// #endif
-// #if KICKS
-import { MULTIPLES } from "./model.mjs";
-// #endif
-// #if RENEWED
-import { MOMENTS, PREPARED, refresh } from "./model.mjs";
-// #endif
-// #if NOISE
-import { drawsOf } from "./philox.mjs";
-// #endif
+import { casimirs, energy, vectorField } from "./model.mjs";
+import { prepareRow } from "./rows_plain.mjs";
+import { takeDraws } from "./philox.mjs";
+import { expectFewSteps } from "./site_noise.mjs";
+import { renewRows } from "./rows_renewed.mjs";
+import { takeTime } from "./sites_timed.mjs";
 import { Sites } from "./sites.mjs";
 import { makeStep } from "./flows.mjs";
 
@@ -37,11 +27,7 @@ function sumOf(values) {
 
 /** The coefficients of all flows or stages of a step: a row for each time. */
 function prepareStep(params, h, rows) {
-  // #if KICKS
-  TIMES.forEach((time, k) => prepare(params, time * h, [MULTIPLES[k] * (h * h)], rows[k]));
-  // #else
-  TIMES.forEach((time, k) => prepare(params, time * h, rows[k]));
-  // #endif
+  TIMES.forEach((time, k) => prepareRow(params, time, h, rows[k], k));
   return rows;
 }
 
@@ -56,12 +42,8 @@ export class Solver {
   static COORDINATES = COORDINATES;
   static CASIMIRS = CASIMIRS;
   static CASIMIR_KINDS = CASIMIR_KINDS;
-  // #if OBSERVED
-  static OBSERVABLES = OBSERVABLES;
-  // #endif
-  // #if OBSERVED_FIELDS
-  static OBSERVED_FIELDS = OBSERVED_FIELDS;
-  // #endif
+  // #members lattice_constants
+  // #members lattice_field_constants
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
   /** The state, one field after the other, each with the last axis fastest; read only. */
@@ -128,13 +110,9 @@ export class Solver {
     this.sites = new Sites(sizes, options);
     this.x = finite(x0, DIM * this.sites.count, "x0");
     this.before = Float64Array.from(this.x);
-    // #if TIMED
-    [this.t] = finite([options.t0 ?? 0], 1, "t0");
-    // #endif
-    // #if NOISE
-    Object.assign(this, drawsOf(options));
-    if (this.step0 >= 2 ** 48) throw new StepError("BAD_ARGUMENT", 0, `step0 is ${this.step0}`);
-    // #endif
+    takeTime(this, options);
+    takeDraws(this, options);
+    expectFewSteps(this);
     const rows = prepareStep(this.sites.params, PROBE_STEP, this.rows);
     if (!rows.every((row) => row.every(Number.isFinite))) {
       throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
@@ -178,12 +156,8 @@ export class Solver {
   step(h) {
     this.#setStep(h);
     this.before.set(this.x);
-    // #if TIMED
     this.sites.t = this.t;
-    // #endif
-    // #if RENEWED
-    this.rows.forEach((row, k) => refresh(row, this.t + MOMENTS[k] * h, row.subarray(PREPARED)));
-    // #endif
+    renewRows(this, h);
     const status = makeStep(this);
     if (status !== "OK") {
       this.x.set(this.before);
@@ -194,27 +168,7 @@ export class Solver {
     return this;
   }
 
-  // #if TANGENT
-  /**
-   * Make one step as `step` does, and multiply vectors by its derivative, exact to round-off. Throws
-   * StepError;
-   * then the state is as before.
-   *
-   * @param {number} h
-   * @param {ArrayLike<number>[]} vectors laid out as x
-   * @returns {Float64Array[]}
-   */
-  stepTangent(h, vectors) {
-    this.vectors = vectors.map((v) => finite(v, this.x.length, "a tangent vector"));
-    try {
-      this.step(h);
-      return this.vectors;
-    } finally {
-      this.vectors = [];
-    }
-  }
-
-  // #endif
+  // #members lattice_tangent
   /**
    * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
    * successful ones.
@@ -228,7 +182,6 @@ export class Solver {
     return march(this, h, count);
   }
 
-  // #if TIMED
   /** The density of the Hamiltonian at each site, of x and its time or of others. */
   density(x = this.x, t = this.t) {
     const out = new Float64Array(this.sites.count);
@@ -236,14 +189,6 @@ export class Solver {
     energy(this.params, x, this.sites, out);
     return out;
   }
-  // #else
-  /** The density of the Hamiltonian at each site, of x or of another state. */
-  density(x = this.x) {
-    const out = new Float64Array(this.sites.count);
-    energy(this.params, x, this.sites, out);
-    return out;
-  }
-  // #endif
 
   /** The Hamiltonian, of x or of another state. */
   hamiltonian(...at) {
@@ -260,72 +205,13 @@ export class Solver {
     return out;
   }
 
-  // #if OBSERVED
-  // #if TIMED
-  /** The observables, in the order of OBSERVABLES, of x and its time or of others. */
-  observables(x = this.x, t = this.t) {
-    this.sites.t = t;
-    return this.#reduced(x);
-  }
-  // #else
-  /** The observables, in the order of OBSERVABLES, of x or of another state. */
-  observables(x = this.x) {
-    return this.#reduced(x);
-  }
-  // #endif
-
-  #reduced(x) {
-    const { count } = this.sites;
-    const densities = new Float64Array(OBSERVABLES.length * count);
-    observables(this.params, x, this.sites, densities);
-    const counts = { sites: count };
-    // #if GRAPH
-    counts.bonds = this.sites.bondCount;
-    // #else
-    counts.pairs = (count * (count - 1)) / 2;
-    // #endif
-    return Float64Array.from(REDUCTIONS, ([kind, over], k) => {
-      const own = densities.subarray(k * count, (k + 1) * count);
-      if (kind === "max") return own.reduce((most, value) => Math.max(most, value), -Infinity);
-      if (kind === "min") return own.reduce((least, value) => Math.min(least, value), Infinity);
-      return kind === "mean" ? sumOf(own) / counts[over] : sumOf(own);
-    });
-  }
-
-  // #endif
-  // #if OBSERVED_FIELDS
-  // #if TIMED
-  /** The observables of sites in the order of OBSERVED_FIELDS, of x and its time or of others. */
-  observedFields(x = this.x, t = this.t) {
-    const out = new Float64Array(OBSERVED_FIELDS.length * this.sites.count);
-    this.sites.t = t;
-    observedFields(this.params, x, this.sites, out);
-    return out;
-  }
-  // #else
-  /** The observables of sites in the order of OBSERVED_FIELDS, of x or of another state. */
-  observedFields(x = this.x) {
-    const out = new Float64Array(OBSERVED_FIELDS.length * this.sites.count);
-    observedFields(this.params, x, this.sites, out);
-    return out;
-  }
-  // #endif
-
-  // #endif
-  // #if TIMED
-  /** The right-hand side pi(x) grad H(t, x), laid out as x. */
+  // #members lattice_observed
+  // #members lattice_observed_fields
+  /** The right-hand side pi(x) grad H at x and its time or at others, laid out as x. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(x.length);
     this.sites.t = t;
     vectorField(this.params, x, this.sites, out);
     return out;
   }
-  // #else
-  /** The right-hand side pi(x) grad H(x), laid out as x. */
-  vectorField(x = this.x) {
-    const out = new Float64Array(x.length);
-    vectorField(this.params, x, this.sites, out);
-    return out;
-  }
-  // #endif
 }

@@ -1,10 +1,5 @@
-import { FRACTIONS, elapsed, energy, monitor } from "./model.mjs";
-// #if GAUSS
-import { WEIGHTS } from "./model.mjs";
-// #endif
-// #if SPLITTING
-import { TIMES, prepareRow } from "./model.mjs";
-// #endif
+import { StepError } from "./errors.mjs";
+import { energy, monitor } from "./model.mjs";
 
 // ---- Physical time, of steps that are equal in tau ----
 
@@ -22,30 +17,19 @@ export function rateAt(params, x) {
   return one[0];
 }
 
-// #if IMPLICIT
-/** The time that a stage takes, by its point y; NaN unless it has the sign of the stage. */
-export function timeOf(solver, stage, y) {
-  elapsed(solver.coef[stage], y, one);
-  return one[0] * (FRACTIONS[stage] * solver.h) > 0 ? one[0] : NaN;
+/** Throw StepError unless the monitor and the energy level are finite and the physical time increases. */
+export function expectPassingTime(solver) {
+  const rate = rateAt(solver.params, solver.x);
+  if (Number.isFinite(rate) && rate > 0 && Number.isFinite(solver.gauge[0])) return;
+  throw new StepError("BAD_ARGUMENT", 0, `the monitor is ${rate} at x0`);
 }
 
-// #endif
-
-// #if GAUSS
-/**
- * The time that a step takes, by its start and the unknowns at its stages; NaN unless it has the sign
- * of the step.
- */
-export function timeOfStep(solver, stage, start, z) {
-  let sum = 0;
-  WEIGHTS.forEach((b, i) => {
-    elapsed(solver.coef[stage], start, z[i], Float64Array.of(solver.h * b), one);
-    sum += one[0];
-  });
-  return sum * solver.h > 0 ? sum : NaN;
+/** Make a vector field per unit of the physical time one per unit of tau. */
+export function makePerTau(params, x, field) {
+  const rate = rateAt(params, x);
+  for (let i = 0; i < field.length; i++) field[i] *= rate;
 }
 
-// #endif
 /** The time of a solver gains that of a stage. */
 export function pass(solver, time) {
   const sum = solver.t + time;
@@ -54,11 +38,3 @@ export function pass(solver, time) {
   solver.t = sum + small;
   solver.tCarry = small - (solver.t - sum);
 }
-
-// #if SPLITTING
-/** The coefficients of all flows of a step: a row for each time. */
-export function prepare(params, gauge, h, rows) {
-  TIMES.forEach((time, k) => prepareRow(params, gauge, time * h, rows[k]));
-}
-
-// #endif

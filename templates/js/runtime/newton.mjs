@@ -1,11 +1,10 @@
-import { TINY, advance, solve } from "./algebra.mjs";
+import { startFrom } from "./start_predicted.mjs";
+import { advance } from "./algebra.mjs";
+import { TINY, solve } from "./linear.mjs";
 import { plausible, retried } from "./guess.mjs";
-// #if MONITOR
-import { pass, timeOf } from "./level.mjs";
-// #endif
-// #if ATTITUDE
-import { turnStage } from "./attitude.mjs";
-// #endif
+import { pass } from "./level.mjs";
+import { timeOf } from "./level_stages.mjs";
+import { turnStage } from "./attitude_stages.mjs";
 import { FLOOR } from "./measure_policy.mjs";
 import { NEARLY_SOLVED, SHRINKING } from "./newton_policy.mjs";
 import { DIM, MAX_ITERATIONS, TOLERANCE, linearise } from "./model.mjs";
@@ -46,11 +45,7 @@ function attempt(solver, stage) {
   const { x, carry } = solver;
   const history = solver.history[stage];
   let previous = Infinity;
-  // #if NOISE
-  y.set(x); // earlier steps say nothing of the noise of this one
-  // #else
-  if (!history.predict(y)) y.set(x);
-  // #endif
+  startFrom(history, x, y);
   for (let iteration = 1; iteration <= MAX_ITERATIONS; iteration++) {
     linearise(solver.coef[stage], y, displacement, increment, jacobian, incrementJacobian);
     solver.evaluations++;
@@ -75,12 +70,8 @@ function attempt(solver, stage) {
     if (Number.isNaN(time)) return "NOT_FINITE";
     // #endif
     if (!advance(solver, increment, small)) return "NOT_FINITE";
-    // #if MONITOR
     pass(solver, time);
-    // #endif
-    // #if ATTITUDE
     turnStage(solver, stage, y);
-    // #endif
     history.remember(y);
     return "OK";
   }

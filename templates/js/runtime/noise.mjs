@@ -1,3 +1,5 @@
+import { StepError } from "./errors.mjs";
+import { orderDraws } from "./noise_of_flows.mjs";
 import { DRAWS, PARTS } from "./model.mjs";
 import { twoNormals, words } from "./philox.mjs";
 
@@ -17,7 +19,7 @@ function normals(seed, member, step, values) {
  *
  * @returns {boolean} false if one is not finite, or some are missing
  */
-export function draw(solver, given) {
+function draw(solver, given) {
   const { dw, seed, member, step0, steps, h } = solver;
   if (given) {
     if (given.length !== DRAWS) return false;
@@ -26,9 +28,12 @@ export function draw(solver, given) {
     normals(seed, member, BigInt(step0) + BigInt(steps), dw);
     const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS); // so that a step of -h undoes one of h
     for (let k = 0; k < DRAWS; k++) dw[k] *= size;
-    // #if SPLITTING
-    if (h < 0) dw.set([...dw.subarray(DRAWS / 2), ...dw.subarray(0, DRAWS / 2)]); // the last come first
-    // #endif
+    orderDraws(dw, h);
   }
   return dw.every(Number.isFinite);
+}
+
+/** Take the increments of the next step. Throws StepError if they are given and not admissible. */
+export function drawStep(solver, given) {
+  if (!draw(solver, given)) throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${given}`);
 }

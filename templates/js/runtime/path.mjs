@@ -1,11 +1,10 @@
-import { TINY, advance, solve } from "./algebra.mjs";
+import { startFrom } from "./start_predicted.mjs";
+import { advance } from "./algebra.mjs";
+import { TINY, solve } from "./linear.mjs";
 import { plausible, retried } from "./guess.mjs";
-// #if MONITOR
-import { pass, timeOf } from "./level.mjs";
-// #endif
-// #if ATTITUDE
-import { turnStage } from "./attitude.mjs";
-// #endif
+import { pass } from "./level.mjs";
+import { timeOf } from "./level_stages.mjs";
+import { turnStage } from "./attitude_stages.mjs";
 import { CONTRACTING, DIFFERENCE, LEAST_SHARE, LONGEST_PATH, MOST_PIECES } from "./path_policy.mjs";
 import { NEARLY_SOLVED, NEGLIGIBLE, PATIENCE, ROUNDED_SLOPE, SHRINKING, SOLVED } from "./path_policy.mjs";
 import { DIM, FIXED, MAX_ITERATIONS, SERIES, TERMS } from "./model.mjs";
@@ -151,11 +150,7 @@ function attempt(solver, stage) {
   const history = solver.history[stage];
   let previous = Infinity;
   let made = 0;
-  // #if NOISE
-  y.set(solver.x); // earlier steps say nothing of the noise of this one
-  // #else
-  if (!history.predict(y)) y.set(solver.x);
-  // #endif
+  startFrom(history, solver.x, y);
   generate(coef, y, p, jacobian);
   for (let iteration = 0; iteration < MAX_ITERATIONS && made <= MOST_PIECES; iteration++) {
     const path = findResidual(solver, coef, p, y, residual, change, jacobian);
@@ -177,12 +172,8 @@ function attempt(solver, stage) {
       if (Number.isNaN(time)) return "NOT_FINITE";
       // #endif
       if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
-      // #if MONITOR
       pass(solver, time);
-      // #endif
-      // #if ATTITUDE
       turnStage(solver, stage, y);
-      // #endif
       history.remember(y);
       return "OK";
     }

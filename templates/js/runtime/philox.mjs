@@ -56,3 +56,8 @@ export function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   }
   return { seed, member, step0 };
 }
+
+/** Take the selection of random numbers from the options of a solver. */
+export function takeDraws(solver, options) {
+  Object.assign(solver, drawsOf(options));
+}

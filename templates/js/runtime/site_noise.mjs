@@ -1,3 +1,4 @@
+import { StepError } from "./errors.mjs";
 import { PARTS, SOURCES } from "./model.mjs";
 import { twoNormals, words } from "./philox.mjs";
 
@@ -23,4 +24,9 @@ export function drawAtSites(solver, part) {
       if (2 * pair + 1 < SOURCES.length) dw[(2 * pair + 1) * count + site] = size * other;
     }
   }
+}
+
+/** Throw StepError unless the number of steps made before fits its place in the random numbers. */
+export function expectFewSteps({ step0 }) {
+  if (step0 >= 2 ** 48) throw new StepError("BAD_ARGUMENT", 0, `step0 is ${step0}`);
 }

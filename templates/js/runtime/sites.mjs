@@ -1,27 +1,13 @@
 import { StepError, finite } from "./errors.mjs";
 import { AT_SITES, AXES, BOUNDS, DEFAULT_PARAMETERS, LEAST, NEAR } from "./model.mjs";
 import { OPEN, PERIODS, POSITIVE } from "./model.mjs";
-// #if COLOURS
 import { COLOURS, COLOUR_WEIGHTS } from "./model.mjs";
-// #endif
-// #if SEAMS
 import { SEAMS, WANTED } from "./model.mjs";
-// #endif
-// #if GATHER
 import { GATHERED } from "./model.mjs";
-// #endif
-// #if GRAPH
 import { AT_BONDS } from "./model.mjs";
-// #endif
-// #if NOISE
 import { SOURCES } from "./model.mjs";
-// #endif
-// #if SPLIT
 import { SCHEDULE } from "./model.mjs";
-// #endif
-// #if BY_COLOUR
 import { BY_COLOUR } from "./model.mjs";
-// #endif
 
 // ---- The sites ----
 

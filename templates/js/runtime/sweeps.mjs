@@ -3,12 +3,8 @@ import { SETTLED, SLOW } from "./lattice_sweep_policy.mjs";
 import { DIM, MOST_SWEEPS, SCHEDULE, increment, relax } from "./model.mjs";
 import { allFinite } from "./sites.mjs";
 import { byNewton } from "./krylov.mjs";
-// #if NOISE
 import { drawAtSites } from "./site_noise.mjs";
-// #endif
-// #if TANGENT
 import { carry } from "./site_tangent.mjs";
-// #endif
 
 // ---- The step of the series: stages, of which each solves an equation on the whole lattice ----
 

@@ -1,8 +1,4 @@
 import { advance } from "./algebra.mjs";
-// #if IMPLICIT
-import { solve } from "./algebra.mjs";
-import { TANGENT_NEARLY_SOLVED, TANGENT_SHRINKING, TANGENT_SOLVED } from "./tangent_policy.mjs";
-// #endif
 import { DIM, FRACTIONS } from "./model.mjs";
 import { differentiateStage } from "./tangent_newton.mjs";
 
@@ -24,28 +20,6 @@ export function multiplied(a, b) {
   return product;
 }
 
-// #if IMPLICIT
-/** Whether a solve has reached the level of rounding, by its last two corrections. */
-export function tangentSolved(size, previous) {
-  return size <= TANGENT_SOLVED || (size < TANGENT_NEARLY_SOLVED && size > TANGENT_SHRINKING * previous);
-}
-
-/**
- * The solution of matrix · solution = sides for all columns of sides.
- *
- * @returns {Float64Array | null} null if the matrix is singular
- */
-export function solvedForAll(matrix, sides) {
-  const solution = new Float64Array(DIM * DIM);
-  for (let j = 0; j < DIM; j++) {
-    const side = Float64Array.from({ length: DIM }, (_, i) => sides[i * DIM + j]);
-    if (!solve(Float64Array.from(matrix), side)) return null;
-    for (let i = 0; i < DIM; i++) solution[i * DIM + j] = side[i];
-  }
-  return solution;
-}
-
-// #endif
 /**
  * The derivative of the step that a solver has just made, the product of those of its stages.
  *

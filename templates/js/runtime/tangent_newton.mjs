@@ -1,7 +1,8 @@
-import { solve } from "./algebra.mjs";
+import { solve } from "./linear.mjs";
 import { DIM, MAX_ITERATIONS, linearise } from "./model.mjs";
 import { relativeSize } from "./newton.mjs";
-import { identity, multiplied, solvedForAll, tangentSolved } from "./tangent.mjs";
+import { identity, multiplied } from "./tangent.mjs";
+import { solvedForAll, tangentSolved } from "./tangent_solve.mjs";
 
 // ---- The derivative of an implicit stage ----
 

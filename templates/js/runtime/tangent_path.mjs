@@ -1,9 +1,10 @@
-import { TINY, solve } from "./algebra.mjs";
+import { TINY, solve } from "./linear.mjs";
 import { LONGEST_PATH } from "./path_policy.mjs";
 import { TANGENT_NEGLIGIBLE, TANGENT_ROUNDED_SLOPE } from "./path_tangent_policy.mjs";
 import { DIM, MAX_ITERATIONS, TANGENT_FIXED, TANGENT_SERIES, TERMS } from "./model.mjs";
 import { curvature, tangentBegin, tangentField, tangentOrder } from "./model.mjs";
-import { identity, multiplied, solvedForAll, tangentSolved } from "./tangent.mjs";
+import { identity, multiplied } from "./tangent.mjs";
+import { solvedForAll, tangentSolved } from "./tangent_solve.mjs";
 
 // ---- The derivative of a stage along paths ----
 

@@ -1,19 +1,8 @@
-import { DIM, FLOWS, SCHEDULE, TANGENTS } from "./model.mjs";
-// #if CORRECTED
-import { BEGIN, END } from "./model.mjs";
-// #endif
+import { DIM, FLOWS, TANGENTS } from "./model.mjs";
+import { flowsOfRun } from "./run_plain.mjs";
 import { identity, multiplied } from "./tangent.mjs";
 
 // ---- The derivative of a step of flows ----
-
-/** The flows of a run of one step: with a corrector, if there is one. */
-function flowsOfRun() {
-  // #if CORRECTED
-  return [...BEGIN, ...SCHEDULE, ...END];
-  // #else
-  return SCHEDULE;
-  // #endif
-}
 
 /** The product of the derivatives of the flows. */
 export function differentiateStage(solver, stage, at) {

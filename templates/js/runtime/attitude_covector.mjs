@@ -1,0 +1,10 @@
+import { fromCovector } from "./attitude_exponential.mjs";
+import { COVECTOR, turn } from "./model.mjs";
+
+const covectorOfStage = new Float64Array(COVECTOR);
+
+/** The group element of a stage, less the identity: the exponential of a matrix. */
+export function factorBy(coef, y, factor) {
+  turn(coef, y, covectorOfStage);
+  fromCovector(covectorOfStage, factor);
+}

@@ -1,0 +1,6 @@
+import { turn } from "./model.mjs";
+
+/** The group element of a stage, less the identity. */
+export function factorBy(coef, y, factor) {
+  turn(coef, y, factor);
+}

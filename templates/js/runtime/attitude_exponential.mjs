@@ -1,0 +1,23 @@
+import { makeOrthogonal } from "./attitude_orthogonal.mjs";
+import { matrixProduct } from "./attitude_matrices.mjs";
+import { COVECTOR, ELEMENT, exponential } from "./model.mjs";
+
+const smallCovector = new Float64Array(COVECTOR);
+const squared = new Float64Array(ELEMENT);
+
+/**
+ * exp(P) - 1 of a covector, which ends with a bound for the square of its size: P/2^k, doubled k times.
+ * Rounding errors double too; if the matrices are orthogonal, that is restored each time.
+ */
+export function fromCovector(covector, element) {
+  let size = covector[COVECTOR - 1];
+  let doublings = 0;
+  for (; Number.isFinite(size) && size > 0.25; size *= 0.25) doublings++;
+  for (let i = 0; i < COVECTOR; i++) smallCovector[i] = covector[i] * 0.5 ** doublings;
+  exponential(smallCovector, element);
+  for (; doublings > 0; doublings--) {
+    matrixProduct(element, element, squared);
+    for (let i = 0; i < ELEMENT; i++) element[i] = 2 * element[i] + squared[i];
+    makeOrthogonal(element);
+  }
+}

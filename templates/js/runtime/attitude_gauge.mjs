@@ -1,0 +1,25 @@
+import { beginAttitude, currentElement, elementOf } from "./attitude.mjs";
+import { multiplyAfter } from "./attitude_body.mjs";
+import { uniformMotion } from "./attitude_rate.mjs";
+import { rateOf } from "./attitude_rate_plain.mjs";
+import { ATTITUDE, ELEMENT, TURNING } from "./model.mjs";
+
+/** Compute the rate of the gauge rotation, after x or the attitude has been set. */
+export function takeTurningRate(solver) {
+  solver.turningRate = new Float64Array(TURNING);
+  rateOf(solver, solver.turningRate);
+  solver.attitudeFrom = solver.t;
+}
+
+/** The first group element, and the gauge rotation since then. */
+export function firstOf({ firstElement, turningRate, t, attitudeFrom }) {
+  const both = new Float64Array(ELEMENT);
+  multiplyAfter(firstElement, uniformMotion(turningRate, t - attitudeFrom), both);
+  return both;
+}
+
+/** Start the attitude anew at its present value, after x has been set. */
+export function restartAttitude(solver) {
+  const element = currentElement(solver);
+  beginAttitude(solver, elementOf(solver.steps, element.subarray(0, ATTITUDE), element.subarray(ATTITUDE)));
+}

@@ -1,0 +1,7 @@
+/** Divide a quaternion, given less 1, by its length. */
+export function shorten(q) {
+  const excess = q[0] * (2 + q[0]) + q[1] * q[1] + (q[2] * q[2] + q[3] * q[3]);
+  const length = Math.sqrt(1 + excess);
+  q[0] = (q[0] - excess / (1 + length)) / length;
+  for (let i = 1; i < 4; i++) q[i] /= length;
+}

@@ -1,0 +1,13 @@
+import { moveUniformly } from "./attitude_rate_position.mjs";
+import { ELEMENT } from "./model.mjs";
+
+/** The element of the motion with a constant rate, for some time. */
+export function uniformMotion(turning, t) {
+  const element = new Float64Array(ELEMENT);
+  const [a, b, c] = turning;
+  const speed = Math.sqrt(a * a + (b * b + c * c));
+  const scale = speed > 0 ? Math.sin(0.5 * t * speed) / speed : 0;
+  element.set([Math.cos(0.5 * t * speed), scale * a, scale * b, scale * c]);
+  moveUniformly(element, turning, t, speed, scale);
+  return element;
+}

@@ -1,0 +1,12 @@
+import { fromCovector } from "./attitude_exponential.mjs";
+import { COVECTOR, ELEMENT, ROWS } from "./model.mjs";
+
+/** The element of the motion with a constant rate, for some time. */
+export function uniformMotion(turning, t) {
+  const element = new Float64Array(ELEMENT);
+  const covector = turning.map((value) => t * value);
+  covector[COVECTOR - 1] *= t;
+  fromCovector(covector, element);
+  for (let i = 0; i < ELEMENT; i += ROWS + 1) element[i] += 1;
+  return element;
+}

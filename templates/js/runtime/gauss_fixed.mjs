@@ -1,0 +1,4 @@
+/** Store the move of a stage. */
+export function keepMove(coef, end, move, to) {
+  to.set(move);
+}

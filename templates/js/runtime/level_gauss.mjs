@@ -1,0 +1,16 @@
+import { WEIGHTS, elapsed } from "./model.mjs";
+
+const timeOfNode = new Float64Array(1);
+
+/**
+ * The time that a step takes, by its start and the unknowns at its stages; NaN unless it has the sign
+ * of the step.
+ */
+export function timeOfStep(solver, stage, start, z) {
+  let sum = 0;
+  WEIGHTS.forEach((b, i) => {
+    elapsed(solver.coef[stage], start, z[i], Float64Array.of(solver.h * b), timeOfNode);
+    sum += timeOfNode[0];
+  });
+  return sum * solver.h > 0 ? sum : NaN;
+}

@@ -1,0 +1,16 @@
+import { StepError } from "./errors.mjs";
+import { chooseGauge, rateAt } from "./level.mjs";
+import { FRACTIONS, prepare } from "./model.mjs";
+
+/** Take the energy level of a state to which a solver is moved. Throws StepError if it has none. */
+export function takeLevel(solver, x) {
+  const [rate, level] = [rateAt(solver.params, x), chooseGauge(solver.params, x)];
+  if (!(Number.isFinite(rate) && rate > 0 && Number.isFinite(level[0]))) {
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the monitor is ${rate} there`);
+  }
+  solver.gauge = level;
+  if (!Number.isFinite(solver.h)) return;
+  FRACTIONS.forEach((fraction, stage) => {
+    prepare(solver.params, level, fraction * solver.h, solver.coef[stage]);
+  });
+}

@@ -1,0 +1,12 @@
+import { modified } from "./model.mjs";
+
+const number = new Float64Array(1);
+
+/** Members of Solver: the modified Hamiltonian. */
+export class Modified {
+  /** The Hamiltonian whose flow a step of size h is, up to O(h^MODIFIED_POWER), at x or elsewhere. */
+  modifiedHamiltonian(h, x = this.x) {
+    modified(this.params, h, x, number);
+    return number[0];
+  }
+}

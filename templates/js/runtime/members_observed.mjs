@@ -1,0 +1,12 @@
+import { observablesAt } from "./observed_autonomous.mjs";
+import { OBSERVABLES } from "./model.mjs";
+
+/** Members of Solver: the observables. */
+export class Observed {
+  /** The observables, in the order of OBSERVABLES, at x and its time or elsewhere. */
+  observables(x = this.x, t = this.t) {
+    const out = new Float64Array(OBSERVABLES.length);
+    observablesAt(this.params, t, x, out);
+    return out;
+  }
+}

@@ -1,0 +1,25 @@
+import { StepError } from "./errors.mjs";
+import { restoreState, savedState } from "./saving.mjs";
+import { tangentOf } from "./tangent.mjs";
+
+/** Members of Solver: the derivative of a step. */
+export class Tangent {
+  /**
+   * One step as `step` makes it, and its derivative, to round-off, with any gauge held fixed. Throws
+   * StepError; then the state is as before.
+   *
+   * @param {number} h
+   * @returns {Float64Array} entry i * DIM + j is the derivative of the new x[i] along the old x[j]
+   */
+  stepTangent(h) {
+    const before = savedState(this);
+    const { t, steps } = this;
+    const at = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry), t };
+    this.step(h);
+    const { status, tangent } = tangentOf(this, at);
+    if (status === "OK") return tangent;
+    restoreState(this, before);
+    Object.assign(this, { steps, h: NaN }); // coefficients belong to the time after the step
+    throw new StepError(status, steps);
+  }
+}

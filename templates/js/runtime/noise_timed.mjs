@@ -1,0 +1,11 @@
+import { noiseFields, refresh } from "./model.mjs";
+
+/** The vector fields of the sources of noise at x and the time t. */
+export function noiseFieldsAt(params, t, x, out) {
+  noiseFields(params, t, x, out);
+}
+
+/** The coefficients that are functions of the increments dw of the noise, and of the time if H is one. */
+export function refreshAt(row, t, dw, out) {
+  refresh(row, t, dw, out);
+}

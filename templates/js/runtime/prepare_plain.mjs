@@ -1,0 +1,12 @@
+import { PROBE_STEP } from "./start_policy.mjs";
+import { prepare } from "./model.mjs";
+
+/** Compute the coefficients of a stage of size h. */
+export function prepareStage({ params }, h, table) {
+  prepare(params, h, table);
+}
+
+/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+export function prepareProbe(params, table) {
+  prepare(params, PROBE_STEP, table);
+}

@@ -1,0 +1,6 @@
+import { BEGIN, END, SCHEDULE } from "./model.mjs";
+
+/** The flows of a run of one step, with the correctors. */
+export function flowsOfRun() {
+  return [...BEGIN, ...SCHEDULE, ...END];
+}

@@ -1,0 +1,6 @@
+/** Coefficient k of the product of two series. */
+export function taylorProduct(a, b, k) {
+  let sum = 0;
+  for (let j = 0; j <= k; j++) sum += a[j] * b[k - j];
+  return sum;
+}
