@@ -30,6 +30,7 @@ COMMANDS = {
     "tune": ("phigen.cli.tune", "Find the cheapest setting and step for an accuracy."),
     "compare": ("phigen.cli.compare", "Compare bi-realisations, schemes and classical methods on a run."),
     "verify": ("phigen.cli.verify", "Build every target and measure order and conservation."),
+    "certify": ("phigen.cli.certify", "Bound the distance of computed steps from the exact Poisson map."),
     "report": ("phigen.cli.report", "Write one HTML page: formulas, proofs, measurements, figures."),
     "show": ("phigen.cli.show", "Show the formulas: π, Casimirs, α, β, S_1 … S_k."),
     "list": ("phigen.cli.list", "List the bundled specs."),

@@ -1,0 +1,263 @@
+"""Kernels of generated C as lists of operations, read from the text that the compiler reads."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable
+from typing import Any
+
+from .rounding import LIBM, SERIES, RefusedError
+
+_OPERATIONS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
+
+#: Array in which the parts of a long function leave values for one another.
+_WORK = "work"
+
+#: Number in C, with a point or an exponent; whole numbers without are indices.
+_NUMBER = r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)"
+
+
+class GeneratedC:
+    """A generated C file, without comments and without the name of the solver before each name."""
+
+    def __init__(self, text: str, name: str) -> None:
+        self.text = re.sub(rf"/\*.*?\*/|\b{re.escape(name)}_(?=[A-Za-z])", "", text, flags=re.DOTALL)
+
+    def function(self, name: str) -> tuple[list[str], str] | None:
+        """Return the names of the arguments and the body of a function; None if there is none of that name."""
+        matched = re.search(rf"\b{name}\(([^{{}};]*)\)\s*\{{\n(.*?)\n\}}", self.text, re.DOTALL)
+        if not matched:
+            return None
+        arguments = re.findall(r"(\w+)(?:\[(?:restrict )?\w*\])*\s*(?:,|$)", matched[1])
+        return arguments, matched[2]
+
+    def has(self, name: str) -> bool:
+        """Whether there is a function of that name."""
+        return self.function(name) is not None
+
+    def numbers(self, name: str, text: str | None = None) -> list[float]:
+        """Return the numbers of a static array, or that of a macro or enumeration constant, in order."""
+        text = self.text if text is None else text
+        matched = re.search(
+            rf"\b{name}(?:\[\w+\])+ =\s*\{{(.*?)\}};|define {name} (.*)|\b{name} = (\d+)", text, re.DOTALL
+        )
+        if not matched:
+            raise RefusedError(f"the C has no {name}")
+        listed = matched[1] or matched[2] or matched[3]
+        return [float(v) for v in re.findall(r"-?\d[\d.]*(?:e[-+]?\d+)?", listed)]
+
+    def number(self, name: str) -> float:
+        """Return the number of a macro or of an enumeration constant."""
+        return self.numbers(name)[0]
+
+
+class KernelReader:
+    """Operations of one function, in the order in which it makes them, each shared as the C shares it.
+
+    ``outputs`` maps each array that the function writes to the indices of the operations that are its entries. The
+    functions that the C itself defines by polynomials are entered into ``series``.
+    """
+
+    def __init__(self, source: GeneratedC, function: str, series: dict[str, Any]) -> None:
+        self.operations: list[list[Any]] = []
+        self.outputs: dict[str, dict[int, int]] = {}
+        self._source, self._series = source, series
+        self._inputs: dict[tuple[str, Any], int] = {}
+        arguments, body = _expect(source.function(function), function)
+        self._names: dict[str, Any] = {a: a for a in arguments}
+        self._run(body)
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """The kernel as a certificate stores it."""
+        written = {name: entries for name, entries in self.outputs.items() if name != _WORK}
+        outputs = {name: [entries[i] for i in range(len(entries))] for name, entries in written.items()}
+        return {"operations": self.operations, "outputs": outputs}
+
+    def _run(self, body: str) -> None:
+        body = re.sub(_NUMBER, r'"\1"', body.replace("->", "."))
+        for statement in (" ".join(s.split()) for s in body.split(";")):
+            if statement.startswith("return "):
+                self.outputs["value"] = {0: self._index(_parsed(statement.removeprefix("return ")))}
+            elif statement.startswith("const double "):
+                call = _parsed(f"declare({statement.removeprefix('const double ')})")
+                for declared in call.keywords if isinstance(call, ast.Call) else ():
+                    self._names[str(declared.arg)] = self._index(declared.value)
+            elif cleared := re.fullmatch(r"(?:\(void\))?memset\((\w+), 0, (\d+) \* sizeof \w+\[0\]\)", statement):
+                self.outputs[cleared[1]] = dict.fromkeys(range(int(cleared[2])), self._operation("number", 0.0))
+            elif re.fullmatch(r"\w+_part\d+\(.*\)", statement):  # of a function that is cut into parts
+                self._run(_expect(self._source.function(statement.split("(")[0]), statement)[1])
+            elif statement and not re.fullmatch(rf"\(void\)\w+(?:, \(void\)\w+)*|double {_WORK}\[\d+\]", statement):
+                self._store(statement)
+
+    def _store(self, statement: str) -> None:
+        match _parsed(statement, mode="exec"):
+            case ast.Assign([ast.Subscript(ast.Name(array), ast.Constant(int(entry)))], value):
+                self.outputs.setdefault(array, {})[entry] = self._index(value)
+            case _:
+                raise RefusedError(f"the C has the statement {statement!r}, which certificates do not cover")
+
+    def _index(self, e: ast.expr) -> int:
+        """Return the index of the operation that an expression is."""
+        match e:
+            case ast.Constant(str(text)):
+                return self._operation("number", float(text))
+            case ast.Name(name) if isinstance(self._names.get(name), int):
+                return int(self._names[name])
+            case ast.Name(name) if name in self._names:
+                return self._input(name, 0)
+            case ast.Attribute(ast.Name(record), field):
+                return self._input(record, field)
+            case ast.Subscript(ast.Name(array), ast.Constant(int(entry))) if entry in self.outputs.get(array, {}):
+                return self.outputs[array][entry]
+            case ast.Subscript(ast.Name(array), ast.Constant(int(entry))):
+                return self._input(array, entry)
+            case ast.UnaryOp(ast.USub(), ast.Constant(str(text))):
+                return self._operation("number", -float(text))
+            case ast.UnaryOp(ast.USub(), operand):
+                return self._operation("neg", self._index(operand))
+            case ast.BinOp(left, operator, right) if type(operator) in _OPERATIONS:
+                return self._operation(_OPERATIONS[type(operator)], self._index(left), self._index(right))
+            case ast.Call(ast.Name(name), [argument]):
+                return self._operation(self._function(name), self._index(argument))
+        raise RefusedError(f"the C has {ast.unparse(e)!r}, which certificates do not cover")
+
+    def _operation(self, name: str, *operands: Any) -> int:
+        self.operations.append([name, *operands])
+        return len(self.operations) - 1
+
+    def _input(self, array: str, entry: Any) -> int:
+        if (array, entry) not in self._inputs:
+            self._inputs[array, entry] = self._operation("input", array, entry)
+        return self._inputs[array, entry]
+
+    def _function(self, name: str) -> str:
+        if not self._source.has(name):
+            if name not in LIBM:
+                raise RefusedError(f"the C calls {name}, which certificates do not cover")
+            return name
+        if name not in SERIES:
+            raise RefusedError(f"the C calls {name}, which certificates do not cover")
+        if f"series:{name}" not in self._series:
+            self._series[f"series:{name}"] = _polynomial(self._source, name)
+        return f"series:{name}"
+
+
+def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
+    """The polynomial by which a function is computed for small arguments, and the radius where it is."""
+    (argument,), body = _expect(source.function(name), name)
+    branch = re.search(r"if \(fabs\(\w+\) [<>] ([\d.]+)\)", body)
+    if not branch:
+        raise RefusedError(f"{name} of the C has no polynomial for small arguments")
+    if "near[" in body:
+        value = ""
+        for c in reversed(source.numbers("near", body)):
+            value = f"({value}) * {argument} + {c!r}" if value else repr(c)
+        body = f"return {value};"
+    else:
+        body = re.sub(r"if \(fabs\([^{;]*(?:\{.*?\n    \}|;)\n", "", body, count=1, flags=re.DOTALL)
+    inner = GeneratedC(f"f({argument})\n{{\n{body}\n}}", "")
+    kernel = KernelReader(inner, "f", {})
+    kernel.operations = [["input", "s", 0] if op[0] == "input" else op for op in kernel.operations]
+    return {"radius": float(branch[1]), **kernel.described}
+
+
+def _parsed(text: str, mode: str = "eval") -> Any:
+    try:
+        tree = ast.parse(text, mode=mode)
+    except SyntaxError:
+        raise RefusedError(f"the C has {text!r}, which certificates do not cover") from None
+    return tree.body if isinstance(tree, ast.Expression) else tree.body[0]  # type: ignore[attr-defined]
+
+
+def _expect(function: tuple[list[str], str] | None, name: str) -> tuple[list[str], str]:
+    if function is None:
+        raise RefusedError(f"the C has no function {name}")
+    return function
+
+
+def read(text: str, name: str) -> dict[str, Any]:
+    """Return all that a certificate states about the C of a solver: the kind of its step, kernels, and tables.
+
+    Raises `RefusedError` for what certificates do not cover.
+    """
+    source, series = GeneratedC(text, name), dict[str, Any]()
+    kind = next((kind for kind, functions in _FUNCTIONS.items() if source.has(functions[-1])), "")
+    if not kind:
+        raise RefusedError("the C has a kind of step that certificates do not cover")
+    facts = _FACTS[kind](source)
+    names = [f for f in (*_FUNCTIONS[kind][:-1], "at_time") if source.has(f)]
+    names += _FUNCTIONS[kind][-1:] if kind != "splitting" else [f"change{flow}" for flow in facts["moves"]]
+    kernels = {name: KernelReader(source, name, series).described for name in names}
+    if "prepare_row" in kernels:
+        kernels["prepare"] = kernels.pop("prepare_row")
+    kernels["prepare"]["outputs"].setdefault("coef", [])
+    fractions = source.numbers("fractions") if re.search(r"\bfractions\[", source.text) else [1.0]
+    middles = source.numbers("middles") if "at_time" in kernels else []
+    return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
+
+
+#: Functions of the kinds of steps; the last is there for no other kind.
+_FUNCTIONS = {
+    "newton": ("prepare", "linearise"),
+    "gauss": ("prepare", "stage_field", "stage_change"),
+    "splitting": ("prepare_row", "flows"),
+    "explicit": ("prepare", "explicit"),
+}
+
+
+def _newton(source: GeneratedC) -> dict[str, Any]:
+    names = {"floor": "FLOOR", "tolerance": "TOLERANCE", "nearly_solved": "NEARLY_SOLVED"}
+    return {key: source.number(name) for key, name in names.items()}
+
+
+def _gauss(source: GeneratedC) -> dict[str, Any]:
+    weights, mixing = source.numbers("weights"), source.numbers("mixing")
+    lanes = len(weights)  # rows may be padded to full lanes
+    nodes = len(mixing) // lanes
+    rows = [mixing[j * lanes : j * lanes + nodes] for j in range(nodes)]
+    return {"weights": weights[:nodes], "mixing": rows, "plain": int(source.number("PLAIN"))}
+
+
+def _splitting(source: GeneratedC) -> dict[str, Any]:
+    """The times of flows, the flows of a step with their coefficients, and the coordinates that each changes."""
+    if source.has("corrector"):
+        message = "runs begin and end with a corrector, so that a step alone is not what the solver makes"
+        raise RefusedError(message, "another composition, without a corrector")
+    _, body = _expect(source.function("flows"), "flows")
+    lines, depth = [], 0
+    for line in map(str.strip, body.splitlines()):
+        loop = re.fullmatch(r"for \(int (\w+) = (\d+); \w+ < (\d+); (?:\+\+\w+|\w+ \+= (\d+))\) \{", line)
+        call = re.fullmatch(r"flow(\d+)\(([\w *+()]*), x, moved, start\);", line)
+        if loop:
+            lines.append("    " * depth + f"for {loop[1]} in range({loop[2]}, {loop[3]}, {loop[4] or 1}):")
+        elif call:
+            lines.append("    " * depth + f"called.append([{call[1]}, ({call[2]}) // ROW])")
+        elif re.fullmatch(r"coef \+= [\w *]+;", line):
+            lines.append("    " * depth + line.rstrip(";"))
+        elif line and line != "}":
+            raise RefusedError(f"the C has the statement {line!r}, which certificates do not cover")
+        depth += bool(loop) - (line == "}")
+    called: list[list[int]] = []
+    names = {"coef": 0, "ROW": int(source.number("ROW")), "called": called, "range": range}
+    exec("\n".join(lines), {"__builtins__": {}}, names)  # the statements matched above, and no others
+    moves = {str(flow): _moves(source, flow) for flow in sorted({flow for flow, _ in called})}
+    return {"fractions": source.numbers("times"), "schedule": called, "moves": moves}
+
+
+def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
+    """The coordinates to which a flow adds its changes, with the indices of these."""
+    _, body = _expect(source.function(f"flow{flow}"), f"flow{flow}")
+    added = re.findall(r"add\(x, moved, start, (\d+), change\[(\d+)\]\);", body)
+    if len(added) != body.count(";") - 2:
+        raise RefusedError(f"flow {flow} of the C does more than to add its changes")
+    return [[int(i), int(j)] for i, j in added]
+
+
+_FACTS: dict[str, Callable[[GeneratedC], dict[str, Any]]] = {
+    "newton": _newton,
+    "gauss": _gauss,
+    "splitting": _splitting,
+    "explicit": lambda source: {},
+}
