@@ -160,7 +160,7 @@ def _tell_of_lattice(spec: Spec) -> None:
     lattice_spec = recognised_lattice(spec, least=SITES)
     if lattice_spec is not None and lattice_spec.lattice is not None:
         sites = spec.dimension // len(lattice_spec.coordinates)
-        message = f"{spec.name} is a lattice of {sites} like sites, written out"
+        message = f"{spec.name} is a lattice of {sites} identical sites, written out"
         hint = f"phigen show --lattice {spec.file} prints a spec of one site, for any number of them"
         place = replace(spec.diagnostic(("coordinates",), message, hint), severity="warning")
         warnings.warn(str(place), PhigenWarning, stacklevel=4)

@@ -40,7 +40,7 @@ def expanded_text(spec: Spec, sizes: str) -> str:
 
 
 def lattice_text(spec: Spec) -> str:
-    """The text of a spec of one site, for an ordinary spec in which like sites are written out."""
+    """The text of a spec of one site, for an ordinary spec in which identical sites are written out."""
     from phigen.lattice.recognition import MIN_SITES_PER_AXIS, recognised_lattice
     from phigen.spec.yaml_text import spec_text
 

@@ -55,7 +55,7 @@ runs:
 
 
 _LATTICE = """\
-# A lattice of like sites for phigen. This one is a chain of spins: change it into yours, then run
+# A lattice of identical sites for phigen. This one is a chain of spins: change it into yours, then run
 #   phigen check {name}.yaml    # proved for all sizes: Jacobi identity, Casimirs, invariants
 #   phigen show {name}.yaml --expand 4   # a small one as an ordinary spec
 phigen: 1                       # version of this format

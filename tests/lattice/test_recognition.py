@@ -96,7 +96,7 @@ def test_parameters_with_numbers_are_at_sites_with_their_values_of_a_run() -> No
 
 def test_who_compiles_a_lattice_recognised_lattice_is_told() -> None:
     spec = loads(spec_text(replace(expanded("fput"), name="chain")), "chain.yaml")
-    with pytest.warns(PhigenWarning, match="chain is a lattice of 16 like sites") as caught:
+    with pytest.warns(PhigenWarning, match="chain is a lattice of 16 identical sites") as caught:
         compile_spec(spec, scheme="splitting", order=2)
     assert "phigen show --lattice chain.yaml" in str(caught[0].message)
     with warnings.catch_warnings():
