@@ -210,7 +210,6 @@ def _expect_correctable(system: System, spec: Spec, method: Corrected) -> None:
         "forces": (system.forces is not None, "the corrector would undo dissipation"),
         "monitor": (spec.monitor is not None, "the corrector takes equal steps of the physical time"),
         "reconstruct": (bool(spec.reconstruct), "attitudes are those of single steps"),
-        "adjoint": (spec.extras.adjoint, "gradients are those of single steps"),
     }
     for key, (present, reason) in refused.items():
         if present:

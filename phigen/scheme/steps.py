@@ -412,8 +412,8 @@ class Splitting(_Scheduled):
         return (*self.flows, *self.tangents, *(self.adjoint.steps if self.adjoint else ()))
 
     def maps(self, stages: int) -> int:
-        """The number of flows."""
-        return len(self.schedule.flows)
+        """The number of flows, with those of a corrector."""
+        return len(self.schedule.flows_of_run)
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:

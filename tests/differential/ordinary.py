@@ -248,12 +248,10 @@ def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:
     motion = [sum(v**2 for v in p[:size]) / (2 * mass), -pull / sympy.sqrt(sum(v**2 for v in q[:size]))]
     beside = [v**2 / 300 for v in p[size:]]
     terms = [*motion, *beside, small(source) * monomial(source, q, 3) / 300]
-    names = {2: ["saba-4-2", "saba-8-2", "wisdom-holman"], 4: ["aba-8-4", "aba-8-6-4", "aba-10-6-4"]}
-    differentiated = {**options, **drawn.asked}.get("adjoint")
+    names = {2: ["saba-8-2", "wisdom-holman"], 4: ["aba-8-4", "aba-8-6-4", "aba-10-6-4"]}
     if not beside and options["order"] in names and source.random() < 0.7:
         name = source.choice(names[options["order"]])
-        corrected = name.startswith("wisdom")
-        options["composition"] = "saba-6-2" if corrected and differentiated else name + "-5" * corrected
+        options["composition"] = name + "-5" * name.startswith("wisdom")
     return replace(drawn, terms=tuple(terms), options=options)
 
 
@@ -278,9 +276,11 @@ def _bodies(source: random.Random, drawn: Ordinary, options: dict[str, Any]) -> 
             terms.append(-m * mass[str(j)] / sympy.sqrt(between))
     if change == "jacobi" and source.random() < 0.4:
         terms.append(small(source) * at("x1") ** 2 * at(f"y{count - 1}") / 400)
-    given = {"scheme": "splitting", "coordinates_from": change, "order": source.choice([2, 4])}
-    if count == 3 and source.random() < 0.5:
-        given["composition"] = source.choice({2: ["saba-4-2", "wisdom-holman"], 4: ["aba-8-4"]}[given["order"]])
+    given = {"scheme": "splitting", "coordinates_from": change, "order": source.choice([2, 2, 4])}
+    if count == 3 and source.random() < 0.7:
+        given["composition"] = source.choice(
+            {2: ["saba-4-2", "wisdom-holman", "wisdom-holman-3"], 4: ["aba-8-4"]}[given["order"]]
+        )
     state = tuple(start[str(v)] for v in structure.coordinates)
     return replace(
         drawn, structure=structure, terms=tuple(terms), start=state, parameters={}, options={**options, **given}

@@ -311,10 +311,37 @@ RUN = Choice(
 
 STEP = Choice(
     "One step of a run.",
-    ("SPLITTING && ADJOINT", "COMPOSED || SPLITTING"),
+    ("CORRECTED && ADJOINT", "SPLITTING && ADJOINT", "COMPOSED || SPLITTING"),
     {
-        "STEP_OF_RUN": ("phi_stages(s, kept)", "phi_stages(s)", "phi_stage(s)"),
-        "NEXT_RECORD": ("if (kept != NULL) kept += PHI_FLOWS;", "", ""),
+        "STEP_OF_RUN": (
+            "phi_stages(s, kept != NULL ? kept + PHI_BEGUN : NULL)",
+            "phi_stages(s, kept)",
+            "phi_stages(s)",
+            "phi_stage(s)",
+        ),
+        "NEXT_RECORD": ("if (kept != NULL) kept += PHI_FLOWS;", "if (kept != NULL) kept += PHI_FLOWS;", "", ""),
+    },
+)
+
+CORRECTORS = Choice(
+    "The tape of a step has the flows of a run of one step; the reverse pass goes through those of a corrector at the"
+    " ends of runs, which are where rows are.",
+    ("CORRECTED && ADJOINT",),
+    {
+        "AND_KEPT": (", kept", ""),
+        "AND_KEPT_AT(place)": (", kept != NULL ? kept + (place) : NULL", ""),
+        "AND_STATES_KEPT": (", double (*kept)[PHI_DIM]", ""),
+        "FIRST_FLOW": ("PHI_BEGUN", "0"),
+        "LAST_FLOW": ("(PHI_FLOWS - PHI_BEGUN - 1)", "(PHI_FLOWS - 1)"),
+        "CORRECTOR_AFTER_BACK": (
+            "if (done == steps || done % stride == 0)"
+            " phi_flows_back(s->coef, trail[done - 1], PHI_FLOWS - PHI_BEGUN, PHI_FLOWS - 1, bar, bar->coef);",
+            "",
+        ),
+        "CORRECTOR_BEFORE_BACK": (
+            "if ((done - 1) % stride == 0) phi_flows_back(s->coef, trail[done - 1], 0, PHI_BEGUN - 1, bar, bar->coef);",
+            "",
+        ),
     },
 )
 
@@ -323,8 +350,8 @@ ENDS = Choice(
     ("CORRECTED", "ATTITUDE && !BLOCKS"),
     {
         "BEFORE_RUN": ("const phi_solver before = *s;", "", ""),
-        "CORRECT_START": ("if (steps > 0 && phi_correct(s, 0) != PHI_OK) return PHI_NOT_FINITE;", "", ""),
-        "END_RUN(status)": ("phi_end_run(s, &before, status)", "phi_end_turning(s, status)", "status"),
+        "CORRECT_START": ("if (steps > 0 && phi_correct(s, 0 PHI_AND_KEPT) != PHI_OK) return PHI_NOT_FINITE;", "", ""),
+        "END_RUN(status)": ("phi_end_run(s, &before, status PHI_AND_KEPT)", "phi_end_turning(s, status)", "status"),
     },
 )
 
@@ -578,6 +605,7 @@ ALL = (
     PARAMETERS,
     RUN,
     STEP,
+    CORRECTORS,
     ENDS,
     CHAPTERS,
     ATTITUDE,

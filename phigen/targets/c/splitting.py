@@ -23,7 +23,9 @@ def sizes(step: Splitting) -> list[tuple[str, int, str]]:
     constants.append(("ROW", max(1, step.row), "coefficients for one of them"))
     flows = len(step.schedule.flows_of_run)
     said = "in a run of one step" if step.schedule.begin else "in a step"
-    return constants + ([("FLOWS", flows, said)] if step.tangents or step.adjoint else [])
+    constants += [("FLOWS", flows, said)] if step.tangents or step.adjoint else []
+    corrected = step.adjoint is not None and bool(step.schedule.begin)
+    return constants + [("BEGUN", len(step.schedule.begin), "before the first step, and after the last")] * corrected
 
 
 def printed(program: Program, step: Splitting) -> str:
@@ -42,16 +44,16 @@ def printed(program: Program, step: Splitting) -> str:
     passed = _moves(bool(program.attitude))
     stored = f", double (*kept)[{program.dimension}]" if step.adjoint else ""
     texts.append(_steps(program, step, "", "static inline ", arguments + more + stored, passed, stores=bool(stored)))
-    texts += [_corrector(program, step.schedule, along)] if step.schedule.begin else []
+    texts += [_corrector(program, step.schedule, along, stored)] if step.schedule.begin else []
     return "\n".join(texts)
 
 
-def _corrector(program: Program, schedule: Schedule, along: int) -> str:
+def _corrector(program: Program, schedule: Schedule, along: int, stored: str) -> str:
     """The flows before the first and after the last step of a run, in alternation."""
     (outer, row), *others = schedule.begin
     (_, last_row), *_ = schedule.end
     inner = others[0][0] + 1 if others else 0
-    values = {"n": along, "outer": outer + 1, "inner": inner, "first": row, "last": last_row}
+    values = {"n": along, "outer": outer + 1, "inner": inner, "first": row, "last": last_row, "stored": stored}
     return render("c", "corrector.c", {"NAME": program.name, "count": len(schedule.begin), **values})
 
 
@@ -88,7 +90,7 @@ def tangent(program: Program, step: Splitting) -> str:
 
 def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
     """Return the transposes of the flows."""
-    flows, (kernels, values) = step.schedule.flows, _transposed(program, step, adjoint.steps)
+    flows, (kernels, values) = step.schedule.flows_of_run, _transposed(program, step, adjoint.steps)
     values["part_of"] = ", ".join(str(part + 1) for part, _ in flows)
     values["row_of"] = ", ".join(str(row) for _, row in flows)
     values["unused"] = not any(kernel.outputs[1].values for kernel in kernels)

@@ -18,7 +18,9 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
     phi_status status = PHI_OK;
     for (size_t done = steps; done > 0 && status == PHI_OK; --done) {
         phi_join(bar, rows_bar, done, steps, stride);
+        PHI_CORRECTOR_AFTER_BACK
         status = phi_back_step(s, trail[done - 1], bar);
+        PHI_CORRECTOR_BEFORE_BACK
     }
     return status;
 }

@@ -6,14 +6,21 @@
 #include "adjoint_stage.c"
 #include "adjoint_flows.h"
 
+/* Pull a cotangent back through flows of a run of one step, from the last one on; they began at y. */
+static void phi_flows_back(const double *coef, phi_kept y, int first, int last, phi_cotangent *bar,
+    double coef_bar[PHI_COEFFICIENTS])
+{
+    for (int k = last; k >= first; --k) {
+        const int row = phi_flow_row[k] * PHI_ROW;
+        phi_follow_back(phi_flow_part[k], coef + row, y[k], bar->x, coef_bar + row);
+    }
+}
+
 /* Pull a cotangent back through a step whose flows began at y. */
 static phi_status phi_stage_adjoint(const double *coef, phi_kept y, phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {
-    for (int k = PHI_FLOWS - 1; k >= 0; --k) {
-        const int row = phi_flow_row[k] * PHI_ROW;
-        phi_follow_back(phi_flow_part[k], coef + row, y[k], bar->x, coef_bar + row);
-    }
+    phi_flows_back(coef, y, PHI_FIRST_FLOW, PHI_LAST_FLOW, bar, coef_bar);
     return PHI_OK;
 }
 #endif

@@ -99,12 +99,12 @@ static phi_status phi_stages(phi_solver *s)
 
 #if PHI_CORRECTED
 /* Bring the state to where the steps of a run move it, or after them back. If it fails, the state is as before. */
-static phi_status phi_correct(phi_solver *s, int after)
+static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_KEPT)
 {
     double x[PHI_DIM], moved[PHI_DIM];
     PHI_COPY(x, s->x, x, PHI_DIM);
     PHI_COPY(moved, s->carry, moved, PHI_DIM);
-    phi_corrector(after, s->coef, x, moved, s->x);
+    phi_corrector(after, s->coef, x, moved, s->x PHI_AND_KEPT);
     if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
     phi_settle(s->x, s->carry, moved);
     return PHI_OK;
@@ -112,9 +112,9 @@ static phi_status phi_correct(phi_solver *s, int after)
 
 /* End a run that began at before: the status of its last step, or that of the corrector. Without a good step, or where
    the corrector fails, the state is as before the run. */
-static phi_status phi_end_run(phi_solver *s, const phi_solver *before, phi_status status)
+static phi_status phi_end_run(phi_solver *s, const phi_solver *before, phi_status status PHI_AND_STATES_KEPT)
 {
-    const phi_status corrected = s->steps == before->steps ? PHI_OK : phi_correct(s, 1);
+    const phi_status corrected = s->steps == before->steps ? PHI_OK : phi_correct(s, 1 PHI_AND_KEPT_AT(-PHI_BEGUN));
     if (s->steps == before->steps || corrected != PHI_OK) *s = *before;
     return status != PHI_OK ? status : corrected;
 }
