@@ -20,8 +20,10 @@ WARNINGS = (
 _DEBIAN = {
     "clang": "clang libclang-rt-dev",
     "clang++": "clang libclang-rt-dev",
+    "mkoctfile": "octave-dev",
     "ninja": "ninja-build",
     "node": "nodejs",
+    "octave-cli": "octave",
     "rustc": "rustc cargo",
     "qemu-aarch64-static": "qemu-user-static",
 }

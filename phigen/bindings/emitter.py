@@ -100,7 +100,7 @@ def _values(compilation: Compilation, language: BindingLanguage) -> dict[str, ob
         "observable_count": len(about.observables),
         "fields": [("vector_field", about.dimension), *observed],
         "movers": ("set_state", "kick") if program.offers("kicks") else (),
-        "parameter_names": ", ".join(struct) or "of no name",
+        "parameter_names": ", ".join(struct) or "none",
         "GUARD": f"{about.name.upper()}_HPP",
         "timed": bool(about.time),
         "monitored": about.monitored,

@@ -87,6 +87,49 @@ def test_program_in_rust_runs(tumbler):
     assert run([cargo, "run", "--quiet", "--offline"], folder, RUSTFLAGS="-Dwarnings") == expected(tumbler)
 
 
+#: Calls of the gateway, and what Octave prints: the states of the page, outputs left out, and arguments refused.
+GATEWAY = """format long
+[x, H, C] = tumbler_mex([0.01 1 0.01], 0.1, 300, 10);
+printf("%d %d %d %d\\n", size(x), size(H, 2), size(C, 2));
+printf("%.6f %.12f\\n", x(1, end), C(end));
+again = tumbler_mex([0.01 1 0.01], 0.1, 300, 300, struct("I2", 2, "I3", 3));
+printf("%d\\n", isequal(again(:, end), x(:, end)));
+moved = tumbler_mex([0.01 1 0.01], 0.1, 300, 300, struct("I2", 2.5));
+printf("%d\\n", isequal(moved(:, end), x(:, end)));
+function refused(varargin)
+  try, tumbler_mex(varargin{:}); catch e, disp(e.message), end
+end
+refused([1 2], 0.1, 3, 1);
+refused([1 2 3], 0.1, 3, 1, struct("Q", 2));
+refused([1 2 3], 0.1, 3, 1, struct("I1", [1 2]));
+refused([1 2 3], 0.1, 3, 0);
+refused([NaN 2 3], 0.1, 3, 1);
+refused([1 2 3], 100, 30, 1);
+"""
+ANSWERS = """3 31 31 31
+{expected}1
+0
+tumbler_mex: x0 has 3 real numbers
+tumbler_mex: there is no parameter Q: the spec has I1, I2, I3
+tumbler_mex: I1 is one real number
+tumbler_mex: stride is a whole number, at least 1
+tumbler_mex: bad argument: a null pointer, or values that are not allowed
+tumbler_mex: no convergence: the step is too large, after 0 steps
+"""
+
+
+@pytest.mark.slow
+def test_gateway_runs_in_octave(tumbler):
+    """Octave has the MEX interface of MATLAB."""
+    octave = tool("octave-cli")
+    place = "generated/tumbler"
+    gateway = [tool("mkoctfile"), "--mex", f"-I{place}", f"{place}/tumbler_mex.c", f"{place}/tumbler.c"]
+    run(gateway, tumbler)
+    (tumbler / "gateway.m").write_text(GATEWAY, encoding="utf-8")
+    answers = run([octave, "--quiet", "--no-gui", "--eval", "source('gateway.m')"], tumbler)
+    assert answers == ANSWERS.format(expected=expected(tumbler))
+
+
 MORE = [pytest.param(name, marks=pytest.mark.slow) for name in ("satellite", "thermal_spin", "kepler_eccentric")]
 
 
