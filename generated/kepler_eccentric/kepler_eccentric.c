@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; What a monitored trajectory holds fixed: e = -H(x0), so that
  *   K = monitor (H + e) is 0 along it; The solver
- * body-sha256: 10cd520bdcb907663c280ca91d1e7621afeec9acd664cfcb427b48a51ca0bd65
+ * body-sha256: 82499a8ec07dea02c0697ab0fc7df10ea6cc0cc435b47dd29c14677cb464f86e
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -248,15 +248,6 @@ static int kepler_eccentric_time_passes(const kepler_eccentric_params *params,
 }
 
 /* ---- The solver ---- */
-/* Hold the given gauge fixed, or for NULL the one chosen at the state. 0 if it is not finite. */
-static int kepler_eccentric_take_gauge(kepler_eccentric_solver *s,
-    const double gauge[kepler_eccentric_GAUGES])
-{
-    if (gauge == NULL) kepler_eccentric_choose_gauge(&s->params, s->x, s->gauge);
-    else memcpy(s->gauge, gauge, sizeof s->gauge);
-    return kepler_eccentric_finite(s->gauge, kepler_eccentric_GAUGES);
-}
-
 /* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM],
@@ -273,7 +264,9 @@ kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     if (!kepler_eccentric_finite(fresh.x, kepler_eccentric_DIM) || !kepler_eccentric_allowed(&fresh.params)
         || !kepler_eccentric_finite(fresh.coef, kepler_eccentric_COEFFICIENTS))
         return kepler_eccentric_BAD_ARGUMENT;
-    if (!kepler_eccentric_take_gauge(&fresh, gauge)) return kepler_eccentric_BAD_ARGUMENT;
+    if (gauge == NULL) kepler_eccentric_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
+    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
+    if (!kepler_eccentric_finite(fresh.gauge, kepler_eccentric_GAUGES)) return kepler_eccentric_BAD_ARGUMENT;
     if (!kepler_eccentric_time_passes(&fresh.params, fresh.x)) return kepler_eccentric_BAD_ARGUMENT;
     *s = fresh;
     return kepler_eccentric_OK;

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8ac3027e298e2d48e7d260d70ca15a65808308da1c4b23bcc01d0abe52023315
+ * body-sha256: 88e5bd266052cea376dfa79bba027f894220e681a22105cc76d0e270c166a00f
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -82,15 +82,6 @@ static int pendulum_euler_advance(pendulum_euler_solver *s, const double *change
     return 1;
 }
 
-/* One explicit stage: x + increment(x). */
-static pendulum_euler_status pendulum_euler_stage(pendulum_euler_solver *s)
-{
-    double increment[pendulum_euler_DIM];
-    pendulum_euler_explicit(s->coef, s->x, increment);
-    ++s->evaluations;
-    return pendulum_euler_advance(s, increment, s->carry) ? pendulum_euler_OK : pendulum_euler_NOT_FINITE;
-}
-
 /* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
     const double x0[pendulum_euler_DIM])
@@ -120,8 +111,10 @@ pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double 
         s->steps_before_h = s->steps;
     }
     for (; steps > 0; --steps) {
-        const pendulum_euler_status status = pendulum_euler_stage(s);
-        if (status != pendulum_euler_OK) return status;
+        double increment[pendulum_euler_DIM];
+        pendulum_euler_explicit(s->coef, s->x, increment);
+        ++s->evaluations;
+        if (!pendulum_euler_advance(s, increment, s->carry)) return pendulum_euler_NOT_FINITE;
         ++s->steps;
         s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     }

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: a1d232b8a82a585d466b416ec7a77678e66955dc845154ddfeec4bbfdb131689
+ * body-sha256: 685e0d4e215e16bf295f18e21a6c2ea01056b4062f7708ed34723d1fec438973
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -858,14 +858,6 @@ static void quaternion_top_choose_gauge(const quaternion_top_params *params,
     }
 }
 
-/* Hold the given gauge fixed, or for NULL the one chosen at the state. 0 if it is not finite. */
-static int quaternion_top_take_gauge(quaternion_top_solver *s, const double gauge[quaternion_top_GAUGES])
-{
-    if (gauge == NULL) quaternion_top_choose_gauge(&s->params, s->x, s->gauge);
-    else memcpy(s->gauge, gauge, sizeof s->gauge);
-    return quaternion_top_finite(s->gauge, quaternion_top_GAUGES);
-}
-
 /* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM], const double gauge[quaternion_top_GAUGES])
@@ -881,7 +873,9 @@ quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const 
     if (!quaternion_top_finite(fresh.x, quaternion_top_DIM) || !quaternion_top_allowed(&fresh.params)
         || !quaternion_top_finite(fresh.coef, quaternion_top_COEFFICIENTS))
         return quaternion_top_BAD_ARGUMENT;
-    if (!quaternion_top_take_gauge(&fresh, gauge)) return quaternion_top_BAD_ARGUMENT;
+    if (gauge == NULL) quaternion_top_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
+    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
+    if (!quaternion_top_finite(fresh.gauge, quaternion_top_GAUGES)) return quaternion_top_BAD_ARGUMENT;
     *s = fresh;
     return quaternion_top_OK;
 }

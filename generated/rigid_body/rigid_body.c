@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: a358977dac27ec72439059a2114118f7604b05b9cb8663aa26cfa7623a1e2874
+ * body-sha256: 5f7e340995c68864c1bfbf7b59f2aea2dfc4bf290d61bc0ec54df4d4959f030d
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -836,14 +836,6 @@ static void rigid_body_choose_gauge(const rigid_body_params *params, const doubl
 }
 
 /* ---- The solver ---- */
-/* Hold the given gauge fixed, or for NULL the one chosen at the state. 0 if it is not finite. */
-static int rigid_body_take_gauge(rigid_body_solver *s, const double gauge[rigid_body_GAUGES])
-{
-    if (gauge == NULL) rigid_body_choose_gauge(&s->params, s->x, s->gauge);
-    else memcpy(s->gauge, gauge, sizeof s->gauge);
-    return rigid_body_finite(s->gauge, rigid_body_GAUGES);
-}
-
 /* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES])
@@ -859,7 +851,9 @@ rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_p
     if (!rigid_body_finite(fresh.x, rigid_body_DIM) || !rigid_body_allowed(&fresh.params)
         || !rigid_body_finite(fresh.coef, rigid_body_COEFFICIENTS))
         return rigid_body_BAD_ARGUMENT;
-    if (!rigid_body_take_gauge(&fresh, gauge)) return rigid_body_BAD_ARGUMENT;
+    if (gauge == NULL) rigid_body_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
+    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
+    if (!rigid_body_finite(fresh.gauge, rigid_body_GAUGES)) return rigid_body_BAD_ARGUMENT;
     *s = fresh;
     return rigid_body_OK;
 }

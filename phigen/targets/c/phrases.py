@@ -128,7 +128,9 @@ GAUGE = Choice(
     ("GAUGE",),
     {
         "AND_GAUGE(gauge)": (", gauge", ""),
-        "TAKE_GAUGE(s, gauge)": ("if (!phi_take_gauge(s, gauge)) return PHI_BAD_ARGUMENT;", ""),
+        "CHOOSE_GAUGE(s)": ("if (gauge == NULL) phi_choose_gauge(&s.params, s.x, s.gauge);", ""),
+        "TAKE_GAUGE(s)": ("else memcpy(s.gauge, gauge, sizeof s.gauge);", ""),
+        "ASK_FOR_GAUGE(s)": ("if (!phi_finite(s.gauge, PHI_GAUGES)) return PHI_BAD_ARGUMENT;", ""),
         "AND_GAUGE_OF(all, m)": (", all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL", ""),
         "COPY_GAUGE(to, from)": ("memcpy(to, from, sizeof to);", ""),
         "GAUGES_OF_MEMBERS": ("double gauge[PHI_LANES][PHI_GAUGES]; /* of each member */", ""),
@@ -310,16 +312,24 @@ RUN = Choice(
 )
 
 STEP = Choice(
-    "One step of a run.",
-    ("CORRECTED && ADJOINT", "SPLITTING && ADJOINT", "COMPOSED || SPLITTING"),
+    "One step of a run. That of a method with one explicit stage is written out.",
+    ("EXPLICIT && !COMPOSED", "CORRECTED && ADJOINT", "SPLITTING && ADJOINT", "COMPOSED || SPLITTING"),
     {
-        "STEP_OF_RUN": (
-            "phi_stages(s, kept != NULL ? kept + PHI_BEGUN : NULL)",
-            "phi_stages(s, kept)",
-            "phi_stages(s)",
-            "phi_stage(s)",
+        "NAME_INCREMENT": ("double increment[PHI_DIM];", *[""] * 4),
+        "COMPUTE_INCREMENT(s)": ("phi_explicit(s->coef, s->x, increment);", *[""] * 4),
+        "COUNT_EVALUATION(s)": ("++s->evaluations;", *[""] * 4),
+        "MAKE_STEP(s)": (
+            "",
+            "const phi_status status = phi_stages(s, kept != NULL ? kept + PHI_BEGUN : NULL);",
+            "const phi_status status = phi_stages(s, kept);",
+            "const phi_status status = phi_stages(s);",
+            "const phi_status status = phi_stage(s);",
         ),
-        "NEXT_RECORD": ("if (kept != NULL) kept += PHI_FLOWS;", "if (kept != NULL) kept += PHI_FLOWS;", "", ""),
+        "END_IF_STEP_FAILED(s)": (
+            "if (!phi_advance(s, increment, s->carry)) return PHI_END_RUN(PHI_NOT_FINITE);",
+            *["if (status != PHI_OK) return PHI_END_RUN(status);"] * 4,
+        ),
+        "NEXT_RECORD": ("", *["if (kept != NULL) kept += PHI_FLOWS;"] * 2, "", ""),
     },
 )
 

@@ -16,7 +16,6 @@
 
 PHI_CHAPTER_OF_SOLVER
 #include "gauge_formula.c"
-#include "gauge_taken.c"
 
 /* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
 phi_status PHI_INIT_FROM(phi_solver *s, const phi_params *params, const double x0[PHI_DIM] PHI_AND_START)
@@ -32,7 +31,9 @@ phi_status PHI_INIT_FROM(phi_solver *s, const phi_params *params, const double x
     PHI_TRY_PARAMETERS(fresh)
     if (!phi_finite(fresh.x, PHI_DIM) PHI_OR_BAD_PARAMETERS(fresh))
         return PHI_BAD_ARGUMENT;
-    PHI_TAKE_GAUGE(&fresh, gauge)
+    PHI_CHOOSE_GAUGE(fresh)
+    PHI_TAKE_GAUGE(fresh)
+    PHI_ASK_FOR_GAUGE(fresh)
     PHI_TAKE_RATE_OF_TIME(fresh)
     phi_begin_unturned(&fresh);
     *s = fresh;
@@ -63,9 +64,12 @@ PHI_RUN(phi_solver *s, double h, size_t steps PHI_AND_RECORD)
         PHI_DRAW
         PHI_NEXT_DRAW
         phi_renew(s);
-        const phi_status status = PHI_STEP_OF_RUN;
+        PHI_NAME_INCREMENT
+        PHI_COMPUTE_INCREMENT(s)
+        PHI_COUNT_EVALUATION(s)
+        PHI_MAKE_STEP(s)
         PHI_NEXT_RECORD
-        if (status != PHI_OK) return PHI_END_RUN(status);
+        PHI_END_IF_STEP_FAILED(s)
         ++s->steps;
         PHI_COUNT_TIME(s)
     }
