@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; Several steps or members at once; The implicit step, by Gauss
  *   collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 5590fa733d7671ede09dc72e7a7b9db7884841bef38c15e41e261bb871dca61a
+ * body-sha256: 8568798c3482e1e01f8d16c4e926215e548a3578ea5350870f7545ecfd38bf7b
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -106,13 +106,15 @@ static int kowalevski_gauss_finite(const double *values, int count)
 static int kowalevski_gauss_advance(kowalevski_gauss_solver *s, const double *change, const double *small)
 {
     double x[kowalevski_gauss_DIM], carry[kowalevski_gauss_DIM];
+    /* x is known after two sums; nothing waits for the rest */
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
-        x[i] = sum + lost;
-        carry[i] = lost - (x[i] - sum);
-        if (!isfinite(x[i])) return 0;
+        const double moved = change[i] + small[i], more = moved - change[i];
+        const double sum = s->x[i] + moved, added = sum - s->x[i];
+        x[i] = sum;
+        carry[i] = ((s->x[i] - (sum - added)) + (moved - added)) + ((change[i] - (moved - more))
+            + (small[i] - more));
     }
+    if (!kowalevski_gauss_finite(x, kowalevski_gauss_DIM)) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     return 1;
@@ -141,9 +143,8 @@ typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES];
 #define kowalevski_gauss_EACH_LANE
 #endif
 
-/* Gauss collocation: the weights b_j, the matrix mu = A diag(1/b) that mixes the stages, and the one that
-   predicts those of the next step; row j has the factors of stage j. mu_ij + mu_ji is 1, without rounding: so
-   the method is symplectic. */
+/* Gauss collocation: the weights b_j, and the matrix mu = A diag(1/b) that mixes the stages; row j has the
+   factors of stage j. mu_ij + mu_ji is 1, without rounding: so the method is symplectic. */
 static const double kowalevski_gauss_weights[kowalevski_gauss_WIDTH] = { 0.05061426814518813,
     0.11119051722668724, 0.15685332293894363, 0.181341891689181, 0.181341891689181, 0.15685332293894363,
     0.11119051722668724, 0.05061426814518813 };
@@ -165,28 +166,102 @@ static const double kowalevski_gauss_mixing[kowalevski_gauss_NODES][kowalevski_g
     { -0.005482808253215898, 0.00874856676919733, -0.012225914113298098, 0.016976173236371128,
         -0.02472134580320029, 0.040042703777944944, -0.08189496310558142, 0.5 }
 };
-static const double kowalevski_gauss_prediction[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH] = {
-    { -0.02555927517325182, -0.731830042234206, -12.061893514283726, -118.1499515199991, -707.114266714457,
-        -2659.2937551075042, -6485.668786428028, -10540.655904255567 },
-    { 0.04002129143135487, 1.1482708114924747, 18.765361645747955, 182.2594473807656, 1082.8438921387317,
-        4049.725687114851, 9839.779987204989, 15959.369109106452 },
-    { -0.05438417540508904, -1.5619903409759361, -25.088841508795227, -239.57098348711125, -1403.100916145201,
-        -5191.664494631218, -12525.049692882953, -20237.210409054635 },
-    { 0.07325812815024581, 2.092481756221542, 32.59704845723685, 302.34903993569634, 1729.6219151791677,
-        6291.961272313383, 15012.661745393876, 24114.77664895275 },
-    { -0.10358367993934758, -2.890132218774026, -42.67137718753876, -377.345415982756, -2082.0103180467204,
-        -7387.704180160404, -17353.345418638954, -27648.751587507646 },
-    { 0.16169236863280928, 4.215817523809776, 56.4399800330904, 462.0341164850074, 2418.18023618926,
-        8294.963443549967, 19092.478574653185, 30108.530190688616 },
-    { -0.300652702075914, -6.477865419312276, -72.01739790743933, -523.6576882640823, -2556.1719695738393,
-        -8420.08648218661, -18941.564853557105, -29537.691656399158 },
-    { 0.7665056642259032, 9.082300892538074, 72.67173490506158, 455.494196239361, 2072.2636907589163,
-        6584.012447758549, 14532.241973122487, 22459.61041241307 }
+
+enum { kowalevski_gauss_PREDICTORS = 3 };
+/* Predictors of the stages of a step from those of the last one, then of the one before. */
+static const double kowalevski_gauss_prediction[kowalevski_gauss_PREDICTORS][kowalevski_gauss_EARLIER
+    * kowalevski_gauss_NODES][kowalevski_gauss_WIDTH] = {
+    {
+        { 0.027362258095587847, 0.008906760160709794, -3.788870319635937, -70.13173821713234,
+            -595.5436386120888, -2868.030992245954, -8318.339965950088, -14928.223333034968 },
+        { 0.03990130364657446, 0.9383360578875294, 12.006556708193013, 98.4752997823501, 531.5880667674097,
+            1905.5936294342112, 4575.127423999828, 7419.463985554247 },
+        { 0.01585462363182936, 0.8118577242496777, 13.255897344554121, 135.89328145663802, 880.1604480049753,
+            3642.0834933290844, 9687.140807403262, 16652.186669804643 },
+        { -0.04600263384128323, -1.032829266709466, -12.467126075082788, -96.25818770218959,
+            -492.8378694106458, -1693.9019250931015, -3946.841828483013, -6292.492100270892 },
+        { 0.014020450521322374, -0.2402761192537839, -7.433239245950179, -95.6023323327177,
+            -684.5474348723383, -2981.3567707569714, -8148.857631264599, -14191.523196551729 },
+        { 0.06689350351129948, 2.314200805555442, 33.061262734135525, 297.204742146967, 1746.8936008571748,
+            6770.042025018872, 17291.75888996211, 29112.004966857286 },
+        { -0.23180956750828333, -5.218388242594433, -57.69297241035958, -437.51223743723943,
+            -2318.069493784142, -8436.323246129914, -20771.141783319174, -34334.08798824588 },
+        { 0.7238560284415854, 8.347051236454352, 64.79616611805292, 414.9218043711526, 2020.7814735197503,
+            7029.435718907627, 16885.664514993932, 27581.34297519629 },
+        { -0.013399356217282528, -0.14838685372583355, -1.2766511982084794, -2.971988825969596,
+            30.060102827028032, 277.1199432094289, 1015.2616607680961, 2009.5194527513643 },
+        { 0.017726027882426713, 0.15650737715344964, 0.953933181814684, -4.5493910657696395,
+            -99.7757180178383, -630.9917934752474, -2075.347543940286, -3944.348661503374 },
+        { -0.015032840430669917, -0.02465280537811303, 1.173181375003162, 26.62959668810658,
+            245.31549322315013, 1242.2203802370911, 3717.422457137189, 6782.04220488691 },
+        { 0.0023450112406312807, -0.2673056067039806, -5.102942410947409, -60.3480040135927,
+            -433.7083510017852, -1932.0303519232834, -5391.108621100598, -9506.947190259001 },
+        { 0.017770205728522327, 0.5333660464057579, 7.620657832839391, 70.72666814827083, 427.72352548972304,
+            1686.8497588800842, 4346.29783755189, 7343.196922372016 },
+        { -0.01732325485096621, -0.10687996848550706, 0.2599091672870619, 19.37738234975756,
+            203.71262065376877, 1073.8940465345802, 3260.8411554232052, 5979.84016633511 },
+        { -0.03072836362770205, -0.8643574103561574, -12.039539777161927, -108.53016853152208,
+            -639.5968510569717, -2471.111716283463, -6276.113166811483, -10519.23449311261 },
+        { -0.009032184248652968, -0.9133372749803188, -16.024363079472742, -175.0587519546858,
+            -1187.7133389900223, -5077.524289112078, -13791.362556476462, -23971.79545091503 }
+    },
+    {
+        { -1.0562883573249242, 1.1236784141627987, 5.0848641038758515, 281.4119054944364, 3542.643018332994,
+            22476.332543730132, 78148.1986319992, 154728.26460009732 },
+        { 0.17011181557929392, -4.349276640604241, -74.62332435388342, -913.2359919768037, -6941.029624974229,
+            -32709.93856824393, -95328.96329261537, -172415.18562406432 },
+        { 0.7189655620887281, -2.395153324266041, -33.73968253840068, -559.3713547251529, -5165.279408973958,
+            -28007.385187897802, -89519.44463570009, -170197.79184448332 },
+        { -0.6150695348288924, 5.848209751460516, 94.85154068773407, 1237.4113397130202, 9883.011867232579,
+            48577.33491814007, 146036.57133306228, 268919.1093003448 },
+        { 0.33139841769889067, -6.799368708038393, -110.43884505214427, -1313.0937364146876,
+            -9810.072061717841, -45956.82578742851, -133918.63286450363, -242547.87659446234 },
+        { -0.09534494773332663, 7.453913949427919, 113.76463063802224, 1225.235629201064, 8555.865815929577,
+            38305.86762574196, 108525.16659120435, 193706.0111108098 },
+        { -0.14867438516875472, -8.914030157184168, -115.6350429003608, -1093.1827797626263,
+            -7067.641456468408, -30212.917999951333, -83328.19364020127, -146749.65892535693 },
+        { 0.6823888891627402, 10.636277329542175, 100.64646241205422, 817.3051550107181, 4916.481282763816,
+            20236.81600940853, 54687.030719482595, 95371.08087939216 },
+        { -0.023078953897651754, -0.32755775531306414, -6.510304096332957, -76.33240113232466,
+            -557.471742576356, -2506.5939425921733, -6996.243265997881, -12293.912543345854 },
+        { 0.04791703496477633, 0.5384236309829313, 10.8716481380434, 125.64369293593548, 904.834245411404,
+            4010.7558912984973, 11057.24311563159, 19274.382132844315 },
+        { -0.10012678273506714, -0.753029294034664, -15.76616090178194, -176.24298600578734,
+            -1227.099045931679, -5246.567177692984, -13999.491746764175, -23870.006603584094 },
+        { 0.21708501855891152, 0.8686760702749455, 19.90931606315355, 205.0707578491596, 1301.0259445540344,
+            4963.566820237874, 11745.341627041988, 18248.371676407914 },
+        { -0.44552757668699566, -0.35880181316653914, -14.33855877271771, -93.36808963306676,
+            -167.08043319070322, 1572.6027759384035, 9931.357698229382, 23748.4252838844 },
+        { 0.6606482299785122, -1.800710703232361, -21.667573138274747, -384.96030593509425,
+            -3707.4982183308925, -20757.634302164173, -67769.49450151643, -130324.50777207095 },
+        { -0.018703785014926044, 3.1869876382437132, 56.84692059566806, 680.5796085091905, 5071.963134051628,
+            23434.03118614151, 67187.58111935604, 120286.32880576182 },
+        { -1.1568474266637105, 5.347314969048372, 78.56172233766412, 1168.8992372438427, 10215.457682425043,
+            53612.69075370039, 168189.57747063978, 316817.7890450205 }
+    },
+    {
+        { -0.02280718993171323, -0.7328357315549449, -11.76248508065444, -111.63207468022699,
+            -640.1837960425155, -2296.045632387808, -5364.0805693841885, -8474.602056953827 },
+        { 0.035418539649890786, 1.1347623172984551, 18.060982230034664, 169.92055096551925, 967.1225843549703,
+            3448.6235755223897, 8025.208355970282, 12651.78421747309 },
+        { -0.04780417615845105, -1.5177244897302922, -23.74756078420829, -219.57427962003575,
+            -1231.5081525665023, -4343.1854817163085, -10032.542554384749, -15753.373328207888 },
+        { 0.0646410209770212, 2.007601565357187, 30.480403424792772, 273.6294731487079, 1498.3708147285367,
+            5193.105169833344, 11859.967403972698, 18510.221407310415 },
+        { -0.09320995608994811, -2.764707605792988, -39.812743979736275, -340.59742545231035,
+            -1798.1166451944075, -6076.282104889186, -13656.840147819023, -21137.567662539645 },
+        { 0.1503584038372477, 4.061818787980517, 53.09057088665747, 420.3098646848024, 2104.1255803998433,
+            6871.263735952382, 15128.438993217538, 23171.45907875723 },
+        { -0.2898321185931512, -6.320821345949782, -68.68639635274853, -482.9006356462094,
+            -2254.1322081713574, -7066.737076434088, -15202.71476593057, -23022.22301378244 },
+        { 0.7585329140641751, 8.962781132328091, 70.16684541929672, 425.11553523071865, 1848.9024985718206,
+            5589.223052637513, 11795.230430604945, 17700.644603362216 }
+    }
 };
 
 /* The unknowns of all stages, each a sum over the moves of all. */
 static inline void kowalevski_gauss_mixed(const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH],
-    kowalevski_gauss_lanes *moves, kowalevski_gauss_lanes *z)
+    double moves[][kowalevski_gauss_WIDTH], kowalevski_gauss_lanes *z)
 {
     for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
         const double *move = moves[k];
@@ -196,6 +271,25 @@ static inline void kowalevski_gauss_mixed(const double matrix[kowalevski_gauss_N
             at[lane] = (matrix[0][lane] * move[0] + matrix[2][lane] * move[2] + matrix[4][lane] * move[4]
             + matrix[6][lane] * move[6]) + (matrix[1][lane] * move[1] + matrix[3][lane] * move[3]
             + matrix[5][lane] * move[5] + matrix[7][lane] * move[7]);
+    }
+}
+
+/* The same from the moves of two steps. */
+static void kowalevski_gauss_mixed_twice(const double matrix[kowalevski_gauss_EARLIER
+    * kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], double last[][kowalevski_gauss_WIDTH],
+    double older[][kowalevski_gauss_WIDTH], kowalevski_gauss_lanes *z)
+{
+    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
+        const double *move = last[k], *before = older[k];
+        double *at = z[k];
+        kowalevski_gauss_EACH_LANE
+        for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
+            at[lane] = (matrix[0][lane] * move[0] + matrix[2][lane] * move[2] + matrix[4][lane] * move[4]
+            + matrix[6][lane] * move[6] + matrix[8][lane] * before[0] + matrix[10][lane] * before[2]
+            + matrix[12][lane] * before[4] + matrix[14][lane] * before[6]) + (matrix[1][lane] * move[1]
+            + matrix[3][lane] * move[3] + matrix[5][lane] * move[5] + matrix[7][lane] * move[7]
+            + matrix[9][lane] * before[1] + matrix[11][lane] * before[3] + matrix[13][lane] * before[5]
+            + matrix[15][lane] * before[7]);
     }
 }
 
@@ -281,8 +375,10 @@ static void kowalevski_gauss_start(const kowalevski_gauss_solver *s, double poin
 static void kowalevski_gauss_end(kowalevski_gauss_lanes *moves, double end[kowalevski_gauss_UNKNOWNS])
 {
     for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
-        end[k] = 0.0;
-        for (int i = 0; i < kowalevski_gauss_NODES; ++i) end[k] += moves[k][i];
+        double even = 0.0, odd = 0.0; /* which need not wait for one another */
+        for (int i = 0; i < kowalevski_gauss_NODES; i += 2) even += moves[k][i];
+        for (int i = 1; i < kowalevski_gauss_NODES; i += 2) odd += moves[k][i];
+        end[k] = even + odd;
     }
 }
 
@@ -294,49 +390,93 @@ static inline void kowalevski_gauss_slopes(const kowalevski_gauss_solver *s,
     kowalevski_gauss_stage_field_lanes(s->coef, point, z, weights, moves);
 }
 
-/* The square of the size of coordinates, that of x; where x is 0 that of the moves. */
-static double kowalevski_gauss_square(const double x[kowalevski_gauss_DIM], kowalevski_gauss_lanes *moves)
+/* The factor of squares of changes of coordinates: 1 / |x|^2; where x is 0 moves have the part of x. */
+static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowalevski_gauss_lanes *moves)
 {
     double square = DBL_MIN;
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) square += x[i] * x[i];
     if (square <= DBL_MIN)
         for (int k = 0; k < kowalevski_gauss_PLAIN; ++k)
             for (int i = 0; i < kowalevski_gauss_NODES; ++i) square += moves[k][i] * moves[k][i];
-    return square;
+    return 1.0 / square;
 }
 
-/* The largest change at any stage, in sizes of the unknowns: of coordinates that of x, of group elements
-   1. */
-static double kowalevski_gauss_change_of(double square, kowalevski_gauss_lanes *before,
+/* The square of the change by a sweep, as a mean over the stages, in sizes of the unknowns: of coordinates
+   that of x, of group elements 1. */
+static inline double kowalevski_gauss_change_of(double scale, kowalevski_gauss_lanes *before,
     kowalevski_gauss_lanes *after)
 {
-    double largest = 0.0;
     kowalevski_gauss_lanes sum = { 0.0 };
+    double even = 0.0, odd = 0.0;
     for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
-        const double *old = before[k], *now = after[k], scale = k < kowalevski_gauss_PLAIN ? 1.0 / square
-            : 1.0;
+        const double *old = before[k], *now = after[k], factor = k < kowalevski_gauss_PLAIN ? scale : 1.0;
         kowalevski_gauss_EACH_LANE
         for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
-            sum[lane] += (now[lane] - old[lane]) * (now[lane] - old[lane]) * scale;
+            sum[lane] += (now[lane] - old[lane]) * ((now[lane] - old[lane]) * factor);
     }
-    for (int i = 0; i < kowalevski_gauss_NODES; ++i)
-        if (!(sum[i] <= largest)) largest = sum[i]; /* or not a number */
-    return sqrt(largest);
+    for (int i = 0; i < kowalevski_gauss_NODES; i += 2) even += sum[i];
+    for (int i = 1; i < kowalevski_gauss_NODES; i += 2) odd += sum[i];
+    return (even + odd) / (double)kowalevski_gauss_NODES;
 }
 
-/* The moves of the last step, as seen from its end, where this one starts. */
-static void kowalevski_gauss_seen(const kowalevski_gauss_solver *s, kowalevski_gauss_lanes *seen)
+/* The values of the unknowns that a predictor derives from the moves of the last steps. */
+static void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predictor, kowalevski_gauss_lanes *z)
 {
-    double end[kowalevski_gauss_UNKNOWNS];
-    kowalevski_gauss_lanes moves[kowalevski_gauss_UNKNOWNS];
-    memcpy(moves, s->history.moves, sizeof moves); /* which need not be aligned as lanes are */
-    kowalevski_gauss_end(moves, end);
-    kowalevski_gauss_next_frame_lanes(s->coef, end, moves, seen);
+    if (predictor + 1 < kowalevski_gauss_PREDICTORS) { /* the last one reads the last step only */
+        kowalevski_gauss_mixed_twice(kowalevski_gauss_prediction[predictor], past->moves[past->latest],
+            past->moves[1 - past->latest], z);
+        return;
+    }
+    kowalevski_gauss_mixed(kowalevski_gauss_prediction[predictor], past->moves[past->latest], z);
+}
+
+/* The predictor that would have come nearest to the values z of the unknowns. */
+static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale,
+    kowalevski_gauss_lanes *z)
+{
+    kowalevski_gauss_lanes predicted[kowalevski_gauss_UNKNOWNS];
+    double least = HUGE_VAL;
+    int best = kowalevski_gauss_PREDICTORS - 1;
+    for (int predictor = 0; predictor < kowalevski_gauss_PREDICTORS; ++predictor) {
+        kowalevski_gauss_predict(past, predictor, predicted);
+        const double change = kowalevski_gauss_change_of(scale, predicted, z);
+        if (change < least) {
+            least = change;
+            best = predictor;
+        }
+    }
+    return best;
+}
+
+/* Moves as seen from the end of a step, where the next one starts. */
+static void kowalevski_gauss_see(const kowalevski_gauss_solver *s,
+    const double end[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_lanes *moves,
+    double seen[kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH])
+{
+    kowalevski_gauss_lanes turned[kowalevski_gauss_UNKNOWNS];
+    kowalevski_gauss_next_frame_lanes(s->coef, end, moves, turned);
+    memcpy(seen, turned, sizeof turned); /* which need not be aligned as lanes are */
+}
+
+/* Store the moves of a step with this end, for the prediction of the next one. */
+static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, const double end[kowalevski_gauss_UNKNOWNS],
+    kowalevski_gauss_lanes *moves)
+{
+    kowalevski_gauss_history *past = &s->history;
+    const int older = past->latest, latest = kowalevski_gauss_EARLIER - 1 - older;
+    kowalevski_gauss_lanes last[kowalevski_gauss_UNKNOWNS];
+    memcpy(last, past->moves[older], sizeof last);
+    kowalevski_gauss_see(s, end, last, past->moves[older]);
+    kowalevski_gauss_see(s, end, moves, past->moves[latest]);
+    past->latest = latest;
+    if (past->count < kowalevski_gauss_EARLIER) ++past->count;
 }
 
 enum {
     /* sweeps that change more than those before, beyond transients: the step is too large */
     kowalevski_gauss_MOST_RISING = 3,
+    /* steps from one comparison of predictors to the next: it takes as long as two sweeps */
+    kowalevski_gauss_TRIALS = 32,
 };
 /* what a next sweep may change; 2e-17 leaves a linear drift of energy and Casimirs */
 #define kowalevski_gauss_SOLVED 2e-18
@@ -347,55 +487,76 @@ enum {
 /* so is the second up to this that changes no less than the one before */
 #define kowalevski_gauss_NEARLY_ROUNDING 2e-14
 
-/* Solve for the moves of all stages by sweeps, from those that the last step predicts. The change by a sweep
-   is looked at from that sweep on that was the last one in the step before, or from the one before it. */
+/* Whether changes shrink no more since they are rounding: 1; 0 if they still shrink, and -1 if they do not
+   converge. By the changes so far, of which last is the one before; past->rate follows the rate of
+   changes. */
+typedef struct {
+    double last;
+    int rising, rises;
+} kowalevski_gauss_progress;
+
+static int kowalevski_gauss_judge(kowalevski_gauss_history *past, kowalevski_gauss_progress *sweeps,
+    int sweep, double change)
+{
+    const double rate = change / sweeps->last;
+    if (rate > 0.0 && rate < 1.0 && change > kowalevski_gauss_NEARLY_ROUNDING)
+        past->rate = 0.7 * past->rate + 0.3 * rate;
+    const int slow = rate >= 1.0 || rate > fmax(kowalevski_gauss_STALLED, 1.5 * past->rate);
+    if (rate >= 1.0 && change <= kowalevski_gauss_NEARLY_ROUNDING) ++sweeps->rises;
+    sweeps->last = change;
+    if ((slow && change <= kowalevski_gauss_ROUNDING) || sweeps->rises > 1) {
+        /* or the first change was rounding too */
+        past->sweeps = (sweep == past->sweeps || rate > 2.0 * past->rate ? past->sweeps : sweep) - 1;
+        return 1;
+    }
+    /* transients may rise over as many sweeps as there are stages */
+    sweeps->rising = rate >= 1.0 ? sweeps->rising + 1 : 0;
+    return sweeps->rising < (int)kowalevski_gauss_NODES + kowalevski_gauss_MOST_RISING ? 0 : -1;
+}
+
+/* Solve for the moves of all stages by sweeps, from those that the last steps predict. The change by a sweep
+   is looked at from that one on that is expected to be the last. */
 static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solver *s,
     double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *moves)
 {
     kowalevski_gauss_history *past = &s->history;
     kowalevski_gauss_lanes z[kowalevski_gauss_UNKNOWNS], next[kowalevski_gauss_UNKNOWNS], weights[1] =
         { { 0.0 } };
-    double last = HUGE_VAL;
-    int rising = 0, rises = 0;
+    kowalevski_gauss_progress progress = { HUGE_VAL, 0, 0 };
     for (int i = 0; i < kowalevski_gauss_NODES; ++i) weights[0][i] = s->h * kowalevski_gauss_weights[i];
     if (past->count > 0) {
-        kowalevski_gauss_seen(s, next);
-        kowalevski_gauss_mixed(kowalevski_gauss_prediction, next, z);
+        kowalevski_gauss_predict(past, past->count < kowalevski_gauss_EARLIER
+            ? kowalevski_gauss_PREDICTORS - 1 : past->predictor, z);
     } else {
         memset(z, 0, sizeof z);
         past->rate = 0.5;
         past->sweeps = 2;
     }
-    kowalevski_gauss_slopes(s, point, weights, z, moves);
-    const double square = kowalevski_gauss_square(s->x, moves);
-    for (int sweep = 2; sweep <= kowalevski_gauss_MAX_SWEEPS; ++sweep) {
+    for (int sweep = 1; sweep <= kowalevski_gauss_MAX_SWEEPS; ++sweep) {
+        const int tested = sweep >= past->sweeps;
+        kowalevski_gauss_slopes(s, point, weights, z, tested ? next : moves);
+        if (tested) {
+            const double scale = kowalevski_gauss_scale(s->x, next),
+                square = kowalevski_gauss_change_of(scale, moves, next);
+            const int solved = square * (past->rate * past->rate) <= kowalevski_gauss_SOLVED
+                * kowalevski_gauss_SOLVED;
+            const int judgement = solved ? 1 : kowalevski_gauss_judge(past, &progress, sweep, sqrt(square));
+            memcpy(moves, next, sizeof next);
+            if (!isfinite(square)) return kowalevski_gauss_NOT_FINITE;
+            if (judgement < 0) return kowalevski_gauss_NO_CONVERGENCE;
+            if (judgement > 0) {
+                /* the sweep before had left about as much as this one changed */
+                if (solved)
+                    past->sweeps = square <= 16.0 * kowalevski_gauss_SOLVED * kowalevski_gauss_SOLVED
+                    ? sweep - 1 : sweep;
+                if (past->sweeps < 2) past->sweeps = 2;
+                if (past->count == kowalevski_gauss_EARLIER && past->age++ % kowalevski_gauss_TRIALS == 0)
+                    past->predictor = kowalevski_gauss_best_predictor(past, scale, z);
+                s->evaluations += (size_t)sweep;
+                return kowalevski_gauss_OK;
+            }
+        }
         kowalevski_gauss_mixed(kowalevski_gauss_mixing, moves, z);
-        ++s->evaluations;
-        if (sweep < past->sweeps) {
-            kowalevski_gauss_slopes(s, point, weights, z, moves);
-            continue;
-        }
-        kowalevski_gauss_slopes(s, point, weights, z, next);
-        const double change = kowalevski_gauss_change_of(square, moves, next), rate = change / last;
-        memcpy(moves, next, sizeof next);
-        if (!isfinite(change)) return kowalevski_gauss_NOT_FINITE;
-        if (rate > 0.0 && rate < 1.0 && change > kowalevski_gauss_NEARLY_ROUNDING)
-            past->rate = 0.7 * past->rate + 0.3 * rate;
-        const int solved = change * past->rate <= kowalevski_gauss_SOLVED;
-        const int slow = rate >= 1.0 || rate > fmax(kowalevski_gauss_STALLED, 1.5 * past->rate);
-        if (rate >= 1.0 && change <= kowalevski_gauss_NEARLY_ROUNDING) ++rises;
-        if (solved || (slow && change <= kowalevski_gauss_ROUNDING) || rises > 1) {
-            /* the first change was rounding too */
-            if (sweep == past->sweeps || rate > 2.0 * past->rate) --past->sweeps;
-            else past->sweeps = sweep - 1;
-            if (past->sweeps < 2) past->sweeps = 2;
-            return kowalevski_gauss_OK;
-        }
-        /* transients may rise over as many sweeps as there are stages */
-        rising = rate >= 1.0 ? rising + 1 : 0;
-        if (rising >= (int)kowalevski_gauss_NODES + kowalevski_gauss_MOST_RISING)
-            return kowalevski_gauss_NO_CONVERGENCE;
-        last = change;
     }
     return kowalevski_gauss_NO_CONVERGENCE;
 }
@@ -405,15 +566,13 @@ static kowalevski_gauss_status kowalevski_gauss_attempt(kowalevski_gauss_solver 
 {
     double point[kowalevski_gauss_POINT], end[kowalevski_gauss_UNKNOWNS], change[kowalevski_gauss_DIM];
     kowalevski_gauss_lanes moves[kowalevski_gauss_UNKNOWNS];
-    kowalevski_gauss_history *past = &s->history;
     kowalevski_gauss_start(s, point);
     const kowalevski_gauss_status status = kowalevski_gauss_collocate(s, point, moves);
     if (status != kowalevski_gauss_OK) return status;
     kowalevski_gauss_end(moves, end);
     kowalevski_gauss_stage_change(s->coef, point, end, change);
     if (!kowalevski_gauss_advance(s, change, s->carry)) return kowalevski_gauss_NOT_FINITE;
-    memcpy(past->moves, moves, sizeof moves);
-    past->count = 1;
+    kowalevski_gauss_remember(s, end, moves);
     return kowalevski_gauss_OK;
 }
 
@@ -484,7 +643,6 @@ kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
 {
     if (s == NULL || change == NULL) return kowalevski_gauss_BAD_ARGUMENT;
     if (!kowalevski_gauss_advance(s, change, s->carry)) return kowalevski_gauss_BAD_ARGUMENT;
-    memset(&s->history, 0, sizeof s->history);
     return kowalevski_gauss_OK;
 }
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7b4fc97b1b7a8e3b395a3a3efd09d08a7ef34394e58bf5e4e81d7cc1c90fb5e8
+ * body-sha256: b6ef32d6896beaf050ec6939efbdfc290740ae0e21f888e81d60e633d9a4535d
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -18,6 +18,7 @@ enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* numbers that are functions of par
 enum { kowalevski_gauss_NODES = 8 };        /* stages of a step */
 enum { kowalevski_gauss_WIDTH = 8 };        /* of an array over the stages */
 enum { kowalevski_gauss_UNKNOWNS = 8 };     /* of a stage */
+enum { kowalevski_gauss_EARLIER = 2 };      /* steps that predictors read */
 
 typedef struct {
     char unused; /* this system has no parameters */
@@ -33,14 +34,17 @@ typedef enum { kowalevski_gauss_OK = 0, kowalevski_gauss_NO_CONVERGENCE, kowalev
     kowalevski_gauss_NOT_FINITE, kowalevski_gauss_BAD_ARGUMENT } kowalevski_gauss_status;
 const char *kowalevski_gauss_status_string(kowalevski_gauss_status status); /* what a status means */
 
-/* Results of the last step, by which the next one predicts the starting values of its iteration. They affect
+/* Results of the last steps, by which the next one predicts the starting values of its iteration. They affect
    the speed only. */
 typedef struct {
-    int count;   /* 0 before the first step, else 1 */
-    int sweeps;  /* sweeps over the stages in the last step */
-    double rate; /* factor by which the changes of a sweep shrink from one sweep to the next */
-    /* stages of the last step, in the frame of its start */
-    double moves[kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
+    int count;     /* steps in moves */
+    int latest;    /* place of the last one there */
+    int sweeps;    /* number of the first sweep over the stages whose change is looked at */
+    int predictor; /* number of the predictor */
+    int age;       /* steps since all predictors were compared for the first time */
+    double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
+    /* stages of the last steps, as seen from the end of the last one */
+    double moves[kowalevski_gauss_EARLIER][kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
 } kowalevski_gauss_history;
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */

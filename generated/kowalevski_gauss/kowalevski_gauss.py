@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 72 additions, 95 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: f51fbc6747ce69838863758844a0c3e8d316ac3a956ff4cfd8e4683bf30bce22
+# body-sha256: 2939b154f01c041e0149f2a974a7f34a2515e856f8adff2048aec560917544f8
 import numpy as np
 
 VERSION = "0.1.0"
@@ -214,6 +214,7 @@ SOLVED = 2e-18  # what a next sweep may change; 2e-17 leaves a linear drift of e
 STALLED = 0.8  # a sweep that changes more than this part of the one before is the last ...
 ROUNDING = 4e-16  # ... if it changes no more than this: a part of 0.4 let Casimirs drift;
 NEARLY_ROUNDING = 2e-14  # so is the second up to this that changes no less than the one before
+TRIALS = 32  # steps from one comparison of predictors to the next: it takes as long as two sweeps
 
 # Gauss collocation: the weights, and the matrix mu that mixes the stages; mu + mu.T is 1 everywhere, without rounding.
 WEIGHTS = np.array((0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.181341891689181, 0.181341891689181, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813,))

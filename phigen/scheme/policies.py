@@ -91,6 +91,7 @@ class GaussPolicy(Policy):
     stalled: float = number(0.8, "a sweep that changes more than this part of the one before is the last ...")
     rounding: float = number(4e-16, "... if it changes no more than this: a part of 0.4 let Casimirs drift;")
     nearly_rounding: float = number(2e-14, "so is the second up to this that changes no less than the one before")
+    trials: int = count(32, "steps from one comparison of predictors to the next: it takes as long as two sweeps")
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from phigen.gauss.tableau import SINGLE, tableau
+from phigen.gauss.tableau import DOUBLE, EARLIER, SINGLE, predictors, tableau
 from phigen.lanes.in_lanes import Lanes, Stages
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.policies import GaussPolicy
@@ -29,6 +29,7 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
         ("NODES", step.tableau.stages, "stages of a step"),
         ("WIDTH", width, "of an array over the stages" + ", those that fill a vector" * (width > step.tableau.stages)),
         ("UNKNOWNS", step.unknowns, "of a stage"),
+        ("EARLIER", EARLIER if isinstance(lanes, Stages) else 1, "steps that predictors read"),
     ]
 
 
@@ -60,21 +61,29 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
     table, width = step.tableau, _width(step, lanes)
     if program.single:
         table = tableau(table.stages, SINGLE)  # rounded again, their sums would not be 1
+    staged = isinstance(lanes, Stages)
+    predictions = predictors(table.stages, SINGLE if program.single else DOUBLE) if staged else (table.prediction,)
     terms = [f"matrix[{j}][lane] * move[{j}]" for j in range(table.stages)]
-    halves = [" + ".join(terms[k::2]) for k in range(min(2, len(terms)))]
+    older = [f"matrix[{table.stages + j}][lane] * before[{j}]" for j in range(table.stages)]
     values = {
         "NAME": program.name,
         "weights": _row(table.weights, width),
-        "matrices": [
-            (name, _columns(rows, width)) for name, rows in (("mixing", table.mixing), ("prediction", table.prediction))
-        ],
-        "terms": " + ".join(f"({half})" for half in halves) if isinstance(lanes, Stages) else "",
+        "mixing": _columns(table.mixing, width),
+        "predictors": len(predictions),
+        "predictions": [_columns(rows, width) for rows in predictions],
+        "terms": _in_chains(terms) if staged else "",
+        "terms_of_two": _in_chains([*terms, *older]) if staged else "",
     }
     return render("c", "gauss.c", values)
 
 
+def _in_chains(terms: Sequence[str]) -> str:
+    """Return a sum as two, which processors add up at the same time."""
+    return " + ".join(f"({' + '.join(terms[k::2])})" for k in range(min(2, len(terms))))
+
+
 def _columns(rows: Sequence[Sequence[float]], width: int) -> list[str]:
-    return [_row([row[j] for row in rows], width) for j in range(len(rows))]
+    return [_row([row[j] for row in rows], width) for j in range(len(rows[0]))]
 
 
 def _row(values: Sequence[float], width: int) -> str:

@@ -12,7 +12,11 @@ static phi_status phi_leave_few(phi_solver *s, size_t steps, phi_kept *trail)
     const phi_solver before = *s;
     const phi_status status = phi_integrate(s, s->h, steps);
     memcpy(trail[0], before.x, sizeof before.x);
-    memcpy(trail[0] + PHI_DIM, s->history.moves, sizeof s->history.moves);
+#if PHI_FRAMED
+    memcpy(trail[0] + PHI_DIM, s->history.solved, sizeof s->history.solved);
+#else
+    memcpy(trail[0] + PHI_DIM, s->history.moves[s->history.latest], sizeof s->history.moves[0]);
+#endif
     if (status != PHI_OK) *s = before;
     return status;
 }

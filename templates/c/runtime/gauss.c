@@ -32,8 +32,10 @@ static void phi_start(const phi_solver *s, double point[PHI_POINT])
 static void phi_end(phi_lanes *moves, double end[PHI_UNKNOWNS])
 {
     for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        end[k] = 0.0;
-        for (int i = 0; i < PHI_NODES; ++i) end[k] += moves[k][i];
+        double even = 0.0, odd = 0.0; /* which need not wait for one another */
+        for (int i = 0; i < PHI_NODES; i += 2) even += moves[k][i];
+        for (int i = 1; i < PHI_NODES; i += 2) odd += moves[k][i];
+        end[k] = even + odd;
     }
 }
 
@@ -52,100 +54,168 @@ static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_
 #endif
 }
 
-/* The square of the size of coordinates, that of x; where x is 0 that of the moves. */
-static double phi_square(const double x[PHI_DIM], phi_lanes *moves)
+/* The factor of squares of changes of coordinates: 1 / |x|^2; where x is 0 moves have the part of x. */
+static double phi_scale(const double x[PHI_DIM], phi_lanes *moves)
 {
     double square = DBL_MIN;
     for (int i = 0; i < PHI_DIM; ++i) square += x[i] * x[i];
     if (square <= DBL_MIN)
         for (int k = 0; k < PHI_PLAIN; ++k)
             for (int i = 0; i < PHI_NODES; ++i) square += moves[k][i] * moves[k][i];
-    return square;
+    return 1.0 / square;
 }
 
-/* The largest change at any stage, in sizes of the unknowns: of coordinates that of x, of group elements 1. */
-static double phi_change_of(double square, phi_lanes *before, phi_lanes *after)
+/* The square of the change by a sweep, as a mean over the stages, in sizes of the unknowns: of coordinates that of x, of
+   group elements 1. */
+static inline double phi_change_of(double scale, phi_lanes *before, phi_lanes *after)
 {
-    double largest = 0.0;
     phi_lanes sum = { 0.0 };
+    double even = 0.0, odd = 0.0;
     for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        const double *old = before[k], *now = after[k], scale = k < PHI_PLAIN ? 1.0 / square : 1.0;
+        const double *old = before[k], *now = after[k], factor = k < PHI_PLAIN ? scale : 1.0;
         PHI_EACH_LANE
-        for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] += (now[lane] - old[lane]) * (now[lane] - old[lane]) * scale;
+        for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] += (now[lane] - old[lane]) * ((now[lane] - old[lane]) * factor);
     }
-    for (int i = 0; i < PHI_NODES; ++i)
-        if (!(sum[i] <= largest)) largest = sum[i]; /* or not a number */
-    return sqrt(largest);
+    for (int i = 0; i < PHI_NODES; i += 2) even += sum[i];
+    for (int i = 1; i < PHI_NODES; i += 2) odd += sum[i];
+    return (even + odd) / (double)PHI_NODES;
 }
 
-/* The moves of the last step, as seen from its end, where this one starts. */
-static void phi_seen(const phi_solver *s, phi_lanes *seen)
+/* The values of the unknowns that a predictor derives from the moves of the last steps. */
+static void phi_predict(phi_history *past, int predictor, phi_lanes *z)
 {
-#if PHI_FRAMED
-    double end[PHI_UNKNOWNS];
-    phi_lanes moves[PHI_UNKNOWNS];
-    PHI_COPY_STAGES(moves, s->history.moves, moves); /* which need not be aligned as lanes are */
-    phi_end(moves, end);
 #if PHI_STAGED
-    phi_next_frame_lanes(s->coef, end, moves, seen);
+    if (predictor + 1 < PHI_PREDICTORS) { /* the last one reads the last step only */
+        phi_mixed_twice(phi_prediction[predictor], past->moves[past->latest], past->moves[1 - past->latest], z);
+        return;
+    }
+#endif
+    phi_mixed(phi_prediction[predictor], past->moves[past->latest], z);
+}
+
+#if PHI_STAGED
+/* The predictor that would have come nearest to the values z of the unknowns. */
+static int phi_best_predictor(phi_history *past, double scale, phi_lanes *z)
+{
+    phi_lanes predicted[PHI_UNKNOWNS];
+    double least = HUGE_VAL;
+    int best = PHI_PREDICTORS - 1;
+    for (int predictor = 0; predictor < PHI_PREDICTORS; ++predictor) {
+        phi_predict(past, predictor, predicted);
+        const double change = phi_change_of(scale, predicted, z);
+        if (change < least) {
+            least = change;
+            best = predictor;
+        }
+    }
+    return best;
+}
+
+#endif
+#if PHI_FRAMED
+/* Moves as seen from the end of a step, where the next one starts. */
+static void phi_see(const phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *moves, double seen[PHI_UNKNOWNS][PHI_WIDTH])
+{
+#if PHI_STAGED
+    phi_lanes turned[PHI_UNKNOWNS];
+    phi_next_frame_lanes(s->coef, end, moves, turned);
+    memcpy(seen, turned, sizeof turned); /* which need not be aligned as lanes are */
 #else
-    double move[PHI_UNKNOWNS], found[PHI_UNKNOWNS];
+    double move[PHI_UNKNOWNS], turned[PHI_UNKNOWNS];
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_UNKNOWNS; ++k) move[k] = moves[k][i];
-        phi_next_frame(s->coef, end, move, found);
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) seen[k][i] = found[k];
+        phi_next_frame(s->coef, end, move, turned);
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) seen[k][i] = turned[k];
     }
 #endif
-#else
-    PHI_COPY_STAGES(seen, s->history.moves, s->history.moves); /* which need not be aligned as lanes are */
+}
+
 #endif
+/* Store the moves of a step with this end, for the prediction of the next one. */
+static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *moves)
+{
+    phi_history *past = &s->history;
+    const int older = past->latest, latest = PHI_EARLIER - 1 - older;
+#if PHI_FRAMED
+#if PHI_STAGED
+    phi_lanes last[PHI_UNKNOWNS];
+    memcpy(last, past->moves[older], sizeof last);
+    phi_see(s, end, last, past->moves[older]);
+#endif
+    phi_see(s, end, moves, past->moves[latest]);
+#if PHI_ADJOINT
+    PHI_COPY_STAGES(past->solved, moves, past->solved);
+#endif
+#else
+    (void)end;
+    PHI_COPY_STAGES(past->moves[latest], moves, past->moves[latest]);
+#endif
+    past->latest = latest;
+    if (past->count < PHI_EARLIER) ++past->count;
 }
 
 #include "gauss_policy.h"
 
-/* Solve for the moves of all stages by sweeps, from those that the last step predicts. The change by a sweep is looked at from
-   that sweep on that was the last one in the step before, or from the one before it. */
+/* Whether changes shrink no more since they are rounding: 1; 0 if they still shrink, and -1 if they do not converge. By the
+   changes so far, of which last is the one before; past->rate follows the rate of changes. */
+typedef struct {
+    double last;
+    int rising, rises;
+} phi_progress;
+
+static int phi_judge(phi_history *past, phi_progress *sweeps, int sweep, double change)
+{
+    const double rate = change / sweeps->last;
+    if (rate > 0.0 && rate < 1.0 && change > PHI_NEARLY_ROUNDING) past->rate = 0.7 * past->rate + 0.3 * rate;
+    const int slow = rate >= 1.0 || rate > fmax(PHI_STALLED, 1.5 * past->rate);
+    if (rate >= 1.0 && change <= PHI_NEARLY_ROUNDING) ++sweeps->rises;
+    sweeps->last = change;
+    if ((slow && change <= PHI_ROUNDING) || sweeps->rises > 1) {
+        /* or the first change was rounding too */
+        past->sweeps = (sweep == past->sweeps || rate > 2.0 * past->rate ? past->sweeps : sweep) - 1;
+        return 1;
+    }
+    sweeps->rising = rate >= 1.0 ? sweeps->rising + 1 : 0; /* transients may rise over as many sweeps as there are stages */
+    return sweeps->rising < (int)PHI_NODES + PHI_MOST_RISING ? 0 : -1;
+}
+
+/* Solve for the moves of all stages by sweeps, from those that the last steps predict. The change by a sweep is looked at from
+   that one on that is expected to be the last. */
 static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lanes *moves)
 {
     phi_history *past = &s->history;
     phi_lanes z[PHI_UNKNOWNS], next[PHI_UNKNOWNS], weights[1] = { { 0.0 } };
-    double last = HUGE_VAL;
-    int rising = 0, rises = 0;
+    phi_progress progress = { HUGE_VAL, 0, 0 };
     for (int i = 0; i < PHI_NODES; ++i) weights[0][i] = s->h * phi_weights[i];
     if (past->count > 0) {
-        phi_seen(s, next);
-        phi_mixed(phi_prediction, next, z);
+        phi_predict(past, past->count < PHI_EARLIER ? PHI_PREDICTORS - 1 : past->predictor, z);
     } else {
         PHI_CLEAR_STAGES(z);
         past->rate = 0.5;
         past->sweeps = 2;
     }
-    phi_slopes(s, point, weights, z, moves);
-    const double square = phi_square(s->x, moves);
-    for (int sweep = 2; sweep <= PHI_MAX_SWEEPS; ++sweep) {
+    for (int sweep = 1; sweep <= PHI_MAX_SWEEPS; ++sweep) {
+        const int tested = sweep >= past->sweeps;
+        phi_slopes(s, point, weights, z, tested ? next : moves);
+        if (tested) {
+            const double scale = phi_scale(s->x, next), square = phi_change_of(scale, moves, next);
+            const int solved = square * (past->rate * past->rate) <= PHI_SOLVED * PHI_SOLVED;
+            const int judgement = solved ? 1 : phi_judge(past, &progress, sweep, sqrt(square));
+            PHI_COPY_STAGES(moves, next, next);
+            if (!isfinite(square)) return PHI_NOT_FINITE;
+            if (judgement < 0) return PHI_NO_CONVERGENCE;
+            if (judgement > 0) {
+                /* the sweep before had left about as much as this one changed */
+                if (solved) past->sweeps = square <= 16.0 * PHI_SOLVED * PHI_SOLVED ? sweep - 1 : sweep;
+                if (past->sweeps < 2) past->sweeps = 2;
+#if PHI_STAGED
+                if (past->count == PHI_EARLIER && past->age++ % PHI_TRIALS == 0) past->predictor = phi_best_predictor(past, scale, z);
+#endif
+                s->evaluations += (size_t)sweep;
+                return PHI_OK;
+            }
+        }
         phi_mixed(phi_mixing, moves, z);
-        ++s->evaluations;
-        if (sweep < past->sweeps) {
-            phi_slopes(s, point, weights, z, moves);
-            continue;
-        }
-        phi_slopes(s, point, weights, z, next);
-        const double change = phi_change_of(square, moves, next), rate = change / last;
-        PHI_COPY_STAGES(moves, next, next);
-        if (!isfinite(change)) return PHI_NOT_FINITE;
-        if (rate > 0.0 && rate < 1.0 && change > PHI_NEARLY_ROUNDING) past->rate = 0.7 * past->rate + 0.3 * rate;
-        const int solved = change * past->rate <= PHI_SOLVED;
-        const int slow = rate >= 1.0 || rate > fmax(PHI_STALLED, 1.5 * past->rate);
-        if (rate >= 1.0 && change <= PHI_NEARLY_ROUNDING) ++rises;
-        if (solved || (slow && change <= PHI_ROUNDING) || rises > 1) {
-            if (sweep == past->sweeps || rate > 2.0 * past->rate) --past->sweeps; /* the first change was rounding too */
-            else past->sweeps = sweep - 1;
-            if (past->sweeps < 2) past->sweeps = 2;
-            return PHI_OK;
-        }
-        rising = rate >= 1.0 ? rising + 1 : 0; /* transients may rise over as many sweeps as there are stages */
-        if (rising >= (int)PHI_NODES + PHI_MOST_RISING) return PHI_NO_CONVERGENCE;
-        last = change;
     }
     return PHI_NO_CONVERGENCE;
 }
@@ -179,7 +249,6 @@ static phi_status phi_attempt(phi_solver *s)
 {
     double point[PHI_POINT], end[PHI_UNKNOWNS], change[PHI_DIM];
     phi_lanes moves[PHI_UNKNOWNS];
-    phi_history *past = &s->history;
     phi_start(s, point);
     const phi_status status = phi_collocate(s, point, moves);
     if (status != PHI_OK) return status;
@@ -191,8 +260,7 @@ static phi_status phi_attempt(phi_solver *s)
 #endif
     if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
     PHI_PASS(s, elapsed)
-    PHI_COPY_STAGES(past->moves, moves, moves);
-    past->count = 1;
+    phi_remember(s, end, moves);
     return PHI_OK;
 }
 #endif

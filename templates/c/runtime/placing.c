@@ -59,9 +59,7 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
     PHI_TAKE_LEVEL(s, from)
 #if PHI_RECURRENCES
     phi_move_guesses(s, from);
-#elif PHI_GAUSS
-    memset(&s->history, 0, sizeof s->history);
-#elif PHI_GUESSED
+#elif PHI_GUESSED && !PHI_GAUSS
     PHI_EACH_STAGE
         for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif

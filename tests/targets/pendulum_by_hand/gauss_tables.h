@@ -5,9 +5,10 @@
 
 static const double phi_weights[PHI_WIDTH] = { 1.0 };
 static const double phi_mixing[PHI_NODES][PHI_WIDTH] = { { 0.5 } };
-static const double phi_prediction[PHI_NODES][PHI_WIDTH] = { { 0.5 } };
+enum { PHI_PREDICTORS = 1 };
+static const double phi_prediction[PHI_PREDICTORS][PHI_EARLIER * PHI_NODES][PHI_WIDTH] = { { { 0.5 } } };
 
-static void phi_mixed(const double matrix[PHI_NODES][PHI_WIDTH], phi_lanes *moves, phi_lanes *z)
+static void phi_mixed(const double matrix[PHI_NODES][PHI_WIDTH], double moves[][PHI_WIDTH], phi_lanes *z)
 {
     for (int k = 0; k < PHI_UNKNOWNS; ++k) z[k][0] = matrix[0][0] * moves[k][0];
 }
