@@ -134,6 +134,12 @@ _RULES: dict[str, Callable[..., Any]] = {
 }
 
 
+def in_many_digits(function: str, s: float) -> Any:
+    """The value of a function of expressions in the current precision of mpmath."""
+    rule = _RULES.get(function) or getattr(mpmath, function)
+    return rule(mpmath.mpf(s))
+
+
 class PreciseStep:
     """The one-step map in many digits: ``step(x)``, and ``defect(x)``, how far it is from a Poisson map at x.
 

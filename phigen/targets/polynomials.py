@@ -17,7 +17,8 @@ def estrin(coefficients: Sequence[Fraction], variable: str, first: str = "a") ->
     v = variable
     blocks = [coefficients[i : i + _BLOCK] for i in range(0, len(coefficients), _BLOCK)]
     names = [chr(ord(first) + k) for k in range(len(blocks))]
-    lines = [f"const double {v}2 = {v} * {v}, {v}4 = {v}2 * {v}2;"]
+    powers = [f"{v}2 = {v} * {v}"] * (len(coefficients) > 2) + [f"{v}4 = {v}2 * {v}2"] * (len(blocks) > 1)
+    lines = [f"const double {', '.join(powers)};"] if powers else []
     lines += [f"const double {n} = {_block(b, v)};" for n, b in zip(names, blocks, strict=True)]
     value = names[-1]
     for name in reversed(names[:-1]):

@@ -1,12 +1,15 @@
 """C in single precision: what is written, what it computes, and what is refused."""
 
+import ctypes
 import re
 import warnings
 from dataclasses import replace
 from functools import cache
 
+import mpmath
 import numpy as np
 import pytest
+from many_digits import in_many_digits
 from support import as_given, first_run, run, setting, slow_but, small, solver, spec_of, tool, write
 
 import phigen
@@ -177,3 +180,28 @@ def test_a_site_beyond_single_precision_is_named():
             made.ensemble(np.array([np.ones((2, 8)), x]), 0.1, 1)
     assert failure.value.members == (1,)
     assert np.isfinite(failure.value.trajectory[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "functions"),
+    [("rigid_body", ("phi0", "phi1")), ("satellite_wheels", ("cosroot", "sinroot", "sin", "versin"))],
+)
+def test_functions_have_the_length_that_24_bits_need(name, functions, tmp_path):
+    """Tables end where terms are below rounding, no coefficient is replaced by a limit, and all digits are right."""
+    compilation = compile_spec(spec_of(name), profile="small", real="float")
+    files = emit(compilation.program, "c", "x")
+    wrapped = [f"float at_{f}(float s);\nfloat at_{f}(float s) {{ return {name}_{f}(s); }}\n" for f in functions]
+    write(tmp_path, {f"{name}.h": files[f"{name}.h"], "all.c": files[f"{name}.c"] + "".join(wrapped)})
+    run([tool("cc"), "-std=c99", "-O1", "-fPIC", "-shared", "all.c", "-o", "all.so", "-lm"], tmp_path)
+    library = ctypes.CDLL(str(tmp_path / "all.so"))
+    for f in functions:
+        body = re.search(rf"\b{name}_{f}\(float \w+\)\n\{{(.*?)\n\}}", files[f"{name}.c"], re.DOTALL)[1]
+        smallest = min(float(v) for v in re.findall(r"\d[\d.]*e-\d+", body))
+        assert smallest > 1e-21
+        assert body.count("e-") < 40
+        at = getattr(library, f"at_{f}")
+        at.restype, at.argtypes = ctypes.c_float, [ctypes.c_float]
+        for s in np.linspace(-0.99, 0.99, 40).astype(np.float32):
+            with mpmath.workdps(30):
+                exact = float(in_many_digits(f, float(s)))
+            assert abs(at(s) - exact) <= 3 * np.spacing(np.float32(abs(exact) or 1e-30))

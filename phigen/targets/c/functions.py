@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TypeVar
 
 from phigen.lanes.lane_functions import SMALL_ARGUMENT_FUNCTIONS
 from phigen.scheme.kernel import Kernel
@@ -16,6 +17,8 @@ from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import (
     LANE_REACH,
+    MIDDLE,
+    NEAR,
     SPECIAL,
     lane_coefficients,
     near_coefficients,
@@ -32,6 +35,12 @@ from phigen.targets.special import entire_used
 
 #: The functions of the library that have a version here, under whose name flows call them.
 FLOW_FUNCTIONS = tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f not in ENTIRE and f != ANOMALY)
+
+
+#: Terms beyond this, relative to the first, are left out of series in single precision: a quarter of a rounding.
+_SINGLE_NEGLIGIBLE = 2.0**-26
+
+C = TypeVar("C", float, Fraction)
 
 
 @dataclass(frozen=True)
@@ -100,6 +109,8 @@ def near(program: Program, names: Iterable[str]) -> list[str]:
 def _anomaly(program: Program, *, near: bool = False) -> str:
     """Return the universal anomaly of Kepler motions, with c2 and c3 by series in the same powers."""
     c2, c3 = special.stumpff()
+    count = max(len(needed(program, c, 1.0)) for c in (c2, c3))
+    c2, c3 = c2[:count], c3[:count]
     lines, first = estrin(c2, "z", "a")
     (_, *others), second = estrin(c3, "z", "e")
     values = {"NAME": program.name, "near": near, "lines": [*lines, *others], "c2": first, "c3": second}
@@ -115,11 +126,12 @@ def _row_values(program: Program, f: str) -> dict[str, object]:
     if f in ENTIRE:
         entire, t = ENTIRE[f], "s"
         meaning, radius, squared, form = entire.meaning, Fraction(entire.radius), False, "{P}"
-        coefficients = list(entire.terms())
+        coefficients = needed(program, entire.terms(), entire.radius)
     else:
         small, t = _SMALL[f], "t"
         (radius, count, form), meaning, squared = small.rows, small.meaning, small.step == 2
         reach = radius**2 if squared else radius
+        count = min(count, len(needed(program, small.terms(count), float(reach))))
         coefficients = economised(small.terms(count + 8), reach, count, symmetric=not squared)
     polynomial = _nested([float(c) for c in coefficients])
     text = f"return {form.format(P=polynomial, t=t)};"
@@ -147,12 +159,22 @@ def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
 
 
 def _phi(program: Program, f: str) -> Mapping[str, object]:
-    near, rest = near_coefficients(order_of(f)), rest_coefficients(order_of(f))
+    near = needed(program, near_coefficients(order_of(f)), NEAR)
+    rest = needed(program, rest_coefficients(order_of(f)), MIDDLE)
     tables = [line for name, numbers in (("near", near), ("rest", rest)) for line in _table(name, numbers)]
     values = dict(special.values(f, f)) | {"NAME": program.name, "function": f, "tables": tables}
     *closed, last = special.closed(order_of(f))
     closed_form = {"closed": closed, "value": last.split(" = ")[1]}
     return values | closed_form | {"near_count": len(near), "rest_count": len(rest)}
+
+
+def needed(program: Program, coefficients: Sequence[C], reach: float) -> list[C]:
+    """The first coefficients of a series, as many as the precision needs for arguments up to ``reach``."""
+    if not program.single:
+        return list(coefficients)
+    least = _SINGLE_NEGLIGIBLE * abs(float(coefficients[0]))
+    last = max(n for n, c in enumerate(coefficients) if abs(float(c)) * reach**n >= least)
+    return list(coefficients[: last + 1])
 
 
 def _table(name: str, numbers: Sequence[float]) -> list[str]:
@@ -168,12 +190,13 @@ def _values(program: Program, f: str) -> dict[str, object]:
         meaning, radius = entire.meaning, entire.radius
         names = {**FUNCTIONS, **{name: f"{program.name}_{name}" for name in ENTIRE}}
         outside = special.far(f, lambda scope: printer(scope, names), "s > 0.0 ? {0} : {1}")
-        lines, value = estrin(entire.terms(), t)
+        lines, value = estrin(needed(program, entire.terms(), radius), t)
     else:
         small, t = _SMALL[f], "t"
         (radius, count, form), meaning, squared = small.flows, small.meaning, small.step == 2
         outside = {"far": small.far, "root": False}
-        lines, value = estrin(small.terms(count), "z" if squared else "t")
+        terms = needed(program, small.terms(count), radius**2 if squared else radius)
+        lines, value = estrin(terms, "z" if squared else "t")
         lines = ["const double z = t * t;"] * squared + lines
     return {
         "NAME": program.name,
