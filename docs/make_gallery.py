@@ -188,7 +188,9 @@ def lattice_facts(name: str) -> dict[str, Any]:
     errors = errors_of(compilation.cell, made)
     thin = max(1, len(made) // FRAMES)
     few = replace(made, t=made.t[::thin], x=made.x[::thin], energy=made.energy[::thin])
-    drawn = lattice_figure(few, {quantity: e[::thin] for quantity, e in errors.items()}, "", dots=SMALL)
+    names = run.lattice.names if run.lattice else ()
+    thin_errors = {quantity: e[::thin] for quantity, e in errors.items()}
+    drawn = lattice_figure(few, thin_errors, "", dots=SMALL, site_names=names)
     save_for_pages(drawn, FIGURES / f"{name}.svg")
     return {
         "sha256": found.source_sha256,

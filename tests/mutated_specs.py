@@ -290,7 +290,7 @@ parameters: {G: {value: 1 + i, at: sites}}
 poisson: {brackets: {x: {y: 1/G}}}
 hamiltonian: {pairs: "-G[a]*G[b]*log((x[a] - x[b])**2 + (y[a] - y[b])**2)"}
 order: 2
-runs: {a: {sizes: [4], initial: {x: [1, 0, 0, 2], y: [0, 1, 2, 0]}, step: 0.01, steps: 4}}
+runs: {a: {sizes: [4], names: [a, b, c, "d e"], initial: {x: [1, 0, 0, 2], y: [0, 1, 2, 0]}, step: 0.01, steps: 4}}
 """,
 }
 

@@ -227,7 +227,8 @@ def _draw(
         from phigen.drawing.figures import save
         from phigen.drawing.lattices import lattice_figure
 
-        save(lattice_figure(result, errors, title, spectrum=spectrum), plot)
+        names = run.lattice.names if run.lattice else ()
+        save(lattice_figure(result, errors, title, spectrum=spectrum, site_names=names), plot)
 
 
 def exponents_of(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +28,10 @@ MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
 MOST_DRAWN = 100
 #: Colours of diagrams, and of snapshots: few enough that files stay small.
 LEVELS = 48
+#: Height in inches of a panel with paths in a plane.
+ORBITS_HEIGHT = 5.0
+#: Most sites whose names are drawn: more would overlap in a panel.
+MOST_NAMED = 24
 
 
 @styled
@@ -37,8 +41,13 @@ def lattice_figure(
     title: str,
     dots: int = MOST_TIMES,
     spectrum: Spectrum | None = None,
+    site_names: Sequence[str] = (),
 ) -> Figure:
     """The coordinates over space and time, and the ``errors`` (frames,) of what is conserved, by name.
+
+    Of pairs the paths in the plane of the first two coordinates are drawn.
+
+    Sites of graphs and pairs may have names.
 
     Below are the observables against the time, S(q, ω), a correlation, and Lyapunov exponents, if there are any.
 
@@ -46,22 +55,26 @@ def lattice_figure(
     """
     from matplotlib.figure import Figure
 
-    names = run.coordinates[:MOST_PANELS]
+    orbits = run.solver.interface.pairs and len(run.coordinates) > 1
+    names = run.coordinates[: 1 if orbits else MOST_PANELS]
     observed = run.solver.interface.observables[:MOST_PANELS]
     transforms = [2.6] * (run.structure_factor is not None) + [1.8] * (run.correlated is not None)
     below = [1.4] * len(observed) + [1.8] + transforms + [1.8] * (spectrum is not None)
-    figure = Figure(figsize=(8.2, 2.2 * len(names) + 0.6 + sum(below)), layout="constrained")
+    height = ORBITS_HEIGHT if orbits else 2.2
+    figure = Figure(figsize=(8.2, height * len(names) + 0.6 + sum(below)), layout="constrained")
     if title:
         figure.suptitle(title, fontsize=10)
-    heights = [2.2] * len(names) + below
+    heights = [height] * len(names) + below
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights)
+    if orbits:
+        _draw_orbits(parts[0].add_subplot(), run, site_names)
     places = places_of(run)
-    for part, name in zip(parts, names, strict=False):
+    for part, name in zip(parts, () if orbits else names, strict=False):
         values = run.column(name)
         if places is not None:
-            _draw_graph(part, name, run, values, places)
+            _draw_graph(part, name, run, values, places, site_names)
         elif values.ndim == 2:
-            _draw_diagram(part, name, run, values, dots)
+            _draw_diagram(part, name, run, values, dots, site_names)
         else:
             _draw_snapshots(part, name, run, values)
     for k, name in enumerate(observed):
@@ -119,7 +132,29 @@ def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
     return figure
 
 
-def _draw_diagram(part: Any, name: str, run: LatticeTrajectory, values: Floats, dots: int = MOST_TIMES) -> None:
+def _draw_orbits(axes: Any, run: LatticeTrajectory, site_names: Sequence[str]) -> None:
+    """The paths of bodies in the plane of their first two coordinates, with a point where each of them ends."""
+    x, y = run.x[:, 0], run.x[:, 1]
+    for site in range(x.shape[1]):
+        colour = SERIES[site % len(SERIES)]
+        axes.plot(x[:, site], y[:, site], color=colour, linewidth=0.7, alpha=0.8)
+        axes.plot(x[-1:, site], y[-1:, site], "o", color=colour, markersize=4)
+    for site, text in enumerate(site_names if len(site_names) <= MOST_NAMED else ()):
+        axes.annotate(text, (x[-1, site], y[-1, site]), xytext=(5, 4), textcoords="offset points", fontsize=8)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(run.coordinates[0])
+    axes.set_ylabel(run.coordinates[1])
+    axes.grid(True)
+
+
+def _draw_diagram(
+    part: Any,
+    name: str,
+    run: LatticeTrajectory,
+    values: Floats,
+    dots: int = MOST_TIMES,
+    site_names: Sequence[str] = (),
+) -> None:
     """One coordinate of a chain: sites upwards, time to the right."""
     axes = part.add_subplot()
     times = _shown_frames(run, dots)
@@ -128,7 +163,10 @@ def _draw_diagram(part: Any, name: str, run: LatticeTrajectory, values: Floats, 
         extent=(run.t[0], run.t[-1], -0.5, values.shape[1] - 0.5), **shades_of(values, LEVELS),
     )  # fmt: skip
     axes.set_xlabel("t")
-    axes.set_ylabel(run.axes[0])
+    if 0 < len(site_names) <= MOST_NAMED:
+        axes.set_yticks(range(len(site_names)), site_names, fontsize=7)
+    else:
+        axes.set_ylabel(run.axes[0])
     part.colorbar(shown, ax=axes, pad=0.02, label=name)
 
 
@@ -149,12 +187,16 @@ def places_of(run: LatticeTrajectory) -> Floats | None:
     return placed(run.parameters["bonds"], run.x.shape[2])
 
 
-def _draw_graph(part: Any, name: str, run: LatticeTrajectory, values: Floats, places: Floats) -> None:
+def _draw_graph(
+    part: Any, name: str, run: LatticeTrajectory, values: Floats, places: Floats, site_names: Sequence[str] = ()
+) -> None:
     """One coordinate of a graph at some times."""
     frames, shades = _snapshots(run), shades_of(values, LEVELS)
     panels = np.atleast_1d(part.subplots(1, len(frames)))
     for axes, k in zip(panels, frames.tolist(), strict=True):
         shown = draw_sites(axes, run.parameters["bonds"], places, values[k], shades)
+        for place, text in zip(places.tolist(), site_names if len(site_names) <= MOST_NAMED else (), strict=False):
+            axes.annotate(text, place, xytext=(4, 3), textcoords="offset points", fontsize=7)
         axes.set_title(f"t = {run.t[k]:.4g}")
     part.colorbar(shown, ax=list(panels), pad=0.02, label=name)
 
@@ -195,8 +237,9 @@ def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats
 
 
 def _draw_errors(axes: Any, run: LatticeTrajectory, errors: Mapping[str, Floats]) -> None:
-    for (name, error), colour in zip(errors.items(), [*SERIES] * (1 + len(errors) // len(SERIES)), strict=False):
-        axes.plot(run.t, np.where(error > 0, error, np.nan), color=colour, label=name, linewidth=1.0)
+    for k, (name, error) in enumerate(errors.items()):
+        style = {"color": SERIES[k % len(SERIES)], "linestyle": "--" if k >= len(SERIES) else "-"}
+        axes.plot(run.t, np.where(error > 0, error, np.nan), label=name, linewidth=1.0, **style)
     axes.set_yscale("log")
     axes.set_xlabel("t")
     axes.set_ylabel("error or change" if any(name.startswith("change") for name in errors) else "error")

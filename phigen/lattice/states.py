@@ -75,6 +75,8 @@ class _Reader:
         sizes = self.lattice_run.sizes or (self._sites(bonds),)
         if len(bonds) and bonds.max() >= sizes[0]:
             raise self._error("bonds", f"a bond ends at site {bonds.max()}, but there are {sizes[0]} sites")
+        if (names := self.lattice_run.names) and len(names) != sizes[0]:
+            raise self._error("names", f"names: {len(names)} names for {sizes[0]} sites")
         self._expect_room(sizes)
         self.arrays = _Arrays(self.spec, sizes, self.run.name)
         parameters: dict[str, float | Floats] = dict(self.spec.parameters_of(self.run))

@@ -125,9 +125,14 @@ def _run(material: LatticeMaterial, trajectory: LatticeTrajectory) -> Iterator[M
         caption = "The fields at some times; sites are as far apart as there are bonds between them, nearly"
     caption += ", and errors of what is conserved, on a logarithmic scale."
     worst = ", ".join(f"{name} {page.scientific(float(e.max()))}" for name, e in material.errors.items())
-    title = "The fields over space and time"
+    title, run = "The fields over space and time", material.run
+    names = run.lattice.names if run and run.lattice else ()
     yield picture(
-        "fields", lattice_figure(trajectory, material.errors, ""), title, f"Largest errors: {worst}.", caption
+        "fields",
+        lattice_figure(trajectory, material.errors, "", site_names=names),
+        title,
+        f"Largest errors: {worst}.",
+        caption,
     )
     energies = material.energies
     if energies is not None:

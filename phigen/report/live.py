@@ -15,7 +15,7 @@ from phigen.errors import PhigenError
 from phigen.geometry.system import System
 from phigen.report import page
 from phigen.scheme.kernel import Kernel, Output
-from phigen.spec.model import NO_EXTRAS, Extras, Parameter, Run
+from phigen.spec.model import NO_EXTRAS, Extras, Parameter, Run, Spec
 from phigen.study.conservation import ENERGY, moving
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.targets.code import lower
@@ -78,14 +78,19 @@ def gathered(
     return Live(by_order, run, parameters, why_not, _invariants(compilation.system))
 
 
-def solvers(compilation: Compilation, scheme: str | None, orders: Sequence[int]) -> tuple[dict[int, str], str]:
-    """JavaScript by order: of the order of the page and those of ``orders`` below it, of lattices any; or why not."""
-    page_order = compilation.order.order
-    spec = replace(compilation.spec, reconstruct="", extras=_PRIVATE)
+def solvers(
+    compilation: Compilation, scheme: str | None, orders: Sequence[int], spec: Spec | None = None
+) -> tuple[dict[int, str], str]:
+    """JavaScript by order: of the order of the page and those of ``orders`` below it, of lattices any; or why not.
+
+    A ``spec`` takes the place of that of the compilation, from which it differs by its observables.
+    """
+    page_order, is_own = compilation.order.order, spec is None
+    spec = replace(spec or compilation.spec, reconstruct="", extras=_PRIVATE)
     by_order: dict[int, str] = {}
     for order in (page_order, *(o for o in orders if o < page_order or (spec.lattice and o > page_order))):
         try:
-            if order == page_order and emits(compilation):
+            if order == page_order and is_own and emits(compilation):
                 variant = compilation
             else:
                 variant = compile_spec(spec, order=order, scheme=scheme, system=compilation.known_system)
@@ -165,9 +170,11 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
             for group, leaf in zip(shown, leaves, strict=True)
         ],
         "quantities": quantities,
+        "observed": list(system.observables),
     }
     return page.block(
         "live",
+        observed=list(system.observables),
         say=_say(system, quantities, any(leaf is not None for leaf in leaves)),
         sides=sides(compilation),
         kind="",

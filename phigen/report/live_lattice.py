@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,8 @@ from phigen.report.live import (
     slider_of,
     solvers,
 )
-from phigen.spec.model import LieAlgebraForm, Parameter, Run, Spec, Values
+from phigen.spec.model import LieAlgebraForm, Parameter, Reduction, Run, Spec, Values
+from phigen.symbolic.expression import Expression, call, total
 
 #: The least number of sites along an axis for halved sizes, and the largest numbers of sites for doubled ones.
 FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
@@ -64,8 +65,24 @@ def gathered_lattice(
         return LatticeLive({}, why_not=NOISE)
     if _numbers(compilation.spec, run, start) > MOST_NUMBERS:
         return LatticeLive({}, why_not="the lists of its start are too long for a page")
-    by_order, why_not = solvers(compilation, scheme, orders)
+    by_order, why_not = solvers(compilation, scheme, orders, _with_invariants(compilation))
     return LatticeLive(by_order, run, None, why_not, start=start, formulas=_formulas(compilation.spec, run))
+
+
+def _with_invariants(compilation: CompiledLattice) -> Spec | None:
+    """The spec with the invariants, and the magnitudes of their terms, as further observables; None without any."""
+    spec, cell = compilation.spec, compilation.cell
+    assert spec.lattice is not None
+    densities: dict[str, Expression] = {}
+    for name, density in cell.invariants.items():
+        apart = "_" * (1 + max(map(len, spec.observables), default=0))  # longer than any name
+        densities[f"{name}{apart}"] = density
+        densities[f"terms_{name}{apart}"] = total(call("abs", term) for term in cell.additive_terms(density))
+    if not densities:
+        return None
+    reductions = {**spec.lattice.reductions, **dict.fromkeys(densities, Reduction("sum"))}
+    lattice = replace(spec.lattice, reductions=reductions)
+    return replace(spec, observables={**spec.observables, **densities}, lattice=lattice)
 
 
 def lattice_script(live: LatticeLive) -> str:
@@ -108,6 +125,8 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
         "initial": {name: _given(v, start, name, spec) for name, v in _initial(spec, run).items()},
         "groups": [{"kind": kind, "fields": fields} for _, kind, fields in shown],
         "quantities": _quantities(compilation),
+        "observed": list(spec.recorded),
+        "names": list(run.lattice.names) if run.lattice else [],
         "sign": _sign(spec, start),
     }
     about = _DIRECTION.format(*spec.coordinates) if shown[0][1] == "direction" else ""
@@ -115,6 +134,7 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
     return page.block(
         "live",
         kind="fields",
+        observed=list(spec.recorded),
         say=_say(compilation),
         sides=sides(compilation),
         label=f"{shown[0][0]} at the sites",
@@ -147,6 +167,8 @@ def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, 
     form = compilation.spec.poisson
     if isinstance(form, LieAlgebraForm) and (form.family, form.size) == ("so", 3):
         views.insert(0, ("directions of the spins", "direction", [0, 1, 2]))
+    observed = [name for name in compilation.spec.observables if name not in compilation.spec.recorded]
+    views += [(name, "observed", [k]) for k, name in enumerate(observed)]
     return [*views, ("energy of each site", "energy", [])]
 
 
@@ -259,12 +281,19 @@ def _quantities(compilation: CompiledLattice) -> list[dict[str, Any]]:
                 "casimirs": [*casimirs.values()],
             }
         )
+    invariants, first = list(cell.invariants), len(compilation.spec.recorded)
+    if invariants:
+        named = f"error{'s' * (len(invariants) > 1)} of {', '.join(invariants)}"
+        named = named if len(invariants) <= 3 else f"error of {len(invariants)} invariants"
+        quantities.append({"name": named, "invariants": [first + 2 * k for k in range(len(invariants))]})
     return quantities
 
 
 def _say(compilation: CompiledLattice) -> str:
     said = "Two solvers follow the motion from the same start, in your browser, now. "
-    conserved_words = " and ".join("its Casimirs" if q["casimirs"] else "its energy" for q in _quantities(compilation))
+    conserved = ["its invariants" if "invariants" in q else "its Casimirs" if q["casimirs"] else "its energy"
+            for q in _quantities(compilation)]  # fmt: skip
+    conserved_words = " and ".join([", ".join(conserved[:-1]), conserved[-1]] if len(conserved) > 1 else conserved)
     if not conserved_words:
         return f"{said}{NOTHING}"
     return f"{said}The true motion keeps {conserved_words}. The numbers say how far each of the two is from that."

@@ -321,6 +321,9 @@ RUN = Record(
             Either({Scalar: INLINE, Sequence: ListOf(ListOf(Integer(0, limits.SITES)), most=limits.BONDS)}),
             "graphs: pairs of sites, counted from 0, or a file of them, .csv",
         ),
+        RecordKey(
+            "names", ListOf(INLINE, least=1), "graphs and pairs: the names of the sites, in figures and the live panel"
+        ),
         RecordKey("step", CONSTANT, "step size h", required=True),
         RecordKey("steps", Integer(1, limits.STEPS, limit=True), "number of steps"),
         RecordKey("duration", CONSTANT, "time span instead of the number of steps; a multiple of the step"),

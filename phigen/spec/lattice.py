@@ -94,7 +94,7 @@ def scope_of_numbers(declared: Declarations, observables: Iterable[str], fields:
 def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRunSettings | None:
     """Read the sizes, bonds, initial state and array parameters of a run."""
     if declared.lattice is None:
-        for key in ("sizes", "bonds", "spectrum", "correlation"):
+        for key in ("sizes", "bonds", "names", "spectrum", "correlation"):
             if key in raw:
                 _fail(name, key, f"{key} is for specs with lattice:", declared)
         return None
@@ -108,6 +108,7 @@ def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRunSet
         _bonds(name, raw, declared),
         spectrum=spectrum_of(name, raw, declared),
         correlation=correlation_of(name, raw, sizes, declared),
+        names=_names(name, raw, declared),
     )
 
 
@@ -161,6 +162,17 @@ def _bonds(name: str, raw: Raw, declared: Declarations) -> tuple[tuple[int, int]
         else:
             pairs.append((pair[0], pair[1]))
     return tuple(pairs)
+
+
+def _names(name: str, raw: Raw, declared: Declarations) -> tuple[str, ...]:
+    names = tuple(text for text in raw.get("names") or () if text is not None)
+    if names and declared.relation == "grid":
+        _fail(name, "names", "names are those of bodies: for lattice: {pairs: all} and {graph: NAME}", declared)
+        return ()
+    repeated = next((text for k, text in enumerate(names) if text in names[:k]), None)
+    if repeated is not None:
+        _fail(name, "names", f"names: {shown(repeated)} is given twice", declared)
+    return names
 
 
 def _state(name: str, initial: Any, declared: Declarations) -> dict[str, Values]:

@@ -286,7 +286,7 @@ class LatticeRunSettings:
     ``sizes`` are those of the axes; where there are none, the number of sites. ``state`` has initial values by field,
     or of all fields under the name ``""``. ``bonds`` are pairs of sites, counted from 0, or a file with them.
     ``arrays`` are the values of parameters at sites and bonds that differ from the defaults. ``spectrum`` and
-    ``correlation`` are computed from the frames.
+    ``correlation`` are computed from the frames. ``names`` are those of the sites of graphs and pairs, in pictures.
     """
 
     sizes: tuple[int, ...] = ()
@@ -295,6 +295,7 @@ class LatticeRunSettings:
     arrays: Mapping[str, Values] = field(default_factory=dict)
     spectrum: SpectrumChoice | None = None
     correlation: CorrelationChoice | None = None
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -221,5 +221,7 @@ function makeView(panel) {
     pen.fill();
   }
 
-  return { begin, pace, look, rehearsed: (given) => given, drawSide };
+  const observed = ({ x, t, race: { solver } }) => (data.observed.length ? solver.observables(x, t) : []);
+
+  return { begin, pace, look, rehearsed: (given) => given, drawSide, observed };
 }

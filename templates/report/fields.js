@@ -66,7 +66,7 @@ function makeView(panel) {
       params[name] = valuesOf(values, name, sizes, values.at === "bonds" ? data.bonds.length / 2 : count);
     }
     const solver = new Solver({ x0: startOf(data, sizes, count), t0: data.t0, sizes, params, bonds: data.bonds });
-    const groups = data.quantities.map(({ name, casimirs }) => ({ name, error: casimirs ? offCasimirs(solver, casimirs) : energyError(solver) }));
+    const groups = data.quantities.map(({ name, casimirs, invariants }) => ({ name, error: invariants ? offInvariants(solver, invariants) : casimirs ? offCasimirs(solver, casimirs) : energyError(solver) }));
     const field = (x, t) => ({ x: solver.vectorField(x, t), t: 1 }), chosen = data.groups[given.group];
     return new Race(solver, { h: given.h, parts: given.parts, field, groups, remember: (runner) => remember(runner, solver, chosen, sizes) });
   }
@@ -97,16 +97,27 @@ function makeView(panel) {
     };
   }
 
+  // Off the invariant that is farthest off: an observable, of which the next has the magnitudes of its terms.
+  function offInvariants(solver, chosen) {
+    const first = Float64Array.from(solver.observables());
+    const unit = (k) => (Math.abs(first[k]) > 1e-3 * first[k + 1] ? Math.abs(first[k]) : first[k + 1]) || 1;
+    const units = chosen.map(unit);
+    return (x, t) => {
+      const now = solver.observables(x, t);
+      return Math.max(...chosen.map((k, i) => Math.abs(now[k] - first[k]) / units[i]));
+    };
+  }
+
   // -- what is kept of a state
 
   // The values of the chosen field at the sites that are drawn, of a direction those of all three, of what moves the
   // places; of three axes the plane in the middle of the first.
-  function shown(x, solver, { kind, fields }, sizes) {
+  function shown({ x, t }, solver, { kind, fields }, sizes) {
     const count = countOf(sizes), plane = sizes.length > 2 ? sizes[1] * sizes[2] : count;
     const from = sizes.length > 2 ? plane * Math.floor(sizes[0] / 2) : 0;
     if (kind === "energy") return Float32Array.from(solver.density(x).subarray(from, from + plane));
-    const kept = new Float32Array(fields.length * plane);
-    fields.forEach((f, k) => kept.set(x.subarray(f * count + from, f * count + from + plane), k * plane));
+    const kept = new Float32Array(fields.length * plane), values = kind === "observed" ? solver.observedFields(x, t) : x;
+    fields.forEach((f, k) => kept.set(values.subarray(f * count + from, f * count + from + plane), k * plane));
     return kept;
   }
 
@@ -115,7 +126,7 @@ function makeView(panel) {
     const kept = (runner.kept ??= { list: [], stride: 1, since: 0 });
     if (++kept.since < kept.stride) return;
     kept.since = 0;
-    kept.list.push(shown(runner.x, solver, chosen, sizes));
+    kept.list.push(shown(runner, solver, chosen, sizes));
     if (data.picture === "diagram" && kept.list.length > COLUMNS) {
       kept.list = kept.list.filter((_, k) => k % 2 === 0);
       kept.stride *= 2;
@@ -130,7 +141,7 @@ function makeView(panel) {
     const chosen = data.groups[given.group], sizes = sizesOf(given), changes = [];
     let last, least = Infinity, most = -Infinity;
     const { trial } = tried(given, steps, milliseconds, (runner) => {
-      const now = shown(runner.x, runner.race.solver, chosen, sizes);
+      const now = shown(runner, runner.race.solver, chosen, sizes);
       let sum = 0;
       now.forEach((v, k) => {
         if (!Number.isFinite(v)) return;
@@ -321,6 +332,7 @@ function makeView(panel) {
       const sign = data.sign && runner.race.solver.params[data.sign][site] < 0;
       if (sign) pen.stroke(); else pen.fill();
     }
+    data.names.forEach((name, site) => label(pen, name, ...place(now, site)));
     pen.restore();
     pen.strokeStyle = ink();
     pen.globalAlpha = 0.35;
@@ -356,7 +368,15 @@ function makeView(panel) {
       pen.fill();
       pen.stroke();
     }
+    data.names.forEach((name, site) => label(pen, name, ...place(site)));
     scaleOf(space, all);
+  }
+
+  // The name of a site beside it.
+  function label(pen, name, x, y) {
+    pen.fillStyle = ink();
+    pen.font = "12px sans-serif";
+    write(pen, name, x + 7, y - 3, "left", "bottom");
   }
 
   const draws = { diagram: drawDiagram, plane: drawPlane, graph: drawGraph, moving: drawMoving };
@@ -367,5 +387,7 @@ function makeView(panel) {
     if (runner) draws[data.picture](space, runner, k);
   }
 
-  return { begin, pace, look, rehearsed, drawSide };
+  const observed = ({ x, t, race: { solver } }) => (data.observed.length ? solver.observables(x, t) : []);
+
+  return { begin, pace, look, rehearsed, drawSide, observed };
 }

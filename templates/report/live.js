@@ -189,6 +189,10 @@ if (document.getElementById("live-panel")) {
     [...at(`${sides[k]}-scores`).children].forEach((row, i) => {
       row.firstElementChild.textContent = !runner ? "–" : readable(runner.histories[i].last);
     });
+    const observed = runner && !runner.failed ? view.observed(runner) : [];
+    [...(at(`${sides[k]}-observed`)?.children ?? [])].forEach((row, i) => {
+      row.lastElementChild.textContent = i in observed ? String(shortened(observed[i])).replace("-", "−") : "–";
+    });
     const told = runner?.failed ? `Broke down after ${runner.steps} steps.` : "";
     if (at(`${sides[k]}-told`).textContent !== told) at(`${sides[k]}-told`).textContent = told;
   }
@@ -247,7 +251,7 @@ if (document.getElementById("live-panel")) {
     if (!race) return;
     for (const side of sides) {
       const { steps, t, x, histories } = race[side];
-      dataset[side] = JSON.stringify({ steps, t, x: [...x], errors: histories.map(({ last }) => last) });
+      dataset[side] = JSON.stringify({ steps, t, x: [...x], errors: histories.map(({ last }) => last), observed: [...view.observed(race[side])].slice(0, data.observed.length) });
     }
   }
 

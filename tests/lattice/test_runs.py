@@ -309,3 +309,62 @@ def test_an_interrupted_run_goes_on_to_the_same_files(cli, spec, monkeypatch, mo
         assert len(stored["t"]) > 4
     assert [path.read_bytes() for path in files] == whole
     assert not list(spec.parent.glob("*.checkpoint"))
+
+
+PLANETS = """\
+phigen: 1
+name: bodies
+lattice: {pairs: all}
+coordinates: [x, y, px, py]
+parameters: {m: {value: [1, 0.01, 0.001], at: sites, positive: true}}
+poisson: {canonical: {q: [x, y], p: [px, py]}}
+hamiltonian:
+  sites: (px**2 + py**2)/(2*m)
+  pairs: -m[a]*m[b]/sqrt((x[a] - x[b])**2 + (y[a] - y[b])**2)
+order: 2
+runs:
+  r:
+    initial: {x: [0, 1, 2], y: [0, 0, 0], px: [0, 0, 0], py: [0, 0.01, 0.0007]}
+    names: [Sun, Jupiter, "&<b>"]
+    step: 0.05
+    steps: 40
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('Jupiter, "&<b>"]', "Jupiter]", "names: 2 names for 3 sites"),
+        ('"&<b>"]', "Sun]", "names: 'Sun' is given twice"),
+        ("names: [Sun", "names: [[Sun]", "expected text, found a list"),
+        ("names: [Sun", "named: [Sun", "did you mean 'names'?"),
+    ],
+)
+def test_names_of_bodies_are_one_for_each(old, new, message):
+    assert old in PLANETS
+    with pytest.raises(phigen.SpecError) as error:
+        phigen.compile(phigen.spec.loads(PLANETS.replace(old, new), "bodies.yaml"), target="numpy").run()
+    assert message in str(error.value)
+    assert str(error.value).startswith("bodies.yaml:1")
+
+
+def test_names_are_for_graphs_and_pairs():
+    text = "phigen: 1\nname: c\nlattice: {axes: [i]}\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+    text += "hamiltonian: p**2/2 + q**2/2\n"
+    text += "runs: {r: {sizes: [2], initial: {q: 0, p: 1}, names: [a, b], step: 0.1, steps: 2}}\n"
+    with pytest.raises(phigen.SpecError, match="names are those of bodies"):
+        phigen.spec.loads(text)
+
+
+def test_paths_of_bodies_are_drawn_in_their_plane_with_their_names():
+    pytest.importorskip("matplotlib")
+    from phigen.drawing.lattices import lattice_figure
+
+    run = phigen.compile(phigen.spec.loads(PLANETS), target="numpy").run()
+    paths = lattice_figure(run, {"energy": np.full(len(run), 1e-3)}, "", site_names=["Sun", "Jupiter", "&<b>"]).axes[0]
+    drawn = [line.get_xydata() for line in paths.get_lines()]
+    for site in range(3):
+        np.testing.assert_array_equal(drawn[2 * site], run.x[:, :2, site])
+        np.testing.assert_array_equal(drawn[2 * site + 1], run.x[-1:, :2, site])
+    assert [text.get_text() for text in paths.texts] == ["Sun", "Jupiter", "&<b>"]
+    assert (paths.get_xlabel(), paths.get_ylabel()) == ("x", "y")

@@ -11,6 +11,7 @@ from support import compiled, tool
 import phigen
 from phigen import spec
 from phigen.compiler import compile_spec
+from phigen.lattice.observing import summed
 from phigen.lattice.states import start_of
 from phigen.report.panel import panel_page
 from phigen.study.classical import rk4
@@ -269,7 +270,26 @@ casimirs: {C: x**2 + y**2 + z**2}
 runs: {r: {sizes: [6], initial: {x: cos(i), y: sin(i), z: 0}, step: 0.1, steps: 10, start: 0.5}}
 """
 #: A chain whose start is a formula, a plane with open ends, a cube, a graph with lists, vortices of both signs.
+#: A ring of named sites with an invariant, and with observables of bonds and of sites.
+NAMED = """\
+phigen: 1
+name: named
+lattice: {graph: bonds}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: {sites: p**2/2, bonds: "(q[a] - q[b])**2/2 + (q[a] - q[b])**4/4"}
+invariants: {P: p}
+observables: {T: {mean: p**2/2}, e: p**2/2, far: {max: "abs(q[a] - q[b])", over: bonds}}
+runs:
+  r:
+    initial: {q: [0.1, 0.8, -0.3, 0.5], p: [0.3, 0, 0, 0]}
+    bonds: [[0, 1], [1, 2], [2, 3], [3, 0]]
+    names: [north, east, south, "<b>west"]
+    step: 0.1
+    steps: 20
+"""
 LATTICE_PANELS = {n: LATTICES[n] for n in ("fput", "spins_2", "spins_3", "food_web", "vortices")} | {"driven": DRIVEN}
+LATTICE_PANELS["named"] = NAMED
 COLOURS = (
     "{const c = document.getElementById('live-ours'), pen = c.getContext('2d');"
     "new Set(new Uint32Array(pen.getImageData(0, 0, c.width, c.height).data.buffer)).size}"
@@ -320,7 +340,19 @@ def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name
     if given.casimirs:
         first, last = ((s**2).sum(axis=0) for s in (begin, x))
         errors.append(np.abs(last - first).max() / first.mean())
-    assert told(browser, "theirs")["errors"] == pytest.approx(errors, rel=1e-6, abs=1e-15)
+    cell, changes = compile_spec(given).by_sweeps().cell, []
+    for density in cell.invariants.values():
+        (first, terms), (last, _) = (summed(cell, density, state, start.parameters) for state in (begin, x))
+        changes.append(abs(last - first) / (abs(first) if abs(first) > 1e-3 * terms else terms))
+    for side, state in (("ours", made.x[-1]), ("theirs", x)):
+        times = {"t": float(at[-1])} if given.time else {}
+        observed = solver.observables(state, parameters=start.arguments, **times)
+        expected = [observed[n] for n in given.recorded]
+        assert told(browser, side)["observed"] == pytest.approx(expected, rel=1e-10, abs=1e-12)
+    shown = told(browser, "theirs")["errors"]
+    assert shown[: len(errors)] == pytest.approx(errors, rel=1e-6, abs=1e-15)
+    # sums over sites of both signs, in another order
+    assert shown[len(errors) :] == pytest.approx([max(changes)] if changes else [], rel=1e-6, abs=1e-13)
     assert browser.value(COLOURS) > 8
     assert browser.complaints == []
 
