@@ -1,15 +1,15 @@
 """Kernels of a Gauss step: the vector field of a stage, the increment of x, and the change of frame.
 
-The unknowns are offsets, 0 at the start of the step: x − x_start of a plain coordinate, t − t_start of the time, G −
-1 of a group element. So small steps lose no digits.
+The unknowns are offsets, 0 at the start of the step: x − x_start of a plain coordinate, t − t_start of the time,
+log x − log x_start of a coordinate with a logarithm, G − 1 of a group element. So small steps lose no digits.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from phigen.gauss.realisation import AlgebraBlock, Realisation
+from phigen.gauss.realisation import AlgebraBlock, Plain, Realisation
 from phigen.gauss.star_algebra import StarAlgebra, Vector, combined
 from phigen.geometry.field import Scalar
 from phigen.geometry.system import System, hamiltonian_vector_field
@@ -19,6 +19,7 @@ from phigen.symbolic.expression import (
     ONE,
     ZERO,
     Expression,
+    call,
     fold,
     gradient,
     number,
@@ -41,17 +42,24 @@ class StageMap:
     """Points as expressions in the start of the step and the unknowns.
 
     ``unknowns`` are symbols, and ``change`` is x − x_start by coordinates. The first ``plain`` unknowns are offsets
-    of the coordinates with the indices ``moved``. Then come the offset of the time, if there is one, and those of
-    group elements.
+    of the coordinates with the indices ``moved``. Then come the offset of the time, if there is one, those of the
+    logarithms of the coordinates ``scaled``, and those of group elements.
     """
 
     system: System
     realisation: Realisation
     unknowns: tuple[str, ...]
     moved: tuple[int, ...]
+    scaled: tuple[int, ...]
     starts: tuple[int, ...]  # the first unknown of each group
     change: tuple[Expression, ...] = field(default=())
     pace: Expression = ONE  # the factor of ∇H + ζ: g with a monitor and forces
+
+    @property
+    def logarithms(self) -> dict[int, Expression]:
+        """The unknowns that are offsets of logarithms, by their coordinates."""
+        first = len(self.moved) + len(self.system.times)
+        return {i: symbol(self.unknowns[first + k]) for k, i in enumerate(self.scaled)}
 
     @property
     def start(self) -> tuple[str, ...]:
@@ -61,12 +69,13 @@ class StageMap:
 
 def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) -> StageMap:
     """Return the points of a system in terms of the unknowns of a step; ``pace`` multiplies ∇H and covector forces."""
-    plain = tuple(i for part in realisation.parts if not isinstance(part, AlgebraBlock) for i in part.indices)
+    plain = tuple(i for part in realisation.parts if isinstance(part, Plain) for i in part.indices)
+    scaled = tuple(i for part in realisation.logarithms for i in part.indices)
     if realisation.exact:
         plain = tuple(i for i in plain if any(not e.is_zero for e in system.poisson[i]))
-    if not (plain or realisation.groups or system.times):
+    if not (plain or scaled or realisation.groups or system.times):
         plain = (0,)  # all brackets are zero; arrays in C have at least one entry
-    count = len(plain) + len(system.times)
+    count = len(plain) + len(system.times) + len(scaled)
     starts = []
     for group in realisation.groups:
         starts.append(count)
@@ -75,11 +84,14 @@ def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) 
     change = [ZERO] * system.dimension
     for k, i in enumerate(plain):
         change[i] = symbol(unknowns[k])
+    points = StageMap(system, realisation, unknowns, plain, scaled, tuple(starts), pace=pace)
+    for i, offset in points.logarithms.items():
+        change[i] = symbol(system.coordinates[i]) * call("expm1", offset)
     for group, first in zip(realisation.groups, starts, strict=True):
         offsets = [symbol(s) for s in unknowns[first : first + group.algebra.dimension]]
         for i, value in zip(group.indices, _momentum_change(group, _values(system, group), offsets), strict=False):
             change[i] = value
-    return StageMap(system, realisation, unknowns, plain, tuple(starts), tuple(change), pace)
+    return replace(points, change=tuple(change))
 
 
 def _values(system: System, group: AlgebraBlock) -> list[Expression]:
@@ -201,6 +213,7 @@ def at_unknowns(points: StageMap) -> dict[str, Expression]:
     """Return the coordinates and the time at a stage, in terms of the unknowns."""
     system = points.system
     at = {c: symbol(c) + d for c, d in zip(system.coordinates, points.change, strict=True)}
+    at |= {system.coordinates[i]: symbol(system.coordinates[i]) * call("exp", z) for i, z in points.logarithms.items()}
     for group, first in zip(points.realisation.groups, points.starts, strict=True):
         momenta = _momentum(group, _values(system, group), _group_element(points, group, first))
         for i, value, shift in zip(group.indices, momenta, group.shift, strict=False):
@@ -249,6 +262,8 @@ def vector_field(
         field_ = tuple(a + b for a, b in zip(field_, system.forces.vector, strict=True))
     plain = substitute([field_[i] for i in points.moved], at)
     derivatives = [*(weight * value for value in plain), *(weight for _ in system.times)]
+    relative = [_logarithmic_rate(points, i, slopes) for i in points.scaled]
+    derivatives += [weight * value for value in substitute(relative, at)]
     rates = [-weight * value for value in substitute(slopes, at)]
     for group, first in zip(realisation.groups, points.starts, strict=True):
         # A constant among the basis elements, if there is one, acts as 0: it is central.
@@ -257,6 +272,12 @@ def vector_field(
             velocity = [hold(value) for value in velocity]
         derivatives += _multiplied(group.algebra, _group_element(points, group, first), velocity)
     return derivatives
+
+
+def _logarithmic_rate(points: StageMap, i: int, slopes: Sequence[Expression]) -> Expression:
+    """Return the derivative of log x_i."""
+    rates = [(j, rate) for part in points.realisation.logarithms for (k, j), rate in part.rates.items() if k == i]
+    return total(rate * slopes[j] for j, rate in rates if not slopes[j].is_zero)
 
 
 def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:

@@ -2,23 +2,26 @@
 
 Coordinates with constant brackets are unknowns themselves, since Gauss methods are symplectic. Coordinates with the
 brackets of a Lie algebra are x̃(G ξ G*), where G is a group element, 1 at the start of each step, and the method is
-applied to G (`phigen.gauss.star_algebra`). Gauss methods preserve quadratic first integrals and constant two-forms,
-and commute with linear maps. So the step of G is presymplectic, and the step of x is a Poisson map, exactly, with all
+applied to G (`phigen.gauss.star_algebra`). Coordinates whose logarithms have constant brackets are exponentials of
+unknowns (`phigen.gauss.logarithms`). Gauss methods preserve quadratic first integrals and constant two-forms, and
+commute with linear maps. So the step of G is presymplectic, and the step of x is a Poisson map, exactly, with all
 Casimirs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from phigen.gauss.logarithms import Rates, logarithmic
 from phigen.gauss.matrices import of_matrices
 from phigen.gauss.quaternionic import quaternionic
 from phigen.gauss.star_algebra import StarAlgebra, Vector
+from phigen.geometry.blocks import blocks
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.linear import kernel
 from phigen.geometry.representations import indecomposable_parts, restricted
-from phigen.geometry.shapes import Affine, Canonical, Constant, LiePoisson, Shape
+from phigen.geometry.shapes import Affine, Canonical, Constant, LiePoisson, Matrix, Shape, recognise
 from phigen.geometry.system import System
 from phigen.symbolic.expression import ONE, ZERO, Expression
 
@@ -31,6 +34,17 @@ class Plain:
     """
 
     indices: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class LogarithmicBlock:
+    """Coordinates (indices) whose logarithms are unknowns; brackets of these and of plain coordinates are constant.
+
+    ``rates`` are the brackets of log x_i and x_j, by (i, j).
+    """
+
+    indices: tuple[int, ...]
+    rates: Rates
 
 
 @dataclass(frozen=True)
@@ -47,7 +61,7 @@ class AlgebraBlock:
     central: bool = False
 
 
-Part = Plain | AlgebraBlock
+Part = Plain | LogarithmicBlock | AlgebraBlock
 
 
 @dataclass(frozen=True)
@@ -63,11 +77,17 @@ class Realisation:
         return tuple(part for part in self.parts if isinstance(part, AlgebraBlock))
 
     @property
+    def logarithms(self) -> tuple[LogarithmicBlock, ...]:
+        """The parts whose unknowns are logarithms."""
+        return tuple(part for part in self.parts if isinstance(part, LogarithmicBlock))
+
+    @property
     def label(self) -> str:
         """The kind of the method, for users."""
         if not self.exact:
             return "Gauss collocation, Poisson to truncation only"
-        return "Gauss collocation, collective" if self.groups else "Gauss collocation"
+        kinds = ["collective"] * bool(self.groups) + ["in logarithms"] * bool(self.logarithms)
+        return ", ".join(["Gauss collocation", " and ".join(kinds)] if kinds else ["Gauss collocation"])
 
 
 def direct(system: System) -> Realisation:
@@ -78,22 +98,62 @@ def direct(system: System) -> Realisation:
 
 def collective(system: System) -> Realisation | None:
     """Return a realisation with which the step is a Poisson map, or None if none is known."""
+    parts = _parts(system.coordinates, system.poisson, system.shape)
+    return None if parts is None else Realisation(tuple(_joined(parts)), True)
+
+
+def _parts(coordinates: Sequence[str], poisson: Matrix, shape: Shape) -> list[Part] | None:
+    """Return parts that make the step a Poisson map, or None; a π of no known shape is treated block by block."""
+    everything = tuple(range(len(coordinates)))
+    if isinstance(shape, Constant | Canonical):
+        return [Plain(everything)]
+    rates = logarithmic(coordinates, poisson)
+    if rates is not None:
+        scaled = sorted({i for i, _ in rates})
+        plain = tuple(i for i in everything if i not in scaled)
+        return [*([Plain(plain)] if plain else []), LogarithmicBlock(tuple(scaled), rates)]
     parts: list[Part] = []
-    for indices, algebra, central in _components(system.shape):
+    for indices, algebra, central in _components(shape):
         part = _part(indices, algebra, central=central)
         if part is None:
             return None
         parts.append(part)
-    if not parts:
-        return direct(system) if isinstance(system.shape, Constant | Canonical) else None
-    return Realisation(tuple(_joined(parts)), True)
+    return parts or _parts_of_blocks(coordinates, poisson)
+
+
+def _parts_of_blocks(coordinates: Sequence[str], poisson: Matrix) -> list[Part] | None:
+    """Return the parts of all blocks of π; None if there is one block, or one of them has no parts."""
+    blocks_of_poisson = blocks(coordinates, poisson)
+    if len(blocks_of_poisson) < 2:
+        return None
+    parts: list[Part] = []
+    for block in blocks_of_poisson:
+        names = [coordinates[i] for i in block]
+        entries = tuple(tuple(poisson[i][j] for j in block) for i in block)
+        within = _parts(names, entries, recognise(names, entries))
+        if within is None:
+            return None
+        parts += [_placed(part, block) for part in within]
+    return parts
+
+
+def _placed(part: Part, block: Sequence[int]) -> Part:
+    """Return a part of a block with the indices of its coordinates among all."""
+    indices = tuple(block[i] for i in part.indices)
+    if isinstance(part, LogarithmicBlock):
+        return LogarithmicBlock(indices, {(block[i], block[j]): rate for (i, j), rate in part.rates.items()})
+    return replace(part, indices=indices)
 
 
 def _joined(parts: Sequence[Part]) -> Iterator[Part]:
-    """Yield the parts, with one plain part first."""
+    """Yield the parts: one plain part first, then one of logarithms."""
     plain = [i for part in parts if isinstance(part, Plain) for i in part.indices]
     if plain:
         yield Plain(tuple(sorted(plain)))
+    logarithms = [part for part in parts if isinstance(part, LogarithmicBlock)]
+    if logarithms:
+        indices = sorted(i for part in logarithms for i in part.indices)
+        yield LogarithmicBlock(tuple(indices), {at: rate for part in logarithms for at, rate in part.rates.items()})
     yield from (part for part in parts if isinstance(part, AlgebraBlock))
 
 

@@ -20,6 +20,8 @@ from phigen.symbolic.expression import (
     ZERO,
     Expression,
     gradient,
+    power,
+    product,
     sparse_derivatives,
     substitute,
     symbol,
@@ -79,6 +81,7 @@ def _brackets(system: System, realisation: Realisation) -> Statement:
     grouped = {i: group for group in realisation.groups for i in group.indices}
     for group in realisation.groups:
         expected |= _lie_poisson(system, group)
+    logs = {i for part in realisation.logarithms for i in part.indices}
     residuals = []
     for i in range(n):
         for j in range(i):
@@ -89,8 +92,10 @@ def _brackets(system: System, realisation: Realisation) -> Statement:
             elif i in grouped or j in grouped:
                 residuals.append((label, entry))
             else:
-                residuals += [(label, slope) for slope in gradient(entry, system.coordinates)]
-    name = "brackets are those of Lie algebras, and constant ones"
+                scales = product(symbol(system.coordinates[k]) for k in (i, j) if k in logs)
+                residuals += [(label, slope) for slope in gradient(entry * power(scales, -1), system.coordinates)]
+    named = ", ".join(f"log {system.coordinates[i]}" for i in sorted(logs))
+    name = "brackets are those of Lie algebras, and constant ones" + f", with {named}" * bool(named)
     return decide_zero(name, residuals, system.positive)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from phigen.compilation import CompiledGauss
-from phigen.gauss.realisation import Plain
+from phigen.gauss.realisation import LogarithmicBlock, Plain
 from phigen.symbolic.readable import readable
 
 
@@ -31,6 +31,9 @@ def lines(compilation: CompiledGauss) -> list[str]:
         listed = ", ".join(names[i] for i in part.indices)
         if isinstance(part, Plain):
             listed_lines.append(f"{listed}: themselves")
+            continue
+        if isinstance(part, LogarithmicBlock):
+            listed_lines.append(f"{listed}: their logarithms")
             continue
         shifts = [f"{names[i]} + {readable([s], None)[0]}" for i, s in zip(part.indices, part.shift, strict=True)]
         shown = listed if all(s.is_zero for s in part.shift) else ", ".join(shifts)

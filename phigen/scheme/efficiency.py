@@ -82,7 +82,7 @@ def _newton(program: Program, grown: float) -> float:
 
 def _gauss(program: Program, grown: float) -> float:
     operations, functions = _operations(program)
-    return SWEEPS_OF_STEP + STAGE_OPERATION * grown * (operations + FUNCTION * functions)
+    return SWEEPS_OF_STEP + STAGE_OPERATION * grown * (operations + FUNCTION / OPERATION * functions)
 
 
 def _path(program: Program, grown: float) -> float:

@@ -15,7 +15,7 @@ from phigen.gauss.kernels import (
     stage_map,
     vector_field,
 )
-from phigen.gauss.realisation import Realisation, collective, direct
+from phigen.gauss.realisation import Plain, Realisation, collective, direct
 from phigen.gauss.tableau import MOST_STAGES, tableau
 from phigen.geometry.system import System
 from phigen.scheme.adjoint import completed, gauss_adjoint, level_adjoint
@@ -84,9 +84,10 @@ def realise_gauss(spec: Spec, system: System) -> Realisation:
         message = f"scheme gauss: no exact Poisson map is known for this bracket ({system.shape})"
         place = ("structure",) if ("structure",) in spec.locations else ("scheme",)
         raise SpecError([spec.diagnostic(place, message, TRUNCATION_HINT)])
-    pushed = [system.coordinates[i] for g in realisation.groups for i in g.indices if _is_pushed(system, i)]
+    bound = [i for part in realisation.parts if not isinstance(part, Plain) for i in part.indices]
+    pushed = [system.coordinates[i] for i in bound if _is_pushed(system, i)]
     if pushed:
-        message = f"scheme gauss: a vector force on {', '.join(pushed)} leaves the coadjoint orbits"
+        message = f"scheme gauss: a vector force on {', '.join(pushed)} leaves the symplectic leaves"
         raise SpecError([spec.diagnostic(("forces",), message, "structure: to truncation, or scheme: series")])
     return realisation
 
@@ -190,6 +191,9 @@ def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge,
     elif realisation.groups:
         listed = "; ".join(", ".join(system.coordinates[i] for i in g.indices) for g in realisation.groups)
         yield f"structure: exact; quadratic momentum maps for {listed}"
+    elif realisation.logarithms:
+        listed = ", ".join(system.coordinates[i] for part in realisation.logarithms for i in part.indices)
+        yield f"structure: exact, as brackets are constant with the logarithms of {listed}"
     else:
         yield "structure: exact, as the brackets are constant"
     yield from gauge.facts

@@ -223,7 +223,8 @@ def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:
     drawn = _acted_upon(source, drawn, scheme, weight)
     drawn = replace(drawn, options=_options(source, drawn, scheme))
     drawn = _with_exact_flows(random.Random(f"flows {seed} {attempt}"), _extras(source, drawn))
-    return _collocated(random.Random(f"gauss {seed} {attempt}"), drawn)
+    drawn = _collocated(random.Random(f"gauss {seed} {attempt}"), drawn)
+    return _chosen(random.Random(f"auto {seed} {attempt}"), drawn)
 
 
 def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:
@@ -440,6 +441,14 @@ def _extras(source: random.Random, drawn: Ordinary) -> Ordinary:
             else:
                 asked[name] = True
     return replace(drawn, options=options, asked=asked)
+
+
+def _chosen(source: random.Random, drawn: Ordinary) -> Ordinary:
+    """The system, now and then with the scheme left to the compiler."""
+    scheme = drawn.options.get("scheme", "series")
+    if source.random() > 0.1 or "structure" in drawn.options or drawn.monitor == "log" or scheme == "splitting":
+        return drawn
+    return replace(drawn, options={**drawn.options, "scheme": "auto"})
 
 
 #: Options of other schemes.

@@ -46,6 +46,7 @@ KINDS = {
     "mixed": (MIXED, 4, [0.4, -0.8, 0.5, 0.3, 0.7]),
     "scaled": (SCALED, 6, [0.3, -0.2, 0.4]),
     "driven": (DRIVEN, 12, [0.4, 0.3]),
+    "logarithms": (SPECIES.replace("structure: to truncation\n", ""), 6, [0.9, 1.2, 0.7]),
     "species": (SPECIES, 10, [0.9, 1.2, 0.7]),
     "monitored": (MONITORED, 8, [1.1, 0.2, 0.1, 0.8]),
 }

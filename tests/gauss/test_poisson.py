@@ -10,10 +10,10 @@ from phigen.compiler import compile_spec, examine
 from phigen.errors import SpecError
 from phigen.spec import loads
 
-#: Each kind of algebra: so(3), se(3), two so(3), so(3) ⋉ 2R³, solvable, nilpotent, affine, direct sums, constant.
+#: Each kind of algebra: so(3), se(3), two so(3), so(3) ⋉ 2R³, nilpotent, affine, direct sums, constant; by logarithms.
 EXACT = (
     "rigid_body", "kowalevski_gauss", "so4_manakov", "satellite", "toda3", "engel_geodesics", "maxwell_bloch",
-    "spin_chain5", "henon_heiles",
+    "spin_chain5", "henon_heiles", "volterra5",
 )  # fmt: skip
 
 MIXED = """coordinates: [x, y, z, q, p]
@@ -31,7 +31,15 @@ poisson: {brackets: {n: {q: p, p: -q}, q: {p: 1}}}
 hamiltonian: n**2/2 + q**3/5 + n*p/3
 casimirs: {C: n + (q**2 + p**2)/2}
 """
+#: Logarithms beside constant brackets and so(3); one of the coordinates is negative, and one is 0.
+LOGARITHMS = """coordinates: [x, y, n, w, u, q, p, a, b, c]
+poisson:
+  brackets: {x: {y: x*y, n: x*n/3}, y: {n: y*n}, w: {u: -w}, q: {p: 1}, a: {b: -c, c: b}, b: {c: -a}}
+hamiltonian: >-
+  x - log(x) - y - log(-y) + n + u**2/2 + w - log(w) + p**2/2 + q**2/2 + a**2/2 + b**2/4 + c**2/6 + (a + x)*q/5
+"""
 STARTS = {
+    "logarithms": (LOGARITHMS, [0.4, -0.8, 0.0, 0.6, 0.3, 0.7, 0.2, 0.5, -0.4, 0.6]),
     "mixed": (MIXED, [0.4, -0.8, 0.5, 0.3, 0.7]),
     "shifted": (SHIFTED, [0.4, -0.8, 0.5]),
     "oscillator": (OSCILLATOR, [0.4, -0.8, 0.5]),
@@ -154,14 +162,31 @@ def test_order_is_that_of_the_method(order):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.25)
 
 
+def test_signs_stay_and_zeros_stay_with_logarithms():
+    text, start = STARTS["logarithms"]
+    run = of(loads(f"phigen: 1\nname: t\n{text}scheme: gauss\n"), 4).integrate(start, 0.1, 50)
+    assert np.all(run.x[:, 0] > 0)
+    assert np.all(run.x[:, 1] < 0)
+    assert np.all(run.x[:, 2] == 0)
+    assert np.ptp(run.x[:, 0]) > 0.1
+
+
+def test_check_proves_that_brackets_of_logarithms_are_constant():
+    spec = replace(spec_of("volterra5"), scheme="gauss", composition="auto")
+    statements = examine(spec).groups["Gauss collocation, in logarithms"]
+    assert any("log v1" in s.name and s.verdict == "proved" for s in statements)
+
+
 def test_check_proves_what_a_step_is():
     statements = examine(spec_of("kowalevski_gauss")).groups["Gauss collocation, collective"]
     assert {s.verdict for s in statements} == {"proved", "checked numerically"}
     assert any("quadratic momentum map" in s.name and s.verdict == "proved" for s in statements)
 
 
+#: A bracket that is neither constant, nor linear, nor so in logarithms.
+CURVED = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: x*y + z**2}}}\nhamiltonian: x**2 + y**2\n"
 REFUSED = {
-    "structure": (f"{SPECIES}scheme: gauss\n", "no exact Poisson map is known", "to truncation"),
+    "structure": (f"{CURVED}scheme: gauss\n", "no exact Poisson map is known", "to truncation"),
     "noise": (f"{BODY}noise: {{w: {{hamiltonian: x1}}}}\nscheme: gauss\n", "not with noise", "series"),
     "monitor": (f"{BODY}monitor: log\nscheme: gauss\n", "log needs H = A + B split in two", "splitting"),
     "modified": (f"{BODY}modified_hamiltonian: 1\nscheme: gauss\n", "belongs to scheme: series", "remove"),

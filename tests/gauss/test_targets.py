@@ -44,7 +44,7 @@ def ends(compilation, x0, h, **more):
 
 @pytest.mark.thin(3)
 @pytest.mark.parametrize(
-    ("name", "order"), [("rigid_body", 6), ("so4_manakov", 16), ("toda3", 2), ("henon_heiles", 10)]
+    ("name", "order"), [("rigid_body", 6), ("so4_manakov", 16), ("toda3", 2), ("volterra5", 12), ("henon_heiles", 10)]
 )
 def test_targets_are_equal_to_rounding(name, order):
     compilation = compiled(name, order, "gauss")

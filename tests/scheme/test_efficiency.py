@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from support import BODY, SPECIES, compile_text, slow_but, spec_of
+from support import BODY, compile_text, slow_but, spec_of
 
 from phigen.compiler import compile_spec
 from phigen.errors import SpecError
@@ -54,8 +54,9 @@ def test_options_of_the_series_choose_it(option):
 
 
 def test_schemes_that_do_not_apply_are_left_out():
-    """No exact Gauss method is known for a log-canonical bracket; and none of the three takes this one."""
-    compilation = compile_text(f"{SPECIES}scheme: auto\n", 4)
+    """No exact Gauss method is known for the first bracket; and none of the three takes the second spec."""
+    curved = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: x*y + z**2}}}\nhamiltonian: x**2 + y**2\n"
+    compilation = compile_text(f"{curved}scheme: auto\n", 4)
     assert "gauss does not apply" in compilation.choice
     text = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: z}}}\nhamiltonian: x**2 + exp(y*x) + sin(x*z*y)\n"
     spec = loads(f"phigen: 1\nname: t\n{text}scheme: auto\ncomposition: suzuki\nmonitor: log\n")

@@ -1,0 +1,44 @@
+"""Brackets that are constant in the logarithms of some coordinates: log-canonical ones, those of Toda chains.
+
+If {x_i, x_j} = c_ij x_i^e_i x_j^e_j with constant c_ij and e_i = 0 or 1, the brackets of the log |x_i| with e_i = 1,
+and of the other x_i, are constant. A Gauss method with these as its unknowns is a Poisson map. A step multiplies x_i by
+the exponential of an increment: signs stay, and 0 stays 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phigen.geometry.shapes import Matrix, coordinate_terms
+from phigen.symbolic.expression import Expression, symbol
+
+#: Brackets divided by coordinates: {x_i, x_j}/x_i by the pair (i, j).
+Rates = dict[tuple[int, int], Expression]
+
+
+def logarithmic(coordinates: Sequence[str], poisson: Matrix) -> Rates | None:
+    """Return {log x_i, x_j} by (i, j), for all x_i whose logarithms make brackets constant; None if none do so."""
+    pairs = [(i, j) for i, row in enumerate(poisson) for j in range(i) if not row[j].is_zero]
+    terms = coordinate_terms(coordinates, [poisson[i][j] for i, j in pairs])
+    if terms is None:
+        return None
+    exponents: dict[int, int] = {}
+    factors: dict[tuple[int, int], Expression] = {}
+    for (i, j), monomials in zip(pairs, terms, strict=True):
+        if not monomials:
+            continue
+        if len(monomials) > 1:
+            return None
+        ((powers, factor),) = monomials.items()
+        if any(k not in (i, j) and power for k, power in enumerate(powers)):
+            return None
+        if any(powers[k] > 1 or exponents.setdefault(k, powers[k]) != powers[k] for k in (i, j)):
+            return None
+        factors[i, j], factors[j, i] = factor, -factor
+    if not any(exponents.values()):
+        return None
+    return {
+        (i, j): factor * symbol(coordinates[j]) if exponents[j] else factor
+        for (i, j), factor in factors.items()
+        if exponents[i]
+    }
