@@ -96,6 +96,17 @@ composition: yoshida
 runs: {a: {initial: [1, 0], step: 0.1, steps: 10, average: {after: 0.2, blocks: 2}}}
 sweeps: {s: {over: {step: [0.1, 0.2]}, keep: [final, energy_error, mean(A)]}}
 """,
+    "bodies": """\
+phigen: 1
+name: binary
+coordinates: [x0, y0, x1, y1, u0, v0, u1, v1]
+parameters: {G: 1, m0: {value: 3, positive: true}, m1: {value: 0.1, positive: true}}
+poisson: {canonical: {q: [x0, y0, x1, y1], p: [u0, v0, u1, v1]}}
+hamiltonian: (u0**2 + v0**2)/(2*m0) + (u1**2 + v1**2)/(2*m1) - G*m0*m1/sqrt((x0 - x1)**2 + (y0 - y1)**2)
+scheme: splitting
+coordinates_from: jacobi
+order: 2
+""",
     "rigid": """\
 phigen: 1
 name: rigid
