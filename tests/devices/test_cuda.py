@@ -10,9 +10,9 @@ from phigen.compiler import emit
 pytestmark = pytest.mark.skipif(not nvrtc.is_installed(), reason="the wheels of NVRTC and ptxas are not installed")
 
 
-def resources_of(name, architecture, folder):
+def resources_of(name, architecture, folder, order=None):
     """The resources of the kernel of ensembles."""
-    (text,) = emit(compilation_of(name, profile="small").program, "device", COMMAND).values()
+    (text,) = emit(compilation_of(name, order=order, profile="small").program, "device", COMMAND).values()
     compiled = nvrtc.assembled(nvrtc.ptx(text, architecture), architecture, folder)
     return compiled[f"{name}_ensemble_kernel"]
 
@@ -30,3 +30,15 @@ def resources_of(name, architecture, folder):
 )
 def test_code_compiles_for_two_generations_of_cards(name, architecture, tmp_path):
     assert 0 < resources_of(name, architecture, tmp_path).registers <= 255
+
+
+SMALL = ("rigid_body", "kepler", "henon_heiles", "toda3", "lotka_volterra")
+
+
+@pytest.mark.parametrize("architecture", nvrtc.ARCHITECTURES)
+@pytest.mark.parametrize("name", [n if n == "henon_heiles" else pytest.param(n, marks=pytest.mark.slow) for n in SMALL])
+def test_small_systems_stay_in_registers(name, architecture, tmp_path):
+    """No spills, and no stack but that of the tangent of large arguments."""
+    used = resources_of(name, architecture, tmp_path, order=4)
+    assert used.spilled == 0
+    assert used.stack <= 64

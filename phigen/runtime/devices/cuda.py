@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from phigen.errors import DeviceError, MissingPackageError
-from phigen.runtime.devices.device import GROUP_SIZE, OutOfMemoryError, choose
+from phigen.runtime.devices.device import OutOfMemoryError, choose
 from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
@@ -33,10 +33,11 @@ class CUDADevice:
     def __repr__(self) -> str:
         return f"<CUDA device: {self.name}, {self.memory >> 20} MiB>"
 
-    def compiled(self, text: str) -> Any:
+    def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
         """See `phigen.runtime.devices.device.Device`."""
+        options = (*_OPTIONS, *(f"-D{name}={value}" for name, value in defined.items()))
         with self._cupy.cuda.Device(self._index):
-            module = self._cupy.RawModule(code=text, options=_OPTIONS)
+            module = self._cupy.RawModule(code=text, options=options)
             try:
                 module.compile()
             except self._cupy.cuda.compiler.CompileException as error:
@@ -61,8 +62,9 @@ class CUDADevice:
         if array.nbytes:
             self._tried(lambda: buffer[: array.nbytes].get(out=array.view(np.uint8).reshape(-1)))
 
-    def launch(self, kernel: Any, items: int, arguments: Sequence[Any], group: int = GROUP_SIZE) -> None:
+    def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
         """See `phigen.runtime.devices.device.Device`."""
+        group = kernel.max_threads_per_block  # that of the launch bounds
         passed = tuple(np.uint64(0) if argument is None else argument for argument in arguments)  # a null pointer
         self._tried(lambda: kernel((-(-items // group),), (group,), passed))
 

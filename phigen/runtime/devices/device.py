@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from phigen.errors import DeviceError
 
 #: Environment variable that chooses a device: its number, or a part of its name.
 CHOICE = "PHIGEN_DEVICE"
-
-#: Work items of a group. Results do not depend on it.
-GROUP_SIZE = 64
 
 
 class OutOfMemoryError(Exception):
@@ -33,8 +30,11 @@ class Device(Protocol):
     units: int  # compute units, each of which runs many work items
     double: bool  # whether it has numbers in double precision
 
-    def compiled(self, text: str) -> Any:
-        """Return the program of a source text. Raises `DeviceError` with the messages of the compiler."""
+    def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
+        """Return the program of a source text, with macros that are ``defined``.
+
+        Raises `DeviceError` with the messages of the compiler.
+        """
         ...
 
     def kernel(self, program: Any, name: str) -> Any:
@@ -53,8 +53,8 @@ class Device(Protocol):
         """Wait for all that was launched, and copy a buffer into a contiguous array."""
         ...
 
-    def launch(self, kernel: Any, items: int, arguments: Sequence[Any], group: int = GROUP_SIZE) -> None:
-        """Run a kernel for a number of work items."""
+    def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
+        """Run a kernel for at least a number of work items, in groups of the size that it is compiled for."""
         ...
 
 

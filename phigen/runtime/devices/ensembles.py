@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from phigen.errors import DeviceError
 from phigen.runtime.backend import Backend
-from phigen.runtime.devices.device import GROUP_SIZE, Device, OutOfMemoryError
+from phigen.runtime.devices.device import Device, OutOfMemoryError
 from phigen.runtime.devices.loading import backend, device_of
 from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface, status_name
 from phigen.runtime.members import Members
@@ -32,10 +32,9 @@ _MEMBERS_PER_UNIT = 2048
 class DeviceSolver:
     """Back end over a generated header for devices, and over a back end for the host.
 
-    ``group_size`` is the number of work items in a group, on which results do not depend.
+    ``defined`` are macros of the generated code: NAME_GROUP, the number of work items in a group, on which results do
+    not depend.
     """
-
-    group_size = GROUP_SIZE
 
     def __init__(
         self,
@@ -47,6 +46,7 @@ class DeviceSolver:
     ) -> None:
         self.interface, self.target = interface, target
         self._files, self._host, self._gauge = dict(files), host, gauge
+        self.defined: dict[str, int] = {}
         self._real: Any = np.float32 if interface.single else np.float64
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
@@ -88,7 +88,7 @@ class DeviceSolver:
                 self._integrate(members.part(part), final[part], status[part], frames, part)
                 done = part.stop
             except OutOfMemoryError as error:
-                if batch <= self.group_size:
+                if batch == 1:
                     raise self._failure(
                         f"too little memory for {batch} members: {error}", final, frames, done
                     ) from None
@@ -140,7 +140,7 @@ class DeviceSolver:
             first = np.uint32(members.paths[0])
             arguments += [np.uint64(members.draws.seed), first, np.uint64(members.draws.step)]
         arguments += [np.uint64(max(1, members.stride)), out, ended]
-        device.launch(self._kernel, count, arguments, self.group_size)
+        device.launch(self._kernel, count, arguments)
         device.read(ended, status)
         device.read(states, x)
         final[:] = x.T
@@ -152,7 +152,7 @@ class DeviceSolver:
     @cached_property
     def _kernel(self) -> Any:
         name = self.interface.name
-        program = self.device.compiled(self._files[f"{name}_device.h"])
+        program = self.device.compiled(self._files[f"{name}_device.h"], self.defined)
         return self.device.kernel(program, f"{name}_ensemble_kernel")
 
     @cached_property

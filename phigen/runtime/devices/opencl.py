@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from phigen.errors import DeviceError, MissingPackageError
-from phigen.runtime.devices.device import GROUP_SIZE, OutOfMemoryError, choose
+from phigen.runtime.devices.device import OutOfMemoryError, choose
 from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
@@ -37,12 +37,13 @@ class OpenCLDevice:
     def __repr__(self) -> str:
         return f"<OpenCL device: {self.name}, {self.memory >> 20} MiB>"
 
-    def compiled(self, text: str) -> Any:
+    def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
         """See `phigen.runtime.devices.device.Device`."""
+        options = [*_OPTIONS, *(f"-D{name}={value}" for name, value in defined.items())]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # logs of successful compilations
             try:
-                return self._cl.Program(self._context, text).build(options=_OPTIONS)
+                return self._cl.Program(self._context, text).build(options=options)
             except self._cl.Error as error:
                 raise DeviceError(f"{self.name}: the driver refuses the generated code\n{error}") from error
 
@@ -64,9 +65,9 @@ class OpenCLDevice:
         if array.nbytes:
             self._tried(lambda: self._cl.enqueue_copy(self._queue, array, buffer))
 
-    def launch(self, kernel: Any, items: int, arguments: Sequence[Any], group: int = GROUP_SIZE) -> None:
+    def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
         """See `phigen.runtime.devices.device.Device`."""
-        size = min(group, kernel.get_work_group_info(self._cl.kernel_work_group_info.WORK_GROUP_SIZE, self._device))
+        size = kernel.get_work_group_info(self._cl.kernel_work_group_info.COMPILE_WORK_GROUP_SIZE, self._device)[0]
         self._tried(lambda: kernel(self._queue, (-(-items // size) * size,), (size,), *arguments))
 
     @property

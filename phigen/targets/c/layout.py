@@ -50,6 +50,9 @@ def _lines(lines: list[str]) -> Iterator[str]:
         block, k = lines[k : end + 1], end + 1
         if max(map(len, block)) <= WIDTH:
             yield from block
+        elif block[0].startswith("#") and "/*" not in block[0]:
+            *first, last = textwrap.wrap(block[0], WIDTH - 2, subsequent_indent="    ", break_on_hyphens=False)
+            yield from (*(f"{line} \\" for line in first), last)
         elif block[-1].endswith("*/") and block[0].lstrip().startswith("/*"):
             yield from comment(" ".join(line.strip() for line in block), _indent(block[0]))
         else:

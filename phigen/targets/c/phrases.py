@@ -65,6 +65,7 @@ STAGES = Choice(
         "FRACTION(h)": ("phi_fractions[stage] * h", "h"),
         "AT_FIRST(pointer)": ("stage == 0 ? pointer : NULL", "pointer"),
         "PER_STAGE": ("/ (double)PHI_STAGES", ""),
+        "LENT_BEFORE": ("stage * PHI_DIFFERENCES * PHI_DIM", "0"),
         "STAGE_OF_LANE": ("PHI_STAGES * lane + stage", "lane"),
         "AND_STAGES": (", PHI_STAGES", ""),
         "AND_INT_STAGES": (", int stages", ""),
@@ -129,7 +130,7 @@ GAUGE = Choice(
     {
         "AND_GAUGE(gauge)": (", gauge", ""),
         "CHOOSE_GAUGE(s)": ("if (gauge == NULL) phi_choose_gauge(&s.params, s.x, s.gauge);", ""),
-        "TAKE_GAUGE(s)": ("else memcpy(s.gauge, gauge, sizeof s.gauge);", ""),
+        "TAKE_GAUGE(s)": ("else PHI_COPY(s.gauge, gauge, s.gauge, PHI_GAUGES);", ""),
         "ASK_FOR_GAUGE(s)": ("if (!phi_finite(s.gauge, PHI_GAUGES)) return PHI_BAD_ARGUMENT;", ""),
         "AND_GAUGE_OF(all, m)": (", all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL", ""),
         "COPY_GAUGE(to, from)": ("memcpy(to, from, sizeof to);", ""),
@@ -542,6 +543,7 @@ MEMORY = Choice(
         "CLEAR_STAGES(z)": ("phi_clear(z[0], PHI_UNKNOWNS * PHI_WIDTH)", "memset(z, 0, sizeof z)"),
         "CLEAR_STAGE(array)": ("phi_clear(array, PHI_WIDTH)", "memset(array, 0, sizeof array)"),
         "TAKE_INCREMENTS(to, from)": ("phi_copy(to, from, PHI_DRAWS)", "memmove(to, from, sizeof to)"),
+        "UNROLL": ("phi_UNROLL", ""),
         "LOCAL_TABLE": ("const", "static const"),
         "TABLE": ("PHI_TABLE_POINTER", "const"),
         "FORGET(history)": (
@@ -576,6 +578,15 @@ DEVICE_NOISE = Choice(
     "The random numbers of a member on a device.",
     ("NOISE",),
     {"SET_NOISE(s)": ("phi_set_noise(s, seed, first_member + (uint32_t)m, first_step);", "")},
+)
+
+DEVICE_MEMORY = Choice(
+    "Shared memory of a device that the predictors of a work item use.",
+    ("GUESSED && !GAUSS",),
+    {
+        "LENT_MEMORY": ("PHI_SHARED_ARRAY double memory[PHI_LENT * PHI_GROUP];", ""),
+        "LEND(s)": ("phi_lend(s, memory);", ""),
+    },
 )
 
 DEVICE_PREDICTOR = Choice(
@@ -634,6 +645,7 @@ ALL = (
     MEMORY,
     DEVICE_STARTS,
     DEVICE_NOISE,
+    DEVICE_MEMORY,
     DEVICE_PREDICTOR,
 )
 

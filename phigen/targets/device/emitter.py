@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from phigen.errors import Diagnostic, SpecError
+from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import Program
 from phigen.targets.c import emitter as c
 from phigen.targets.c.amalgamation import Amalgam
@@ -55,10 +56,28 @@ def for_devices(program: Program) -> Program:
     return replace(program, step=step, extras=extras, modified=None, attitude=None, lanes=False, profile="small")
 
 
+#: Bytes of shared memory of a group on all cards, and of predictors for a coordinate of a stage.
+_SHARED, _OF_PREDICTOR = 48 * 1024, 8 * PredictorPolicy().differences
+
+#: Numbers of work items in a group, the largest first: 128 hide the time that memory takes better than 256 do where
+#: each has many registers.
+_GROUPS = (128, 64, 32, 16, 8, 4, 2, 1)
+
+
+def group_size(program: Program) -> int:
+    """Return the largest number of work items in a group whose predictors fit into shared memory."""
+    if not program.step.kind.predicted or program.step.kind.collocates or program.noise:
+        return _GROUPS[0]
+    of_item = _OF_PREDICTOR * program.dimension * len(program.fractions)
+    return next((size for size in _GROUPS if size * of_item <= _SHARED), _GROUPS[-1])
+
+
 def text_of_device(program: Program) -> str:
     """Return the text of a file but its first comment."""
     has = switches(program, None) | {"DEVICE": True, "KICKED": False}
-    language = render("c", "device_language.h", {"NAME": program.name, "double": not program.single})
+    language = render(
+        "c", "device_language.h", {"NAME": program.name, "double": not program.single, "group": group_size(program)}
+    )
     texts = {"device_language.h": language} | text_of(program).texts(program, program.step, None, has)
     declarations = render("c", "device_declarations.h", c.declared_values(program, None, has))
     texts |= {"device_declarations.h": declarations, "model.h": c.model(program, None, has, texts.values())}

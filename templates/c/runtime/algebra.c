@@ -6,11 +6,8 @@
 #include "model.h"
 
 PHI_CHAPTER_OF_ALGEBRA
-static int phi_finite(const double *values, int count)
-{
-    while (count > 0 && isfinite(values[count - 1])) --count;
-    return count == 0;
-}
+#include "finite.c"
+#include "device_finite.c"
 
 /* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the change,
    corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */

@@ -2,6 +2,7 @@
 #define PHI_FILE_DEVICE_ENSEMBLE
 #include "device_solver.c"
 #include "device_gauge.c"
+#include "device_lent.c"
 
 /* ---- The kernel of ensembles ---- */
 /* Each work item integrates one member; work items beyond members do nothing, so that any size of work groups or blocks
@@ -27,6 +28,7 @@ PHI_KERNEL void phi_ensemble_kernel(uint64_t members, PHI_GLOBAL const phi_param
 {
     const uint64_t m = PHI_WORK_ITEM;
     phi_solver s;
+    PHI_LENT_MEMORY
     double start[PHI_DIM];
     if (m >= members) return;
     for (int i = 0; i < PHI_DIM; ++i) start[i] = x[i * members + m];
@@ -35,6 +37,7 @@ PHI_KERNEL void phi_ensemble_kernel(uint64_t members, PHI_GLOBAL const phi_param
     phi_status ended = PHI_INIT_OWN(&s, &member, start, t0[own_start ? m : 0], level);
     const int begun = ended == PHI_OK;
     PHI_SET_NOISE(&s)
+    PHI_LEND(&s)
     uint64_t done = 0;
     PHI_NO_UNROLL
     do {

@@ -3,6 +3,10 @@
 #include "model.h"
 #include "predictor_policy.h"
 
+/* The place of entry i of difference k among those of the work items of a group. */
+static int phi_place_of(int k, int i) { return (k * PHI_DIM + i) * PHI_GROUP; }
+
+
 /* All loops have constant bounds, and selections in place of branches, so that a compiler can keep all values in
    registers. */
 
@@ -15,9 +19,9 @@ static int phi_predict(const phi_history *history, double value[PHI_DIM])
     for (int i = 0; i < PHI_DIM; ++i) {
         value[i] = 0.0;
         PHI_UNROLL
-        for (int k = 0; k < PHI_DIFFERENCES; ++k) value[i] = k < history->order ? value[i] + history->difference[k][i] : value[i];
-        distance += fabs(value[i] - history->difference[0][i]);
-        size += fabs(history->difference[0][i]);
+        for (int k = 0; k < PHI_DIFFERENCES; ++k) value[i] = k < history->order ? value[i] + history->difference[phi_place_of(k, i)] : value[i];
+        distance += fabs(value[i] - history->difference[phi_place_of(0, i)]);
+        size += fabs(history->difference[phi_place_of(0, i)]);
     }
     return history->order > 0 && distance <= PHI_REACH * size;
 }
@@ -33,8 +37,8 @@ static void phi_remember(phi_history *history, const double value[PHI_DIM])
         double size = 0.0;
         PHI_UNROLL
         for (int i = 0; i < PHI_DIM; ++i) {
-            const double last = history->difference[k][i];
-            history->difference[k][i] = known ? next[i] : last;
+            const double last = history->difference[phi_place_of(k, i)];
+            history->difference[phi_place_of(k, i)] = known ? next[i] : last;
             size += fabs(next[i]);
             next[i] -= last;
         }
