@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from phigen.api import interface_of
 from phigen.errors import SpecError
-from phigen.targets.c.kernels import members
+from phigen.targets.c.language import members
 from phigen.targets.header import plain, sealed
 from phigen.targets.rendering import render
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from phigen.fmu.variables import Variable, first_numbers, first_run
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.emitter import runtime_of
-from phigen.targets.c.kernels import members
+from phigen.targets.c.language import members
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.single import literal
 from phigen.targets.header import sealed

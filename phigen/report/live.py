@@ -14,11 +14,10 @@ from phigen.drawing.groups import Group, groups
 from phigen.errors import PhigenError
 from phigen.geometry.system import System
 from phigen.report import page
-from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.lowering import assign, expand_powers
 from phigen.spec.model import NO_EXTRAS, Extras, Parameter, Run, Spec
 from phigen.study.conservation import ENERGY, moving
 from phigen.symbolic.expression import Expression, symbols_of
-from phigen.targets.code import lower
 from phigen.targets.js.emitter import emit
 from phigen.targets.js.printing import LANGUAGE
 from phigen.targets.names import Scope
@@ -129,12 +128,12 @@ def script(live: Live) -> str:
 
 def function_of(formula: Expression, names: Sequence[str]) -> str:
     """A formula as an arrow function in JavaScript of the named symbols."""
-    code = lower(Kernel("formula", "", {"symbols": tuple(symbols_of(formula))}, (Output("out", (formula,)),)))
+    assignments, (value,) = assign(expand_powers([formula]))
     scope = Scope(LANGUAGE.reserved | set(LANGUAGE.functions.values()))
     arguments = [scope[name] for name in names]
     show = LANGUAGE.printer(scope)
-    lines = [f"const {scope[a.target]} = {show(a.value)};" for a in code.assignments]
-    return f"({', '.join(arguments)}) => {{ {' '.join(lines)} return {show(code.stores[0].value)}; }}"
+    lines = [f"const {scope[a.target]} = {show(a.value)};" for a in assignments]
+    return f"({', '.join(arguments)}) => {{ {' '.join(lines)} return {show(value)}; }}"
 
 
 def _invariants(system: System) -> str:

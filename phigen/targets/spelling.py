@@ -10,7 +10,7 @@ from functools import cache
 from phigen.ir import nodes as ir
 from phigen.ir.walk import statements, values
 from phigen.symbolic.expression import Expression
-from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.symbols import TEMPORARY, Symbol
 from phigen.targets.language import Language
 from phigen.targets.names import Scope
 from phigen.targets.printer import ATOM, PRODUCT, SUM
@@ -47,8 +47,13 @@ class Spelling:
         declarations = [s for s in statements(body) if isinstance(s, ir.Declare) and not s.in_place]
         records = {self.name(n) for s in declarations if isinstance(s.type, ir.RecordType) for n, _ in s.items}
         self._pointers = dialect.pointers - records
-        for name in (name for s in declarations for name, _ in s.items if not isinstance(name, Symbol)):
-            self.scope[name]
+        names = dict.fromkeys(name for s in declarations for name, _ in s.items)
+        temporaries = (n for n in names if isinstance(n, Symbol) and n.kind == TEMPORARY)
+        for k, temporary in enumerate(temporaries, 1):
+            self.scope.bind(temporary, f"t{k}")
+        for name in names:
+            if not isinstance(name, Symbol):
+                self.scope[name]
         self._arithmetic = dialect.language.printer(self.scope)
 
     def name(self, symbol: str) -> str:

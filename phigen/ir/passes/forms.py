@@ -15,12 +15,14 @@ from phigen.lanes.lane_functions import FULL_RANGE_FUNCTIONS, LANE_FORMULAS, LAN
 from phigen.symbolic.expression import Expression, fold, raw, topological
 from phigen.symbolic.special import SPECIAL
 
-#: The ends of the names of functions for small arguments, and of those for SIMD lanes.
-NEAR, LANE = "_near", "_lane"
+#: The ends of the names of functions for small arguments, of those for SIMD lanes, and of functions of a solver that
+#: replace those of the library for any argument.
+NEAR, LANE, OWN = "_near", "_lane", "_own"
 
-_IN_LANES = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
-#: The versions of functions in loops over lanes, and those among them that have a value at any argument.
-IN_LANES = {f: version for f, version in _IN_LANES.items() if f not in SPECIAL}
+#: The versions of functions in loops over lanes; those in loops over sites, where functions with a removable
+#: singularity have a version for small arguments only; and those among them that have a value at any argument.
+SIMD = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
+IN_LANES = {f: version for f, version in SIMD.items() if f not in SPECIAL}
 FULL_RANGE = {f: version for f, version in IN_LANES.items() if f in FULL_RANGE_FUNCTIONS}
 
 
@@ -35,7 +37,7 @@ def calling(function: ir.Function, versions: Mapping[str, str]) -> ir.Function:
 
     def change(body: ir.Block) -> Iterator[ir.Statement]:
         for s in body:
-            if isinstance(s, ir.Update):
+            if isinstance(s, ir.Update | ir.Assign):
                 s = replace(s, value=changed(s.value))
             elif isinstance(s, ir.Declare):
                 s = replace(s, items=tuple((name, changed(value)) for name, value in s.items))

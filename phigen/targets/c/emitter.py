@@ -21,9 +21,10 @@ from phigen.targets.c import functions, paths
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.gauss import SINGLE_POLICY
-from phigen.targets.c.kernels import declaration, function, members
+from phigen.targets.c.kernels import declaration, function
 from phigen.targets.c.lanes import KNOTS, remembered, travels
 from phigen.targets.c.lanes import printed as kernels_in_lanes
+from phigen.targets.c.language import members
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.single import single
 from phigen.targets.c.step_text import Sizes, text_of

@@ -27,7 +27,7 @@ from phigen.symbolic.special import (
 )
 from phigen.symbolic.universal import ANOMALY
 from phigen.targets import special
-from phigen.targets.c.kernels import FUNCTIONS, printer
+from phigen.targets.c.language import FUNCTIONS, printer
 from phigen.targets.c.layout import WIDTH
 from phigen.targets.polynomials import estrin
 from phigen.targets.rendering import render

@@ -6,12 +6,13 @@ from collections.abc import Callable, Sequence
 from itertools import accumulate
 from math import prod
 
+from phigen.ir.passes.forms import NEAR, SIMD
 from phigen.lanes.in_lanes import LANES, Blocks, Lanes, Packs, Stages, Traces
 from phigen.lanes.lane_functions import SMALL_ARGUMENT_FUNCTIONS, operations
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Splitting
 from phigen.targets.c import functions, splitting
-from phigen.targets.c.kernels import function, lane_calls
+from phigen.targets.c.kernels import function
 
 #: Past values in the fitted recurrence, a multiple of 8; values that it is fitted to; and the least number of the
 #: latter, which large systems have, whose solvers would otherwise take too much memory.
@@ -75,12 +76,11 @@ def printed(program: Program, lanes: Lanes, packed: Callable[[Packs], list[str]]
 
 def printed_back(program: Program, step: Splitting, packs: Packs) -> str:
     """Return the transposes of the flows of packs."""
-    return "\n".join(splitting.adjoint_in_lanes(program, step, packs.transposes, _short(program), lane_calls(program)))
+    return "\n".join(splitting.adjoint_in_lanes(program, step, packs.transposes, _NEAR, SIMD))
 
 
-def _short(program: Program) -> dict[str, str]:
-    """Return the names of functions that loops over lanes call for small arguments."""
-    return {**lane_calls(program), **{f: f"{program.name}_{f}_near" for f in SMALL_ARGUMENT_FUNCTIONS}}
+#: The versions of functions that loops over lanes call for small arguments.
+_NEAR = {**SIMD, **{f: f + NEAR for f in SMALL_ARGUMENT_FUNCTIONS}}
 
 
 def packed_kernels(program: Program, packs: Packs) -> list[str]:
@@ -93,5 +93,5 @@ def packed_step(program: Program, step: Splitting, packs: Packs) -> list[str]:
     """Return the flows of packs, and the step composed of them."""
     called = operations([*packs.kernels, *packs.transposes])
     texts = functions.near(program, [f for f in SMALL_ARGUMENT_FUNCTIONS if f in called])
-    texts += splitting.in_lanes(program, step, "", _short(program))
-    return texts + (splitting.in_lanes(program, step, "_far", lane_calls(program)) if packs.small_argument else [])
+    texts += splitting.in_lanes(program, step, "", _NEAR)
+    return texts + (splitting.in_lanes(program, step, "_far", SIMD) if packs.small_argument else [])

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from functools import cache
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 from phigen.ir import nodes as ir
-from phigen.ir.passes.forms import LANE, NEAR
-from phigen.lanes.lane_functions import LANE_FORMULAS, LANE_FUNCTIONS
-from phigen.symbolic.functions import FUNCTIONS
-from phigen.targets.c.kernels import LANGUAGE
+from phigen.symbolic.expression import Expression
+from phigen.targets.c.language import LANGUAGE, elementary_functions
 from phigen.targets.c.layout import WIDTH
 from phigen.targets.spelling import Dialect, Spelling
 
@@ -26,6 +24,9 @@ _TYPES = {
     ir.Type.ARRAYS: "double *const *",
 }
 
+#: Types of the variables of loops, by their kinds.
+_COUNTERS = {"segments": "size_t", "lanes": "int"}
+
 #: The most statements of a case of a switch that are printed on one line, and their most letters: the label, and the
 #: indentation in a loop, have the rest of the line.
 _SHORT_CASE, _CASE_WIDTH = 2, WIDTH - 24
@@ -35,21 +36,22 @@ def function(printed: ir.Function, name: str, *, inline: bool = False) -> str:
     """Return a function by rows of a solver as text, without its comment."""
     parameters = ", ".join(_parameter(p, name) for p in printed.parameters)
     head = f"static {'inline ' * inline}void {name}_{printed.name}({parameters})"
-    return f"{head}\n{{\n{statements(printed, name)}}}\n"
+    return "\n".join([f"{head}\n{{", *statements(printed, name), "}\n"])
 
 
-@cache
-def elementary_functions(name: str) -> dict[str, str]:
-    """Return what loops call elementary functions: functions of the solver where the library of C has none.
+def statements(printed: ir.Function, name: str, *, shared_line: int = 0) -> list[str]:
+    """Return the lines of the body of a function of a solver.
 
-    Versions for small arguments and for SIMD lanes, see `phigen.ir.passes.forms`, are functions of the solver, or
-    formulas of these.
+    Declarations of computed values share lines that are not longer than ``shared_line``.
     """
-    lanes = {f: f"{name}_{f}{LANE}" for f in LANE_FUNCTIONS}
-    formulas = {f: text.format_map(lanes) for f, text in LANE_FORMULAS.items()}
-    near = {f + NEAR: f"{name}_{f}{NEAR}" for f in FUNCTIONS}
-    in_lanes = {f + LANE: text for f, text in {**lanes, **formulas}.items()}
-    return {**{f: f"{name}_{f}" for f in FUNCTIONS}, **LANGUAGE.functions, **near, **in_lanes}
+    dialect = Dialect(
+        replace(LANGUAGE, functions=elementary_functions(name)),
+        operators={"and": "&&", "or": "||", "index": "ptrdiff_t", "size": "size_t"},
+        functions={function: f"{name}_{function}" for function in _RUNTIME},
+        pointers=frozenset({"row", "s", *(p for p in printed.parameters if p == "params")}),
+    )
+    spelling = Spelling(dialect, printed.parameters, printed.body)
+    return [*_indented(_StatementPrinter(spelling, name, shared_line).lines(printed.body))]
 
 
 def _parameter(parameter: str, name: str) -> str:
@@ -64,137 +66,157 @@ def _type(kind: ir.Type | ir.Pointer) -> str:
     return _TYPES[kind]
 
 
-def statements(printed: ir.Function, name: str) -> str:
-    """Return the body of a function of a solver as text."""
-    dialect = Dialect(
-        replace(LANGUAGE, functions=elementary_functions(name)),
-        operators={"and": "&&", "or": "||", "index": "ptrdiff_t", "size": "size_t"},
-        functions={function: f"{name}_{function}" for function in _RUNTIME},
-        pointers=frozenset({"row", "s"}),
-    )
-    spelling = Spelling(dialect, printed.parameters, printed.body)
-    return "".join(f"{line}\n" for line in _indented(_lines(printed.body, spelling, name)))
-
-
 def _indented(lines: Iterable[str]) -> Iterator[str]:
     return (line if line.startswith("#") else f"    {line}" for line in lines)
 
 
-def _lines(body: Iterable[ir.Statement], spelling: Spelling, name: str) -> Iterator[str]:
-    for s in body:
-        yield from _statement(s, spelling, name)
+@dataclass(frozen=True)
+class _StatementPrinter:
+    """The statements of one function, in a spelling, of the solver with a name; see `statements`."""
 
+    spell: Spelling
+    name: str
+    shared_line: int
 
-def _statement(s: ir.Statement, spelling: Spelling, name: str) -> Iterator[str]:
-    match s:
-        case ir.Declare(in_place=True):
-            spelling.substitute(s)
-        case ir.Declare():
-            yield _declaration(s, spelling, name)
-        case ir.Assign():
-            yield f"{_assignment(s, spelling)};"
-        case ir.Together(assignments):
-            yield f"{', '.join(_assignment(a, spelling) for a in assignments)};"
-        case ir.Call(called, arguments):
-            yield f"{name}_{called}({', '.join(map(spelling, arguments))}){';' * (not called.isupper())}"
-        case ir.Clear(array, first, count):
-            start = spelling(ir.Binary("+", array, first) if first else array)
-            yield f"memset({start}, 0, {spelling(ir.Cast(count, 'size'))} * sizeof *{spelling(array)});"
-        case ir.Discard(parameter):
-            yield f"(void){parameter};"
-        case ir.Comment(text):
-            yield f"/* {text} */"
-        case ir.Continue():
-            yield "continue;"
-        case ir.Return(None):
-            yield "return;"
-        case ir.If():
-            yield from _if(s, spelling, name)
-        case ir.Switch():
-            yield from _switch(s, spelling, name)
-        case ir.Loop():
-            yield from _loop(s, spelling, name)
-        case _:
-            raise TypeError(s)
+    def lines(self, body: Iterable[ir.Statement]) -> Iterator[str]:
+        """Yield the lines of statements."""
+        if self.shared_line:  # else what is read in place would separate declarations
+            body = sorted(body, key=lambda s: not (isinstance(s, ir.Declare) and s.in_place))
+        for kind, group in groupby(body, self._kind):
+            if kind == "discards":
+                yield f"{', '.join(f'(void){s.name}' for s in group if isinstance(s, ir.Discard))};"
+            elif kind == "reads":
+                items = [item for s in group if isinstance(s, ir.Declare) for item in s.items]
+                yield self._declaration(ir.Declare(ir.Type.REAL, tuple(items)))
+            elif kind == "values":
+                yield from self._sharing_lines(item for s in group if isinstance(s, ir.Declare) for item in s.items)
+            else:
+                for s in group:
+                    yield from self._statement(s)
 
-
-def _assignment(s: ir.Assign, spelling: Spelling) -> str:
-    return f"{' = '.join(map(spelling, (s.target, *s.too)))} {'+=' if s.adds else '='} {spelling(s.value)}"
-
-
-def _declaration(s: ir.Declare, spelling: Spelling, name: str) -> str:
-    star, length = "", ""
-    match s.type:
-        case ir.Pointer(constant, restricted):
-            kind, star = f"{'const ' * constant}double", "*restrict " if restricted else "*"
-        case ir.Vector(size):
-            kind, length = "double", f"[{spelling(size)}]"
-        case ir.Type.ARRAYS:
-            kind, star, length = "double", "*const ", "[]"
-        case ir.RecordType(record):
-            kind = f"{'const ' * (not s.mutable)}{name}_{record}"
-        case kind_of_number:
-            kind = f"{'const ' * (not s.mutable)}{_TYPES[kind_of_number]}"
-    items = (f"{star}{spelling.name(symbol)}{length}{_initial(value, spelling)}" for symbol, value in s.items)
-    return f"{kind} {', '.join(items)};{f' /* {s.note} */' if s.note else ''}"
-
-
-def _if(s: ir.If, spelling: Spelling, name: str) -> Iterator[str]:
-    then, otherwise = [*_lines(s.then, spelling, name)], [*_lines(s.otherwise, spelling, name)]
-    head = f"if ({spelling(s.condition)})"
-    if len(then) == 1 and len(otherwise) <= 1:
-        yield f"{head} {then[0]}"
-        yield from (f"else {line}" for line in otherwise)
-        return
-    yield f"{head} {{"
-    yield from _indented(then)
-    if otherwise:
-        yield "} else {"
-        yield from _indented(otherwise)
-    yield "}"
-
-
-def _switch(s: ir.Switch, spelling: Spelling, name: str) -> Iterator[str]:
-    """Yield the lines of a switch; each case is on a line if all cases are short."""
-    *labels, _ = s.labels
-    cases = [[*_lines(case, spelling, name)] for case in s.cases]
-    one_line = [" ".join(lines) for lines in cases]
-    short = all(len(lines) <= _SHORT_CASE for lines in cases) and max(map(len, one_line)) <= _CASE_WIDTH
-    short = short and not any(text.startswith(("for", "if")) for text in one_line)
-    yield f"switch ({spelling(s.value)}) {{"
-    for head, lines in zip([*(f"case {k}:" for k in labels), "default:"], cases, strict=True):
-        if short:
-            yield " ".join([head, *lines, "break;"])
-        else:
-            yield head
-            yield from _indented([*lines, "break;"])
-    yield "}"
-
-
-def _initial(value: ir.Value, spelling: Spelling) -> str:
-    match value:
-        case ir.Constant(None):
+    def _kind(self, s: ir.Statement) -> str:
+        """Return the kind of statements that are printed together, or nothing."""
+        if isinstance(s, ir.Discard):
+            return "discards"
+        if not self.shared_line or not isinstance(s, ir.Declare) or s.in_place or s.type is not ir.Type.REAL:
             return ""
-        case ir.Listed(values):
-            return f" = {{ {', '.join(map(spelling, values))} }}"
-    return f" = {spelling(value)}"
+        return "values" if isinstance(s.items[0][1], Expression) else "reads"
 
+    def _sharing_lines(self, items: Iterable[tuple[str, ir.Value]]) -> Iterator[str]:
+        line = ""
+        for symbol, value in items:
+            item = f"{self.spell.name(symbol)} = {self.spell(value)}"
+            if line and len(line) + len(item) + 2 > self.shared_line - 4:
+                yield f"{line};"
+                line = ""
+            line = f"{line}, {item}" if line else f"const double {item}"
+        yield f"{line};"
 
-def _loop(s: ir.Loop, spelling: Spelling, name: str) -> Iterator[str]:
-    assert s.low is not None
-    assert s.high is not None
-    kind = "size_t" if s.kind == "segments" else "ptrdiff_t"
-    limit = f", {s.limit} = {spelling(s.high)}" if s.limit else ""
-    goes_on = f"{spelling(s.condition)} && " if s.condition else ""
-    goes_on += f"{s.variable} < {s.limit or spelling(s.high)}"
-    onward = f"{s.variable} += {spelling(s.step)}" if s.step else f"++{s.variable}"
-    head = f"for ({kind} {s.variable} = {spelling(s.low)}{limit}; {goes_on}; {onward})"
-    if s.independent:
-        yield f"{name}_EACH_{s.independent}"
-    if s.threads:
-        yield from ("#ifdef _OPENMP", f"#pragma omp parallel for if (s->sites > {s.threads})", "#endif")
-    body = [*_lines(s.body, spelling, name)]
-    if s.kind == "line":
-        yield f"{head} {body[0]}"
-        return
-    yield from (f"{head} {{{f' /* {s.note} */' if s.note else ''}", *_indented(body), "}")
+    def _statement(self, s: ir.Statement) -> Iterator[str]:
+        spell = self.spell
+        match s:
+            case ir.Declare(in_place=True):
+                spell.substitute(s)
+            case ir.Declare():
+                yield self._declaration(s)
+            case ir.Assign():
+                yield f"{self._assignment(s)};"
+            case ir.Together(assignments):
+                yield f"{', '.join(map(self._assignment, assignments))};"
+            case ir.Call(called, arguments):
+                yield f"{self.name}_{called}({', '.join(map(spell, arguments))}){';' * (not called.isupper())}"
+            case ir.Clear(array, None, ir.Constant() as count):
+                yield f"PHI_CLEAR_FIRST({spell(array)}, {spell(count)});"
+            case ir.Clear(array, first, count):
+                start = spell(ir.Binary("+", array, first) if first else array)
+                yield f"memset({start}, 0, {spell(ir.Cast(count, 'size'))} * sizeof *{spell(array)});"
+            case ir.Comment(text):
+                yield f"/* {text} */"
+            case ir.Continue():
+                yield "continue;"
+            case ir.Return(value):
+                yield f"return {spell(value)};" if value else "return;"
+            case ir.If():
+                yield from self._if(s)
+            case ir.Switch():
+                yield from self._switch(s)
+            case ir.Loop():
+                yield from self._loop(s)
+            case _:
+                raise TypeError(s)
+
+    def _assignment(self, s: ir.Assign) -> str:
+        return f"{' = '.join(map(self.spell, (s.target, *s.too)))} {'+=' if s.adds else '='} {self.spell(s.value)}"
+
+    def _declaration(self, s: ir.Declare) -> str:
+        star, length = "", ""
+        match s.type:
+            case ir.Pointer(constant, restricted):
+                kind, star = f"{'const ' * constant}double", "*restrict " if restricted else "*"
+            case ir.Vector(size):
+                kind, length = "double", f"[{self.spell(size)}]"
+            case ir.Type.ARRAYS:
+                kind, star, length = "double", "*const ", "[]"
+            case ir.RecordType(record):
+                kind = f"{'const ' * (not s.mutable)}{self.name}_{record}"
+            case kind_of_number:
+                kind = f"{'const ' * (not s.mutable)}{_TYPES[kind_of_number]}"
+        items = (f"{star}{self.spell.name(symbol)}{length}{self._initial(value)}" for symbol, value in s.items)
+        return f"{kind} {', '.join(items)};{f' /* {s.note} */' if s.note else ''}"
+
+    def _initial(self, value: ir.Value) -> str:
+        match value:
+            case ir.Constant(None):
+                return ""
+            case ir.Listed(values):
+                return f" = {{ {', '.join(map(self.spell, values))} }}"
+        return f" = {self.spell(value)}"
+
+    def _if(self, s: ir.If) -> Iterator[str]:
+        then, otherwise = [*self.lines(s.then)], [*self.lines(s.otherwise)]
+        head = f"if ({self.spell(s.condition)})"
+        if len(then) == 1 and len(otherwise) <= 1:
+            yield f"{head} {then[0]}"
+            yield from (f"else {line}" for line in otherwise)
+            return
+        yield f"{head} {{"
+        yield from _indented(then)
+        if otherwise:
+            yield "} else {"
+            yield from _indented(otherwise)
+        yield "}"
+
+    def _switch(self, s: ir.Switch) -> Iterator[str]:
+        """Yield the lines of a switch; each case is on a line if all cases are short."""
+        *labels, _ = s.labels
+        cases = [[*self.lines(case)] for case in s.cases]
+        one_line = [" ".join(lines) for lines in cases]
+        short = all(len(lines) <= _SHORT_CASE for lines in cases) and max(map(len, one_line)) <= _CASE_WIDTH
+        short = short and not any(text.startswith(("for", "if")) for text in one_line)
+        yield f"switch ({self.spell(s.value)}) {{"
+        for head, lines in zip([*(f"case {k}:" for k in labels), "default:"], cases, strict=True):
+            if short:
+                yield " ".join([head, *lines, "break;"])
+            else:
+                yield head
+                yield from _indented([*lines, "break;"])
+        yield "}"
+
+    def _loop(self, s: ir.Loop) -> Iterator[str]:
+        assert s.low is not None
+        assert s.high is not None
+        kind = _COUNTERS.get(s.kind, "ptrdiff_t")
+        limit = f", {s.limit} = {self.spell(s.high)}" if s.limit else ""
+        goes_on = f"{self.spell(s.condition)} && " if s.condition else ""
+        goes_on += f"{s.variable} < {s.limit or self.spell(s.high)}"
+        onward = f"{s.variable} += {self.spell(s.step)}" if s.step else f"++{s.variable}"
+        head = f"for ({kind} {s.variable} = {self.spell(s.low)}{limit}; {goes_on}; {onward})"
+        if s.independent:
+            yield f"{self.name}_EACH_{s.independent}"
+        if s.threads:
+            yield from ("#ifdef _OPENMP", f"#pragma omp parallel for if (s->sites > {s.threads})", "#endif")
+        body = [*self.lines(s.body)]
+        if s.kind == "line":
+            yield f"{head} {body[0]}"
+            return
+        yield from (f"{head} {{{f' /* {s.note} */' if s.note else ''}", *_indented(body), "}")

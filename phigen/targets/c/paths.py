@@ -10,7 +10,7 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Path
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, momentum
-from phigen.targets.c.kernels import FUNCTIONS, printer
+from phigen.targets.c.language import FUNCTIONS, printer
 from phigen.targets.names import Scope
 from phigen.targets.rendering import render
 from phigen.targets.reserved import Reserved

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 
+from phigen.ir.passes.forms import OWN
 from phigen.lanes.lane_functions import SMALL_ARGUMENT_FUNCTIONS, operations
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.kernel import Kernel, Output
@@ -13,7 +14,7 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Adjoint, Splitting
 from phigen.symbolic.expression import symbols_of
 from phigen.targets.c.functions import FLOW_FUNCTIONS
-from phigen.targets.c.kernels import FUNCTIONS, function
+from phigen.targets.c.kernels import function
 from phigen.targets.rendering import render
 
 
@@ -35,9 +36,9 @@ def printed(program: Program, step: Splitting) -> str:
     more = f", double element[{program.name}_ELEMENT]" if program.attitude else ""
     for k, flow in enumerate(program.attitude.turns if program.attitude else step.flows, 1):
         kernel, values = _flow(program, flow, k)
-        text = function(program, kernel, functions=_functions(program))
         # With an element compilers would find it too long to be put into its only callers.
-        texts.append(_linked(text, "static inline") if more else text)
+        linkage = "static inline" if more else "static"
+        texts.append(function(program, kernel, versions=_VERSIONS, linkage=linkage))
         texts.append(render("c", "flow.c", {**values, "more": more}))
     along = _along(program)
     arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"
@@ -57,13 +58,13 @@ def _corrector(program: Program, schedule: Schedule, along: int, stored: str) ->
     return render("c", "corrector.c", {"NAME": program.name, "count": len(schedule.begin), **values})
 
 
-def in_lanes(program: Program, step: Splitting, form: str, functions: Mapping[str, str]) -> list[str]:
-    """Return the step of packs of members, which calls ``functions``; ``form`` is added to the names."""
+def in_lanes(program: Program, step: Splitting, form: str, versions: Mapping[str, str]) -> list[str]:
+    """Return the step of packs of members, with these ``versions`` of functions; ``form`` is added to the names."""
     texts = []
     for k, flow in enumerate(step.flows, 1):
         kernel, values = _flow(program, flow, k)
         kernel = replace(kernel, name=kernel.name + form)
-        texts.append(function(program, kernel, lanes=True, alike=["coef"], functions=functions))
+        texts.append(function(program, kernel, lanes=True, alike=["coef"], versions=versions))
         texts.append(render("c", "flow.c", {**values, "form": f"{form}_lanes"}))
     arguments = f"int row, int own, {program.name}_group *group"
     linkage = f"{program.name}_IN_PLACE static inline "
@@ -84,7 +85,7 @@ def tangent(program: Program, step: Splitting) -> str:
         "part_of": ", ".join(str(part + 1) for part, _ in flows),
         "row_of": ", ".join(str(row) for _, row in flows),
     }
-    texts = [function(program, kernel, functions=_functions(program)) for kernel in step.tangents]
+    texts = [function(program, kernel, versions=_VERSIONS) for kernel in step.tangents]
     return "\n".join([*texts, render("c", "tangent_flows.c", values)])
 
 
@@ -94,7 +95,7 @@ def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
     values["part_of"] = ", ".join(str(part + 1) for part, _ in flows)
     values["row_of"] = ", ".join(str(row) for _, row in flows)
     values["unused"] = not any(kernel.outputs[1].values for kernel in kernels)
-    texts = [function(program, kernel, functions=_functions(program)) for kernel in kernels]
+    texts = [function(program, kernel, versions=_VERSIONS) for kernel in kernels]
     return "\n".join([*texts, render("c", "adjoint_flows.c", values)])
 
 
@@ -108,20 +109,16 @@ def adjoint_in_lanes(
     kernels, values = _transposed(program, step, back)
     texts = []
     for kernel in kernels:
-        text = function(program, kernel, lanes=True, functions=near)
-        texts.append(_linked(text, f"{program.name}_IN_PLACE static inline"))
+        linkage = f"{program.name}_IN_PLACE static inline"
+        texts.append(function(program, kernel, lanes=True, versions=near, linkage=linkage))
         if reaches_far(kernel):
-            text = function(program, replace(kernel, name=f"{kernel.name}_far"), lanes=True, functions=far)
-            texts.append(_linked(text, f"{program.name}_APART static"))
+            far_kernel = replace(kernel, name=f"{kernel.name}_far")
+            linkage = f"{program.name}_APART static"
+            texts.append(function(program, far_kernel, lanes=True, versions=far, linkage=linkage))
     values["more"] = ", before" * any(len(kernel.outputs) > 2 for kernel in kernels)
     values["undone"] = any(len(kernel.outputs) > 2 for kernel in kernels)
     values["linear"] = not any(_read(kernel) for kernel in kernels)
     return [*texts, render("c", "adjoint_flows_lanes.c", values)]
-
-
-def _linked(text: str, linkage: str) -> str:
-    """Return a function with another linkage, which tells compilers whether to inline it."""
-    return text.replace("\nstatic void", f"\n{linkage} void")
 
 
 def reaches_far(kernel: Kernel) -> bool:
@@ -166,9 +163,8 @@ def _along(program: Program) -> int:
     return program.dimension + (2 if program.monitor else 0)
 
 
-def _functions(program: Program) -> dict[str, str]:
-    """Return the names of the functions that flows call, which have small-argument versions."""
-    return FUNCTIONS | {f: f"{program.name}_{f}" for f in FLOW_FUNCTIONS}
+#: The versions of functions that flows call, which have a polynomial for small arguments.
+_VERSIONS = {f: f + OWN for f in FLOW_FUNCTIONS}
 
 
 def _flow(program: Program, kernel: Kernel, k: int) -> tuple[Kernel, dict[str, object]]:

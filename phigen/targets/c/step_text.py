@@ -14,8 +14,9 @@ from phigen.scheme.steps import Gauss, Newton, Path, PathAdjoint, Splitting
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.symbols import COEFFICIENT, FIXED, MOMENTUM, kind_of
 from phigen.targets.c import gauss, paths, splitting
-from phigen.targets.c.kernels import function, printer
+from phigen.targets.c.kernels import function
 from phigen.targets.c.lanes import packed_kernels, packed_step, printed_back
+from phigen.targets.c.language import printer
 from phigen.targets.path import TERMS, Syntax, adjoint_program, statements, tangent_program
 from phigen.targets.rendering import render
 

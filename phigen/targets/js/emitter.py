@@ -7,6 +7,8 @@ import textwrap
 from collections.abc import Mapping
 
 from phigen.errors import Diagnostic, SpecError
+from phigen.ir.kernel_functions import kernel_function
+from phigen.ir.passes.zeros import zeros_first
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.policies import POLICIES
 from phigen.scheme.program import Attitude, Program
@@ -16,7 +18,8 @@ from phigen.targets.features import switches
 from phigen.targets.header import facts, header_lines, sealed
 from phigen.targets.js.files import LATTICE_MODULES, MODULES, chosen
 from phigen.targets.js.functions import definitions
-from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
+from phigen.targets.js.loops import statements
+from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties
 from phigen.targets.js.runtime import assembled
 from phigen.targets.js.step_modules import STEP_MODULES
 from phigen.targets.policies import policies_of
@@ -145,7 +148,7 @@ def _function(kernel: Kernel) -> str:
     """Return a kernel as a function that writes its outputs to arrays."""
     arrays = {argument: camel(argument) for argument in (*kernel.inputs, *(o.name for o in kernel.outputs))}
     head = f"function {camel(kernel.name)}({', '.join(arrays.values())}) {{"
-    lines = [part for line in LANGUAGE.statements(kernel, arrays) for part in wrapped(line)]
+    lines = statements(zeros_first(kernel_function(kernel, {p: p for p in kernel.inputs.get("params", ())}, arrays)))
     stored = camel(kernel.outputs[0].name)
     for start, n in kernel.exponentials:
         lines.append(f"  matrixExponential({n}, {stored}.subarray({start}, {start + n * n}));")

@@ -8,22 +8,21 @@ from phigen.ir import nodes as ir
 from phigen.targets.js.printing import LANGUAGE, camel, comment, wrapped
 from phigen.targets.spelling import Dialect, Spelling
 
-#: Identifiers that lowered functions use, which names of users make way for.
-_RESERVED = frozenset({"coef", "params", "start", "x", "v", "sites", "count", "near", "present", "sums", "out"})
-_RESERVED |= {"i", "j", "k", "bond", "here", "there", "colour", "colours", "chosen", *(f"change{k}" for k in range(9))}
-_RESERVED |= set(LANGUAGE.functions.values())
-
 DIALECT = Dialect(LANGUAGE, operators={"==": "===", "!=": "!==", "and": "&&", "or": "||"})
 
 
 def function(lowered: ir.Function, names: Iterable[str] = ()) -> str:
     """Return the text of a function on memory; ``names`` are those of other functions in the file."""
-    spelling = Spelling(DIALECT, _RESERVED | {*names}, lowered.body)
     head = f"function {camel(lowered.name)}({', '.join(lowered.parameters)}) {{"
     if not lowered.body:
         return "\n".join([*comment(lowered.doc), f"{head}}}"])
-    lines = [line for s in lowered.body for line in _statement(s, spelling, "  ")]
-    return "\n".join([*comment(lowered.doc), head, *lines, "}"])
+    return "\n".join([*comment(lowered.doc), head, *statements(lowered, names), "}"])
+
+
+def statements(lowered: ir.Function, names: Iterable[str] = ()) -> list[str]:
+    """Return the lines of the body of a function; ``names`` are those of other functions in the file."""
+    spelling = Spelling(DIALECT, {*lowered.parameters, *names}, lowered.body)
+    return [line for s in lowered.body for line in _statement(s, spelling, "  ")]
 
 
 def _statement(s: ir.Statement, spelling: Spelling, indent: str) -> Iterator[str]:
@@ -50,6 +49,8 @@ def _line(s: ir.Statement, spelling: Spelling) -> str:
         case ir.Call(name, arguments, instance):
             owner = f"{spelling(instance)}." if instance else ""
             return f"{owner}{camel(name)}({', '.join(map(spelling, arguments))});"
+        case ir.Clear(array, None, count):
+            return f"{spelling(array)}.fill(0, 0, {spelling(count)});"
         case ir.If(condition, (ir.Continue(),)):
             return f"if ({spelling(condition)}) continue;"
     raise TypeError(s)

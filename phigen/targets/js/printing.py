@@ -19,12 +19,7 @@ LANGUAGE = Language(
     reserved=JAVASCRIPT_RESERVED,
     functions={name: name for name in FUNCTIONS} | written_in("js"),
     constants={"pi": "Math.PI", "E": "Math.E"},
-    declare="const {name} = {value};",
-    assign="{place} = {value};",
-    subscript="{array}[{index}]",
-    parameter="params.{name}",
     point="",
-    clear="{array}.fill(0, 0, {size});",
 )
 
 

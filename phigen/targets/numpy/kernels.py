@@ -3,36 +3,51 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from phigen.ir import nodes as ir
+from phigen.ir.kernel_functions import kernel_function
+from phigen.ir.passes.zeros import stored_array
 from phigen.scheme.kernel import EXPONENTS, SCALARS, Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
-from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
-from phigen.targets.code import Code, bound, lower
 from phigen.targets.header import plain, sentence
-from phigen.targets.names import Scope
-from phigen.targets.numpy.language import LANGUAGE
-from phigen.targets.printer import Printer
-from phigen.targets.reserved import PYTHON_RESERVED
+from phigen.targets.numpy.loops import statements
 
 
 def function(program: Program, kernel: Kernel) -> str:
     """Return a kernel as a function of arrays with any number of axes before that of the coordinates."""
     if kernel.exponents:
         return _through_exponentials(program, kernel, kernel.exponents)
-    code = lower(kernel)
     arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
-    lines = [f"def _{kernel.name}({arguments}):", *_docstring(kernel.purpose)]
-    reserved = PYTHON_RESERVED | {*kernel.inputs, *(o.name for o in kernel.outputs), *LANGUAGE.functions.values()}
-    scope = Scope(reserved)
-    lines += _bindings(kernel, code, scope)
-    printer = LANGUAGE.printer(scope)
-    lines += [f"    {scope[a.target]} = {printer(a.value)}" for a in code.assignments]
-    lines.append(_result(program, kernel, code, printer))
-    return "\n".join(lines) + "\n"
+    built = kernel_function(kernel, {p: p for p in kernel.inputs.get("params", ())}, named=True)
+    spelling, lines = statements(over_states(built), {*built.parameters, "parameters"})
+    values: dict[str, list[str]] = {o.name: [] for o in kernel.outputs}
+    for s in built.body:
+        if isinstance(s, ir.Assign):
+            values[stored_array(s)].append(spelling(s.value))
+    head = [f"def _{kernel.name}({arguments}):", *_docstring(kernel.purpose)]
+    return "\n".join([*head, *lines, _result(program, kernel, values)]) + "\n"
+
+
+def over_states(function: ir.Function) -> ir.Function:
+    """Return the declarations of a kernel for arrays of states, whose last axis is that of the coordinates.
+
+    Parameters are in a dictionary. Functions of NumPy return the stored values in lists.
+    """
+
+    def read(name: str, value: ir.Value) -> ir.Value:
+        match value:
+            case ir.Member(_, member):
+                return ir.Entry(ir.fixed("parameters"), ir.Constant(member))
+            case ir.Entry(array, index) if not isinstance(name, Symbol):
+                return ir.Entry(array, ir.Several((ir.fixed("..."), index)))
+        return value
+
+    declarations = (s for s in function.body if isinstance(s, ir.Declare))
+    return function.with_body(*(replace(s, items=tuple((n, read(n, v)) for n, v in s.items)) for s in declarations))
 
 
 def _through_exponentials(program: Program, kernel: Kernel, inner: Kernel) -> str:
@@ -54,28 +69,17 @@ def _docstring(text: str) -> list[str]:
     return textwrap.wrap(f'"""{said}"""', 104, initial_indent="    ", subsequent_indent="    ")
 
 
-def _bindings(kernel: Kernel, code: Code, scope: Scope) -> list[str]:
-    def entry(array: str, i: int, s: str) -> str:
-        return array if array in SCALARS else f"{array}[{i}]" if isinstance(s, Symbol) else f"{array}[..., {i}]"
-
-    named = bound(kernel, code, scope, lambda s: f'parameters["{s}"]', entry, named=True)
-    return [f"    {name} = {place}" for name, place in named]
-
-
-def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> str:
-    values: dict[str, list[Expression]] = {o.name: [] for o in kernel.outputs}
-    for s in code.stores:
-        values[s.array].append(s.value)
+def _result(program: Program, kernel: Kernel, values: Mapping[str, Sequence[str]]) -> str:
     state = _state(kernel)
     if not state:
-        lists = [_list([printer(v) for v in entries]) for entries in values.values()]
+        lists = [*map(_list, values.values())]
         if kernel.exponentials:
             lists[0] = f"_with_exponentials({lists[0]}, {kernel.exponentials!r})"
         return "    return " + ", ".join(lists)
     n = program.dimension
     arrays = []
     for name, entries in values.items():
-        array = f"_filled({state}, {_list([printer(e) for e in entries])})"
+        array = f"_filled({state}, {_list(entries)})"
         arrays.append(array + (f".reshape({state}.shape + ({n},))" if name.endswith("jacobian") else ""))
     if len(arrays) == 1:
         return f"    return {arrays[0]}"

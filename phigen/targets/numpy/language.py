@@ -13,10 +13,6 @@ LANGUAGE = Language(
     reserved=PYTHON_RESERVED,
     functions={name: f"_{name}" for name in elementary.FUNCTIONS} | elementary.written_in("numpy"),
     constants={"pi": "np.pi", "E": "np.e"},
-    declare="{name} = {value}",
-    assign="{place} = {value}",
-    subscript="{array}[..., {index}]",
-    parameter='parameters["{name}"]',
 )
 
 

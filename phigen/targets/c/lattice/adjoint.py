@@ -51,7 +51,8 @@ from phigen.scheme.sweep_facts import (
 from phigen.scheme.sweep_inverse import apart, can_recompute_fields, transposes
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
-from phigen.targets.c.kernels import function, members
+from phigen.targets.c.kernels import function
+from phigen.targets.c.language import members
 from phigen.targets.c.lattice.adjoint_loops import First, Seeds, handed_by
 from phigen.targets.c.lattice.layout import Layout, layout_of
 from phigen.targets.c.lattice.loops import RowLoops, code

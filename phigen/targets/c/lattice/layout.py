@@ -23,7 +23,7 @@ from phigen.scheme.sweep_facts import (
 from phigen.scheme.sweep_inverse import can_recompute_fields
 from phigen.symbolic.symbols import Symbol
 from phigen.targets import lattice
-from phigen.targets.c.kernels import members
+from phigen.targets.c.language import members
 
 #: Differences that predictions of all stages are extrapolated from: more gain little and are arrays over sites.
 MOST_REMEMBERED = 14

@@ -11,7 +11,8 @@ from phigen.scheme.steps import Sweeps
 from phigen.scheme.sweep_facts import band, reach
 from phigen.spec.model import Parameter, Reduction
 from phigen.spec.names import OVER, REDUCTIONS
-from phigen.targets.c.kernels import function, members
+from phigen.targets.c.kernels import function
+from phigen.targets.c.language import members
 from phigen.targets.c.lattice.layout import (
     MOST_REMEMBERED,
     Layout,

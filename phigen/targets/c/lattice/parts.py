@@ -32,7 +32,7 @@ from phigen.scheme.steps import Sweep, Sweeps
 from phigen.scheme.sweep_facts import beside_seams, first_kind, wide
 from phigen.symbolic.special import SPECIAL
 from phigen.targets.c import functions
-from phigen.targets.c.kernels import members
+from phigen.targets.c.language import members
 from phigen.targets.c.lattice.layout import Layout, layout_of, switches
 from phigen.targets.c.lattice.loops import (
     RowLoops,

@@ -1,0 +1,49 @@
+"""Order of the statements of a kernel: named values first, then for each output its further values and its stores."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from phigen.ir import nodes as ir
+from phigen.ir.passes.zeros import stored_array
+from phigen.ir.walk import names_in
+from phigen.symbolic.expression import Expression
+
+
+def in_output_order(function: ir.Function, named: Sequence[str], *, headings: bool) -> ir.Function:
+    """Return the function in this order; with ``headings`` the values of an output are right before its stores.
+
+    ``named`` are the symbols of values that have a name in the kernel, the momenta.
+    """
+    temporaries = {s.items[0][0]: s for s in function.body if isinstance(s, ir.Declare) and is_temporary(s)}
+    stores: dict[str, list[ir.Statement]] = {}
+    for s in function.body:
+        if array := stored_array(s):
+            stores.setdefault(array, []).append(s)
+    left = dict(temporaries)
+
+    def taken(names: Iterable[str]) -> list[ir.Statement]:
+        """Remove the temporaries that some values need from those that are left, and return them in order."""
+        needed, rest = set[str](), [*names]
+        while rest:
+            name = rest.pop()
+            if name in temporaries and name not in needed:
+                needed.add(name)
+                rest += names_in(temporaries[name])
+        return [left.pop(name) for name in temporaries if name in needed and name in left]
+
+    momenta = taken(named)
+    groups = [(array, taken(names_in(tuple(of))), of) for array, of in stores.items()]
+    reads = [s for s in function.body if isinstance(s, ir.Declare) and not is_temporary(s)]
+    if not headings or len(stores) < 2:
+        values = (s for _, declared, _ in groups for s in declared)
+        return function.with_body(*reads, *momenta, *values, *(s for _, _, of in groups for s in of))
+    body = [*reads, *([ir.Comment("momenta"), *momenta] if momenta else [])]
+    for array, declared, of in groups:
+        body += [ir.Comment(array.replace("_", " ")), *declared, *of]
+    return function.with_body(*body)
+
+
+def is_temporary(s: ir.Statement) -> bool:
+    """Whether a statement declares a computed value."""
+    return isinstance(s, ir.Declare) and not s.in_place and isinstance(s.items[0][1], Expression)

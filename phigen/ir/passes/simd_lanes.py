@@ -1,0 +1,43 @@
+"""SIMD lanes: a straight-line function evaluated at several points at once, or at one of these points.
+
+Each array gets an inner index over the lanes, unless all lanes share it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import replace
+
+from phigen.ir import nodes as ir
+
+LANE, OWN, LANES = ir.fixed("lane"), ir.fixed("own"), ir.fixed("LANES")
+
+
+def in_lanes(
+    function: ir.Function, shared: Set[str], alike: Set[str] = frozenset(), *, single: bool = False
+) -> ir.Function:
+    """Return the function as a loop over all lanes; a ``single`` one is evaluated at the lane that callers pass.
+
+    Arrays that are ``shared`` have one value for all lanes; those ``alike`` have one if the argument ``own`` is 0.
+    """
+
+    def at_lane(value: ir.Value) -> ir.Value:
+        if not isinstance(value, ir.Entry) or not isinstance(value.array, ir.Name):
+            return value
+        name = value.array.symbol.key[0]  # type: ignore[attr-defined]
+        if name in shared:
+            return value
+        return ir.Entry(value, ir.Binary("*", OWN, LANE) if name in alike else LANE)
+
+    def lowered(s: ir.Statement) -> ir.Statement:
+        match s:
+            case ir.Declare(items=items):
+                return replace(s, items=tuple((name, at_lane(value)) for name, value in items))
+            case ir.Assign(target=target):
+                return replace(s, target=at_lane(target))
+        return s
+
+    body = tuple(map(lowered, function.body))
+    if single:
+        return function.with_body(*body)
+    return function.with_body(ir.Loop("lanes", body, "lane", ir.Constant(0), LANES, independent="LANE"))

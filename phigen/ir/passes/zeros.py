@@ -1,0 +1,43 @@
+"""Zeros among the outputs of a kernel: arrays with many of them are cleared first, or no zeros are stored."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from phigen.ir import nodes as ir
+from phigen.symbolic.expression import Expression
+
+#: Number of entries of an array that are always zero, from which on the array is cleared in one statement.
+MANY_ZEROS = 6
+
+
+def zeros_first(function: ir.Function) -> ir.Function:
+    """Return the function with arrays of many zeros cleared before their first store, and without stores of these."""
+    zeros = Counter(stored_array(s) for s in function.body if _is_zero(s))
+    sizes = Counter(stored_array(s) for s in function.body)
+    cleared = {array for array, count in zeros.items() if count >= MANY_ZEROS}
+    body, done = list[ir.Statement](), set[str]()
+    for s in function.body:
+        array = stored_array(s)
+        if array in cleared and array not in done:
+            done.add(array)
+            body.append(ir.Clear(ir.fixed(array), None, ir.Constant(sizes[array])))
+        if not (array in cleared and _is_zero(s)):
+            body.append(s)
+    return function.with_body(*body)
+
+
+def without_zeros(function: ir.Function) -> ir.Function:
+    """Return the function without stores of zeros."""
+    return function.with_body(*(s for s in function.body if not _is_zero(s)))
+
+
+def stored_array(s: ir.Statement) -> str:
+    """Return the name of the array that a statement stores to or clears, or nothing."""
+    place = s.target if isinstance(s, ir.Assign) else s if isinstance(s, ir.Clear) else None
+    array = place.array if isinstance(place, ir.Entry | ir.Clear) else None
+    return str(array.symbol.key[0]) if isinstance(array, ir.Name) else ""  # type: ignore[attr-defined]
+
+
+def _is_zero(s: ir.Statement) -> bool:
+    return isinstance(s, ir.Assign) and isinstance(s.value, Expression) and s.value.is_zero

@@ -1,0 +1,49 @@
+"""Description of C99 as a target language, and the names that a solver has for functions and parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+from phigen.ir.passes.forms import LANE, NEAR, OWN
+from phigen.lanes.lane_functions import LANE_FORMULAS, LANE_FUNCTIONS
+from phigen.scheme.program import Program
+from phigen.symbolic import functions as elementary
+from phigen.targets.language import Language
+from phigen.targets.names import Scope, identifiers
+from phigen.targets.printer import Printer
+from phigen.targets.reserved import C_RESERVED
+
+FUNCTIONS = elementary.written_in("c")
+LANGUAGE = Language(
+    reserved=C_RESERVED,
+    functions=FUNCTIONS,
+    constants={"pi": "3.141592653589793", "E": "2.718281828459045"},  # digits, since -std=c99 hides M_PI
+)
+
+
+@cache
+def elementary_functions(name: str) -> dict[str, str]:
+    """Return what a solver calls elementary functions: functions of its own where the library of C has none.
+
+    Versions for small arguments and for SIMD lanes, see `phigen.ir.passes.forms`, are functions of the solver, or
+    formulas of these.
+    """
+    lanes = {f: f"{name}_{f}{LANE}" for f in LANE_FUNCTIONS}
+    formulas = {f: text.format_map(lanes) for f, text in LANE_FORMULAS.items()}
+    general = {f: f"{name}_{f}" for f in elementary.FUNCTIONS}
+    near = {f + NEAR: f"{name}_{f}{NEAR}" for f in general}
+    of_solver = {f + OWN: text for f, text in general.items()}
+    in_lanes = {f + LANE: text for f, text in {**lanes, **formulas}.items()}
+    return {**general, **FUNCTIONS, **near, **of_solver, **in_lanes}
+
+
+def printer(scope: Scope, functions: Mapping[str, str] = FUNCTIONS) -> Printer:
+    """Prints lowered trees in C, with the names of a scope."""
+    return replace(LANGUAGE, functions=functions).printer(scope)
+
+
+def members(program: Program) -> dict[str, str]:
+    """The members of the parameter struct, by the names of the parameters."""
+    return identifiers((p.name for p in program.parameters), C_RESERVED)
