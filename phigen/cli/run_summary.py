@@ -95,6 +95,9 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
 
 def print_averages(names: Sequence[str], averages: Averages) -> None:
     """Print the time averages of the observables over the rows of a run."""
+    if not averages.count:
+        out("\n  observables have no means: no stored row is in the time that average: says")
+        return
     first, last = averages.times
     out(f"\n  observables, means over {counted(averages.count, 'row')} from t = {first:.9g} to {last:.9g}")
     header = ["", "mean", "standard error", "least", "largest", "correlation time"]

@@ -142,6 +142,16 @@ def _average(raw: Mapping[str, Any] | None, declared: Declarations) -> AverageCh
     return AverageChoice(declared.number(raw.get("after"), declared.numbers()), raw.get("blocks"))
 
 
+def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
+    """Report averages that begin after the end of a run with steps of equal time."""
+    after, end = run_.average.after, run_.until
+    end = run_.start + run_.step * run_.steps if end is None else end
+    if after is not None and (end - after) * run_.step < 0:
+        place = declared.reader.locations["runs", run_.name, "average", "after"]
+        message = f"average: after: {float(after):.9g} is not before the end of the run, t = {float(end):.9g}"
+        declared.reader.problems.add(message, place, "the average is over the rows from that time on")
+
+
 def _crossed(
     name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: AllowedNames
 ) -> Expression | None:

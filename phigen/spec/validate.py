@@ -30,7 +30,7 @@ from phigen.spec.names import COMPOSITIONS, LICENSE_REFERENCE, LICENSES, LOGARIT
 from phigen.spec.observables import observables
 from phigen.spec.poisson import brackets_of_sites, poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
-from phigen.spec.runs import run, without_repetition
+from phigen.spec.runs import expect_rows_to_average, run, without_repetition
 from phigen.spec.sweeps import sweep
 from phigen.spec.taken import objection
 from phigen.spec.yaml_source import Scalar, decode, read
@@ -87,6 +87,9 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     fields = [name for name in observed if name not in numbers]
     watched = declared.dated_scope() if lattice is None else scope_of_numbers(declared, numbers, fields)
     runs = {n: run(n, r, declared, columns, watched) for n, (_, r) in raw.get("runs", {}).items() if r is not None}
+    if "monitor" not in raw:
+        for run_ in runs.values():
+            expect_rows_to_average(run_, declared)
     return {
         "name": _name(raw.get("name"), declared),
         "coordinates": declared.coordinates,

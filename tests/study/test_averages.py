@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+import phigen
+import phigen.spec
 from phigen.study.averages import Averages
 
 
@@ -79,3 +81,16 @@ def test_too_few_rows_are_no_numbers():
     assert one.mean == 1
     assert np.isnan(one.error)
     assert np.isnan(one.variance)
+
+
+@pytest.mark.parametrize(
+    ("end", "message"), [("steps: 20", "t = 2"), ("until: 1.5", "t = 1.5"), ("duration: 2", "t = 2")]
+)
+def test_averages_from_a_time_after_the_end_are_refused(end, message):
+    text = (
+        "phigen: 1\nname: o\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2 + q**2\n"
+        f"observables: {{o: q*p}}\nruns: {{r: {{initial: [1, 0], step: 0.1, {end}, average: {{after: AFTER}}}}}}\n"
+    )
+    with pytest.raises(phigen.SpecError, match=f"after: 3 is not before the end of the run, {message}"):
+        phigen.spec.loads(text.replace("AFTER", "3"))
+    assert float(phigen.spec.loads(text.replace("AFTER", "1.5")).runs["r"].average.after) == 1.5

@@ -1,5 +1,8 @@
 """Observables that sweeps keep."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -91,3 +94,21 @@ def test_statistics_of_lattices_are_those_of_single_runs(tmp_path):
 def test_sweeps_of_lattices_keep_numbers_only():
     with pytest.raises(phigen.SpecError, match=r"keep: 'mean\(local\)' is not known"):
         phigen.spec.loads(CHAIN.replace("mean(heat)", "mean(local)"))
+
+
+@pytest.mark.slow  # it starts a cluster of workers
+def test_the_temperature_curve_of_the_page_is_that_of_theory():
+    page = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    (text,) = (block for block in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL) if "name: samples" in block)
+    text = text.replace("sizes: [65]", "sizes: [33]").replace("steps: 4000", "steps: 2000")
+    text = text.replace("{from: 0.2, to: 2, count: 10}", "[0.5, 1.5]")
+    data = phigen.sweep(phigen.spec.loads(text), workers=1)
+    assert dict(data.sizes) == {"T": 2, "seed": 32}
+    couplings = np.linspace(0.5, 1.5, 1001)
+    for temperature in data["T"].values:
+        expected = (1 / np.tanh(couplings / temperature) - temperature / couplings).mean()
+        bonds = data["mean(bonds)"].sel({"T": temperature}).values / 32
+        error = bonds.std(ddof=1) / np.sqrt(32)
+        assert error < 0.01
+        assert bonds.mean() == pytest.approx(expected, abs=4 * error)
+    assert (data["error(bonds)"] > 0).all()
