@@ -218,7 +218,7 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     looped = [
         kernel for kernel in step.kernels if id(kernel) not in of_coefficients and kernel.name not in observable_names
     ]
-    if program.profile == "small":
+    if program.profile != "fast":
         if not (program.extras.tangent or step.adjoint):  # variations are differences of sweeps there
             varied_names = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
             looped = [kernel for kernel in looped if not kernel.reads_variations and kernel.name not in varied_names]

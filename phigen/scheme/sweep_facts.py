@@ -79,7 +79,7 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
 
 def takes(program: Program, step: Sweeps) -> bool:
     """Whether what a flow hands to sites of a grid on the way back is taken by the loop of the next: in long code."""
-    if program.profile == "small" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
+    if program.profile != "fast" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False
     kernels = [kernel for part in transposes(program, step) for kernel in part]
     alone = all(len(part) == 1 for part in step.parts) and not any(kernel.inputs.get(AROUND) for kernel in kernels)

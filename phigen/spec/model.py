@@ -509,7 +509,7 @@ class Spec:
         return replace(
             ordered if order else self,
             scheme=scheme or self.scheme,
-            profile="small" if extras.real == "float" else profile or self.profile,
+            profile=_profile(profile or self.profile, extras.real),
             extras=extras,
             written=self.written or self,
         )
@@ -533,3 +533,8 @@ class Spec:
         location = self.locations.get(path)
         line = self.source.split("\n")[location.line - 1] if location else ""
         return Diagnostic(message, location, hint, line)
+
+
+def _profile(profile: str, real: str) -> str:
+    """The profile of C with numbers of a type: that for speed has double precision only."""
+    return "small" if profile == "fast" and real == "float" else profile

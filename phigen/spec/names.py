@@ -88,7 +88,7 @@ BIREALISATIONS = (
 )
 POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu", "product", "pullback")
 #: How much the C does for speed.
-PROFILES = ("fast", "small")
+PROFILES = ("fast", "small", "certified")
 
 #: The numbers of the C.
 REALS = ("double", "float")
@@ -99,6 +99,7 @@ PARTS = ("by-hand", "ensemble", "gauge-search", "kicks", "lanes", "members", "re
 LEFT_OUT = {
     "fast": frozenset[str](),
     "small": frozenset(["by-hand", "gauge-search", "lanes", "members", "recurrences"]),
+    "certified": frozenset(PARTS),
 }
 
 #: How a section is crossed.

@@ -472,6 +472,10 @@ def _asked_twice(trial: Trial) -> bool:
     return bool(trial.system.asked) and not {"adjoint", "tangent", "real", "without"}.isdisjoint(trial.system.options)
 
 
+def _is_fast(trial: Trial) -> bool:
+    return trial.system.options.get("profile", "fast") == "fast"
+
+
 def _compensated(trial: Trial) -> bool:
     return bool(trial.compilation.program.compensated)
 
@@ -489,8 +493,8 @@ CHECKS = (
     Check("order", order, lambda t: not t.system.noise, _RUN),
     Check("targets agree", targets, _always, _RUN),
     Check("strides and checkpoints keep the bits", bits, _always, _RUN),
-    Check("sessions", sessions, lambda t: t.system.options.get("profile") != "small" and not _compensated(t), _RUN),
-    Check("members are runs", members, _always),
+    Check("sessions", sessions, lambda t: _is_fast(t) and not _compensated(t), _RUN),
+    Check("members are runs", members, lambda t: t.system.options.get("profile") != "certified"),
     Check("gradient", gradient, _wants("adjoint"), _GRADIENT),
     Check("gradients of members", member_gradients, _wants("adjoint"), _GRADIENT),
     Check("tangent", tangent, _wants("tangent")),

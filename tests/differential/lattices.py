@@ -305,7 +305,7 @@ def _with_options(source: random.Random, drawn: Lattice) -> Lattice:
     if scheme:
         options["scheme"] = scheme
     options["order"] = 2 if drawn.noise else source.choices([2, 4, 6], [65, 28, 7])[0]
-    options["profile"] = source.choice(["fast", "small"])
+    options["profile"] = source.choice(["fast", "small", "certified"])
     if source.random() < 0.12:
         options["solver"] = {"lanes": False}
     if options["order"] == 4 and source.random() < 0.2:

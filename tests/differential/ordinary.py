@@ -395,7 +395,7 @@ def _options(source: random.Random, drawn: Ordinary, scheme: str) -> dict[str, A
     if scheme == "series" and heavy:
         order = 2 if chain else source.choice([2, 2, 4])
     options["order"] = 2 if drawn.noise and scheme == "series" else order
-    options["profile"] = source.choice(["fast", "small"])
+    options["profile"] = source.choice(["fast", "small", "certified"])
     if source.random() < 0.3:
         options["solver"] = source.choice([{"lanes": False}, {"lanes": False}, {"method": "newton"}])
     if scheme == "series":

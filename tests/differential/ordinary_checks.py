@@ -479,6 +479,11 @@ def _keeps_casimirs(trial: Trial) -> bool:
     return bool(trial.system.structure.casimirs) and not trial.system.vector and bool(trial.attribute("exact"))
 
 
+def _has_ensembles(trial: Trial) -> bool:
+    options = trial.system.options
+    return "ensemble" not in options.get("without", ()) and options.get("profile") != "certified"
+
+
 def _asked_twice(trial: Trial) -> bool:
     """Whether the spec and the call of `compile` ask for something each."""
     return bool(trial.system.asked) and not {"adjoint", "tangent", "real", "without"}.isdisjoint(trial.system.options)
@@ -498,7 +503,7 @@ CHECKS = (
     Check("targets agree", targets, _always, _RUN),
     Check("strides and sessions keep the bits", bits, _is_plain, _RUN),
     Check("until", until, lambda t: t.system.monitor is None),
-    Check("members are runs", members, lambda t: "ensemble" not in t.system.options.get("without", ())),
+    Check("members are runs", members, _has_ensembles),
     Check("gradient", gradient, _wants("adjoint"), _GRADIENT),
     Check("gradients of members", member_gradients, _wants("adjoint"), _GRADIENT),
     Check("tangent", tangent, _wants("tangent"), "print(target, s.step_tangent(x, h, **since))"),

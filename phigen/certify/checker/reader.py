@@ -156,7 +156,7 @@ def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
             value = f"({value}) * {argument} + {c!r}" if value else repr(c)
         body = f"return {value};"
     else:
-        body = re.sub(r"if \(fabs\([^{;]*(?:\{.*?\n    \}|;)\n", "", body, count=1, flags=re.DOTALL)
+        body = re.sub(r"if \(fabs\([^{;]*(?:\{[^\n]*\}|\{.*?\n    \}|;)\n", "", body, count=1, flags=re.DOTALL)
     inner = GeneratedC(f"f({argument})\n{{\n{body}\n}}", "")
     kernel = KernelReader(inner, "f", {})
     kernel.operations = [["input", "s", 0] if op[0] == "input" else op for op in kernel.operations]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from functools import partial, reduce
 
 from phigen.lanes.in_lanes import LANES, Blocks, Lanes, Packs, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
@@ -26,6 +26,7 @@ from phigen.targets.c.lanes import KNOTS, remembered, travels
 from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.language import members
 from phigen.targets.c.layout import fitted
+from phigen.targets.c.misra import compliant
 from phigen.targets.c.single import single
 from phigen.targets.c.step_text import Sizes, text_of
 from phigen.targets.header import header_lines, plain, right_hand_side, sealed
@@ -45,10 +46,10 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
     """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
     name, lines = program.name, header_lines(program, command)
     amalgam, header, code = runtime_of(program)
-    written = single if program.single else str
-    declarations, definitions = amalgam.texts(header, code)
-    declared = written(declarations) + "\n#ifdef __cplusplus\n}\n#endif\n"
-    defined = unrestricted(program, written(definitions))
+    passes = [single] * program.single + [compliant] * (program.profile == "certified")
+    declarations, definitions = (reduce(lambda t, each: each(t), passes, t) for t in amalgam.texts(header, code))
+    declared = declarations + "\n#ifdef __cplusplus\n}\n#endif\n"
+    defined = unrestricted(program, definitions)
     headers = "\n".join(sorted(amalgam.headers))
     if single_file:
         body = fitted(f"{headers}\n{declared}\n{defined}")
@@ -64,7 +65,7 @@ def unrestricted(program: Program, code: str) -> str:
 
     Only loops over lanes and sites become faster by it. Other code loses the word.
     """
-    if program.profile == "small" and not program.step.kind.sites and "_EACH_LANE" not in code:
+    if program.profile != "fast" and not program.step.kind.sites and "_EACH_LANE" not in code:
         return re.sub(r"\brestrict\b ?", "", code)
     return render("c", "restrict.c", {"code": code.strip()})
 

@@ -1,0 +1,217 @@
+"""C as rules of MISRA C:2012 have it, for the profile certified: the same program with more parentheses and braces.
+
+- 12.1: operators of different precedence in one expression have parentheses.
+- 15.6: the bodies of loops and conditionals have braces.
+- 17.7: results that are not used are cast to void.
+- 21.16: floating-point numbers are compared as numbers, not as bytes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+_TOKEN = re.compile(
+    r"(?P<trivia>\s+|/\*.*?\*/|^[ \t]*\#(?:[^\n\\]|\\.|\\\n)*)"
+    r"|(?P<word>[A-Za-z_]\w*)|(?P<number>\.?\d(?:[eEpP][-+]|[\w.])*)|(?P<text>\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])*')"
+    r"|(?P<sign><<=|>>=|\.\.\.|->|\+\+|--|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|.)",
+    re.DOTALL | re.MULTILINE,
+)
+
+#: Precedence of binary operators, as in C.
+_PRECEDENCE = {
+    "*": 12, "/": 12, "%": 12, "+": 11, "-": 11, "<<": 10, ">>": 10, "<": 9, ">": 9, "<=": 9, ">=": 9, "==": 8,
+    "!=": 8, "&": 7, "^": 6, "|": 5, "&&": 4, "||": 3,
+}  # fmt: skip
+_CONDITIONAL = 2
+
+#: Tokens between which there is an expression of its own.
+_SEPARATORS = {
+    ";", ",", "{", "}", "=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>=", "return", "else", "case",
+    "do", "goto",
+}  # fmt: skip
+_CLOSING = {"(": ")", "[": "]", "{": "}"}
+_CONTROLS = {"if", "for", "while", "switch"}
+_UNUSED = {"memcpy", "memmove", "memset"}
+
+#: Comparison of the bytes of two numbers, which says whether a step size has changed.
+_BYTES = re.compile(r"memcmp\(&(\w+), &([\w>.-]+), sizeof \w+\) ([!=]=) 0")
+
+
+def compliant(code: str) -> str:
+    """Return C that keeps the rules, from C that compiles."""
+    compared = _BYTES.sub(lambda m: f"{'!' * (m[3] == '!=')}({m[1]} == {m[2]})", code)
+    return _Text(_with_void(_Text(compared).braced())).parenthesised()
+
+
+@dataclass
+class _Text:
+    """The tokens of C, and what is inserted before and after each."""
+
+    code: str
+    tokens: list[str] = field(default_factory=list)
+    significant: list[int] = field(default_factory=list)
+    before: dict[int, str] = field(default_factory=dict)
+    after: dict[int, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for match in _TOKEN.finditer(self.code):
+            if match.lastgroup != "trivia":
+                self.significant.append(len(self.tokens))
+            self.tokens.append(match[0])
+
+    def __getitem__(self, place: int) -> str:
+        return self.tokens[self.significant[place]] if place < len(self.significant) else ""
+
+    def text(self) -> str:
+        """The code with what was inserted."""
+        places = {token: place for place, token in enumerate(self.significant)}
+        return "".join(
+            self.before.get(places[k], "") + token + self.after.get(places[k], "") if k in places else token
+            for k, token in enumerate(self.tokens)
+        )
+
+    def closing(self, place: int) -> int:
+        """The place of the bracket that closes the one at a place."""
+        opening, depth = self[place], 0
+        for at in range(place, len(self.significant)):
+            depth += (self[at] == opening) - (self[at] == _CLOSING[opening])
+            if depth == 0:
+                return at
+        raise ValueError(f"no bracket closes {opening}")
+
+    def braced(self) -> str:
+        """The code with braces around the bodies of loops and conditionals."""
+        for place in range(len(self.significant)):
+            if self[place] in _CONTROLS and self[place + 1] == "(":
+                self._brace(self.closing(place + 1))
+            elif self[place] == "else" and self[place + 1] != "if":
+                self._brace(place)
+        return self.text()
+
+    def _brace(self, head: int) -> None:
+        """Put braces around the statement that follows, unless it has them or there is none."""
+        if self[head + 1] not in ("{", ";"):
+            last = self._end(head + 1)
+            self.after[head] = self.after.get(head, "") + " {"
+            self.after[last] = " }" + self.after.get(last, "")
+
+    def _end(self, place: int) -> int:
+        """The last token of the statement that begins at a place."""
+        if self[place] in _CONTROLS:
+            last = self._end(self.closing(place + 1) + 1)
+            while self[place] == "if" and self[last + 1] == "else":
+                last = self._end(last + 2)
+            return last
+        if self[place] == "{":
+            return self.closing(place)
+        while self[place] != ";":
+            place = self.closing(place) + 1 if self[place] in _CLOSING else place + 1
+        return place
+
+    def parenthesised(self) -> str:
+        """The code with parentheses around operands of another precedence."""
+        self._within(0, len(self.significant))
+        return self.text()
+
+    def _within(self, begin: int, end: int) -> None:
+        """Treat the expressions between two places, and those in brackets among them."""
+        operand, operands, operators = begin, list[tuple[int, int]](), list[str]()
+        place = begin
+        while place < end:
+            token, first = self[place], place == operand
+            if token in ("(", "["):
+                closing = self.closing(place)
+                self._within(place + 1, closing)
+                place = closing
+            elif token in _SEPARATORS:
+                self._combine(operands, operators, (operand, place))
+                operand, operands, operators = place + 1, [], []
+            elif not first and (token in _PRECEDENCE or token in "?:") and self._ended(place - 1):
+                operands.append((operand, place))
+                operators.append(token)
+                operand = place + 1
+            place += 1
+        self._combine(operands, operators, (operand, end))
+
+    def _ended(self, place: int) -> bool:
+        """Whether an operand may end at a place: an operator after it is binary."""
+        token = self[place]
+        return token in (")", "]", "++", "--") or token[0].isalnum() or token[0] in "_\"'."
+
+    def _combine(self, operands: list[tuple[int, int]], operators: list[str], last: tuple[int, int]) -> None:
+        """Put parentheses into an expression of operands with operators between them."""
+        if len(operators) > 1:
+            reader = _Operators([*operands, last], operators)
+            tree = reader.conditional()
+            if reader.at == len(operators):  # not in labels, whose colon ends a statement
+                self._wrap(tree)
+
+    def _wrap(self, tree: _Tree) -> None:
+        for part in tree.parts:
+            if tree.precedence < part.precedence < _OPERAND:
+                begin, end = part.span
+                self.before[begin] = self.before.get(begin, "") + "("
+                self.after[end - 1] = ")" + self.after.get(end - 1, "")
+            self._wrap(part)
+
+
+_OPERAND = 99
+
+
+@dataclass(frozen=True)
+class _Tree:
+    """An expression: its span of tokens, the precedence of its operator, and the operands."""
+
+    span: tuple[int, int]
+    precedence: int = _OPERAND
+    parts: tuple[_Tree, ...] = ()
+
+
+class _Operators:
+    """Reader of a sequence of operands with operators between them, by precedence."""
+
+    def __init__(self, operands: list[tuple[int, int]], operators: list[str]) -> None:
+        self.operands, self.operators, self.at = operands, operators, 0
+
+    def _next(self) -> str:
+        return self.operators[self.at] if self.at < len(self.operators) else ""
+
+    def conditional(self) -> _Tree:
+        """Read an expression that may be a conditional one."""
+        condition = self.binary(_CONDITIONAL + 1)
+        if self._next() != "?":
+            return condition
+        self.at += 1
+        then = self.conditional()
+        if self._next() != ":":
+            return condition
+        self.at += 1
+        otherwise = self.conditional()
+        return _Tree((condition.span[0], otherwise.span[1]), _CONDITIONAL, (condition, then, otherwise))
+
+    def binary(self, least: int) -> _Tree:
+        """Read operands joined by operators of at least a precedence."""
+        left = _Tree(self.operands[self.at])
+        while _PRECEDENCE.get(self._next(), 0) >= least:
+            precedence = _PRECEDENCE[self._next()]
+            self.at += 1
+            right = self.binary(precedence + 1)
+            left = _Tree((left.span[0], right.span[1]), precedence, (left, right))
+        return left
+
+
+def _with_void(code: str) -> str:
+    """The code with casts before statements that are calls of functions of `_UNUSED`."""
+    return "".join(_cast(code))
+
+
+def _cast(code: str) -> Iterator[str]:
+    before = ""
+    for match in _TOKEN.finditer(code):
+        if match["word"] in _UNUSED and before in (";", "{", "}"):
+            yield "(void)"
+        if match.lastgroup != "trivia":
+            before = match[0]
+        yield match[0]
