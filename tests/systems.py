@@ -33,7 +33,7 @@ MONITORED = ("kepler_eccentric",)
 #: Those by Gauss collocation: tests/gauss.
 COLLOCATED = ("kowalevski_gauss",)
 #: Those by splitting: tests/splitting.
-SPLIT = ("planets", "satellite_wheels")
+SPLIT = ("earth_moon", "planets", "satellite_wheels")
 NAMES = sorted(
     {path.stem for path in resources.bundled_specs().glob("*.yaml")}
     - {*TIMED, *FORCED, *NOISY, *MONITORED, *COLLOCATED, *SPLIT}

@@ -16,6 +16,7 @@ from phigen.splitting.near_integrable import size_of, small_part, with_motions
 from phigen.splitting.regrouping import by_blocks, with_companions
 from phigen.splitting.ring import Ring, ring_of
 from phigen.splitting.terms import hamiltonian_terms, terms_of
+from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Poly
 
@@ -92,12 +93,18 @@ def _lost(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly
 
 
 def _candidates(system: System, conflicts: Conflicts, terms: list[Term], *, motions: bool) -> Iterator[list[Term]]:
-    """Yield the terms as written, with Kepler motions, by blocks of π, without companions, and in simpler groups."""
+    """Yield the terms as written, squares whole, with Kepler motions, by blocks, without companions, and in groups."""
     yield terms
     ring = conflicts.ring
+    whole = _with_whole_summands(ring, hamiltonian_terms(system))
+    if whole:
+        yield whole
     keplerian = with_motions(ring, terms) if motions else None
     if keplerian:
         yield keplerian
+        moving = [t for t in keplerian if t.motion]
+        for grouped in groupings(ring, [t for t in keplerian if not t.motion]):
+            yield [*moving, *grouped]
     blocked = by_blocks(system, ring, terms)
     if blocked:
         yield blocked
@@ -105,6 +112,25 @@ def _candidates(system: System, conflicts: Conflicts, terms: list[Term], *, moti
     for grouped in groupings(ring, terms):
         yield grouped
         yield from _without_companions(system, conflicts, grouped)
+
+
+def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term] | None:
+    """Return the terms with summands that have a flow as they are, such as squares of linear forms; None without any.
+
+    (v·m)² on so(3) rotates m about v, while its monomials do not commute.
+    """
+    whole: list[Term] = []
+    others: list[Expression] = []
+    for e in listed:
+        element = ring.tower.convert(e)
+        support = ring.support(element)
+        mixed = any((i, j) not in ring.zero_pairs for i in support for j in support)
+        term = Term(e, element)
+        if mixed and len(ring.terms(element, ring.state)) > 1 and isinstance(joint_flow(ring, [term]), Flow):
+            whole.append(term)
+        else:
+            others.append(e)
+    return [*whole, *terms_of(ring, others)] if whole else None
 
 
 def _without_companions(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:

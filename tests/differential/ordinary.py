@@ -228,8 +228,11 @@ def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:
 
 
 def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """The system, or with the same pairs a linear one, or a Kepler motion with a small perturbation."""
+    """The system, or with a rotation, or with the same pairs a linear one, or a perturbed Kepler motion."""
     acted_upon = drawn.timed or drawn.forced or drawn.noise or drawn.monitor is not None
+    if drawn.structure.body and not acted_upon and drawn.options.get("scheme") == "splitting" and source.random() < 0.5:
+        square = linear(source, drawn.structure.coordinates) ** 2  # a rotation about a vector
+        return replace(drawn, terms=(*drawn.terms, small(source) * square / 4))
     if drawn.structure.kind != "canonical" or acted_upon:
         return drawn
     series_only = ("gauge", "birealisation", "solver", "composition")
