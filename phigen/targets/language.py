@@ -15,14 +15,16 @@ class Language:
     """Spelling of formulas in a language.
 
     ``functions`` are the names of functions, or texts with ``{0}`` for the argument, including functions that the
-    generated file defines. ``point`` follows integers.
+    generated file defines. ``point`` follows integers. ``real`` is a literal of a number in double precision.
     """
 
     reserved: Reserved
     functions: Mapping[str, str]
     constants: Mapping[str, str]
     point: str = ".0"
+    real: str = "{0!r}"
 
     def printer(self, scope: Scope) -> Printer:
         """Return a printer of lowered trees with the names of a scope."""
-        return Printer(lambda n: scope[n], self.functions, self.constants, self.functions["power"], self.point)
+        power = self.functions["power"]
+        return Printer(lambda n: scope[n], self.functions, self.constants, power, self.point, self.real)

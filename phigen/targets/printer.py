@@ -23,9 +23,11 @@ class Printer:
         constants: Mapping[str, str],
         power: str,
         point: str = ".0",
+        real: str = "{0!r}",
     ) -> None:
-        """``point`` follows whole numbers."""
+        """``point`` follows whole numbers, ``real`` is the text of any other number."""
         self.name, self.functions, self.constants, self.power, self.point = name, functions, constants, power, point
+        self.real = real
 
     def __call__(self, e: Expression) -> str:
         """The tree as text."""
@@ -43,7 +45,7 @@ class Printer:
             return f"{value.numerator}{self.point}", ATOM
         as_float = value.numerator / value.denominator
         if Fraction(as_float) == value or value.denominator > 10**6 or value.numerator > 10**6:
-            return repr(as_float), ATOM
+            return self.real.format(as_float), ATOM
         return f"{value.numerator}{self.point} / {value.denominator}{self.point}", PRODUCT
 
     def _visit(self, e: Expression, args: list[Printed]) -> Printed:

@@ -23,12 +23,18 @@ _OF_ARITHMETIC = {SUM: 3, PRODUCT: 4, ATOM: _ATOM}
 
 @dataclass(frozen=True)
 class Dialect:
-    """Spelling of values in a language: ``operators`` and ``functions`` that have another name there."""
+    """Spelling of values in a language: ``operators`` and ``functions`` that have another name there.
+
+    ``select`` is a conditional value, of the condition and both values. ``subscript`` is an element of an array, whose
+    indices count from 0, and ``member`` a member of a record.
+    """
 
     language: Language
     operators: Mapping[str, str] = field(default_factory=dict)
     functions: Mapping[str, str] = field(default_factory=dict)
     select: str = "{0} ? {1} : {2}"
+    subscript: str = "{0}[{1}]"
+    member: str = "{0}.{1}"
     pointers: frozenset[str] = frozenset()  # addresses of records, unless the function declares the record
     quote: str = '"{0}"'
 
@@ -85,13 +91,15 @@ class Spelling:
                 return self.name(symbol), _ATOM
             case ir.Constant(str() as text):
                 return self.dialect.quote.format(text), _ATOM
+            case ir.Constant(float() as number):
+                return self.dialect.language.real.format(number), _ATOM
             case ir.Constant(number):
                 return repr(number), _ATOM
             case ir.Member(record, name):
                 text, last = self(record, _ATOM), record.name if isinstance(record, ir.Member) else self(record)
-                return f"{text}{'->' if last in self._pointers else '.'}{name}", _ATOM
+                return f"{text}->{name}" if last in self._pointers else self.dialect.member.format(text, name), _ATOM
             case ir.Entry(array, index):
-                return f"{self(array, _ATOM)}[{self(index)}]", _ATOM
+                return self.dialect.subscript.format(self(array, _ATOM), self(index)), _ATOM
             case ir.Binary("&", left, right):
                 return f"{self(left, _ATOM)} & {self(right, _ATOM)}", 0
             case ir.Binary(operator, left, right):
