@@ -127,6 +127,7 @@ class CLatticeSession:
         # the fields before the last flow of a step, and the compensation terms of the fields now and then
         self._saved_states = 3 if interface.compensated else 1
         self._dear = interface.dear
+        self._steps_per_call = max(1, _UPDATES_PER_CALL // math.prod(x0.shape[1:]))
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
         bonds = np.ascontiguousarray(parameters.get("bonds", ()), dtype=np.uintp).reshape(-1, 2)
@@ -159,9 +160,8 @@ class CLatticeSession:
 
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps of size ``h``."""
-        most = max(1, _UPDATES_PER_CALL // int(np.prod(self._shape[1:])))
         while steps > 0:
-            now = min(steps, most)
+            now = min(steps, self._steps_per_call)
             status = self._c.integrate(self._address, h, now)
             if status:
                 raise BackendError(status_name(status), self.steps, self.state()[None])

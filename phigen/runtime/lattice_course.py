@@ -18,11 +18,16 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
 
+#: Steps for which branches share one saved state: to save one costs as much as some twenty steps of 64 sites.
+SHARED_STEPS = 16
+
+
 class LatticeCourse:
     """A lattice being integrated (`phigen.runtime.session.Followed`); its state is (coordinates, *sizes).
 
     Steps of a branch, and of a course restored from `saved`, have the same bits as those of one integration. The
-    session of a branch is made on its first use: sections branch at every step, and use few of the branches.
+    session of a branch is made on its first use: sections branch at every step, and use few of the branches. So
+    branches share a saved state for up to `SHARED_STEPS` steps; a branch that is used repeats the steps since then.
     """
 
     def __init__(self, solver: LatticeSolver, at: Beginning) -> None:
@@ -30,6 +35,9 @@ class LatticeCourse:
         self._arrays: Mapping[str, Any] = {}
         self._sites: LatticeSession | None = solver.started(at)
         self._clock, self._before = Clock(at.t0), 0
+        self._ahead = 0  # steps from the saved arrays to where a course without a session stands
+        self._anchor: Mapping[str, Any] = {}  # saved arrays that branches share, with the same step size since
+        self._anchor_steps = 0
 
     @property
     def sites(self) -> LatticeSession:
@@ -42,13 +50,17 @@ class LatticeCourse:
             self._sites = self.solver.started(begin)
             if clock.h:
                 self._sites.resume(clock.h, int(arrays["counts"][1]) - counted, arrays)
-            self._arrays = {}
+            if self._ahead:
+                self._sites.advance(clock.h, self._ahead)
+            self._arrays, self._ahead = {}, 0
         return self._sites
 
     @property
     def steps(self) -> int:
         """The number of successful steps since the start."""
-        return int(self._arrays["counts"][1]) if self._sites is None else self._before + self.sites.steps
+        if self._sites is None:
+            return int(self._arrays["counts"][1]) + self._ahead
+        return self._before + self._sites.steps
 
     @property
     def rounding(self) -> float:
@@ -70,28 +82,37 @@ class LatticeCourse:
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps of size ``h``."""
         sites = self.sites  # starts with the previous step size
+        if h != self._clock.h:
+            self._anchor = {}
         self._clock.set_step(h, self.steps)
         sites.advance(h, steps)
 
     def branch(self) -> LatticeCourse:
         """An independent copy."""
-        return LatticeCourse.restored(self.solver, self.at, self.saved())
+        steps = self.steps
+        if not (self._anchor and 0 <= steps - self._anchor_steps < SHARED_STEPS):
+            self._anchor, self._anchor_steps = self.saved(), steps
+        twin = LatticeCourse.restored(self.solver, self.at, self._anchor)
+        twin._ahead = steps - self._anchor_steps
+        return twin
 
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes), and nothing else; raises `BackendError` if not finite."""
+        self._anchor = {}
         self.sites.place(x)
 
     def kick(self, change: Floats) -> None:
         """Add ``change`` (coordinates, *sizes) to the state; else as `place`."""
+        self._anchor = {}
         self.sites.kick(change)
 
     def saved(self) -> dict[str, Any]:
         """Arrays for `restored`."""
-        if self._sites is None:
+        if self._sites is None and not self._ahead:
             return dict(self._arrays)
-        clock = self._clock
+        sites, clock = self.sites, self._clock
         counts = np.array([clock.counted, self.steps])
-        return {"state": self.state(), "clock": np.array([clock.t, clock.h]), "counts": counts, **self.sites.saved()}
+        return {"state": self.state(), "clock": np.array([clock.t, clock.h]), "counts": counts, **sites.saved()}
 
     @classmethod
     def restored(cls, solver: LatticeSolver, at: Beginning, arrays: Mapping[str, Any]) -> LatticeCourse:
@@ -107,7 +128,8 @@ class LatticeCourse:
         self.solver, self.at, arrays = state["solver"], state["at"], state["saved"]
         (t, h), (counted, _) = arrays["clock"].tolist(), arrays["counts"].tolist()
         self._clock, self._before = Clock(t, h, counted), counted
-        self._arrays, self._sites = arrays, None
+        self._arrays, self._sites, self._ahead = arrays, None, 0
+        self._anchor, self._anchor_steps = {}, 0
 
 
 class ObservedCourse(Retrying):
