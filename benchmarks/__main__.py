@@ -14,12 +14,15 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from benchmarks import document, eccentric, ensembles, lattices, plots, pullbacks, studies, tables
+from benchmarks import document, eccentric, ensembles, lattices, planets, plots, pullbacks, studies, tables
 from benchmarks.problems import PROBLEMS, Problem
 from benchmarks.studies import Effort
 
 ROOT = Path(__file__).resolve().parent.parent
-TABLES = ("work", "steps", "ensembles", "growth", "build", "lattices", "eccentric", "pullbacks", "gradients", "sharing")
+TABLES = (
+    "work", "steps", "ensembles", "growth", "build", "lattices", "eccentric", "planets",
+    "pullbacks", "gradients", "sharing",
+)  # fmt: skip
 #: Of a table that is made alone, in a process of its own: what it imports reads variables of the environment.
 ALONE = ("gradients", "sharing")
 
@@ -160,6 +163,11 @@ def orbit(session: Session) -> list[str]:
     return []
 
 
+def bodies(session: Session) -> list[str]:
+    session.save("planets", {}, planets.measured(session.effort.quick, session.say))
+    return []
+
+
 def passes(session: Session) -> list[str]:
     """The tables of docs/gradients.md."""
     for name, text in pullbacks.measured(session.effort.quick, session.say).items():
@@ -185,7 +193,7 @@ def alone(name: str) -> Callable[[Session], list[str]]:
 
 MAKERS: dict[str, Callable[[Session], list[str]]] = {
     "work": work, "steps": steps, "ensembles": members, "growth": growth, "build": build, "lattices": sites,
-    "eccentric": orbit, "pullbacks": passes, **{name: alone(name) for name in ALONE},
+    "eccentric": orbit, "planets": bodies, "pullbacks": passes, **{name: alone(name) for name in ALONE},
 }  # fmt: skip
 
 if __name__ == "__main__":

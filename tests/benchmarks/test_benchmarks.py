@@ -11,7 +11,7 @@ from systems import slow_but
 
 pytest.importorskip("scipy")
 
-from benchmarks import document, eccentric, ensembles, lanes, lattices, tables
+from benchmarks import document, eccentric, ensembles, lanes, lattices, planets, tables
 from benchmarks.lanes import collocation, lanes_method
 from benchmarks.measure import Cell, Grid, Judge, Result, Scan, Study, run
 from benchmarks.problems import PROBLEMS, volterra
@@ -251,3 +251,16 @@ def test_the_document_has_a_place_for_every_table():
     for name in (*names, "summary", "machine", "steps", "ensembles", "growth", "build", "lattices", "eccentric",
                  "gradients", "sharing", "pullbacks", "pullbacks-members", "pullbacks-lattices"):  # fmt: skip
         document.replaced(document.page(name).read_text(encoding="utf-8"), name, "")
+
+
+@pytest.mark.slow
+def test_all_methods_follow_the_same_planets(monkeypatch):
+    """After ten years, from the same state: peers too where they are installed."""
+    monkeypatch.setattr(planets, "PHIGEN", [m for m in planets.PHIGEN if m[1].startswith("aba") and m[3] == 10])
+    masses, q, v, gm = planets.planets()
+    contestants = [*planets.phigen_methods(masses, q, v), *planets.rebound_methods(masses, q, v, gm, print)]
+    ends = [c.advance(round(planets.DECADE / c.step)) for c in contestants]
+    for positions, velocities in ends:
+        np.testing.assert_allclose(positions, ends[0][0], rtol=0, atol=1e-5)
+        assert abs(planets.energy(masses, positions, velocities, gm) / planets.energy(masses, q, v, gm) - 1) < 1e-11
+    assert np.abs(masses @ ends[0][0]).max() < 1e-13

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import TARGETS, compile_text, javascript, solver
 
-from phigen import SpecError, spec
+from phigen import SpecError, StepError, spec
 from phigen.compiler import examine
 from phigen.geometry.system import system_from_spec
 from phigen.spec.names import RELATIVE
@@ -187,3 +187,50 @@ def test_other_systems_are_refused_at_the_key(case):
     (diagnostic,) = refused.value.diagnostics
     assert diagnostic.location is not None
     assert diagnostic.hint
+
+
+#: Starts and steps of two bodies that have no end: at one place, a fall onto one another, and an overflow.
+IMPOSSIBLE = {
+    "at one place": ([0.1, 0.2, 0.1, 0.2, 0, 0, 0.001, 0], 0.1),
+    "falls from rest": ([0, 0, 1, 0, 0, 0, 0, 0], 3.0),
+    "a step that overflows": ([0, 0, 1, 0, 0, 0, 0, 0.001], 1e300),
+}
+
+
+@pytest.mark.parametrize("case", IMPOSSIBLE)
+def test_a_step_without_an_end_is_not_finite_and_changes_nothing(case):
+    x, h = IMPOSSIBLE[case]
+    made = compiled(2, "jacobi")
+    for target in TARGETS:
+        with pytest.raises(StepError, match="NOT_FINITE") as failed:
+            solver(made, target).integrate(x, h, 2)
+        np.testing.assert_array_equal(failed.value.trajectory.x[-1], x)
+        assert failed.value.step == 0
+    calls = f"try {{ s.integrate({h!r}, 2) }} catch (error) {{ s.status = error.status }}"
+    shown = "[...s.x, s.steps, s.status === 'NOT_FINITE' ? 1 : 0]"
+    assert javascript(made, f"x0: {x}", calls, shown) == [*x, 0, 1]
+
+
+#: The speed of a parabola at the distance 1 from both masses 1.5 and 0.001.
+PARABOLA = 0.001 * np.sqrt(2 * 1.501) / 1.501 * 1.5
+
+
+@pytest.mark.parametrize(
+    "momentum", [PARABOLA, 3 * PARABOLA, 0.05 * PARABOLA], ids=["parabola", "hyperbola", "ellipse"]
+)
+def test_orbits_of_any_kind_are_followed_past_the_pericentre_and_back(momentum):
+    """In one step there and one back, about the centre of mass."""
+    start_of_orbit = [0, 0, 1, 0, 0, -momentum, 0, momentum]
+    made = compiled(2, "jacobi")
+    ends = [solver(made, target).integrate(start_of_orbit, 1.5, 1).x[-1] for target in TARGETS]
+    ends.append(javascript(made, f"x0: {[float(v) for v in start_of_orbit]}", "s.step(1.5)", "[...s.x]"))
+    np.testing.assert_allclose(ends, ends[:1] * len(ends), rtol=0, atol=1e-13)
+    back = solver(made, "c").integrate(ends[0], -1.5, 1).x[-1]
+    np.testing.assert_allclose(back, start_of_orbit, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("mass", [0, -0.001])
+def test_a_mass_that_is_not_positive_is_refused_before_the_first_step(mass):
+    for target in TARGETS:
+        with pytest.raises(ValueError, match="'m1' must be positive"):
+            solver(compiled(2, "jacobi"), target).integrate(start(2), 0.1, 1, m1=mass)
