@@ -174,7 +174,8 @@ def _loaded(program: Program, target: str) -> tuple[Any, Any]:
     command = f"phigen build {program.name}.yaml"
     if target in registry.DEVICES:
         device = registry.find(target)
-        files = {**emit(program, chosen_target("auto", _warn), command), **emit(program, target, command)}
+        host = "numpy" if program.step.kind.sites else chosen_target("auto", _warn)
+        files = {**emit(program, host, command), **emit(program, target, command)}
         return device.load(files, interface), interface
     return backend_of(emit(program, chosen_target(target, _warn), command), interface), interface
 
@@ -213,7 +214,9 @@ def interface_of(program: Program) -> Interface:
     step = program.step.swept
     if step is None:
         return about
-    sites = step.sites
+    from phigen.ir.lattice_loops import LatticeLoops, bounds
+
+    sites, loops = step.sites, LatticeLoops(program, step)
     every_other = bool(step.partners and not step.partners.graph)
     return LatticeInterface(
         **vars(about),
@@ -231,6 +234,11 @@ def interface_of(program: Program) -> Interface:
         pairs=every_other,
         compensated=program.compensated,
         at_bonds=sites.at_bonds,
+        neighbours=tuple(loops.neighbours),
+        bounds=tuple(tuple(bounds(w.key)) for w in loops.weights),
+        colours=sites.colours,
+        colour_weights=sites.weights,
+        sweeps=tuple(tuple((sweep.kernel.name, sweep.colour) for sweep in part) for part in step.parts),
         dear=every_other or step.equation is not None,
     )
 

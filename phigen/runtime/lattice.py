@@ -349,6 +349,11 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def __init__(self, backend: LatticeBackend, interface: LatticeInterface, spec: Spec | None = None) -> None:
         self.backend, self.interface, self.spec = backend, interface, spec
 
+    @property
+    def device(self) -> Any:
+        """The device that lattices are integrated on, with its ``name`` and ``memory``; None for other targets."""
+        return getattr(self.backend, "device", None)
+
     def __repr__(self) -> str:
         about = self.interface
         fields = ", ".join(about.coordinates)

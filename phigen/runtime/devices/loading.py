@@ -9,7 +9,7 @@ from typing import Any
 from phigen import registry
 from phigen.errors import DeviceError
 from phigen.runtime.devices.device import Device
-from phigen.runtime.interface import Interface
+from phigen.runtime.interface import Interface, LatticeInterface
 
 #: The modules of devices by target.
 DEVICES = {"opencl": "phigen.runtime.devices.opencl", "cuda": "phigen.runtime.devices.cuda"}
@@ -24,10 +24,13 @@ def device_of(target: str) -> Device:
 def backend(files: Mapping[str, str], interface: Interface, target: str) -> Any:
     """Return the back end of generated files: what runs on the host is of another target among the files."""
     from phigen.runtime.devices.ensembles import DeviceSolver
+    from phigen.runtime.devices.lattices import DeviceLattice
 
     host = registry.target_of([file for file in files if not file.endswith("_device.h")], interface.name)
     device = device_of(target)
     if not (device.double or interface.single):
         hint = "say real: float in the spec, or take another device, which PHIGEN_DEVICE names"
         raise DeviceError(f"{device.name} has no numbers in double precision; {hint}")
+    if isinstance(interface, LatticeInterface):
+        return DeviceLattice(files, interface, target)
     return DeviceSolver(files, interface, target, host.load(files, interface))

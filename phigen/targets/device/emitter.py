@@ -10,7 +10,6 @@ from dataclasses import fields, replace
 from functools import partial
 from typing import Any
 
-from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import Program
 from phigen.targets.c import emitter as c
@@ -19,6 +18,7 @@ from phigen.targets.c.features import switches
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.single import single
 from phigen.targets.c.step_text import text_of
+from phigen.targets.device import lattice
 from phigen.targets.device.dialect import qualified
 from phigen.targets.header import header_lines, sealed
 from phigen.targets.rendering import render
@@ -36,10 +36,9 @@ def emit(program: Program, command: str) -> dict[str, str]:
 
 
 def expect_offered(program: Program) -> None:
-    """Raise `SpecError` for lattices."""
-    if program.step.kind.sites:
-        message = f"target device: {program.name} is a lattice; there are kernels of ordinary systems only"
-        raise SpecError([Diagnostic(message, hint="take target c")])
+    """Raise `SpecError` for lattices whose steps have no kernels."""
+    if program.step.swept:
+        lattice.expect_offered(program, program.step.swept)
 
 
 _READING = (
@@ -74,10 +73,13 @@ def group_size(program: Program) -> int:
 
 def text_of_device(program: Program) -> str:
     """Return the text of a file but its first comment."""
-    has = switches(program, None) | {"DEVICE": True, "KICKED": False}
     language = render(
         "c", "device_language.h", {"NAME": program.name, "double": not program.single, "group": group_size(program)}
     )
+    if program.step.swept:
+        lines = lattice.body(program, program.step.swept, language).splitlines()
+        return fitted(_guarded(program.name, "\n".join([*qualified(lines, program.name), ""])))
+    has = switches(program, None) | {"DEVICE": True, "KICKED": False}
     texts = {"device_language.h": language} | text_of(program).texts(program, program.step, None, has)
     declarations = render("c", "device_declarations.h", c.declared_values(program, None, has))
     texts |= {"device_declarations.h": declarations, "model.h": c.model(program, None, has, texts.values())}
