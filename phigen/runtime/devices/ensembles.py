@@ -5,15 +5,16 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from phigen import registry
 from phigen.errors import DeviceError
 from phigen.runtime.backend import Backend
 from phigen.runtime.devices.device import Device, OutOfMemoryError
-from phigen.runtime.devices.loading import backend, device_of
+from phigen.runtime.devices.opening import device_of
 from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface, status_name
 from phigen.runtime.members import Members
 from phigen.runtime.session import Session
@@ -220,5 +221,5 @@ class DeviceSolver:
 
 def _loaded_again(files: Mapping[str, str], interface: Interface, target: str, gauge: Floats | None) -> DeviceSolver:
     """Return a solver that was pickled, on the device of this process."""
-    solver: DeviceSolver = backend(files, interface, target)
+    solver = cast(DeviceSolver, registry.find(target).load(files, interface))
     return solver if gauge is None else solver.with_gauge(gauge)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from phigen.errors import DeviceError
 from phigen.runtime.devices.device import Device, OutOfMemoryError
-from phigen.runtime.devices.loading import device_of
+from phigen.runtime.devices.opening import device_of
 from phigen.runtime.interface import FIRST_DRAWS, BackendError, Draws, Floats, LatticeInterface
 from phigen.runtime.numpy_lattice import NumpyLattice, NumpyLatticeSession
 
@@ -31,7 +31,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
         super().__init__(*arguments, timed=timed)
         self._tables = backend.tables(self._sites, self._shape[1:])
         self._fields, self._before = (self._device.empty(8 * int(np.prod(self._shape))) for _ in range(2))
-        self._found = self._device.empty(4)
+        self._flag = self._device.empty(4)
 
     @property
     def _x(self) -> Floats:
@@ -106,11 +106,11 @@ class DeviceLatticeSession(NumpyLatticeSession):
             self._host = None
 
     def _failed(self) -> bool:
-        size, found = int(np.prod(self._shape)), np.zeros(1, dtype=np.int32)
-        self._device.write(self._found, found)
-        self._device.launch(self._kernels.failed, size, [np.int32(size), self._fields, self._found])
-        self._device.read(self._found, found)
-        return bool(found[0])
+        size, flag = int(np.prod(self._shape)), np.zeros(1, dtype=np.int32)
+        self._device.write(self._flag, flag)
+        self._device.launch(self._kernels.failed, size, [np.int32(size), self._fields, self._flag])
+        self._device.read(self._flag, flag)
+        return bool(flag[0])
 
 
 class Kernels:
@@ -224,9 +224,8 @@ class DeviceLattice(NumpyLattice):
         """Return the arrays of a lattice of some size on the device."""
         largest = np.iinfo(np.int32).max // max(self.interface.dimension, len(self.interface.neighbours))
         if np.prod(sizes, dtype=float) > largest:
-            raise DeviceError(
-                f"{self.interface.name}: {sizes} are more than {largest} sites, whose indices have 32 bits"
-            )
+            name = self.interface.name
+            raise DeviceError(f"{name}: {sizes} are more than {largest} sites, the most that 32 bits can number")
         try:
             return Tables(self.device, sites, sizes, self.interface)
         except OutOfMemoryError as error:

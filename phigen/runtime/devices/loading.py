@@ -3,22 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import import_module
 from typing import Any
 
 from phigen import registry
 from phigen.errors import DeviceError
-from phigen.runtime.devices.device import Device
+from phigen.runtime.devices.opening import device_of
 from phigen.runtime.interface import Interface, LatticeInterface
-
-#: The modules of devices by target.
-DEVICES = {"opencl": "phigen.runtime.devices.opencl", "cuda": "phigen.runtime.devices.cuda"}
-
-
-def device_of(target: str) -> Device:
-    """Return the device of a target in this process. Raises `DeviceError` or `MissingPackageError`."""
-    opened: Device = import_module(DEVICES[target]).device()
-    return opened
 
 
 def backend(files: Mapping[str, str], interface: Interface, target: str) -> Any:
