@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
@@ -18,6 +18,12 @@ FIELDS, COEFFICIENTS, NEIGHBOURS, WEIGHTS, PARAMETERS, INCREMENTS = map(
     ir.fixed, ("x", "coef", "neighbours", "weights", "at_sites", "dw")
 )
 
+#: Names in a kernel that fields and parameters make way for.
+KERNEL_NAMES = (
+    *("items", "count", "sites", "coefficients", "first", "coef", "neighbours", "weights", "at_sites", "dw", "x"),
+    *("i", "k"),
+)
+
 
 def work_items(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
     """Return a sweep as the statements of one work item. Raises `TypeError` for what only some lattices have."""
@@ -25,7 +31,8 @@ def work_items(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
     loops = (s for s in function.body if isinstance(s, ir.Loop))
     before = (s for s in function.body if not isinstance(s, ir.Loop))
     statements = [*before, *(inner for loop in loops for inner in loop.body)]
-    return function.with_body(*(new for s in statements for new in items.lowered(s)))
+    lowered = tuple(new for s in statements for new in items.lowered(s))
+    return replace(function, parameters=KERNEL_NAMES, body=lowered)
 
 
 @dataclass

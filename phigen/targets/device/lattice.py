@@ -49,7 +49,7 @@ def body(program: Program, step: Sweeps, language: str) -> str:
     return render("c", "device_lattice.h", values)
 
 
-def _kernels(program: Program, step: Sweeps) -> Iterator[tuple[str, str, str]]:
+def _kernels(program: Program, step: Sweeps) -> Iterator[tuple[str, str, list[str]]]:
     """Yield the comment, the name, and the statements of each sweep."""
     loops = LatticeLoops(program, step)
     for sweep in (sweep for part in step.parts for sweep in part):
