@@ -19,6 +19,22 @@ CONDITIONS = 7.9
 #: The same for lines ``// #if``, ``// #else`` and ``// #endif`` of the runtime in JavaScript.
 JAVASCRIPT_CONDITIONS = 2.9
 
+#: The modules of targets that use regular expressions, each with what these read. Passes over C read tokens.
+REGULAR_EXPRESSIONS = {
+    "phigen/targets/names.py": "names of the spec, for identifiers",
+    "phigen/targets/reserved.py": "names of the spec, for identifiers",
+    "phigen/targets/spelling.py": "patterns of functions and names of the loop IR",
+    "phigen/targets/header.py": "descriptions in specs; files of users, for their checksum",
+    "phigen/targets/c/tokens.py": "the text of the runtime and of printed parts: the lexer of C",
+    "phigen/targets/c/macros.py": "lines of the runtime that name phrases",
+    "phigen/targets/c/amalgamation.py": "lines of the runtime that call hooks, and its prefix",
+    "phigen/targets/c/layout.py": "lines of finished C, where they may be broken",
+    "phigen/targets/c/misra.py": "the text of solvers of the profile certified: a lexer with the operators of C",
+    "phigen/targets/c/lattice/loops.py": "descriptions of kernels, for their comments",
+    "phigen/targets/js/printing.py": "names of kernels and arrays, for identifiers",
+    "phigen/targets/js/runtime.py": "lines of the runtime that include or import",
+}
+
 #: Tests on the kind of a step or of a compilation: ``isinstance``, class patterns, and comparisons of the records of
 #: kinds or of their names. Kinds differ by facts in their records, entries in tables, and methods.
 KIND_TESTS = 0
@@ -130,6 +146,13 @@ def test_conditions_in_the_runtime_do_not_grow():
 def test_conditions_in_the_runtime_in_javascript_do_not_grow():
     counted, total = javascript_conditions()
     assert 0 < 100.0 * counted / total <= JAVASCRIPT_CONDITIONS
+
+
+def test_regular_expressions_read_what_is_listed():
+    """No pass edits generated text by them."""
+    files = [path for room in ("targets", "ir", "lanes") for path in sorted((ROOT / "phigen" / room).rglob("*.py"))]
+    users = {str(p.relative_to(ROOT)) for p in files if re.search(r"^import re$", p.read_text("utf-8"), re.MULTILINE)}
+    assert users == REGULAR_EXPRESSIONS.keys()
 
 
 def test_circles_are_found():

@@ -14,7 +14,7 @@ from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.emitter import runtime_of
 from phigen.targets.c.language import members
 from phigen.targets.c.layout import fitted
-from phigen.targets.c.single import literal
+from phigen.targets.c.real import literal
 from phigen.targets.header import sealed
 from phigen.targets.rendering import render
 

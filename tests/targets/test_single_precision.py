@@ -17,7 +17,7 @@ from phigen.api import lattice_solver_of
 from phigen.compiler import compile_spec, emit
 from phigen.lattice.states import start_of
 from phigen.study.single_precision import COARSER, ONE_STEP
-from phigen.targets.c.single import single
+from phigen.targets.c.real import FLOAT
 
 WRITTEN = {
     "types, literals, functions, limits": (
@@ -48,7 +48,7 @@ DOUBLE = re.compile(
 @pytest.mark.parametrize("case", WRITTEN)
 def test_what_is_written(case):
     given, wanted = WRITTEN[case]
-    assert single(given) == wanted
+    assert FLOAT.spelt(given) == wanted
 
 
 @cache

@@ -16,17 +16,22 @@ from phigen import resources
 from phigen.targets.c import phrases, states
 from phigen.targets.c.files import calls_left_out, left_out
 from phigen.targets.c.macros import Macros
+from phigen.targets.c.real import DOUBLE, Real
 from phigen.targets.c.unused import without_unused
 from phigen.targets.features import holds
 
 
 @dataclass
 class Amalgam:
-    """Assembly of one solver: ``switches`` and ``printed`` files by name; ``headers`` collects those of the library."""
+    """Assembly of one solver: ``switches`` and ``printed`` files by name, all in the type ``real``.
+
+    ``headers`` collects those of the library.
+    """
 
     name: str
     switches: Mapping[str, bool]
     printed: Mapping[str, str]
+    real: Real = DOUBLE
     headers: set[str] = field(default_factory=set)
     _defined: set[str] = field(default_factory=set)
     _macros: Macros = field(default_factory=Macros)
@@ -116,7 +121,14 @@ class Amalgam:
         """Return lines that were printed for the solver with macros expanded; names of the model stay as they are."""
         spelt = [line for line in lines if "PHI_" in line]
         replaced = dict(zip(spelt, map(self._macros.expanded, ([line] for line in spelt)), strict=True))
-        return [self._prefixed(text) if text != line else text for line in lines for text in replaced.get(line, [line])]
+        spelt_lines = [
+            self._prefixed(text) if text != line else text for line in lines for text in replaced.get(line, [line])
+        ]
+        return self._typed(spelt_lines)
+
+    def _typed(self, lines: Sequence[str]) -> list[str]:
+        """Return lines that compute in double in the type of the solver."""
+        return self.real.spelt("\n".join(lines)).split("\n") if lines else []
 
     def _prefixed(self, line: str) -> str:
         return re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line)
@@ -124,7 +136,7 @@ class Amalgam:
     def _own(self, lines: Sequence[str]) -> list[str]:
         """Return lines of the runtime with macros expanded, and with the prefix of the solver."""
         lines = [line for line in lines if not self._not_called.match(line)]
-        return [self._prefixed(line) for line in self._macros.expanded(lines)]
+        return self._typed([self._prefixed(line) for line in self._macros.expanded(lines)])
 
 
 #: Line between header and source while both are processed as one text.
@@ -133,5 +145,8 @@ _BEHIND = "/* */"
 
 def _spaced(lines: Sequence[str]) -> str:
     """Return the text of lines, with single blank lines only, and none after the title of a chapter."""
-    text = re.sub(r"\n{3,}", "\n\n", "\n".join(lines))
-    return re.sub(r"( ---- \*/\n)\n", r"\1", text).strip("\n") + "\n"
+    spaced: list[str] = []
+    for line in lines:
+        if line or (spaced and spaced[-1] and not spaced[-1].endswith(" ---- */")):
+            spaced.append(line)
+    return "\n".join(spaced).rstrip("\n") + "\n"

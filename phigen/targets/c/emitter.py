@@ -6,10 +6,9 @@ What depends on the model is printed: sizes, constants, kernels (`printed`). All
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial, reduce
+from functools import partial
 
 from phigen.lanes.in_lanes import LANES, Blocks, Lanes, Packs, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
@@ -27,8 +26,9 @@ from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.language import members
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.misra import compliant
-from phigen.targets.c.single import single
+from phigen.targets.c.real import DOUBLE, FLOAT
 from phigen.targets.c.step_text import Sizes, text_of
+from phigen.targets.c.tokens import without_word
 from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
@@ -46,8 +46,9 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
     """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
     name, lines = program.name, header_lines(program, command)
     amalgam, header, code = runtime_of(program)
-    passes = [single] * program.single + [compliant] * (program.profile == "certified")
-    declarations, definitions = (reduce(lambda t, each: each(t), passes, t) for t in amalgam.texts(header, code))
+    declarations, definitions = amalgam.texts(header, code)
+    if program.profile == "certified":
+        declarations, definitions = compliant(declarations), compliant(definitions)
     declared = declarations + "\n#ifdef __cplusplus\n}\n#endif\n"
     defined = unrestricted(program, definitions)
     headers = "\n".join(sorted(amalgam.headers))
@@ -66,7 +67,7 @@ def unrestricted(program: Program, code: str) -> str:
     Only loops over lanes and sites become faster by it. Other code loses the word.
     """
     if program.profile != "fast" and not program.step.kind.sites and "_EACH_LANE" not in code:
-        return re.sub(r"\brestrict\b ?", "", code)
+        return without_word(code, "restrict")
     return render("c", "restrict.c", {"code": code.strip()})
 
 
@@ -74,10 +75,10 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     """Return the assembly of a solver, and the files of the runtime from which header and source start."""
     lanes = in_lanes(program)
     has = switches(program, lanes)
-    constants = policies(program)
+    constants, real = policies(program), FLOAT if program.single else DOUBLE
     step = program.step.swept
     if step is None:
-        return Amalgam(program.name, has, constants | printed(program, lanes, has)), "solver.h", "runtime.c"
+        return Amalgam(program.name, has, constants | printed(program, lanes, has), real), "solver.h", "runtime.c"
     from phigen.targets.c.lattice import adjoint as lattice_adjoint
     from phigen.targets.c.lattice import layout as lattice_layout
     from phigen.targets.c.lattice import model as lattice_model
@@ -95,7 +96,7 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     }
     if step.adjoint:
         texts["adjoint_sweeps.h"] = lattice_adjoint.printed(program, step, step.adjoint, lanes)
-    return Amalgam(program.name, has, constants | texts), "lattice.h", "lattice.c"
+    return Amalgam(program.name, has, constants | texts, real), "lattice.h", "lattice.c"
 
 
 def policies(program: Program) -> dict[str, str]:
@@ -116,10 +117,17 @@ def _declared_lines(program: Program) -> list[str]:
 
 
 def _sealed(lines: Sequence[str], body: str) -> str:
-    chapters = re.findall(r"^/\* ---- (.*) ---- \*/$", body, re.MULTILINE)
+    chapters = [line[len(_CHAPTER) : -len(_END)] for line in body.splitlines() if _is_chapter(line)]
     long = chapters and body.count("\n") > FEW_SCREENS
     contents = textwrap.wrap(f"Contents: {'; '.join(chapters)}", 100, subsequent_indent="  ") if long else []
     return sealed([*lines, *contents], body)
+
+
+_CHAPTER, _END = "/* ---- ", " ---- */"
+
+
+def _is_chapter(line: str) -> bool:
+    return line.startswith(_CHAPTER) and line.endswith(_END)
 
 
 def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, str]:

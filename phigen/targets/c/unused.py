@@ -3,13 +3,13 @@ that are not defined."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-_HEAD = re.compile(r"(?!typedef|extern|enum|struct)[a-z][^=;{]*?\b(\w+)\(")
-_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
-_WORD = re.compile(r"\b[A-Za-z_]\w*\b")
+from phigen.targets.c.tokens import CToken, TokenKind, names, tokens
+
+#: First words of what declares no function, or one of the library.
+_NO_FUNCTIONS = ("typedef", "extern", "enum", "struct", "union")
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ def without_unused(lines: Sequence[str], prefix: str) -> list[str]:
     functions = [f for f in functions_of(lines) if f.name.startswith(prefix)]
     static = [f for f in functions if f.static]
     inside = {k for f in static for k in range(f.begin, f.end)} | _declared(functions)
-    reached = _reached(_words(line for k, line in enumerate(lines) if k not in inside), static, lines)
+    reached = _reached(names("\n".join(line for k, line in enumerate(lines) if k not in inside)), static, lines)
     defined = {f.name for f in functions if f.defined}
     unused = [f for f in functions if (f.name not in reached if f.static else f.name not in defined)]
     return _without(lines, unused)
@@ -43,7 +43,7 @@ def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str])
     """The static functions that are called, also by one another."""
     words: dict[str, set[str]] = {}
     for f in static:
-        words.setdefault(f.name, set()).update(_words(lines[f.begin : f.end]) if f.defined else ())
+        words.setdefault(f.name, set()).update(names("\n".join(lines[f.begin : f.end])) if f.defined else ())
     reached, open_ = set[str](), [name for name in words if name in called]
     while open_:
         name = open_.pop()
@@ -55,20 +55,67 @@ def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str])
 
 def functions_of(lines: Sequence[str]) -> Iterator[Function]:
     """Yield the functions that lines declare or define."""
-    k = 0
-    while k < len(lines):
-        end = k
-        while end < len(lines) and lines[k][:1].islower() and not lines[end].rstrip().endswith((";", "{", "}", "*/")):
-            end += 1
-        head = _HEAD.match(" ".join(lines[k : end + 1]))
-        if head is None or end == len(lines):
-            k += 1
+    declaration, opened = _Declaration(), 0
+    for line, token in _code("\n".join(lines)):
+        if token.text == "}" and not opened:
+            declaration = _Declaration()  # the end of extern "C"
             continue
-        defined = "{" in lines[end]
-        while defined and not _COMMENT.sub("", lines[end]).rstrip().endswith("}"):
-            end = next(e for e in range(end + 1, len(lines)) if lines[e].startswith("}"))
-        yield Function(head[1], k, end + 1, lines[k].startswith("static "), defined)
-        k = end + 1
+        declaration.take(token, line, outside=not opened)
+        opened += (token.text == "{") - (token.text == "}")
+        if declaration.is_linkage:
+            declaration, opened = _Declaration(), 0
+        elif not opened and token.text in declaration.ends:
+            if declaration.name:
+                yield Function(
+                    declaration.name, declaration.begin, line + 1, declaration.first == "static", token.text == "}"
+                )
+            declaration = _Declaration()
+
+
+def _code(text: str) -> Iterator[tuple[int, CToken]]:
+    """Yield the tokens of a text without white space, comments and directives, each after the number of its line."""
+    line, fresh, directive = 0, True, False
+    for token in tokens(text):
+        ends = token.kind is TokenKind.SPACE and "\n" in token.text
+        directive = not ends and (directive or (fresh and token.text == "#"))
+        if token.kind not in (TokenKind.SPACE, TokenKind.COMMENT) and not directive:
+            yield line, token
+        fresh = ends or (fresh and token.kind is TokenKind.SPACE)
+        line += token.text.count("\n")
+
+
+@dataclass
+class _Declaration:
+    """Declaration or definition as far as it has been read: its ``first`` word, and the name if it is of a function."""
+
+    first: str = ""
+    begin: int = 0
+    name: str = ""
+    last: str = ""
+    is_plain: bool = False  # whether it is no function
+    has_body: bool = False
+
+    def take(self, token: CToken, line: int, *, outside: bool) -> None:
+        """Take the next token, which is ``outside`` of braces or not."""
+        if not self.first:
+            self.first, self.begin = token.text, line
+            self.is_plain = token.text in _NO_FUNCTIONS or not token.text[:1].islower()
+        if outside and not self.name and not self.is_plain:
+            if token.text == "(":
+                self.name = self.last
+            self.is_plain = token.text in ("=", "{")
+        self.has_body = self.has_body or (outside and token.text == "{" and bool(self.name))
+        self.last = token.text
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """The marks outside of braces with which it ends."""
+        return ("}",) if self.has_body else (";",)
+
+    @property
+    def is_linkage(self) -> bool:
+        """Whether it is the beginning of ``extern "C"``."""
+        return self.first == "extern" and self.last == "{"
 
 
 def _without(lines: Sequence[str], functions: Iterable[Function]) -> list[str]:
@@ -95,7 +142,3 @@ def _is_comment(lines: Sequence[str], last: int) -> bool:
 def _beginning(lines: Sequence[str], last: int) -> int:
     """The line on which the comment begins that ends on this one."""
     return next(k for k in range(last, -1, -1) if "/*" in lines[k])
-
-
-def _words(lines: Iterable[str]) -> set[str]:
-    return set(_WORD.findall(_COMMENT.sub("", "\n".join(lines))))

@@ -16,7 +16,7 @@ from phigen.targets.c import emitter as c
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.layout import fitted
-from phigen.targets.c.single import single
+from phigen.targets.c.real import DOUBLE, OVERLOADED_FLOAT
 from phigen.targets.c.step_text import text_of
 from phigen.targets.device import lattice
 from phigen.targets.device.dialect import qualified
@@ -83,10 +83,11 @@ def text_of_device(program: Program) -> str:
     texts = {"device_language.h": language} | text_of(program).texts(program, program.step, None, has)
     declarations = render("c", "device_declarations.h", c.declared_values(program, None, has))
     texts |= {"device_declarations.h": declarations, "model.h": c.model(program, None, has, texts.values())}
-    amalgam = Amalgam(program.name, has, c.policies(program) | texts)
+    real = OVERLOADED_FLOAT if program.single else DOUBLE
+    amalgam = Amalgam(program.name, has, c.policies(program) | texts, real)
     body = c.unrestricted(program, amalgam.text("device.c", partial(qualified, name=program.name)))
     body = _guarded(program.name, body)
-    return fitted(single(body, overloaded=True) if program.single else body)
+    return fitted(body)
 
 
 def _guarded(name: str, text: str) -> str:

@@ -1,0 +1,132 @@
+"""The types of real numbers that C computes in: how types, literals, limits and functions of the library are spelt.
+
+The runtime and the printers are written for ``double``; `Real.spelt` is the pass that spells their text in another
+type. What is computed stays the same but for the thresholds, small numbers that a ``#define`` names: they say at how
+many digits something counts as rounding.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from phigen.targets.c.tokens import CToken, TokenKind, tokens
+
+#: Digits of float in those of double.
+DIGITS = 24 / 53
+
+#: Below this a number that is named by a ``#define`` is a threshold.
+_THRESHOLD = 1e-5
+
+#: The functions of C's library that have one for each type.
+_FUNCTIONS = frozenset(
+    [
+        "acos",
+        "acosh",
+        "asin",
+        "asinh",
+        "atan",
+        "atanh",
+        "cos",
+        "cosh",
+        "sin",
+        "sinh",
+        "tan",
+        "tanh",
+        "atan2",
+        "cbrt",
+        "ceil",
+        "copysign",
+        "erf",
+        "erfc",
+        "exp",
+        "exp2",
+        "expm1",
+        "fabs",
+        "fdim",
+        "floor",
+        "fma",
+        "fmax",
+        "fmin",
+        "fmod",
+        "frexp",
+        "hypot",
+        "ldexp",
+        "lgamma",
+        "log",
+        "log10",
+        "log1p",
+        "log2",
+        "logb",
+        "nearbyint",
+        "nextafter",
+        "pow",
+        "remainder",
+        "rint",
+        "round",
+        "scalbn",
+        "sqrt",
+        "tgamma",
+        "trunc",
+    ]
+)
+_LEAST, _MOST = 2.0**-126, (2.0 - 2.0**-23) * 2.0**127
+
+
+@dataclass(frozen=True)
+class Real:
+    """A type of real numbers: its ``name``, and the ``words`` for the type and limits of double.
+
+    ``function_suffix`` is behind the names of functions of the library, empty where these are overloaded.
+    """
+
+    name: str
+    words: Mapping[str, str] = field(default_factory=dict)
+    function_suffix: str = ""
+
+    def spelt(self, text: str) -> str:
+        """Return C that computes in this type, from C that computes in double."""
+        return "".join(self._spelt(text)) if self.words else text
+
+    def _spelt(self, text: str) -> Iterator[str]:
+        naming = False  # whether this is the line of a #define
+        for token, after in pairwise([*tokens(text), CToken(TokenKind.SPACE, "")]):
+            naming = (naming or token.text == "define") and "\n" not in token.text
+            if token.kind is TokenKind.REAL and not token.text.endswith("f"):
+                value = float.fromhex(token.text) if token.text.startswith("0x") else float(token.text)
+                yield literal(threshold(value) if naming and 0.0 < value < _THRESHOLD else value)
+            elif token.kind is TokenKind.NAME and token.text in _FUNCTIONS and after.text == "(":
+                yield f"{token.text}{self.function_suffix}"
+            else:
+                yield self.words.get(token.text, token.text) if token.kind is TokenKind.NAME else token.text
+
+
+_FLOAT = {
+    "double": "float",
+    "DBL_MIN": "FLT_MIN",
+    "DBL_MAX": "FLT_MAX",
+    "DBL_EPSILON": "FLT_EPSILON",
+    "HUGE_VAL": "HUGE_VALF",
+}
+
+DOUBLE = Real("double")
+FLOAT = Real("float", _FLOAT, "f")
+#: Single precision in dialects of C whose functions are those of their arguments.
+OVERLOADED_FLOAT = Real("float", _FLOAT)
+
+
+def threshold(value: float) -> float:
+    """Return the threshold in single precision that has the same share of the digits as ``value`` in double."""
+    return float(f"{value**DIGITS:.0e}")
+
+
+def literal(value: float) -> str:
+    """Return the shortest literal of the nearest float; values beyond the range of floats become its limits."""
+    if value:
+        value = min(max(value, _LEAST), _MOST)
+    nearest = struct.unpack("f", struct.pack("f", value))[0]
+    texts = (f"{nearest:.{digits}g}" for digits in range(1, 10))
+    text = next(t for t in texts if struct.unpack("f", struct.pack("f", float(t)))[0] == nearest)
+    return f"{text}f" if "." in text or "e" in text else f"{text}.0f"
