@@ -11,7 +11,11 @@ from lattice import test_forcing as forcing
 from lattice import test_sweeps as sweeps
 from lattice import test_time as timed
 
+import phigen
+import phigen.spec
 from phigen.errors import StepError
+from phigen.runtime.arguments import Beginning
+from phigen.runtime.lattice_course import LatticeCourse
 
 #: A splitting whose steps are joined, one in time, the series with noise, and a splitting with noise.
 CASES = {"xxz": sweeps, "coloured": timed, "bath": forcing, "langevin": forcing}
@@ -70,3 +74,39 @@ def test_states_that_cannot_be_are_refused_and_leave_the_session_where_it_was(ta
         session.kick(x[:, :4])
     np.testing.assert_array_equal(session.x, before)
     assert session.casimirs["C"].shape == x.shape[1:]
+
+
+CHAIN_WITH_NOISE = """\
+phigen: 1
+name: chain
+lattice: {axes: [i]}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + (q[i+1] - q)**2/2 + q**4/4
+noise: {bath: {hamiltonian: q, amplitude: 0.1}}
+"""
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_branches_share_states_and_keep_the_bits(target):
+    solver = phigen.compile(phigen.spec.loads(CHAIN_WITH_NOISE), target=target)
+    x0 = np.random.default_rng(4).normal(size=(2, 9))
+    whole = LatticeCourse(solver, Beginning(x0, 0.1, solver.values({}, {}, (9,))))
+    course, branches = LatticeCourse(solver, whole.at), []
+    for step in range(40):
+        branches.append(course.branch())
+        h = 0.1 if step < 25 else 0.07
+        course.advance(h, 1)
+        if step == 20:
+            course.kick(np.full((2, 9), 0.01))
+    for step in range(40):
+        assert branches[step].steps == step
+        if step % 7 == 0:
+            np.testing.assert_array_equal(branches[step].branch().state(), whole.state())
+        whole.advance(0.1 if step < 25 else 0.07, 1)
+        if step == 20:
+            whole.kick(np.full((2, 9), 0.01))
+    late = branches[3]
+    late.advance(0.1, 17)
+    np.testing.assert_array_equal(late.state(), branches[20].state())
+    np.testing.assert_array_equal(whole.state(), course.state())
