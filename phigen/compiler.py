@@ -333,13 +333,14 @@ def _collocated(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
     expect_offered(spec)
     plan = plan_gauss(spec)
     realisation = clock.timed("momentum maps", lambda: realise_gauss(spec, source))
+    group = _group(spec, source, "")
     monitor = monitor_of(spec)
     if isinstance(spec.gauge, str):
         chosen = slowest(source, realisation) if spec.gauge == "auto" and not monitor else Gauge()
     else:
         chosen = fixed_gauge(source, spec.gauge)
     gauge = replace(chosen, monitor=monitor)
-    program = clock.timed("program", lambda: build_gauss(source, gauge, realisation, plan, spec))
+    program = clock.timed("program", lambda: build_gauss(source, gauge, realisation, plan, spec, group))
     return CompiledGauss(
         spec=spec, system=source, order=plan, program=program, gauge=gauge, seconds=clock.seconds, gauss=realisation
     )

@@ -17,7 +17,9 @@ from phigen.attitude.elements import cross, direction, dot, element, product, ro
 from phigen.attitude.group import Group
 from phigen.attitude.matrices import multiplied
 from phigen.attitude.parts import Turning, constancy, factor_elements, joined, turnings
-from phigen.compilation import Compilation, CompiledSeries, CompiledSplitting
+from phigen.compilation import Compilation, CompiledGauss, CompiledSeries, CompiledSplitting
+from phigen.gauss.kernels import at_unknowns, stage_map, vector_field
+from phigen.gauss.rotation import group_element
 from phigen.geometry.lie_algebra import LieAlgebra, Representation
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.cayley import trilinear
@@ -34,6 +36,7 @@ from phigen.symbolic.expression import (
     gradient,
     number,
     rebuild,
+    sparse_derivatives,
     substitute,
     symbol,
     total,
@@ -53,7 +56,9 @@ def check(compilation: Compilation) -> Iterator[Statement]:
     attitude = compilation.program.attitude
     if attitude is not None:
         yield from compilation.by_kind(
-            partial(_series_statements, attitude), partial(_splitting_statements, attitude), lambda gauss: iter(())
+            partial(_series_statements, attitude),
+            partial(_splitting_statements, attitude),
+            partial(_gauss_statements, attitude),
         )
 
 
@@ -87,6 +92,23 @@ def _first_term(compilation: CompiledSeries) -> Expression:
     except OverflowError:
         return compilation.series.graph(1)[0]
     return first.tower.expression(first.terms[0])
+
+
+def _gauss_statements(attitude: Attitude, compilation: CompiledGauss) -> Iterator[Statement]:
+    """Statement on the rate of the element of a Gauss step at its start, which moves as the stages do."""
+    system, group = compilation.system, attitude.group
+    pace = compilation.gauge.pace(system)
+    points = stage_map(compilation.discretised, compilation.gauss, pace)
+    values = group_element(points, group)
+    assert values is not None  # else the program had no attitude
+    at_start = dict.fromkeys(points.unknowns, ZERO)
+    slopes = dict(zip(points.unknowns, substitute(vector_field(points, at_unknowns(points)), at_start), strict=True))
+    rates = [total(substitute([e], at_start)[0] * slopes[z] for z, e in row.items())
+             for row in sparse_derivatives(values, points.unknowns)]  # fmt: skip
+    turned = {i: 2 * rate for i, rate in zip(group.rotation, rates[1:4], strict=True)}
+    turned |= dict(zip(group.translation, rates[4:], strict=True))
+    slope = [turned.get(i, ZERO) for i in range(system.dimension)]
+    yield rate_statement(system, attitude, slope, compilation.gauge.monitor)
 
 
 def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: Expression | None = None) -> Statement:

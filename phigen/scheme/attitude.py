@@ -9,6 +9,8 @@ from phigen.attitude.group import Group, refused
 from phigen.attitude.matrices import cayley as cayley_transform
 from phigen.attitude.matrices import exponential, size_of
 from phigen.attitude.parts import Turning, factor_elements, joined, turning_of, turnings
+from phigen.gauss.kernels import StageMap
+from phigen.gauss.rotation import group_element
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.gathering import staged
@@ -54,6 +56,29 @@ def stage_attitude(
     rate = rate_kernel(system, group, gauge)
     needed = group.matrices and (rate or not cayley)
     return Attitude(group, cayley, turn, along, rate=rate, exponential=_exponential(group) if needed else None)
+
+
+def gauss_attitude(
+    system: System, group: Group, points: StageMap, coefficients: Coefficients, gauge: Gauge
+) -> Attitude:
+    """Return the attitude of a Gauss step; its coefficients go to the table. Raises `SpecError` where there is none."""
+    series = "scheme: series or splitting"
+    if not points.realisation.exact:
+        raise refused(
+            system, "reconstruct: steps to truncation have no group element", f"structure: exact, or {series}"
+        )
+    if group.matrices:
+        raise refused(system, "reconstruct: Gauss steps have a quaternion, no matrix", f"quaternion, or {series}")
+    if system.forces and any(not z.is_zero for z in system.forces.covector):
+        message = "reconstruct: with covector forces the group element of a Gauss step is not that of the body"
+        raise refused(system, message, series)
+    element_less_one = group_element(points, group)
+    if element_less_one is None:
+        raise refused(system, "reconstruct: the group element of this algebra is no quaternion", series)
+    purpose = "what a step turns by, a quaternion less 1" + ", and what it translates by" * bool(group.translation)
+    inputs = {"coef": coefficients.slots, "z": points.unknowns}
+    turn = Kernel("turn", purpose, inputs, (Output("turn", tuple(coefficients.hoist(element_less_one))),))
+    return Attitude(group, False, turn, rate=rate_kernel(system, group, gauge))
 
 
 def _along(group: Group, system: System) -> Kernel:

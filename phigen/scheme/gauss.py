@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from phigen.errors import SpecError
 from phigen.gauss.kernels import (
@@ -34,6 +35,9 @@ from phigen.spec.model import Spec
 from phigen.symbolic.expression import derivatives
 from phigen.symbolic.symbols import STEP
 
+if TYPE_CHECKING:
+    from phigen.attitude.group import Group
+
 #: Largest number of sweeps in the solve of a step, after which it has failed; the spec may set another.
 MAX_SWEEPS = 100
 
@@ -57,8 +61,6 @@ def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
         yield ("noise",), "not with noise", "scheme: series or splitting"
     if extras.modified_hamiltonian:
         yield ("modified_hamiltonian",), "the modified Hamiltonian is not computed", series
-    if spec.reconstruct:
-        yield ("reconstruct",), "attitudes are not offered", "scheme: series or splitting"
     if spec.composition not in ("auto", "none"):
         yield ("composition",), "steps are not composed", f"order: up to {2 * MOST_STAGES}, in one step"
     if spec.solver.tolerance is not None:
@@ -96,7 +98,9 @@ def _is_pushed(system: System, i: int) -> bool:
     return system.forces is not None and not system.forces.vector[i].is_zero
 
 
-def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: Order, spec: Spec) -> Program:
+def build_gauss(
+    system: System, gauge: Gauge, realisation: Realisation, order: Order, spec: Spec, group: Group | None = None
+) -> Program:
     """Return the solver as a program, with H less the Casimirs of the gauge. `LimitError` if it is too large."""
     discretised = gauge.applied(system)
     points = stage_map(discretised, realisation, gauge.pace(system))
@@ -105,6 +109,11 @@ def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: O
     frame = frame_kernel(points, coefficients)
     tangent = _tangent(points, coefficients) if spec.extras.tangent else None
     elapsed = elapsed_kernel(points, gauge.monitor, coefficients) if gauge.monitor else None
+    attitude = None
+    if group is not None:
+        from phigen.scheme.attitude import gauss_attitude
+
+        attitude = gauss_attitude(system, group, points, coefficients, gauge)
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters only",
@@ -147,6 +156,7 @@ def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: O
         lanes=spec.solver.lanes,
         profile=spec.profile,
         observed=tuple(system.observables),
+        attitude=coefficients.settled(attitude),
         truncated=not realisation.exact,
     )
 

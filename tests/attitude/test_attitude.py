@@ -86,6 +86,10 @@ CASES = {
     "sl(2)": algebra("sl(2)", "minus", 3, "reconstruct: matrix", "scheme: series"),
     "heisenberg(1)": algebra("heisenberg(1)", "plus", 3, "reconstruct: matrix", "scheme: series"),
     "su(2) along paths": algebra("su(2)", "minus", 3, "reconstruct: matrix", "birealisation: karasev"),
+    "body by Gauss": BODY + "scheme: gauss\n",
+    "momenta in space, by Gauss": algebra("so(3)", "plus", 3, "reconstruct: quaternion", "scheme: gauss"),
+    "top by Gauss": TOP + "scheme: gauss\n",
+    "motions, momenta in space, by Gauss": algebra("se(3)", "plus", 6, "reconstruct: quaternion", "scheme: gauss"),
 }
 pytestmark = pytest.mark.few(
     "body",
@@ -97,6 +101,8 @@ pytestmark = pytest.mark.few(
     "top",
     "so(4)",
     "so(3) by matrices",
+    "body by Gauss",
+    "motions, momenta in space, by Gauss",
     of=CASES,
 )
 

@@ -466,6 +466,8 @@ def _collocated(source: random.Random, drawn: Ordinary) -> Ordinary:
     options |= {"scheme": "gauss", "order": source.choice([2, 4, 6, 8, 12, 16])}
     if source.random() < 0.4:
         options["structure"] = "to truncation"
+    elif drawn.structure.body and not drawn.forced and source.random() < 0.5:
+        options["reconstruct"] = "quaternion"
     if source.random() < 0.2:
         options["solver"] = {"lanes": False}
     if source.random() < 0.1:

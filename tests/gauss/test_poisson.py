@@ -190,7 +190,17 @@ REFUSED = {
     "noise": (f"{BODY}noise: {{w: {{hamiltonian: x1}}}}\nscheme: gauss\n", "not with noise", "series"),
     "monitor": (f"{BODY}monitor: log\nscheme: gauss\n", "log needs H = A + B split in two", "splitting"),
     "modified": (f"{BODY}modified_hamiltonian: 1\nscheme: gauss\n", "belongs to scheme: series", "remove"),
-    "attitude": (f"{BODY}reconstruct: quaternion\nscheme: gauss\n", "attitudes are not offered", "series"),
+    "attitude to truncation": (
+        f"{BODY}reconstruct: quaternion\nscheme: gauss\nstructure: to truncation\n",
+        "no group element",
+        "exact",
+    ),
+    "matrix": (f"{BODY}reconstruct: matrix\nscheme: gauss\n", "a quaternion, no matrix", "quaternion"),
+    "attitude with covectors": (
+        f"{BODY}reconstruct: quaternion\nforces: {{covector: {{x1: x2}}}}\nscheme: gauss\n",
+        "covector",
+        "series",
+    ),
     "composition": (f"{BODY}composition: suzuki\nscheme: gauss\n", "not composed", "order"),
     "terms": (f"{BODY}terms: 3\nscheme: gauss\n", "belongs to scheme: series", "remove"),
     "birealisation": (f"{BODY}birealisation: cayley\nscheme: gauss\n", "belongs to scheme: series", "remove"),

@@ -24,7 +24,7 @@ def pieces(program: Program, attitude: Attitude) -> list[str]:
         "normalise": group.orthogonal,
         "splitting": step.kind.flows,
         "rates": f"_rate(parameters, {'gauge.T, ' * bool(program.gauge)}x)" if attitude.rate else "None",
-        "turn_of_stage": _turn_of_stage(attitude, solved),
+        "turn_of_stage": _turn_of_stage(attitude, solved, collocates=step.kind.collocates),
         "lengthened": attitude.lengthened,
         "turn_of_flows": "_shorter(turn)" if attitude.lengthened else "turn",
         "shaped": _shaped(rows, bool(group.translation)),
@@ -40,8 +40,10 @@ def pieces(program: Program, attitude: Attitude) -> list[str]:
     return [*functions, *(render("numpy", f"{part}.py", values) for part in parts)]
 
 
-def _turn_of_stage(attitude: Attitude, solved: str) -> str:
+def _turn_of_stage(attitude: Attitude, solved: str, *, collocates: bool) -> str:
     """Return the expression of the attitude increment of a stage, minus the identity."""
+    if collocates:  # the kernel is one of unknowns, whose axis is the first
+        return f"np.stack(_turn(stage[0], np.sum({solved}, axis=-1)), axis=-1)"
     turn = "_along(solved)" if attitude.along else f"_turn(stage[0], x + {solved})"
     return f"_of_covector({turn})" if attitude.group.matrices and not attitude.cayley else turn
 

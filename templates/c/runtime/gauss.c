@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "algebra.c"
+#include "attitude.c"
 #include "model.h"
 #if PHI_STAGED
 #include "lanes.c"
@@ -261,6 +262,11 @@ static phi_status phi_attempt(phi_solver *s)
     if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
     PHI_PASS(s, elapsed)
     phi_remember(s, end, moves);
+#if PHI_ATTITUDE
+    double factor[PHI_ELEMENT];
+    phi_turn(s->coef, end, factor);
+    phi_turn_by(s, factor PHI_AND_ASIDE(s->aside));
+#endif
     return PHI_OK;
 }
 #endif

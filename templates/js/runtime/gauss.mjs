@@ -2,6 +2,7 @@ import { advance } from "./algebra.mjs";
 import { MOST_RISING, NEARLY_ROUNDING, ROUNDING, SOLVED, STALLED } from "./gauss_policy.mjs";
 import { DIM, MAX_SWEEPS, MIXING, PLAIN, POINT, PREDICTION, UNKNOWNS, WEIGHTS } from "./model.mjs";
 import { stageChange, stageField } from "./model.mjs";
+import { turnStage } from "./attitude_stages.mjs";
 import { keepMove } from "./gauss_framed.mjs";
 import { pass } from "./level.mjs";
 import { timeOfStep } from "./level_gauss.mjs";
@@ -153,6 +154,7 @@ function attempt(solver, stage) {
   pass(solver, time);
   work.now.forEach((move, i) => keepMove(solver.coef[stage], end, move, history.moves[i]));
   history.count = 1;
+  turnStage(solver, stage, end);
   return "OK";
 }
 

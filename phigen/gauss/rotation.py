@@ -1,0 +1,118 @@
+"""Group elements of a Gauss step as rotations: a homomorphism from a star algebra to dual quaternions.
+
+A dual quaternion q + εr, ε² = 0, is the rotation q and the translation 2r q̄. Elements E_a of the rotations become ∓½i,
+½j, ½k, as the sign of the bracket is, those of translations ε times these, all others 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import count
+
+from phigen.attitude.elements import product as quaternion_product
+from phigen.attitude.group import Group
+from phigen.gauss.kernels import StageMap
+from phigen.gauss.realisation import AlgebraBlock
+from phigen.gauss.star_algebra import StarAlgebra, Vector, combined
+from phigen.geometry.field import Scalar
+from phigen.geometry.linear import Span
+from phigen.symbolic.expression import ONE, Expression, number, symbol, total
+
+#: Components of a dual quaternion: those of q, then those of r.
+Dual = list[Scalar]
+
+
+def group_element(points: StageMap, attitude: Group) -> list[Expression] | None:
+    """Return the element of a step less 1, with a translation if the group has one, in terms of the unknowns; or None.
+
+    None if the coordinates of the rotation belong to no star algebra, or to one without the homomorphism.
+    """
+    for group, first in zip(points.realisation.groups, points.starts, strict=True):
+        if set(attitude.rotation) <= set(group.indices):
+            images = _images(group, attitude)
+            return None if images is None else _element(points, group.algebra, first, images, attitude)
+    return None
+
+
+def _element(
+    points: StageMap, algebra: StarAlgebra, first: int, images: Sequence[Dual], attitude: Group
+) -> list[Expression]:
+    unknowns = [symbol(s) for s in points.unknowns[first : first + algebra.dimension]]
+    w = [
+        total(algebra.field.expression(image[k]) * z for image, z in zip(images, unknowns, strict=True) if image[k])
+        for k in range(8)
+    ]
+    if attitude.spatial:  # the element moves from the left, so it is the inverse
+        w = [w[0], *(-v for v in w[1:4]), w[4], *(-v for v in w[5:])]
+    inverse = [ONE + w[0], *(-v for v in w[1:4])]
+    translation = quaternion_product(w[4:], inverse)[1:]
+    return [*w[:4], *(number(2) * v for v in translation)] if attitude.translation else w[:4]
+
+
+def _images(group: AlgebraBlock, attitude: Group) -> list[Dual] | None:
+    """Return the dual quaternions of the basis of the star algebra, or None if there is no homomorphism."""
+    algebra, field = group.algebra, group.algebra.field
+    half = field.one / field.number(2)
+    scale = half if attitude.spatial else -half
+    elements, images = [algebra.unit], [_dual(algebra, 0, field.one)]
+    for a, i in enumerate(group.indices):
+        image = [field.zero] * 8
+        for shift, triple in ((0, attitude.rotation), (4, attitude.translation)):
+            if i in triple:
+                image = _dual(algebra, shift + 1 + list(triple).index(i), scale)
+        elements.append(algebra.basis[a])
+        images.append(image)
+    _generate(algebra, elements, images)
+    span = Span(field, elements)
+    if span.dimension < algebra.dimension:
+        return None
+    of_basis = [_combination(algebra, span.coordinates({i: field.one}) or {}, images) for i in range(algebra.dimension)]
+    return of_basis if _is_homomorphism(algebra, of_basis) else None
+
+
+def _dual(algebra: StarAlgebra, place: int, value: Scalar) -> Dual:
+    return [value if k == place else algebra.field.zero for k in range(8)]
+
+
+def _combination(algebra: StarAlgebra, factors: Vector, images: Sequence[Dual]) -> Dual:
+    rows = [{k: v for k, v in enumerate(image) if v} for image in images]
+    value = combined(rows, factors)
+    return [value.get(k, algebra.field.zero) for k in range(8)]
+
+
+def _generate(algebra: StarAlgebra, elements: list[Vector], images: list[Dual]) -> None:
+    """Append products of the elements, with their images, until they span the algebra or nothing is new."""
+    generators = len(elements)
+    for k in count():
+        if k == len(elements) or Span(algebra.field, elements).dimension == algebra.dimension:
+            return
+        for g in range(generators):
+            value = algebra.product(elements[k], elements[g])
+            if value and Span(algebra.field, [*elements, value]).dimension > Span(algebra.field, elements).dimension:
+                elements.append(value)
+                images.append(_multiplied(images[k], images[g]))
+
+
+def _multiplied(a: Dual, b: Dual) -> Dual:
+    """Return the product of two dual quaternions."""
+    one = _times(a[:4], b[:4])
+    return [*one, *(u + v for u, v in zip(_times(a[:4], b[4:]), _times(a[4:], b[:4]), strict=True))]
+
+
+def _times(a: Sequence[Scalar], b: Sequence[Scalar]) -> Dual:
+    return [
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3],
+        a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
+    ]
+
+
+def _is_homomorphism(algebra: StarAlgebra, images: Sequence[Dual]) -> bool:
+    """Whether products of basis elements have the products of their images."""
+    n = range(algebra.dimension)
+    return all(
+        _multiplied(images[i], images[j]) == _combination(algebra, algebra.table.get((i, j), {}), images)
+        for i in n
+        for j in n
+    )
