@@ -87,6 +87,41 @@ def test_program_in_rust_runs(tumbler):
     assert run([cargo, "run", "--quiet", "--offline"], folder, RUSTFLAGS="-Dwarnings") == expected(tumbler)
 
 
+def cell(language):
+    """The code in the table of parameters, in a language."""
+    row = re.search(
+        rf"^\| {re.escape(language)} \| (.*) \|$", (ROOT / "docs/bindings.md").read_text("utf-8"), re.MULTILINE
+    )
+    return re.findall(r"`([^`]*)`", row[1])
+
+
+@pytest.mark.slow
+def test_parameters_are_set_as_the_page_says(tumbler):
+    """In C++, Fortran and Rust, by programs of the page with the lines of the table in them."""
+    run([tool("cc"), "-std=c99", "-c", "generated/tumbler/tumbler.c"], tumbler)
+    declare, assign, start = cell("Fortran")
+    fortran = re.sub(r"  call body%init.*", f"  {assign}\n  {start}", example("fortran"))
+    (tumbler / "set.f90").write_text(fortran.replace("  real(", f"  {declare}\n  real(", 1), encoding="utf-8")
+    run([tool("gfortran"), "generated/tumbler/tumbler.f90", "set.f90", "tumbler.o", "-lm", "-o", "set"], tumbler)
+    (tumbler / "set.cpp").write_text(re.sub(r"    tumbler_phigen::Solver body.*", cell("C++")[0], example("cpp")))
+    cpp = [tool("g++"), "-std=c++11", "-Igenerated/tumbler", "set.cpp", "tumbler.o", "-lm", "-o", "set_cpp"]
+    run(cpp, tumbler)
+    code = "import tumbler as b; x = b.integrate([0.01, 1, 0.01], 0.1, 300, I2=2.5)[-1]"
+    code += "; print(f'{x[0]:.6f} {b.casimirs(x)[0]:.12f}')"
+    moved = run([sys.executable, "-c", code], tumbler / "generated/tumbler").strip()
+    assert moved != expected(tumbler).strip()
+    assert {re.sub(r"^\.", "0.", run([tumbler / p], tumbler).strip()) for p in ("set", "set_cpp")} == {moved}
+    declared, call = cell("Rust")
+    rust = f"pub fn f() -> Result<(), tumbler::Error> {{ use tumbler::*; {declared} let _ = {call}; Ok(()) }}"
+    folder = tumbler / "set_rust"
+    (folder / "src").mkdir(parents=True)
+    (folder / "src/lib.rs").write_text(rust, encoding="utf-8")
+    manifest = '[package]\nname = "set"\nversion = "0.1.0"\nedition = "2021"\n[dependencies]\n'
+    place = 'tumbler = { path = "../generated/tumbler/rust" }\n'
+    (folder / "Cargo.toml").write_text(f"{manifest}{place}", encoding="utf-8")
+    run([tool("cargo"), "check", "--quiet", "--offline"], folder)
+
+
 #: Calls of the gateway, and what Octave prints: the states of the page, outputs left out, and arguments refused.
 GATEWAY = """format long
 [x, H, C] = tumbler_mex([0.01 1 0.01], 0.1, 300, 10);
