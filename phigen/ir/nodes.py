@@ -362,7 +362,7 @@ class Loop:
 
     ``end`` and ``chosen`` say which bonds a loop over bonds runs over, as in `phigen.scheme.steps.Ends`. A loop of the
     kind "segments" runs over row segments, by several threads if there are more sites than ``threads``, unless this is
-    0. A loop of the kind "line" has one statement.
+    0. Loops of the kinds "line" and "search" have one statement; that of a search may end the function.
     """
 
     kind: str

@@ -160,12 +160,7 @@ class _Driver:
         With one loop, the ends of a single open row are copied for all fields: only the segments there read the copies.
         """
         drivers, segments = self.drivers, [case for case in cases if isinstance(case, RowSegment)]
-        copies = [
-            [drivers.copied_ends(case.arrays, f, near_ends=case.near_ends) for f in case.updated]
-            if drivers.halo
-            else []
-            for case in segments
-        ]
+        copies = [[*self._copied_ends(case)] for case in segments]
         if len(segments) > 1 and drivers.one_loop:
             last: ir.Block = ()
             if drivers.layout.lattice.step.sites.open == (True,) and any(copies):

@@ -16,7 +16,8 @@ from phigen.targets.names import Scope
 from phigen.targets.printer import ATOM, PRODUCT, SUM
 
 #: Binding strength of operators, as in `phigen.targets.printer`, and of what needs no parentheses.
-_STRENGTH = {"or": 1, "and": 1, "==": 2, "!=": 2, "<": 2, ">": 2, ">=": 2, "+": 3, "-": 3, "*": 4, "/": 4, "%": 4}
+_STRENGTH = {"or": 1, "and": 1, "+": 3, "-": 3, "*": 4, "/": 4, "%": 4}
+_STRENGTH |= dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), 2)
 _ATOM = 9
 _OF_ARITHMETIC = {SUM: 3, PRODUCT: 4, ATOM: _ATOM}
 

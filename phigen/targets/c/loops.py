@@ -25,7 +25,7 @@ _TYPES = {
 }
 
 #: Types of the variables of loops, by their kinds.
-_COUNTERS = {"segments": "size_t", "lanes": "int"}
+_COUNTERS = {"segments": "size_t", "search": "size_t", "lanes": "int"}
 
 #: The most statements of a case of a switch that are printed on one line, and their most letters: the label, and the
 #: indentation in a loop, have the rest of the line.
@@ -46,7 +46,7 @@ def statements(printed: ir.Function, name: str, *, shared_line: int = 0) -> list
     """
     dialect = Dialect(
         replace(LANGUAGE, functions=elementary_functions(name)),
-        operators={"and": "&&", "or": "||", "index": "ptrdiff_t", "size": "size_t"},
+        operators={"and": "&&", "or": "||", "not": "!", "index": "ptrdiff_t", "size": "size_t"},
         functions={function: f"{name}_{function}" for function in _RUNTIME},
         pointers=frozenset({"row", "s", *(p for p in printed.parameters if p == "params")}),
     )
@@ -216,7 +216,7 @@ class _StatementPrinter:
         if s.threads:
             yield from ("#ifdef _OPENMP", f"#pragma omp parallel for if (s->sites > {s.threads})", "#endif")
         body = [*self.lines(s.body)]
-        if s.kind == "line":
-            yield f"{head} {body[0]}"
+        if s.kind in ("line", "search"):
+            yield from (head, *_indented(body)) if s.kind == "search" else (f"{head} {body[0]}",)
             return
         yield from (f"{head} {{{f' /* {s.note} */' if s.note else ''}", *_indented(body), "}")

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
 
+from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import bounds
+from phigen.ir.passes.unread import discard_unread
+from phigen.scheme.kernel import Role
 from phigen.scheme.policies import LatticeNewtonPolicy, LatticeSweepPolicy
 from phigen.scheme.program import MAX_NORMAL_VARIATE, Program
 from phigen.scheme.steps import Sweeps
@@ -20,6 +24,7 @@ from phigen.targets.c.lattice.layout import (
     switches,
 )
 from phigen.targets.c.lattice.loops import share
+from phigen.targets.c.loops import statements
 from phigen.targets.header import plain
 from phigen.targets.rendering import render
 
@@ -144,7 +149,7 @@ def model(program: Program, step: Sweeps) -> str:
         "bound": repr(MAX_NORMAL_VARIATE) if program.noise else "",
         "reductions": ", ".join(_braced(_reduction(r)) for r in program.observables.reductions),
         "joined": not program.noise,
-        "allowed": [*_allowed(program, graph=layout.graph)],
+        "allowed": statements(_allowed(program, graph=layout.graph), program.name),
     }
     timed = step.refresh or (program.time and step.equation)
     prepare = render("c", "middles.c", values) if timed else ""
@@ -236,25 +241,27 @@ def _moments(step: Sweeps) -> list[float]:
     return _by_flow(step, step.schedule.moments, 0.0)
 
 
-def _allowed(program: Program, *, graph: bool) -> Iterator[str]:
-    """The statements that return whether parameters are allowed."""
-    named = members(program)
-    inside, outside = ({"positive": o, "nonnegative": e} for o, e in ((">", ">="), ("<=", "<")))
-    numbers = [(f"params->{named[p.name]}", p.bound) for p in program.parameters if p.at == "all"]
-    asked = [f"isfinite({n})" + (f" && {n} {inside[bound]} 0.0" if bound else "") for n, bound in numbers]
-    arrays = [(named[p.name], p.bound, p.values is not None, p.at) for p in program.parameters if p.at != "all"]
-    counts = ["sites", *["bonds"] * graph]
-    unused = ["params"] * (not asked and not arrays) + [c for c in counts if all(at != c for *_, at in arrays)]
-    if unused:
-        yield ", ".join(f"(void){u}" for u in unused) + ";"
-    for member, bound, required, at in arrays:
-        if required:
-            yield f"if (params->{member} == NULL) return 0;"
-        beyond = f" || params->{member}[k] {outside[bound]} 0.0" if bound else ""
-        wrong = f"!isfinite(params->{member}[k])" + beyond
-        yield f"for (size_t k = 0; params->{member} != NULL && k < {at}; ++k)"
-        yield f"    if ({wrong}) return 0;"
-    yield f"return {' && '.join(asked) or '1'};"
+def _allowed(program: Program, *, graph: bool) -> ir.Function:
+    """Return the function whose value is 1 if all parameters are finite, and positive where they have to be."""
+    named, params, k = members(program), ir.fixed("params"), ir.fixed("k")
+    body, conditions = list[ir.Statement](), list[ir.Value]()
+    for p in program.parameters:
+        array, zero = ir.Member(params, named[p.name]), ir.Constant(0.0)
+        if p.at == "all":
+            conditions.append(ir.Called("isfinite", (array,)))
+            conditions += [ir.Binary(">" if p.positive else ">=", array, zero)] if p.bound else []
+            continue
+        wrong: ir.Value = ir.Prefix("not", ir.Called("isfinite", (ir.Entry(array, k),)))
+        if p.bound:
+            wrong = ir.Binary("or", wrong, ir.Binary("<=" if p.positive else "<", ir.Entry(array, k), zero))
+        refusal = (ir.Return(ir.Constant(0)),)
+        if p.values is not None:
+            body.append(ir.If(ir.Binary("==", array, ir.fixed("NULL")), refusal))
+        is_array, search = ir.Binary("!=", array, ir.fixed("NULL")), (ir.If(wrong, refusal),)
+        body.append(ir.Loop("search", search, "k", ir.Constant(0), ir.fixed(p.at), condition=is_array))
+    value = reduce(lambda a, b: ir.Binary("and", a, b), conditions) if conditions else ir.Constant(1)
+    parameters = ("params", "sites", *["bonds"] * graph)
+    return discard_unread(ir.Function("allowed", "", Role.OTHER, parameters, (*body, ir.Return(value))))
 
 
 def _reduction(reduction: Reduction) -> tuple[int, int]:
