@@ -31,7 +31,7 @@ NOISY = ("double_well", "thermal_chain", "thermal_spin")
 #: Those with a monitor: tests/scheme/test_monitor.py and tests/splitting/test_logarithmic.py.
 MONITORED = ("kepler_eccentric",)
 #: Those by Gauss collocation: tests/gauss.
-COLLOCATED = ("kowalevski_gauss",)
+COLLOCATED = ("comet_jupiter", "kowalevski_gauss")
 #: Those by splitting: tests/splitting.
 SPLIT = ("earth_moon", "planets", "satellite_wheels")
 NAMES = sorted(
