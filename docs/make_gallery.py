@@ -21,7 +21,6 @@ from phigen.drawing.groups import groups
 from phigen.drawing.lattices import lattice_figure
 from phigen.drawing.palette import save_for_pages
 from phigen.drawing.phase_space import joins
-from phigen.lattice.observing import errors_of
 from phigen.lattice.states import start_of as start_of_lattice
 from phigen.notation.lattices import described, sections
 from phigen.paper.runge_kutta import started
@@ -30,6 +29,7 @@ from phigen.runtime.session import rows_along
 from phigen.runtime.solver import Solver
 from phigen.runtime.trajectory import Trajectory
 from phigen.spec.model import Run, Spec
+from phigen.study.lattice_errors import errors_of
 from phigen.study.methods import of_classical
 from phigen.study.race import TABLEAUX
 from phigen.study.sections import function_of

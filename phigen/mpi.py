@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from phigen.errors import MissingPackageError, StepError
+from phigen.memory import filled
 from phigen.reading import opened
 from phigen.runtime import arguments
 from phigen.runtime.arguments import Beginning
@@ -32,7 +33,6 @@ from phigen.runtime.c_lattice import CLattice, CLatticeSession, SweepStage
 from phigen.runtime.checkpoint import objection, objection_to_frames
 from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
-from phigen.runtime.memory import filled
 from phigen.writing import replacing
 
 #: As in the C, whose bits these are: see templates/c/runtime/lattice.c.

@@ -13,6 +13,44 @@ ROOT = Path(__file__).resolve().parents[1]
 #: `phigen.display`), which are imported when they are asked for, do not.
 LARGEST_CIRCLE = 2
 
+#: Rooms from the lowest to the highest: each imports those before it. Others stand above all.
+ORDER = [
+    "_version",
+    "progress",
+    "errors",
+    "display",
+    "memory",
+    "reading",
+    "writing",
+    "resources",
+    "registry",
+    "symbolic",
+    "spec",
+    "geometry",
+    "realisations",
+    "splitting",
+    "attitude",
+    "gauss",
+    "series",
+    "scheme",
+    "lattice",
+    "lanes",
+    "ir",
+    "targets",
+    "compilation",
+    "runtime",
+    "notation",
+    "proofs",
+    "compiler",
+    "api",
+    "study",
+    "sweeping",
+    "drawing",
+]
+
+#: Imports against this order, inside functions too. They may fall and must not rise; the aim is none.
+UPWARD_IMPORTS = 11
+
 #: Lines of preprocessor conditions among the non-blank lines of the runtime in C, in percent.
 CONDITIONS = 7.9
 
@@ -73,6 +111,17 @@ def executed(tree: ast.AST) -> Iterator[ast.AST]:
         if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)):
             yield node
             yield from executed(node)
+
+
+def upward_imports() -> list[str]:
+    """The imports of modules from rooms above their own, as "MODULE imports MODULE"."""
+    level = {room: k for k, room in enumerate(ORDER)}
+
+    def height(module: str) -> int:
+        return level.get(module.split(".")[1], len(ORDER)) if "." in module else len(ORDER)
+
+    pairs = [(name, other) for name, others in imports().items() for other in sorted(others)]
+    return [f"{name} imports {other}" for name, other in pairs if height(other) > height(name)]
 
 
 def circles(graph: dict[str, set[str]]) -> list[set[str]]:
@@ -138,6 +187,10 @@ def test_circles_of_imports_do_not_grow():
     assert len(largest) <= LARGEST_CIRCLE, sorted(largest)
 
 
+def test_upward_imports_do_not_grow():
+    assert len(upward_imports()) <= UPWARD_IMPORTS, upward_imports()
+
+
 def test_conditions_in_the_runtime_do_not_grow():
     counted, total = conditions()
     assert 100.0 * counted / total <= CONDITIONS
@@ -184,6 +237,7 @@ def f(step):
 
 if __name__ == "__main__":
     print([len(circle) for circle in circles(imports())], "modules in circles")
+    print(len(upward_imports()), "imports from higher rooms")
     print(sum(map(len, all_kind_tests().values())), "tests on kinds of steps and compilations")
     print("{} of {} lines of the runtime in C are conditions".format(*conditions()))
     print("{} of {} lines of the runtime in JavaScript are conditions".format(*javascript_conditions()))

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: f044b75c5c54659f97c2b43b8fd2d1afc0f3e7f9ddc8b0064ba65d3f1d0def27
+ * body-sha256: cc8c201aeef2fe7e62bb1564e3764c256103a06f8cefd865ce5d580bd570e804
  */
 #include "food_web.h"
 #include <float.h>
@@ -80,7 +80,7 @@ static void food_web_prepare(const food_web_params *params, double h, double coe
 typedef struct {
     const food_web_solver *s;
     double *const *x;   /* see food_web_solver */
-    ptrdiff_t from, to; /* its sites, to not among them */
+    ptrdiff_t from, to; /* first site of the segment, and the one after the last */
     int chosen;         /* the colour that a part of H belongs to */
 } food_web_row;
 

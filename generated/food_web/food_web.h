@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f8f68187abc6b8dac362dcf46a60721dcdc5e62eb9db7ed07db0246078901839
+ * body-sha256: 9bad5e9e4f4ca1c6ebb1f27266c39fca325860d35c4c7b5c939cf1c6efcb3663
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -36,11 +36,12 @@ typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food
    sites: copies of the other end beside each end. Only read the struct, at any time. */
 typedef struct {
     size_t sizes[food_web_AXES]; /* number of sites along each axis */
-    size_t sites, rows; /* number of all sites, and of rows */
-    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[food_web_ARRAYS]; /* state: first site of fields, then of parameters at sites */
-    double *before[food_web_DIM]; /* fields before the present steps, restored if one fails */
-    double *gathered[food_web_GATHERED]; /* for each site, sums over other sites */
+    size_t sites, rows;          /* number of all sites, and of rows */
+    ptrdiff_t length, width;     /* sites of a row; doubles from the start of a row to that of the next */
+    /* state, written by steps: first sites of the fields, then of parameters at sites */
+    double *x[food_web_ARRAYS];
+    double *before[food_web_DIM]; /* copies of the fields before the present steps, restored if one fails */
+    double *gathered[food_web_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     int *bonds, *middle; /* for each site, index in other of the first bond from it, and to it */
     int *other, *number; /* for each of these, the site at the other end, and the number of the bond */
     double *at_bonds[food_web_BOND_ARRAYS]; /* for each of these, parameters at bonds */

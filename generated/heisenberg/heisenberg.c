@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: fd4f81c80260d94e533d6791b6fe4c758fa155e16a39255ea68e135baadee5e9
+ * body-sha256: e629dfd57e412a3b5f5ed880cd0dc7a60eabc8d810064b65e263581aee154935
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -73,8 +73,8 @@ static void heisenberg_prepare(const heisenberg_params *params, double h, double
 typedef struct {
     const heisenberg_solver *s;
     double *const *x;    /* see heisenberg_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t from, to;  /* its sites, to not among them */
+    const ptrdiff_t *at; /* offsets of the row and of its neighbouring rows from the first row, in doubles */
+    ptrdiff_t from, to;  /* first site of the segment, and the one after the last */
 } heisenberg_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -705,8 +705,8 @@ static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const do
 
 /* A part of H, and the coefficients of its flow. */
 typedef struct {
-    int part;
-    const double *coef;
+    int part;           /* the part of H */
+    const double *coef; /* its coefficients */
 } heisenberg_flow;
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b4ae3dcc7de09b7bffcdd0b26f92824909ad43fad141298739e919cd19d6e21e
+ * body-sha256: 95447cb9d2b8cb45f23c798ec0469b21b7e2943a2d20ebcbd036ee1202d56a9d
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -34,10 +34,11 @@ typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR
    other sites: copies of the other end beside each end. Only read the struct, at any time. */
 typedef struct {
     size_t sizes[heisenberg_AXES]; /* number of sites along each axis */
-    size_t sites, rows; /* number of all sites, and of rows */
-    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[heisenberg_ARRAYS]; /* state: first site of fields, then of parameters at sites */
-    double *before[heisenberg_DIM]; /* fields before the present steps, restored if one fails */
+    size_t sites, rows;            /* number of all sites, and of rows */
+    ptrdiff_t length, width;       /* sites of a row; doubles from the start of a row to that of the next */
+    /* state, written by steps: first sites of the fields, then of parameters at sites */
+    double *x[heisenberg_ARRAYS];
+    double *before[heisenberg_DIM]; /* copies of the fields before the present steps, restored if one fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
     size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 4a07a97938b2eaee4a6eaf174039b5b274e6202b680094ef68a119c083e1f785
+ * body-sha256: 06da322ee266148f05fc469670e1e096caba30b212089bc907c098b6e9c699cb
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -59,11 +59,10 @@ static void point_vortices_prepare(const point_vortices_params *params, double h
 /* A piece of a row, and what loops over its sites are told. */
 typedef struct {
     const point_vortices_solver *s;
-    double *const *x;   /* see point_vortices_solver */
-    ptrdiff_t from, to; /* its sites, to not among them */
-    /* where a stage starts, and where what is computed goes; x is y there */
-    double *const *start, *const *out;
-    double *const *varied; /* a variation of x */
+    double *const *x;                  /* see point_vortices_solver */
+    ptrdiff_t from, to;                /* first site of the segment, and the one after the last */
+    double *const *start, *const *out; /* start of a stage, and the result; x is its solution y */
+    double *const *varied;             /* tangent vector: a variation of x */
 } point_vortices_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */

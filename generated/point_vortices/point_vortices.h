@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a8ae10a33291e4b4c52dba19ebd7bca8fd2095ff302fc5594b260f659aea219a
+ * body-sha256: 4c15b11e9902e937707831ffd10912e374602033ae633752775fd11473198d21
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -46,9 +46,11 @@ typedef struct {
     size_t sizes[point_vortices_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[point_vortices_ARRAYS]; /* state: first site of fields, then of parameters at sites */
-    double *before[point_vortices_DIM]; /* fields before the present steps, restored if one fails */
-    double *gathered[point_vortices_GATHERED]; /* for each site, sums over other sites */
+    /* state, written by steps: first sites of the fields, then of parameters at sites */
+    double *x[point_vortices_ARRAYS];
+    /* copies of the fields before the present steps, restored if one fails */
+    double *before[point_vortices_DIM];
+    double *gathered[point_vortices_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     /* solution of a stage before and after a sweep, with the parameters at sites */
     double *y[2][point_vortices_ARRAYS];
     point_vortices_guess guess[point_vortices_STAGES]; /* predictor of each stage */

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 79811642b7b5794cc7eb2ed1dc7cb4ae4691cf1f225be543bafefee7ca52c78f
+ * body-sha256: a485505953f79f1ec356169e4f885df7e79acdc5c1d751909d5361221bbcb5ec
  */
 #include "toda.h"
 #include <float.h>
@@ -63,7 +63,7 @@ static void toda_prepare(const toda_params *params, double h, double coef[restri
 typedef struct {
     const toda_solver *s;
     double *const *x;   /* see toda_solver */
-    ptrdiff_t from, to; /* its sites, to not among them */
+    ptrdiff_t from, to; /* first site of the segment, and the one after the last */
 } toda_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */

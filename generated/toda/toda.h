@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 272fff7333baea15486c01a08549ccbb47c518e723b2ac6fb5deda862cf9b8cb
+ * body-sha256: 90c2de3b81e7c91145074f6a3542cb2c688e54900d82cbcd4e64016c48983315
  */
 #ifndef TODA_H
 #define TODA_H
@@ -33,10 +33,11 @@ typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
    sites: copies of the other end beside each end. Only read the struct, at any time. */
 typedef struct {
     size_t sizes[toda_AXES]; /* number of sites along each axis */
-    size_t sites, rows; /* number of all sites, and of rows */
+    size_t sites, rows;      /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[toda_ARRAYS]; /* state: first site of fields, then of parameters at sites */
-    double *before[toda_DIM]; /* fields before the present steps, restored if one fails */
+    /* state, written by steps: first sites of the fields, then of parameters at sites */
+    double *x[toda_ARRAYS];
+    double *before[toda_DIM]; /* copies of the fields before the present steps, restored if one fails */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
     size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
     size_t steps; /* number of successful steps since toda_init */

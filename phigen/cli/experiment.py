@@ -161,7 +161,7 @@ def changed(
 
 def _expect_room_for_members(spec: Spec, run: Run) -> None:
     """`LimitError` where the members of a run with noise do not fit into memory: their states, and copies of these."""
-    from phigen.runtime.memory import expect_room
+    from phigen.memory import expect_room
 
     place = spec.diagnostic(("runs", run.name, "members"), "").location
     if run.members > 1:

@@ -56,10 +56,10 @@ def run_lattice(
     from phigen.cli.endings import ended, timed
     from phigen.cli.energy_warning import energy_warning
     from phigen.cli.lattice_experiment import LatticeExperiment, extended, started_from
-    from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, errors_of, units_of
     from phigen.lattice.states import start_of
     from phigen.runtime.lattice_series import LatticeSeries, series_of
     from phigen.study.averages import averages_of
+    from phigen.study.lattice_errors import BALANCE, CHANGE, ENERGY, errors_of, units_of
 
     if plot and plot.suffix.lower() in FILMS and run.records_numbers:
         raise click.BadParameter("a film needs frames: the run has record: without state", param_hint="--plot")
@@ -284,8 +284,8 @@ def _print(
     errors: Mapping[str, float],
     units: Mapping[str, Unit],
 ) -> None:
-    from phigen.lattice.observing import BALANCE, CHANGE, ENERGY
     from phigen.study.conservation import stated
+    from phigen.study.lattice_errors import BALANCE, CHANGE, ENERGY
 
     out(heading(f"{spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
     sizes = " × ".join(map(str, start.sizes))

@@ -54,10 +54,10 @@ def _measured(
     from phigen.cli.lattice_experiment import LatticeExperiment
     from phigen.cli.lattice_run import exponents_of
     from phigen.cli.verify import fallen_short, verified_lattice
-    from phigen.lattice.observing import errors_of
     from phigen.lattice.states import start_of
     from phigen.report.live_lattice import gathered_lattice
     from phigen.runtime import toolchain
+    from phigen.study.lattice_errors import errors_of
 
     spec = compilation.spec
     start = start_of(spec, run)

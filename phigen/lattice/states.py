@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from phigen.errors import SpecError
 from phigen.lattice.array_files import bonds_in, values_in
-from phigen.runtime.memory import expect_room
+from phigen.memory import expect_room
 from phigen.spec.model import LatticeRunSettings, Run, Spec, Values
 from phigen.symbolic.arrays import evaluate
 

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from phigen.memory import expect_room, filled
 from phigen.runtime import cache
 from phigen.runtime.binding import bound
 from phigen.runtime.interface import (
@@ -22,7 +23,6 @@ from phigen.runtime.interface import (
     status_name,
 )
 from phigen.runtime.interrupts import interruptible
-from phigen.runtime.memory import expect_room, filled
 
 _POINTER, _DOUBLE, _SIZE, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
 _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from phigen.display import display
 from phigen.errors import ParameterError, StepError
+from phigen.memory import expect_room
 from phigen.runtime import arguments, checkpoint, ending, lattice_ensemble, lattice_gradients, lattice_series, runs
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.crossings import Function
@@ -42,7 +43,6 @@ from phigen.runtime.lattice_rows import Crossed, IntegrationPlan, strided, timed
 from phigen.runtime.lattice_run import LatticeRun
 from phigen.runtime.lattice_series import LatticeSeries, NumberRows, expect_table, recordable
 from phigen.runtime.live import LiveLattice
-from phigen.runtime.memory import expect_room
 from phigen.runtime.named import Named
 from phigen.runtime.timed import advance_by
 from phigen.writing import replacing

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.errors import StepError
+from phigen.memory import filled
 from phigen.runtime import arguments
 from phigen.runtime.interface import BackendError, Draws, Floats, LatticeInterface, row_steps
 from phigen.runtime.members import cores, in_threads
-from phigen.runtime.memory import filled
 
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSolver

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from phigen.memory import expect_room, filled
 from phigen.reading import opened
 from phigen.runtime import checkpoint
 from phigen.runtime.checkpoint import MismatchError
 from phigen.runtime.interface import FIRST_DRAWS, Floats, LatticeInterface
-from phigen.runtime.memory import expect_room, filled
 from phigen.runtime.tables import Column, write
 from phigen.runtime.trajectory import trajectory_columns
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from phigen.memory import filled
 from phigen.runtime import arguments
 from phigen.runtime.gradients import Pullback, cotangents
 from phigen.runtime.interface import BackendError, Floats, MissingExtraError, row_steps
 from phigen.runtime.lattice_ensemble import has_members, states
-from phigen.runtime.memory import filled
 
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSolver

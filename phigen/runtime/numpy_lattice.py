@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from phigen.memory import expect_room
 from phigen.runtime.interface import (
     FIRST_DRAWS,
     BackendError,
@@ -18,7 +19,6 @@ from phigen.runtime.interface import (
     LatticeInterface,
     MissingExtraError,
 )
-from phigen.runtime.memory import expect_room
 from phigen.runtime.modules import load_module
 from phigen.scheme.policies import StartPolicy
 

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from phigen.memory import expect_room
 from phigen.runtime.interface import Progress
 from phigen.runtime.lattice import LatticeSolver
-from phigen.runtime.memory import expect_room
 from phigen.runtime.solver import Solver
 from phigen.symbolic.arrays import Floats
 

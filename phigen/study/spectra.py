@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from phigen.memory import expect_room
 from phigen.runtime.interface import Floats
-from phigen.runtime.memory import expect_room
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from phigen.lattice.states import Start, start_of
+from phigen.memory import filled
 from phigen.runtime.interface import STATUSES, BackendError, Draws, Floats, LatticeInterface, row_steps
 from phigen.runtime.lattice import LatticeSession, LatticeSolver, reduced
-from phigen.runtime.memory import filled
 from phigen.spec.model import Run, Spec, Statistic, Values
 from phigen.study.averages import Averages
 from phigen.sweeping.plan import Plan

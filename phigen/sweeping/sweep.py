@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from phigen import __version__
+from phigen._version import __version__
 from phigen.api import chosen_target, compilation_of, interface_of
 from phigen.compilation import Compilation
 from phigen.compiler import emit
 from phigen.errors import Diagnostic, FileError, SpecError
+from phigen.memory import expect_room
 from phigen.reading import opened_text
 from phigen.runtime.interface import BackendError, Draws, Floats
 from phigen.runtime.members import Members
-from phigen.runtime.memory import expect_room
 from phigen.spec.model import Run, Spec, SweepSettings
 from phigen.spec.names import KEPT
 from phigen.spec.problems import did_you_mean

@@ -17,9 +17,9 @@ from phigen.geometry.system import system_from_spec
 from phigen.lattice.cell import vector_field
 from phigen.lattice.cell_building import cell_from_spec, least_sizes
 from phigen.lattice.expansion import expand
-from phigen.lattice.observing import summed
 from phigen.lattice.states import start_of
 from phigen.spec import load, loads
+from phigen.study.lattice_errors import summed
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.expression import total
 from phigen.symbolic.verdict import PROVED

@@ -16,12 +16,12 @@ from phigen.geometry.system import System, hamiltonian_vector_field, system_from
 from phigen.lattice.cell import Cell, bond_forces, contributions, vector_field
 from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import Expansion, expand, run_of
-from phigen.lattice.observing import summed
 from phigen.lattice.recognition import recognised
 from phigen.lattice.states import Start, start_of
 from phigen.spec import loads
 from phigen.spec.model import Spec
 from phigen.spec.yaml_text import spec_text
+from phigen.study.lattice_errors import summed
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.expression import gradient
 from phigen.symbolic.verdict import REFUTED

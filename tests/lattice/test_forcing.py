@@ -20,7 +20,6 @@ from phigen.compiler import compile_spec, emit
 from phigen.errors import SpecError
 from phigen.geometry.system import system_from_spec
 from phigen.lattice.expansion import Expansion, expand
-from phigen.lattice.observing import BALANCE, CHANGE, errors_of
 from phigen.lattice.states import Start
 from phigen.proofs import lattices
 from phigen.runtime.arguments import Beginning
@@ -28,6 +27,7 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.numpy_lattice import NumpyLatticeSession
 from phigen.spec.yaml_text import spec_text
 from phigen.study import lattice_noise
+from phigen.study.lattice_errors import BALANCE, CHANGE, errors_of
 from phigen.study.lattices import verify_lattice
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.verdict import PROVED

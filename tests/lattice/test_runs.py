@@ -11,13 +11,13 @@ import phigen.spec
 from phigen.cli import group
 from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import expand, run_of
-from phigen.lattice.observing import works
 from phigen.lattice.states import start_of
 from phigen.mpi import DistributedLattice
 from phigen.runtime import lattice_series
 from phigen.runtime.checkpoint import Checkpoint
 from phigen.runtime.interface import BackendError
 from phigen.runtime.numpy_lattice import NumpyLatticeSession
+from phigen.study.lattice_errors import works
 
 ROTORS = """\
 phigen: 1

@@ -17,13 +17,13 @@ from phigen.compiler import compile_spec
 from phigen.geometry.system import system_from_spec
 from phigen.lattice.energy_balance import Power, integral
 from phigen.lattice.expansion import expand
-from phigen.lattice.observing import BALANCE, errors_of
 from phigen.lattice.states import Start
 from phigen.proofs import lattices
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.lattice import LatticeSolver
 from phigen.spec.model import Spec
 from phigen.spec.yaml_text import spec_text
+from phigen.study.lattice_errors import BALANCE, errors_of
 from phigen.study.lattices import verify_lattice
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.expression import gradient

@@ -11,10 +11,10 @@ from support import compiled, tool
 import phigen
 from phigen import spec
 from phigen.compiler import compile_spec
-from phigen.lattice.observing import summed
 from phigen.lattice.states import start_of
 from phigen.report.panel import panel_page
 from phigen.study.classical import rk4
+from phigen.study.lattice_errors import summed
 
 #: A browser takes seconds to start; what the page is made of has tests of its own.
 pytestmark = pytest.mark.slow

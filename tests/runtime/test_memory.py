@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from phigen import compile, sweep
+from phigen import compile, memory, sweep
 from phigen.cli import group
 from phigen.errors import LimitError
-from phigen.runtime import memory
 from phigen.study.lyapunov import lattice_spectrum
 from phigen.sweeping import cluster
 

@@ -19,19 +19,24 @@ LATTICE = (
         "SEAMS",
         (
             "ptrdiff_t seams[PHI_AXES];"
-            " /* first site along each axis whose colour breaks the period; the size if there is none */",
-            "ptrdiff_t inside[2];     "
-            " /* in a row, the first site away from the seam, and the site behind the last of them */",
+            " /* along each axis, the first site of the boundary seam, where colours break their period; the"
+            " size without one */",
+            "ptrdiff_t inside[2];      /* in a row, the first site away from the seam, and the one after the last */",
         ),
     ),
     StateBlock(
         "x",
-        members=("double *x[PHI_ARRAYS];    /* state: first site of fields, then of parameters at sites */",),
+        members=(
+            "double *x[PHI_ARRAYS];"
+            " /* state, written by steps: first sites of the fields, then of parameters at sites */",
+        ),
         reset=("for (size_t k = 0; k < PHI_ARRAYS; ++k, memory += block) s->x[k] = memory;",),
     ),
     StateBlock(
         "before",
-        members=("double *before[PHI_DIM]; /* fields before the present steps, restored if one fails */",),
+        members=(
+            "double *before[PHI_DIM]; /* copies of the fields before the present steps, restored if one fails */",
+        ),
         reset=("for (size_t k = 0; k < PHI_DIM; ++k, memory += block) s->before[k] = memory;",),
     ),
     StateBlock(
@@ -42,7 +47,7 @@ LATTICE = (
     StateBlock(
         "gathered",
         "GATHER",
-        ("double *gathered[PHI_GATHERED]; /* for each site, sums over other sites */",),
+        ("double *gathered[PHI_GATHERED]; /* for each site, sums over its bonds or over all pairs */",),
         reset=("for (size_t k = 0; k < PHI_GATHERED; ++k, memory += block) s->gathered[k] = memory;",),
     ),
     StateBlock(
@@ -83,7 +88,7 @@ LATTICE = (
     StateBlock(
         "swept",
         "!SERIES && BY_HAND && ONE_ROW",
-        ("ptrdiff_t from, to;       /* the sites of the present sweep */",),
+        ("ptrdiff_t from, to;       /* first site of the present sweep, and the one after its last */",),
         reset=("s->to = s->length;",),
     ),
     StateBlock(
@@ -210,7 +215,11 @@ LATTICE = (
             " /* number of the first plane in the whole lattice, and its number of planes, or 0 */",
         ),
     ),
-    StateBlock("stop", "ADJOINT", ("int (*stop)(void);        /* see phi_ask */",)),
+    StateBlock(
+        "stop",
+        "ADJOINT",
+        ("int (*stop)(void);        /* called between steps to ask whether to stop, see phi_ask; or NULL */",),
+    ),
     StateBlock(
         "kept",
         "ADJOINT && SERIES",
@@ -246,7 +255,7 @@ LATTICE = (
     ),
 )
 
-#: What loops over the sites of a piece of a row are told. What is ``reset`` is so for the row of a solver s.
+#: Arguments of loops over the sites of a row segment. ``reset`` are statements for a whole row of a solver s.
 ROW = (
     StateBlock(
         "x",
@@ -256,44 +265,44 @@ ROW = (
     StateBlock(
         "at",
         "!ONE_ROW",
-        ("const ptrdiff_t *at;          /* the row itself and those beside it, from the first row on */",),
+        ("const ptrdiff_t *at; /* offsets of the row and of its neighbouring rows from the first row, in doubles */",),
         reset=("row.at = s->lines + index * PHI_LINES;",),
     ),
     StateBlock(
         "sites",
-        members=("ptrdiff_t from, to;           /* its sites, to not among them */",),
+        members=("ptrdiff_t from, to;           /* first site of the segment, and the one after the last */",),
         reset=("row.from = 0;", "row.to = s->length;"),
     ),
     StateBlock(
         "stage",
         "SERIES",
-        (
-            "double *const *start, *const *out;"
-            " /* where a stage starts, and where what is computed goes; x is y there */",
-        ),
+        ("double *const *start, *const *out; /* start of a stage, and the result; x is its solution y */",),
         reset=("row.start = row.out = s->x;",),
     ),
     StateBlock(
         "varied",
         "SERIES && SLOPES || TANGENT",
-        ("double *const *varied;        /* a variation of x */",),
+        ("double *const *varied;        /* tangent vector: a variation of x */",),
     ),
     StateBlock(
         "bar",
         "ADJOINT",
-        ("double *const *bar, *const *handed; /* see phi_transpose */",),
+        (
+            "double *const *bar, *const *handed;"
+            " /* cotangents by x, and those for neighbouring sites: see phi_transpose */",
+        ),
         reset=("row.bar = row.handed = NULL;",),
     ),
     StateBlock(
         "given",
         "ADJOINT && TAKES",
-        ("double *const *given;         /* what sites beside have handed before */",),
+        ("double *const *given;         /* cotangents that neighbouring sites have computed for these before */",),
         reset=("row.given = NULL;",),
     ),
     StateBlock(
         "givers",
         "GIVERS",
-        ("ptrdiff_t givers[PHI_LINES];  /* the rows that hand something to this one, where they have been found */",),
+        ("ptrdiff_t givers[PHI_LINES];  /* the rows whose sites compute cotangents for this one */",),
     ),
     StateBlock(
         "chosen",
@@ -304,33 +313,40 @@ ROW = (
     StateBlock(
         "present",
         "OPEN && !ONE_ROW",
-        ("double present[PHI_WEIGHTS];  /* 1 for terms of H that are there as far as the other axes say, else 0 */",),
+        (
+            "double present[PHI_WEIGHTS];"
+            " /* for each term of H, 0 if it reaches beyond an open end of another axis, else 1 */",
+        ),
     ),
-    StateBlock("whole", "OPEN && BESIDE && !ONE_ROW", ("int whole;                    /* whether all of them are */",)),
+    StateBlock(
+        "whole",
+        "OPEN && BESIDE && !ONE_ROW",
+        ("int whole;                    /* whether all terms of H are present */",),
+    ),
     StateBlock(
         "window",
         "SEAMS",
         (
             "double window;               "
-            " /* the first kind, see phi_solver, of those that terms begin on which move sites near seams */",
+            " /* number in kinds of the first site of a term of H near the seam, see phi_solver */",
         ),
         reset=("row.window = 0.0;",),
     ),
     StateBlock(
         "near",
         "SEAMS && !ONE_ROW",
-        ("int near;                     /* the other axes along which it is near a seam, as bits */",),
+        ("int near;                     /* bits: the other axes along which the row is near a seam */",),
     ),
     StateBlock(
         "colour",
         "COLOURS && !ONE_ROW",
-        ("int colour;                   /* of the first site */",),
+        ("int colour;                   /* colour of the first site */",),
         reset=("row.colour = 0;",),
     ),
     StateBlock(
         "swept_colour",
         "COLOURS && SWEPT",
-        ("int swept;                    /* that of the sites which are swept */",),
+        ("int swept;                    /* colour of the sites of the present sweep */",),
         reset=("row.swept = 0;",),
     ),
 )

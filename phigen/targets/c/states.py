@@ -42,6 +42,8 @@ PARTS = {
     "state_of_cotangent.h": Part(structs.COTANGENT, 4, _members),
     "state_of_pulled.h": Part(structs.PULLED, 4, _members),
     "state_of_back_group.h": Part(structs.BACK_GROUP, 4, _members),
+    "state_of_transpose.h": Part(structs.TRANSPOSE, 4, _members),
+    "state_of_flow.h": Part(structs.FLOW, 4, _members),
     "state_of_traced.h": Part(structs.TRACED, 4, _members),
 }
 

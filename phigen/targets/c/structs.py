@@ -127,3 +127,96 @@ BACK_GROUP = (
         ("phi_lanes kept[PHI_SEGMENT][PHI_FLOWS][PHI_BACK_PACKS][PHI_DIM]; /* states before flows */",),
     ),
 )
+
+#: The reverse pass of a lattice: derivatives of a number L, and the memory that it shares out.
+TRANSPOSE = (
+    StateBlock(
+        "bar",
+        members=(
+            "double *bar[PHI_BARS];      /* derivatives by fields, then by parameters at sites and at bonds */",
+            "double *row_bar[PHI_BARS];  /* the same, with those of the fields at one row of a run */",
+            "double *handed[PHI_HANDED]; /* derivatives that sites compute for their neighbours */",
+            "double *sums;               /* for each row segment, derivatives by the coefficients */",
+        ),
+    ),
+    StateBlock(
+        "tape_of_stages",
+        "SERIES",
+        ("double *kept;               /* tape: for each step and stage, its solution y, and x if needed */",),
+    ),
+    StateBlock(
+        "states_of_legs",
+        "!SERIES && UNDONE",
+        (
+            "double *kept;               /* states at the starts of the legs of a segment */",
+            "size_t leg;                 /* number of steps of a leg */",
+            "int lost;                   /* 1 if inverse flows of a leg have led to another state than its start */",
+            "int anew;                   /* 1 if the flows of a step are repeated, as inverse flows do not serve */",
+        ),
+    ),
+    StateBlock(
+        "tape_of_sweeps",
+        "!SERIES && !UNDONE",
+        (
+            "double *kept;               /* tape: for each step and sweep of a segment, the fields that it changes */",
+            "double *x[PHI_ARRAYS];      /* fields before the sweep that the reverse pass reached last */",
+        ),
+    ),
+    StateBlock("end", members=("double *end[PHI_DIM];       /* state after all steps, from which others continue */",)),
+    StateBlock(
+        "last_far",
+        "!SERIES",
+        ("size_t last_far;            /* number of these that use functions for arguments of any size */",),
+    ),
+    StateBlock("block", members=("size_t block;               /* numbers of one field, in doubles */",)),
+    StateBlock("of_step", "!UNDONE", ("size_t of_step;             /* numbers that a step writes to the tape */",)),
+    StateBlock("states", members=("double *states;             /* checkpoints: states at the starts of segments */",)),
+    StateBlock("marks", "SERIES", ("size_t *marks;              /* for each, the number of its step */",)),
+    StateBlock(
+        "marks", "!SERIES", ("size_t *marks;              /* for each, the number of its step, and s->far there */",)
+    ),
+    StateBlock(
+        "counts",
+        members=(
+            "size_t most, count;         /* largest and present number of checkpoints */",
+            "size_t longest;             /* largest number of steps of a segment */",
+            "size_t first_step;          /* number of steps made before the run */",
+            "size_t unasked;             /* updates of sites since s->stop was called last */",
+            "int far;                    /* 1 if the reverse pass uses functions for arguments of any size */",
+            "int failed;                 /* 1 if functions for small arguments have given what is not finite */",
+        ),
+    ),
+)
+
+#: A flow of a step of a lattice.
+FLOW = (
+    StateBlock(
+        "part",
+        members=(
+            "int part;                   /* the part of H */",
+            "const double *coef;         /* its coefficients */",
+        ),
+    ),
+    StateBlock(
+        "own", "RENEWED", ("double own[PHI_ROW];        /* memory for coef, which differs from step to step */",)
+    ),
+    StateBlock(
+        "go",
+        "UNDONE && TAKES",
+        ("int go;                     /* 0 forward; 1, 2 reverse: by the array that takes derivatives */",),
+    ),
+    StateBlock(
+        "go",
+        "UNDONE && !TAKES",
+        ("int go;                     /* 0 forward; reverse: 1 at the sites themselves, 2 for their neighbours */",),
+    ),
+    StateBlock(
+        "reverse",
+        "UNDONE",
+        (
+            "int row;                    /* in the reverse pass: the row of coefficients, */",
+            "const struct phi_transpose *g;",
+            "double *const *bar;         /* and the derivatives to transform */",
+        ),
+    ),
+)

@@ -5,21 +5,7 @@
 
 /* A part of H, and the coefficients of its flow. */
 typedef struct {
-    int part;
-    const double *coef;
-#if PHI_RENEWED
-    double own[PHI_ROW];
-#endif
-#if PHI_UNDONE
-#if PHI_TAKES
-    int go;                    /* 0 onward; else back, 1 and 2 in turn, by which of the arrays what is handed goes, with: */
-#else
-    int go;                    /* 0 onward; else back, 1 at the sites themselves, and 2 as they are handed something then, with: */
-#endif
-    int row;
-    const struct phi_transpose *g;
-    double *const *bar;
-#endif
+#include "state_of_flow.h"
 } phi_flow;
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */

@@ -19,45 +19,9 @@
 static int phi_joined(int flow, int continues) { return PHI_FLOWS > 1 && flow == 0 && continues ? PHI_FLOWS : flow; }
 
 #endif
-/* What is pulled back through steps, and the memory for it. */
+/* The reverse pass of a run: derivatives of a number L, and checkpoints and tape of the forward pass. */
 typedef struct phi_transpose {
-    double *bar[PHI_BARS];       /* cotangents of the fields, then of parameters at sites, and at the bonds of each site */
-    double *row_bar[PHI_BARS];   /* those of the fields of one row, and the same of parameters */
-    double *handed[PHI_HANDED];  /* what sites hand to those that they have read */
-    double *sums;                /* of each piece of a row those of the coefficients */
-#if PHI_SERIES
-    double *kept;                /* of each step of a segment, and each of its stages, y and what else its transpose reads */
-    double *end[PHI_DIM];        /* what steps after the last go on from */
-#elif PHI_UNDONE
-    double *kept;                /* in a segment the states that its legs begin with */
-    size_t leg;                  /* the steps of a leg */
-    int lost;                    /* whether sweeps of a leg were undone to another state than that, */
-    int anew;                    /* and whether all flows of a step are made anew for each that is gone back through */
-    double *end[PHI_DIM];        /* what steps after the last go on from, */
-    size_t last_far;             /* and how many of these by functions for large arguments */
-#else
-    double *kept;                /* of each step of a segment, and each of its sweeps, the fields before that it changes */
-    double *x[PHI_ARRAYS];       /* the fields before what was gone back through last */
-    double *end[PHI_DIM];        /* what steps after the last go on from, */
-    size_t last_far;             /* and how many of these by functions for large arguments */
-#endif
-#if PHI_UNDONE
-    size_t block;                /* numbers of one field */
-#else
-    size_t block, of_step;       /* numbers of one field, and that a step keeps */
-#endif
-    double *states;              /* what segments begin with ... */
-#if PHI_SERIES
-    size_t *marks;               /* ... and of each the number of its step */
-#else
-    size_t *marks;               /* ... and of each the number of its step, then of steps by functions for large arguments */
-#endif
-    size_t most, count;          /* how many there may be, and are */
-    size_t longest;              /* most steps of a segment */
-    size_t first_step;           /* steps that were made before */
-    size_t unasked;              /* updates of sites since it was asked whether to stop */
-    int far;                     /* whether cotangents are found by functions for arguments of any size */
-    int failed;                  /* whether others have led to what is not finite */
+#include "state_of_transpose.h"
 } phi_transpose;
 
 #if PHI_SERIES
