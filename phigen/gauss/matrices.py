@@ -22,14 +22,16 @@ MOST_UNKNOWNS = 36
 
 def of_matrices(lie: LieAlgebra) -> StarAlgebra | None:
     """Return the algebra of a Lie algebra that is known by matrices with rational entries, or None."""
-    known = known_representation(lie)
-    if known is None or not lie.field.is_rational:
+    known, field = known_representation(lie), lie.field
+    if not field.is_rational:
         return None
-    field, n = lie.field, known.size
     try:
-        matrices = [{at: field.convert(e) for at, e in m.items()} for m in known.matrices]
+        matrices = [{at: field.convert(e) for at, e in m.items()} for m in known.matrices] if known else _affine(lie)
     except KeyError:  # entries with parameters
         return None
+    if not matrices:
+        return None
+    n = known.size if known else 1 + max(j for m in matrices for _, j in m)
     form = _form(matrices, n, field)
     if form is None:
         matrices = [_doubled(m, n, field) for m in matrices]
@@ -37,6 +39,65 @@ def of_matrices(lie: LieAlgebra) -> StarAlgebra | None:
         n = 2 * n
     hull = _hull([_unit(n, field), *matrices], n, field)
     return _assembled(hull, matrices, form, n, field) if hull else None
+
+
+def _affine(lie: LieAlgebra) -> list[SparseMatrix]:
+    """Return affine maps of an abelian ideal, the radical of the Killing form; none if there is no such ideal.
+
+    With a complement, which the linear map π onto the ideal has as its kernel, X becomes the matrix of ad X on the
+    ideal with the column π(X).
+    """
+    m, field = lie.dimension, lie.field
+    ad = [{(k, j): field.convert(c) for j in range(m) for k, c in lie.bracket(i, j).items()} for i in range(m)]
+    ideal = kernel(field, [{j: v for j, b in enumerate(ad) if (v := _trace(a, b, field)) != 0} for a in ad], m)
+    span, size = Span(field, ideal), len(ideal)
+    if not ideal or size == m:
+        return []
+    action: list[SparseMatrix] = []
+    for a in ad:
+        images = [_applied(a, t) for t in ideal]
+        columns = [span.coordinates(image) for image in images]
+        if any(column is None for column in columns):
+            return []
+        action.append({(k, q): v for q, column in enumerate(columns) for k, v in (column or {}).items()})
+    projection = _projection(lie, ideal, action)
+    if projection is None or size < 2:
+        return []
+    return [
+        {**linear, **{(k, size): v for k in range(size) if (v := projection.get(k * m + i, field.zero)) != 0}}
+        for i, linear in enumerate(action)
+    ]
+
+
+def _projection(lie: LieAlgebra, ideal: Sequence[Vector], action: Sequence[SparseMatrix]) -> Vector | None:
+    """Return π, at k·m + i, with π = 1 on the ideal and π([X, Y]) = X π(Y) − Y π(X); None if there is none."""
+    m, size, field = lie.dimension, len(ideal), lie.field
+    last = size * m
+    rows: list[Vector] = []
+    for q, t in enumerate(ideal):
+        for k in range(size):
+            row = {k * m + i: v for i, v in t.items()}
+            rows.append({**row, last: -field.one} if k == q else row)
+    for i in range(m):
+        for j in range(i):
+            for k in range(size):
+                row = {k * m + n: field.convert(c) for n, c in lie.bracket(i, j).items()}
+                for (at, q), v in action[i].items():
+                    if at == k:
+                        add_multiple(row, {q * m + j: v}, -field.one)
+                for (at, q), v in action[j].items():
+                    if at == k:
+                        add_multiple(row, {q * m + i: v}, field.one)
+                rows.append(row)
+    return next((v for v in kernel(field, [r for r in rows if r], last + 1) if last in v), None)
+
+
+def _applied(a: SparseMatrix, vector: Mapping[int, Scalar]) -> Vector:
+    image: Vector = {}
+    for (i, j), v in a.items():
+        if j in vector:
+            add_multiple(image, {i: v}, vector[j])
+    return image
 
 
 def _unit(n: int, field: Field) -> SparseMatrix:
@@ -134,7 +195,7 @@ def _functional(
 ) -> list[Vector] | None:
     """Return x̃ at the basis.
 
-    x̃ vanishes on symmetric elements, and on skew elements orthogonal to g by the trace of products.
+    x̃ vanishes on symmetric elements, and on skew elements orthogonal to g by the trace of products, if there are any.
     """
     half = field.one / field.number(2)
     skew: list[Vector] = []
@@ -151,6 +212,8 @@ def _functional(
     # skew elements orthogonal to g are in the kernels of the traces and of the projection on symmetric elements
     rows = [{i: v[k] for i, v in enumerate(symmetric) if k in v} for k in range(len(hull))]
     others = kernel(field, [*traces, *(r for r in rows if r)], len(hull))
+    if Span(field, skew).dimension == len(basis):  # g is all of them, as that of se(n)
+        others = []
     span = Span(field, [*basis, *others])
     if span.dimension < len(basis) + len(others):
         return None

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from phigen.gauss.enveloping import enveloping
 from phigen.gauss.logarithms import Rates, logarithmic
 from phigen.gauss.matrices import of_matrices
 from phigen.gauss.quaternionic import quaternionic
@@ -194,7 +195,7 @@ def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | N
 
 def star_algebra(lie: LieAlgebra) -> StarAlgebra | None:
     """Return a star algebra whose skew elements contain the Lie algebra, or None if none is known."""
-    return quaternionic(lie) or of_matrices(lie)
+    return quaternionic(lie) or of_matrices(lie) or enveloping(lie)
 
 
 def _without_constants(lie: LieAlgebra, last: int) -> LieAlgebra:

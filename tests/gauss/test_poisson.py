@@ -8,6 +8,7 @@ from support import BODY, SCALED, SPECIES, compile_text, compiled, first_run, sl
 
 from phigen.compiler import compile_spec, examine
 from phigen.errors import SpecError
+from phigen.geometry.families import named
 from phigen.spec import loads
 
 #: Each kind of algebra: so(3), se(3), two so(3), so(3) ⋉ 2R³, nilpotent, affine, direct sums, constant; by logarithms.
@@ -110,6 +111,27 @@ def test_matrix_algebras_step_by_poisson_maps(name):
     spec = loads(f"phigen: 1\nname: t\n{text}scheme: gauss\n")
     x = 0.5 * np.sin(1.0 + np.arange(n))
     assert defect(of(spec, 2), x, 0.15, poisson_of(spec)) <= 1e-13
+
+
+@pytest.mark.slow
+def test_algebras_without_known_matrices_step_by_poisson_maps():
+    """so(5) with factors, for which only the enveloping algebra has a quotient."""
+    lie, factors = named("so", 5), [1, 2, -1, 3, 1, 2, 1, -1, 3, 2]
+    brackets = {
+        f"x{i + 1}": {
+            f"x{j + 1}": " + ".join(
+                f"({c.value * factors[i] * factors[j] / factors[k]})*x{k + 1}" for k, c in lie.bracket(i, j).items()
+            )
+            for j in range(i + 1, 10)
+            if lie.bracket(i, j)
+        }
+        for i in range(9)
+    }
+    names = [f"x{k}" for k in range(1, 11)]
+    energy = " + ".join([f"{c}**2/{k + 2}" for k, c in enumerate(names)] + ["x1*x2*x3/4"])
+    text = f"coordinates: {names}\npoisson: {{brackets: {brackets}}}\nhamiltonian: {energy}\nscheme: gauss\n"
+    spec = loads(f"phigen: 1\nname: t\n{text}".replace("'", '"'))
+    assert defect(of(spec, 2), 0.3 * np.sin(1.0 + np.arange(10)), 0.1, poisson_of(spec)) <= 1e-14
 
 
 def test_direct_step_is_no_poisson_map_and_says_so():

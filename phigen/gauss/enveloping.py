@@ -1,0 +1,374 @@
+"""Star algebras of simple Lie algebras without known matrices, as quotients of their universal enveloping algebras.
+
+For sl(n), so(n), sp(2n) and their real forms A = K ⊕ g ⊕ S ⊕ Z: K is spanned by 1, S is a module of symmetric elements
+that the anticommutators ab + ba span with 1, and Z is spanned by a central skew element, for sl(n) and su(n) only. S is
+an eigenspace of the Casimir operator on Sym² g. Products by elements of g are, for a, b in g and f in S,
+
+    ab = ½[a, b] + c κ(a, b) + σ(a, b),    af = ½ a▷f + μ τ(a, f) + ν ⟨a, f⟩ z,    az = ι(a),
+
+with the Killing form κ, the projection σ on S, its transpose τ, and an isomorphism ι of g and S. That these represent g
+gives linear equations for c, μ and ν. All products follow from those by g. gl(n) and u(n) are sl(n) and su(n) with z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import isqrt
+from typing import Any
+
+from flint import fmpq, fmpq_mat
+
+from phigen.gauss.matrices import MOST_UNKNOWNS
+from phigen.gauss.star_algebra import StarAlgebra, Vector
+from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.symbolic.tower import rational
+
+#: Largest dimension of the Lie algebra, that of sp(6): larger ones have larger A than may be used.
+MOST_SIMPLE = 21
+
+#: Largest number of terms in the table of products. The bases of `named` algebras, permuted and scaled, have up to
+#: 1,700; the 4,000 of so(5) in a dense basis make 120,000 operations of a tangent of a stage, which programs refuse.
+MOST_TERMS = 2000
+
+
+def enveloping(lie: LieAlgebra) -> StarAlgebra | None:
+    """Return the algebra A of a simple Lie algebra, or of the sum of one and a centre of one dimension, or None."""
+    field, m = lie.field, lie.dimension
+    if not field.is_rational or m > MOST_SIMPLE:
+        return None
+    ad = [_matrix(m, m) for _ in range(m)]
+    for i in range(m):
+        for j in range(m):
+            for k, c in lie.bracket(i, j).items():
+                ad[i][k, j] = _number(rational(field.convert(c)))
+    parts = _derived_and_centre(ad, m)
+    if parts is None:
+        return None
+    basis, inverse, simple = parts
+    inner = [_restricted(ad, basis, inverse, k, simple) for k in range(simple)]
+    for module in _modules(inner, centre=m - simple):
+        rows = module.products()
+        algebra = rows and _assembled(lie, module, rows, basis, inverse)
+        if algebra and sum(map(len, algebra.table.values())) <= MOST_TERMS and algebra.sound:
+            return algebra
+    return None
+
+
+def _number(value: Any) -> fmpq:
+    exact = Fraction(value)
+    return fmpq(exact.numerator, exact.denominator)
+
+
+def _matrix(rows: int, columns: int) -> fmpq_mat:
+    return fmpq_mat(rows, columns)
+
+
+def _kernel(a: fmpq_mat) -> list[list[fmpq]]:
+    """Return a basis of the kernel of a matrix."""
+    reduced, rank = a.rref()
+    columns, pivots, row = a.ncols(), [], 0
+    for j in range(columns):
+        if row < rank and reduced[row, j] != 0:
+            pivots.append(j)
+            row += 1
+    free = [j for j in range(columns) if j not in pivots]
+    vectors = []
+    for j in free:
+        vector = [fmpq(0)] * columns
+        vector[j] = fmpq(1)
+        for r, pivot in enumerate(pivots):
+            vector[pivot] = -reduced[r, j]
+        vectors.append(vector)
+    return vectors
+
+
+def _derived_and_centre(ad: Sequence[fmpq_mat], m: int) -> tuple[fmpq_mat, fmpq_mat, int] | None:
+    """Return a basis of [g, g] and of the centre as rows, its inverse, and dim [g, g]; None if these do not span g."""
+    brackets = fmpq_mat(m * m, m, [ad[i][k, j] for i in range(m) for j in range(m) for k in range(m)])
+    reduced, rank = brackets.rref()
+    centre = _kernel(fmpq_mat(m * m, m, [ad[i][k, j] for k in range(m) for j in range(m) for i in range(m)]))
+    if rank + len(centre) != m or len(centre) > 1:
+        return None
+    rows = [[reduced[r, j] for j in range(m)] for r in range(rank)] if rank < m else _unit_rows(m)
+    basis = fmpq_mat(m, m, [v for row in [*rows, *centre] for v in row])
+    try:
+        return basis, basis.inv(), rank
+    except ZeroDivisionError:
+        return None
+
+
+def _unit_rows(m: int) -> list[list[fmpq]]:
+    return [[fmpq(int(i == j)) for j in range(m)] for i in range(m)]
+
+
+def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: int, simple: int) -> fmpq_mat:
+    """Return the adjoint matrix of a basis element of [g, g] in the basis of [g, g]."""
+    m = len(ad)
+    total = _matrix(m, m)
+    for i in range(m):
+        total = total + ad[i] * basis[k, i]
+    changed = inverse.transpose() * total * basis.transpose()
+    return fmpq_mat(simple, simple, [changed[i, j] for i in range(simple) for j in range(simple)])
+
+
+def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
+    """Yield the modules S that the algebra may have by its dimension, those of the smallest A first."""
+    m = len(ad)
+    form = fmpq_mat(m, m, [_trace(a * b) for a in ad for b in ad])
+    if m < 8 or form.det() == 0:
+        return
+    eigenvalues: list[tuple[int, Fraction, bool]] = []
+    n = isqrt(m + 1)
+    if n * n == m + 1:
+        eigenvalues.append((m, Fraction(1), True))  # sl(n): symmetric products without trace
+    n = (1 + isqrt(1 + 8 * m)) // 2
+    if n * (n - 1) == 2 * m and not centre:
+        eigenvalues.append((n * (n + 1) // 2 - 1, Fraction(n, n - 2), False))  # so(n): symmetric matrices
+    n = (isqrt(1 + 8 * m) - 1) // 4
+    if n * (2 * n + 1) == m and not centre:
+        eigenvalues.append((n * (2 * n - 1) - 1, Fraction(n, n + 1), False))  # sp(2n)
+    for size, eigenvalue, central in sorted(eigenvalues):
+        if 1 + m + size + central > MOST_UNKNOWNS:
+            continue
+        tensors = _eigenspace(ad, form, eigenvalue)
+        if len(tensors) == size:
+            yield _Module(ad, form, tensors, central)
+
+
+def _trace(a: fmpq_mat) -> fmpq:
+    return sum((a[i, i] for i in range(a.nrows())), fmpq(0))
+
+
+def _eigenspace(ad: Sequence[fmpq_mat], form: fmpq_mat, eigenvalue: Fraction) -> list[fmpq_mat]:
+    """Return a basis of the symmetric tensors with this eigenvalue of the Casimir operator, 1 on g."""
+    m = len(ad)
+    flat = fmpq_mat(m * m, m, [ad[a][i, p] for i in range(m) for p in range(m) for a in range(m)])
+    crossed = flat * form.inv() * flat.transpose()  # Σ κ^ab ad_a ⊗ ad_b, at (i, p), (j, q)
+    pairs = [(i, j) for i in range(m) for j in range(i + 1)]
+    half = _number((eigenvalue - 2) / 2)
+    matrix = _matrix(len(pairs), len(pairs))
+    for row, (i, j) in enumerate(pairs):
+        for column, (p, q) in enumerate(pairs):
+            entry = crossed[i * m + p, j * m + q]
+            if p != q:
+                entry = entry + crossed[i * m + q, j * m + p]
+            matrix[row, column] = entry - (half if row == column else 0)
+    tensors = []
+    for vector in _kernel(matrix):
+        tensor = _matrix(m, m)
+        for (i, j), value in zip(pairs, vector, strict=True):
+            tensor[i, j] = tensor[j, i] = value
+        tensors.append(tensor)
+    return tensors
+
+
+@dataclass(frozen=True)
+class _Module:
+    """The module S of a simple Lie algebra: symmetric tensors; with ``central`` A has the element z."""
+
+    ad: Sequence[fmpq_mat]
+    form: fmpq_mat
+    tensors: Sequence[fmpq_mat]
+    central: bool
+
+    @property
+    def size(self) -> int:
+        """The dimension of A."""
+        return 1 + len(self.ad) + len(self.tensors) + self.central
+
+    def products(self) -> list[fmpq_mat] | None:
+        """Return the matrices of left multiplication by the basis of A = K ⊕ g ⊕ S ⊕ Z, or None."""
+        m, d = len(self.ad), len(self.tensors)
+        lowered = [self.form * s * self.form for s in self.tensors]
+        flat = fmpq_mat(d, m * m, [q[i, j] for q in lowered for i in range(m) for j in range(m)])
+        gram = flat * flat.transpose()
+        extract = flat.transpose() * gram.inv()
+        action = [self._action(a, lowered, extract) for a in self.ad]
+        metric = fmpq_mat(d, d, [_trace(q * s) for q in lowered for s in self.tensors]).inv()
+        raised = [s * self.form for s in self.tensors]
+        back = [_combination(raised, [metric[k, k2] for k in range(d)]) for k2 in range(d)]  # τ(·, f_l)
+        iota = _isomorphism(self.ad, action) if self.central else None
+        if self.central and iota is None:
+            return None
+        factors = self._factors(lowered, action, back, iota)
+        if factors is None:
+            return None
+        left = [self._left(a, factors, lowered, action, back, iota) for a in range(m)]
+        return self._completed(left, lowered, factors, iota)
+
+    def _action(self, a: fmpq_mat, lowered: Sequence[fmpq_mat], extract: fmpq_mat) -> fmpq_mat:
+        """Return the matrix of a basis element of g on S."""
+        m, d = a.nrows(), len(lowered)
+        images = [a.transpose() * q + q * a for q in lowered]
+        return fmpq_mat(d, m * m, [e[i, j] for e in images for i in range(m) for j in range(m)]) * extract
+
+    def _factors(
+        self, lowered: Sequence[fmpq_mat], action: Sequence[fmpq_mat], back: Sequence[fmpq_mat], iota: fmpq_mat | None
+    ) -> tuple[fmpq, fmpq, fmpq] | None:
+        """Return c, μ, ν, from the equations on a few elements: the axioms of A are decided afterwards."""
+        m, d, rows = len(self.ad), len(self.tensors), list[list[fmpq]]()
+        pairing = None if iota is None else self.form * iota.inv()  # ⟨a, f⟩ with ⟨a, ι(b)⟩ = κ(a, b)
+        for a, b in ((0, 1), (1, 2), (0, m - 1)):
+            bracket = [self.ad[a][k, b] for k in range(m)]
+            twice = _combination(self.ad, bracket)
+            for x in range(m):
+                there = sum_of(back, [lowered[k][b, x] for k in range(d)], a, m)
+                again = sum_of(back, [lowered[k][a, x] for k in range(d)], b, m)
+                for i in range(m):
+                    plain = self.form[b, x] * (i == a) - self.form[a, x] * (i == b)
+                    rows.append([plain, there[i] - again[i], fmpq(0), twice[i, x] / 4])
+            if iota is None or pairing is None:
+                continue
+            rotated = _combination(action, bracket)
+            for f in range(d):
+                ab = [back[f][i, b] for i in range(m)]
+                ba = [back[f][i, a] for i in range(m)]
+                for k in range(d):
+                    first = sum((lowered[k][a, i] * ab[i] - lowered[k][b, i] * ba[i] for i in range(m)), fmpq(0))
+                    second = pairing[b, f] * iota[k, a] - pairing[a, f] * iota[k, b]
+                    rows.append([fmpq(0), first, second, rotated[k, f] / 4])
+        kernel = _kernel(fmpq_mat(len(rows), 4, [v for row in rows for v in row]))
+        solution = next((v for v in kernel if v[3] != 0), None)
+        if solution is None:
+            return None
+        c, mu, nu = (-v / solution[3] for v in solution[:3])
+        return c, mu, nu
+
+    def _left(
+        self,
+        a: int,
+        factors: tuple[fmpq, fmpq, fmpq],
+        lowered: Sequence[fmpq_mat],
+        action: Sequence[fmpq_mat],
+        back: Sequence[fmpq_mat],
+        iota: fmpq_mat | None,
+    ) -> fmpq_mat:
+        """Return the matrix of left multiplication by an element of g."""
+        m, d, (c, mu, nu) = len(self.ad), len(self.tensors), factors
+        left = _matrix(self.size, self.size)
+        left[1 + a, 0] = fmpq(1)
+        for b in range(m):
+            left[0, 1 + b] = c * self.form[a, b]
+            for k in range(m):
+                left[1 + k, 1 + b] = self.ad[a][k, b] / 2
+            for k in range(d):
+                left[1 + m + k, 1 + b] = lowered[k][a, b]
+        pairing = None if iota is None else self.form * iota.inv()
+        for f in range(d):
+            for k in range(m):
+                left[1 + k, 1 + m + f] = mu * back[f][k, a]
+            for k in range(d):
+                left[1 + m + k, 1 + m + f] = action[a][k, f] / 2
+            if pairing is not None:
+                left[self.size - 1, 1 + m + f] = nu * pairing[a, f]
+        if iota is not None:
+            for k in range(d):
+                left[1 + m + k, self.size - 1] = iota[k, a]
+        return left
+
+    def _completed(
+        self,
+        left: Sequence[fmpq_mat],
+        lowered: Sequence[fmpq_mat],
+        factors: tuple[fmpq, fmpq, fmpq],
+        iota: fmpq_mat | None,
+    ) -> list[fmpq_mat] | None:
+        """Return the left multiplications by all of A: those by S and z are combinations of products of g."""
+        m, d, size = len(self.ad), len(self.tensors), self.size
+        one = fmpq_mat(size, size, [fmpq(int(i == j)) for i in range(size) for j in range(size)])
+        pairs = [(a, b) for a in range(m) for b in range(a + 1)]
+        values = fmpq_mat(d, len(pairs), [q[a, b] for q in lowered for a, b in pairs])
+        chosen = _pivots(values)
+        if len(chosen) < d:
+            return None
+        square = fmpq_mat(d, d, [values[k, c] for k in range(d) for c in chosen])
+        symmetric = []
+        for c in chosen:  # σ(a, b) = ½(ab + ba) − c κ(a, b)
+            a, b = pairs[c]
+            product = left[a] * left[b] + left[b] * left[a]
+            symmetric.append(product * fmpq(1, 2) - one * (factors[0] * self.form[a, b]))
+        inverse = square.inv()
+        by_module = [_combination(symmetric, [inverse[c, k] for c in range(d)]) for k in range(d)]
+        everything = [one, *left, *by_module]
+        if iota is not None:
+            everything.append(self._centre(left, by_module, factors, iota))
+        return everything
+
+    def _centre(
+        self, left: Sequence[fmpq_mat], by_module: Sequence[fmpq_mat], factors: tuple[fmpq, fmpq, fmpq], iota: fmpq_mat
+    ) -> fmpq_mat:
+        """Return the left multiplication by z, from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z) for some a and f."""
+        m, d, pairing = len(self.ad), len(self.tensors), self.form * iota.inv()
+        a, f = next((a, f) for a in range(m) for f in range(d) if pairing[a, f] != 0)
+        anticommutator = (left[a] * by_module[f] + by_module[f] * left[a]) * fmpq(1, 2)
+        skew = [left[a][1 + k, 1 + m + f] for k in range(m)]
+        return (anticommutator - _combination(left, skew)) * (1 / (factors[2] * pairing[a, f]))
+
+
+def sum_of(matrices: Sequence[fmpq_mat], factors: Sequence[fmpq], column: int, rows: int) -> list[fmpq]:
+    """Return a column of Σ_k factors[k]·matrices[k]."""
+    listed = [(m, f) for m, f in zip(matrices, factors, strict=True) if f != 0]
+    return [sum((m[i, column] * f for m, f in listed), fmpq(0)) for i in range(rows)]
+
+
+def _combination(matrices: Sequence[fmpq_mat], factors: Sequence[fmpq]) -> fmpq_mat:
+    total = _matrix(matrices[0].nrows(), matrices[0].ncols())
+    for matrix, factor in zip(matrices, factors, strict=True):
+        if factor != 0:
+            total = total + matrix * factor
+    return total
+
+
+def _pivots(a: fmpq_mat) -> list[int]:
+    """Return columns that span the column space."""
+    reduced, rank = a.rref()
+    pivots: list[int] = []
+    for j in range(a.ncols()):
+        if len(pivots) < rank and reduced[len(pivots), j] != 0:
+            pivots.append(j)
+    return pivots
+
+
+def _isomorphism(ad: Sequence[fmpq_mat], action: Sequence[fmpq_mat]) -> fmpq_mat | None:
+    """Return an invertible matrix ι with D_x ι = ι ad_x for all x, or None."""
+    m, d = len(ad), action[0].nrows()
+    rows: list[fmpq] = []
+    for weights in ([fmpq(1 + k % 3) for k in range(m)], [fmpq(1 - 2 * (k % 2) + k) for k in range(m)]):
+        there, here = _combination(action, weights), _combination(ad, weights)
+        for i in range(d):
+            for j in range(m):
+                row = [fmpq(0)] * (d * m)
+                for k in range(d):
+                    row[k * m + j] = row[k * m + j] + there[i, k]
+                for k in range(m):
+                    row[i * m + k] = row[i * m + k] - here[k, j]
+                rows += row
+    for vector in _kernel(fmpq_mat(2 * d * m, d * m, rows)):
+        iota = fmpq_mat(d, m, vector)
+        if d == m and iota.det() != 0:
+            return iota
+    return None
+
+
+def _assembled(
+    lie: LieAlgebra, module: _Module, left: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat
+) -> StarAlgebra:
+    """Return the star algebra; rows of ``basis`` are elements of [g, g], then that of the centre, if there is one."""
+    field, size, simple, m = lie.field, module.size, len(module.ad), lie.dimension
+
+    def vector(entries: Sequence[fmpq]) -> Vector:
+        return {k: field.number(Fraction(int(v.p), int(v.q))) for k, v in enumerate(entries) if v != 0}
+
+    table = {(i, j): vector([left[i][k, j] for k in range(size)]) for i in range(size) for j in range(size)}
+    skew = {*range(1, 1 + simple), *([size - 1] if module.central else [])}
+    star = [{k: -field.one if k in skew else field.one} for k in range(size)]
+    places = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]  # of the rows of the basis
+    elements = [{places[r]: v for r, v in vector([inverse[a, r] for r in range(m)]).items()} for a in range(m)]
+    functional: list[Vector] = [{} for _ in range(size)]
+    for r, place in enumerate(places):
+        functional[place] = vector([basis[r, a] for a in range(m)])
+    units = [{a: field.one} for a in range(m)]
+    table = {at: row for at, row in table.items() if row}
+    return StarAlgebra(field, size, table, star, {0: field.one}, elements, functional, elements, units)
