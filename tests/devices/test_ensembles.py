@@ -31,7 +31,7 @@ hamiltonian: (x1**2/I1 + x2**2/I2 + x3**2/3)/2
 casimirs: {C: x1**2 + x2**2 + x3**2}
 order: 2
 """
-#: Of each kind of step, of time, of noise, and of a monitor.
+#: Of each kind of step, of time, of noise, and of a monitor: the others need --corpus.
 QUICK = ("pendulum_euler",)
 LONGER = (
     "kepler_eccentric",
@@ -40,7 +40,6 @@ LONGER = (
     "kowalevski_gauss",
     "seasonal_predator_prey",
     "thermal_spin",
-    "double_well",
 )
 
 
@@ -86,13 +85,14 @@ def x0():
     return np.random.default_rng(2).standard_normal((100, 3)) + 1
 
 
+@pytest.mark.slow
 def test_members_have_parameters_and_steps_of_their_own(body, x0):
     device, c = body
     own = {"h": np.linspace(0.01, 0.1, 100), "I1": np.linspace(1, 2, 100)}
     np.testing.assert_array_equal(device.ensemble(x0, steps=20, **own), c.ensemble(x0, steps=20, **own))
 
 
-@pytest.mark.parametrize("size", [1, 48])
+@pytest.mark.parametrize("size", [pytest.param(1, marks=pytest.mark.slow), 48])
 def test_bits_do_not_depend_on_the_size_of_work_groups(body, x0, size):
     device, _ = body
     again = pickle.loads(pickle.dumps(device))

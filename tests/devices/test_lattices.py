@@ -53,6 +53,7 @@ def test_fields_are_those_of_c(name):
     np.testing.assert_allclose(ours.energy, theirs.energy, rtol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REFUSED)
 def test_lattices_without_kernels_are_refused(name):
     program = compilation_of(name, profile="small").program
@@ -60,6 +61,7 @@ def test_lattices_without_kernels_are_refused(name):
         emit(program, "device", COMMAND)
 
 
+@pytest.mark.slow
 def test_bits_do_not_depend_on_the_size_of_work_groups():
     device, _ = both("fput")
     x, h, _ = beginning("fput", device.interface)
@@ -70,6 +72,7 @@ def test_bits_do_not_depend_on_the_size_of_work_groups():
     np.testing.assert_array_equal(session.state(), device.integrate(x, h, 20).x[-1])
 
 
+@pytest.mark.slow
 def test_a_failing_step_leaves_the_state_before_it():
     device, c = both("fput")
     x, _, _ = beginning("fput", c.interface)
@@ -97,6 +100,7 @@ def test_a_lost_device_says_where_the_run_can_be_resumed(monkeypatch):
 
 
 @pytest.mark.skipif(not nvrtc.is_installed(), reason="the wheels of NVRTC and ptxas are not installed")
+@pytest.mark.slow
 @pytest.mark.parametrize("architecture", nvrtc.ARCHITECTURES)
 def test_kernels_compile_for_two_generations_of_cards(architecture, tmp_path):
     (text,) = emit(compilation_of("xxz_disorder", profile="small").program, "device", COMMAND).values()

@@ -21,7 +21,9 @@ real: float
 """
 
 
-@pytest.mark.parametrize("scheme", [pytest.param("series", marks=pytest.mark.slow), "splitting"])
+@pytest.mark.parametrize(
+    "scheme", [pytest.param("series", marks=pytest.mark.slow), pytest.param("splitting", marks=pytest.mark.slow)]
+)
 def test_members_have_the_bits_of_c_and_its_casimirs(scheme, tmp_path):
     """By compensated sums: 500 steps change a Casimir by a few roundings of floats."""
     compilation = compile_text(f"{BODY}order: 2\nscheme: {scheme}\n")
