@@ -146,11 +146,14 @@ WITHOUT_SERIES = {
 }
 
 
-#: Keys that lattices do not take yet, and the values that do no harm.
-NOT_OF_LATTICES: Mapping[str, tuple[object, ...]] = {
-    "monitor": (), "reconstruct": (), "terms": (),
-    "gauge": ("auto", "none"), "modified_hamiltonian": (0,),
-}  # fmt: skip
+#: Keys that lattices do not take: the values that do no harm, and what to do.
+NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
+    "monitor": ((), "phigen show --expand 3 prints an ordinary spec of three sites, which takes it"),
+    "reconstruct": ((), "phigen show --expand prints an ordinary spec of a few sites, which takes it"),
+    "terms": ((), "order: sets the method of a lattice"),
+    "gauge": (("auto", "none"), "gauges are those of ordinary systems"),
+    "modified_hamiltonian": ((0,), "phigen show --expand prints an ordinary spec of a few sites, which takes it"),
+}
 
 
 #: Keys that noise excludes: the values that do no harm, the reason, and what to do.
@@ -179,9 +182,9 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
         if run_ and "average" in run_:
             hint = "observables: {NAME: formula} declares what is averaged"
             problems.add("average: the spec has no observables", reader.locations["runs", name, "average"], hint)
-    for key, harmless in NOT_OF_LATTICES.items() if raw.get("lattice") is not None else ():
+    for key, (harmless, hint) in NOT_OF_LATTICES.items() if raw.get("lattice") is not None else ():
         if raw.get(key) is not None and raw[key] not in harmless:
-            problems.add(f"{key}: not available for lattices", reader.locations[key,])
+            problems.add(f"{key}: not available for lattices", reader.locations[key,], hint)
     if raw.get("coordinates_from") is not None and raw.get("lattice") is not None:
         hint = "phigen show --expand RUN writes the bodies of a run as an ordinary spec, which takes coordinates_from"
         problems.add("coordinates_from: not available for lattices", reader.locations["coordinates_from",], hint)

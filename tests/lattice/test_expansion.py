@@ -9,8 +9,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from lattice.lattices import LATTICES, on_grid
 
+import phigen
+from phigen.cli import group
 from phigen.geometry.checks import check
 from phigen.geometry.system import System, hamiltonian_vector_field, system_from_spec
 from phigen.lattice.cell import Cell, bond_forces, contributions, vector_field
@@ -225,3 +228,27 @@ def test_random_lattices_move_as_their_expansions(seed: int) -> None:
     )
     energy, _ = summed(cell, cell.hamiltonian, start.state, start.parameters)
     np.testing.assert_allclose(energy, evaluate([made.hamiltonian], here)[0], rtol=1e-12)
+
+
+def test_bodies_that_meet_take_the_logarithmic_monitor_as_an_ordinary_system(tmp_path):
+    text = """\
+phigen: 1
+name: bodies
+lattice: {pairs: all}
+coordinates: [x, y, px, py]
+parameters: {m: {value: [1, 0.01, 0.002], at: sites, positive: true}}
+poisson: {canonical: {q: [x, y], p: [px, py]}}
+hamiltonian:
+  sites: (px**2 + py**2)/(2*m)
+  pairs: -m[a]*m[b]/sqrt((x[a] - x[b])**2 + (y[a] - y[b])**2)
+runs: {close: {initial: {x: [0, 1, 1.3], y: 0, px: 0, py: [0, 0.003, 0.0018]}, step: 0.02, until: 3}}
+"""
+    plain = phigen.compile(loads(text), target="numpy", order=4)
+    (tmp_path / "bodies.yaml").write_text(text)
+    command = ["show", str(tmp_path / "bodies.yaml"), "--expand", "3"]
+    listed = CliRunner().invoke(group, command, prog_name="phigen").stdout
+    monitored = phigen.compile(loads(f"{listed}scheme: splitting\nmonitor: log\n"), target="numpy", order=4)
+    runs = plain.run(), monitored.run(step=0.0005)
+    errors = [np.abs(run.energy - run.energy[0]).max() / abs(run.energy[0]) for run in runs]
+    assert runs[1].steps < runs[0].steps
+    assert errors[1] < 1e-6 < 0.05 < errors[0]
