@@ -18,15 +18,27 @@ from pathlib import Path
 from typing import Any
 
 import mpmath
+import numpy as np
 import pytest
-from flint import arb
+from flint import arb, arb_mat
 from many_digits import PreciseStep
 from systems import compile_anew, slow_but, spec_of
 
 import phigen.certify.checker
+from phigen.certify.checker import krawczyk
+from phigen.certify.checker.explicit_steps import explicit
 from phigen.certify.checker.reader import GeneratedC
 from phigen.certify.checker.replay import replayed
-from phigen.certify.checker.rounding import LIBM, SERIES, TERMS, RefusedError, Tape, coefficients
+from phigen.certify.checker.rounding import (
+    LIBM,
+    SERIES,
+    TERMS,
+    RefusedError,
+    Tape,
+    coefficients,
+    interval,
+    play,
+)
 from phigen.certify.problem import problem_of
 from phigen.certify.prove import LEAST_RATE, StepProblem, certified, precise
 from phigen.certify.samples import exact_step, observed
@@ -40,6 +52,7 @@ SYSTEMS: dict[str, dict[str, Any]] = {
     "pendulum_euler": {},
     "pendulum": {"domain": [[-1, 1], [-1.5, 1.5]]},
     "predator_prey": {},
+    "henon_heiles": {},
     "rigid_body": {},
     "duffing": {},
     "seasonal_predator_prey": {},
@@ -274,6 +287,85 @@ def test_bounds_of_random_expressions_hold_for_every_value() -> None:
         assert error <= bound
         most = max(most, float(error / bound)) if bound > 0 else most
     assert most > 0.02
+
+
+def test_derivatives_are_limits_of_differences() -> None:
+    """Of each operation, by each operand."""
+    with precise():
+
+        def value(x: Any, y: Any) -> tuple[Tape, Any, Any, Any]:
+            tape = Tape({}, 1.0, exact=True)
+            a, b = tape.value(arb(x)), tape.value(arb(y))
+            return tape, a, b, tape.function("exp", (a * b - a / b) + (-a * a)) / (b + a)
+
+        tape, a, b, result = value("0.7", "1.3")
+        slopes, h = tape.derivatives(result), arb("1e-9")
+        by_a = (value(arb("0.7") + h, "1.3")[3].x - value(arb("0.7") - h, "1.3")[3].x) / (2 * h)
+        by_b = (value("0.7", arb("1.3") + h)[3].x - value("0.7", arb("1.3") - h)[3].x) / (2 * h)
+        assert abs(slopes[a.index] - by_a) < 1e-12
+        assert abs(slopes[b.index] - by_b) < 1e-12
+
+
+def test_corrections_miss_no_more_than_the_bound_says() -> None:
+    """The correction that doubles give at the solution, where the rounding of the residual decides."""
+    c, _ = certificate("henon_heiles")
+    draw, n = random.Random(5), len(c["domain"])
+    *X, T = [interval(d) for d in [*c["domain"], c["time"]]]
+    with precise():
+        Y = [interval(y) for y in c["tree"]["y"][0]]
+        correction = krawczyk.Correction(*krawczyk.linearised(c, Y, T, 0))
+        centre = krawczyk.linearised(c, [arb(v.mid()) for v in Y], T, 0)[2]["displacement"]
+        correction.expect_one_solution(krawczyk.column(X), krawczyk.column(v.x for v in centre))
+    worst = 0.0
+    for _ in range(40):
+        x = [draw.uniform(*d) for d in c["domain"]]
+        with precise():
+            solution = x
+            for _ in range(6):
+                _, _, out = krawczyk.linearised(c, [arb(v) for v in solution], T, 0, exact=True)
+                matrix = arb_mat(n, n, [v.x for v in out["jacobian"]])
+                residual = [[arb(s) - arb(v) + d.x] for s, v, d in zip(solution, x, out["displacement"], strict=True)]
+                delta = matrix.solve(arb_mat(residual)).entries()
+                solution = [(arb(s) - d).mid() for s, d in zip(solution, delta, strict=True)]
+            y = [float(s) for s in solution]
+            e = [arb(a) - b for a, b in zip(y, solution, strict=True)]
+        h, number = c["step"], lambda c, _=None: c
+        coef = play(c["kernels"]["prepare"], number, params=c["parameters"], gauge=[], h=[h])["coef"]
+        out = play(c["kernels"]["linearise"], number, coef=coef, y=y)
+        side = [(a - b) + d for a, b, d in zip(y, x, out["displacement"], strict=True)]
+        computed = np.linalg.solve(np.reshape(out["jacobian"], (n, n)), side)
+        with precise():
+            bound = correction.missed(krawczyk.column(abs(v) for v in e)).entries()
+            errors = [abs(arb(d) - v) for d, v in zip(computed, e, strict=True)]
+            assert all(error <= b for error, b in zip(errors, bound, strict=True))
+            worst = max(worst, *(float(error / b) for error, b in zip(errors, bound, strict=True)))
+    assert worst > 0.02
+
+
+def test_truncation_of_a_polynomial_counts() -> None:
+    """cos(sqrt(s)) by two terms is wrong by the third."""
+    polynomial = {
+        "radius": 1.0,
+        "operations": [["input", "s", 0], ["number", -0.5], ["mul", 1, 0], ["number", 1.0], ["add", 3, 2]],
+        "outputs": {"value": [4]},
+    }
+    with precise():
+        tape = Tape({"series:cosroot": polynomial}, 1.0)
+        error = tape.error(tape.function("series:cosroot", tape.value(arb("0.5"))))
+        assert math.cos(math.sqrt(0.5)) - 0.75 <= float(error) < 1.1 * 0.5**2 / 24
+
+
+def test_kernels_that_read_the_state_without_its_carry_are_wrong_by_it() -> None:
+    """The increment x - 1 has no rounding near 1, but the C computes it from x, and the map of x + carry differs."""
+    operations = [["input", "state", 0], ["number", 1.0], ["sub", 0, 1]]
+    kernels = {
+        "prepare": {"operations": [], "outputs": {"coef": []}},
+        "explicit": {"operations": operations, "outputs": {"increment": [2]}},
+    }
+    c = {"series": {}, "ulps": 1.0, "step": 1.0, "fractions": [1.0], "parameters": {}, "gauge": [], "kernels": kernels}
+    with precise():
+        (bound,), _ = explicit(c, [interval((1.0, 1.001))], arb(0), {})
+        assert 2.0**-53 <= float(bound) < 1.1 * 2.0**-53
 
 
 def test_the_runtime_is_the_one_that_the_theorems_are_about() -> None:
