@@ -171,22 +171,27 @@ def lattice_solver_of(compilation: Compilation, target: str = "auto") -> Lattice
 def _loaded(program: Program, target: str) -> tuple[Any, Any]:
     """The back end of a program, and its interface."""
     interface = interface_of(program)
-    command = f"phigen build {program.name}.yaml"
-    if target in registry.DEVICES:
-        device = registry.find(target)
-        host = "numpy" if program.step.kind.sites else chosen_target("auto", _warn)
-        files = {**emit(program, host, command), **emit(program, target, command)}
-        return device.load(files, interface), interface
-    return backend_of(emit(program, chosen_target(target, _warn), command), interface), interface
+    chosen = chosen_target(target, _warn)
+    files = files_of(program, chosen, f"phigen build {program.name}.yaml")
+    return backend_of(files, interface, chosen), interface
+
+
+def files_of(program: Program, target: str, command: str) -> dict[str, str]:
+    """The files that Python runs on a target: for a device, those of another target too, for what the host computes."""
+    if target not in registry.DEVICES:
+        return emit(program, target, command)
+    host = "numpy" if program.step.kind.sites else chosen_target("auto", _warn)
+    return {**emit(program, host, command), **emit(program, target, command)}
 
 
 def _warn(message: str) -> None:
     warnings.warn(message, PhigenWarning, stacklevel=2)
 
 
-def backend_of(files: Mapping[str, str], interface: Interface) -> Backend:
-    """The back end of generated files (name → text) of one target. Raises `ToolchainError`."""
-    return registry.target_of(files, interface.name).load(files, interface)
+def backend_of(files: Mapping[str, str], interface: Interface, target: str = "") -> Backend:
+    """The back end of the files (name → text) of a target, by default of the one they tell. Raises `ToolchainError`."""
+    language = registry.find(target) if target else registry.target_of(files, interface.name)
+    return language.load(files, interface)
 
 
 def interface_of(program: Program) -> Interface:

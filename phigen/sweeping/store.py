@@ -59,7 +59,7 @@ class Job:
         """The loaded solver. Raises `ToolchainError`."""
         from phigen import registry
 
-        return registry.target_of(self.files, self.interface.name).load(self.files, self.interface)
+        return registry.find(self.plan.about["target"]).load(self.files, self.interface)
 
     @cached_property
     def module(self) -> Any:

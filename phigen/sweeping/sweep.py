@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from phigen._version import __version__
-from phigen.api import chosen_target, compilation_of, interface_of
+from phigen.api import chosen_target, compilation_of, files_of, interface_of
 from phigen.compilation import Compilation
 from phigen.compiler import emit
 from phigen.errors import Diagnostic, FileError, SpecError
@@ -179,7 +179,7 @@ def _beside(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]
     """The solver as source, and what else workers need."""
     program, command = compilation.program, f"phigen build {compilation.program.name}.yaml"
     (functions,) = emit(program, "numpy", command).values()
-    return store.made_by(interface_of(program), emit(program, target, command), functions, spec.source)
+    return store.made_by(interface_of(program), files_of(program, target, command), functions, spec.source)
 
 
 def _gone_on_with(output: Path, plan: Plan, beside: Mapping[str, Any]) -> store.Job:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from types import MappingProxyType
 from typing import Any
 
@@ -140,7 +141,7 @@ class Tables:
         self._device, self._count = device, int(np.prod(sizes))
         numbers = np.arange(self._count, dtype=np.int32).reshape(sizes)
         neighbours = [sites.shifted(numbers, *offset).ravel() for offset in interface.neighbours]
-        weights = [np.broadcast_to(sites.present(*sum(b, ())), sizes).ravel() for b in interface.bounds]
+        weights = [np.broadcast_to(sites.present(*chain.from_iterable(b)), sizes).ravel() for b in interface.bounds]
         at_sites = [np.broadcast_to(sites.parameters[name], sizes).ravel() for name in interface.at_sites]
         self._neighbours, self._weights = self._written(neighbours, np.int32), self._written(weights, np.float64)
         self._at_sites = self._written(at_sites, np.float64)
