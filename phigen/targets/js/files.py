@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from phigen.scheme.step_kinds import STEP_KINDS
 from phigen.targets.features import holds
+
+_KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
 #: Modules of ordinary systems, in their order, each with its condition on switches.
 MODULES = {
@@ -28,11 +31,7 @@ MODULES = {
     "tables_stages": "!SPLITTING",
     "saving": "",
     "nonnegative": "NONNEGATIVE",
-    "newton": "NEWTON",
-    "explicit": "EXPLICIT",
-    "path": "PATH",
-    "gauss": "GAUSS",
-    "splitting": "SPLITTING",
+    **{kind: kind.upper() for kind in _KINDS},
     "gauss_framed": "GAUSS && FRAMED",
     "gauss_fixed": "GAUSS && !FRAMED",
     "flow_alone": "SPLITTING && !ATTITUDE",
@@ -92,11 +91,7 @@ MODULES = {
     "attitude_covector": "TURNED_BY_COVECTOR",
     "tangent": "TANGENT",
     "tangent_solve": "TANGENT && IMPLICIT",
-    "tangent_newton": "TANGENT && NEWTON",
-    "tangent_explicit": "TANGENT && EXPLICIT",
-    "tangent_path": "TANGENT && PATH",
-    "tangent_gauss": "TANGENT && GAUSS",
-    "tangent_splitting": "TANGENT && SPLITTING",
+    **{f"tangent_{kind}": f"TANGENT && {kind.upper()}" for kind in _KINDS},
     "run_plain": "TANGENT && SPLITTING && !CORRECTED",
     "run_corrected": "TANGENT && SPLITTING && CORRECTED",
     "algebra": "!SPLITTING || GAUGE_SEARCHED || TANGENT",
