@@ -52,10 +52,10 @@ ORDER = [
 UPWARD_IMPORTS = 11
 
 #: Lines of preprocessor conditions among the non-blank lines of the runtime in C, in percent.
-CONDITIONS = 7.9
+CONDITIONS = 7.8
 
 #: The same for lines ``// #if``, ``// #else`` and ``// #endif`` of the runtime in JavaScript.
-JAVASCRIPT_CONDITIONS = 2.9
+JAVASCRIPT_CONDITIONS = 2.8
 
 #: The modules of targets that use regular expressions, each with what these read. Passes over C read tokens.
 REGULAR_EXPRESSIONS = {

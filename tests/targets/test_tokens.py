@@ -31,7 +31,7 @@ DECLARED = """\
 #define N_CALL(x) n_macro(x)
 typedef double n_lanes[8];
 enum { n_SIZE = (2) };
-static const double n_table[2] = { (1.0), 2.0 };
+static const double n_number = n_scale * (1.0);
 #ifdef __cplusplus
 extern "C" {
 #endif
