@@ -367,6 +367,13 @@ class CompiledGauss(_CompiledSystem):
         return self.order.order
 
     @property
+    def notes(self) -> list[str]:
+        """Decisions of the compiler, and that steps to truncation are no Poisson maps."""
+        defect = f"its defect is O(h^{self.order.order + 1}) in a step, and phigen verify measures it"
+        warned = [] if self.gauss.exact else [f"structure: to truncation: a step is no Poisson map; {defect}"]
+        return [*super().notes, *warned]
+
+    @property
     def structure(self) -> str:
         """The structure of the method, as in specs."""
         return "exact" if self.gauss.exact else "to truncation"

@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4efb233dd704a05b716690bfde5e9d1ce932275c90819d6e73d7efa0cdcab6ad
+ * body-sha256: 3cfd8bdfd1edf382474e9ac17d6da33995d1c18a5b70f9b25a450ca543c90248
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -58,8 +58,8 @@ double kepler_eccentric_solver_time(const kepler_eccentric_solver *s);
 kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM]);
 
-/* As kepler_eccentric_init, with the energy level e = gauge[0] in place of -H(x0). The step is a Poisson map
-   for each fixed e. */
+/* As kepler_eccentric_init, with the energy level e = gauge[0] in place of -H(x0). Steps with one e follow
+   one Hamiltonian. */
 kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM],
     const double gauge[kepler_eccentric_GAUGES]);

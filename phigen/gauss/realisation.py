@@ -31,7 +31,7 @@ from phigen.symbolic.expression import ONE, ZERO, Expression
 class Plain:
     """Coordinates (indices) that are unknowns themselves.
 
-    Their brackets are constant, or the step is a Poisson map to truncation only.
+    Their brackets are constant, or the step is no Poisson map: its structure is one to truncation.
     """
 
     indices: tuple[int, ...]
@@ -67,7 +67,7 @@ Part = Plain | LogarithmicBlock | AlgebraBlock
 
 @dataclass(frozen=True)
 class Realisation:
-    """The parts of a system; the step is a Poisson map if ``exact``, else to truncation only."""
+    """The parts of a system; the step is a Poisson map if ``exact``, else its structure is one to truncation."""
 
     parts: tuple[Part, ...]
     exact: bool
@@ -86,7 +86,7 @@ class Realisation:
     def label(self) -> str:
         """The kind of the method, for users."""
         if not self.exact:
-            return "Gauss collocation, Poisson to truncation only"
+            return "Gauss collocation, structure to truncation"
         kinds = ["collective"] * bool(self.groups) + ["in logarithms"] * bool(self.logarithms)
         return ", ".join(["Gauss collocation", " and ".join(kinds)] if kinds else ["Gauss collocation"])
 

@@ -42,7 +42,7 @@ def lines(compilation: CompiledGauss) -> list[str]:
         )
     exact = compilation.gauss.exact
     listed_lines.append(
-        "the step is a Poisson map" if exact else "the step is a Poisson map to truncation only, that is: none"
+        "the step is a Poisson map" if exact else "the step is no Poisson map, its structure is one to truncation"
     )
     return listed_lines
 

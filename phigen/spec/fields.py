@@ -480,7 +480,7 @@ SPEC = Record(
         RecordKey(
             "structure",
             _switch("structure", *STRUCTURES),
-            "scheme gauss: whether steps are exact Poisson maps, or to truncation only",
+            "scheme gauss: exact for steps that are Poisson maps, or to truncation for steps that are none",
             default="exact",
         ),
         RecordKey(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import BODY, SCALED, SPECIES, compile_text, compiled, first_run, slow_but, solver, spec_of
 
-from phigen.compiler import compile_spec, examine
+from phigen.compiler import compile_spec, emit, examine
 from phigen.errors import SpecError
 from phigen.geometry.families import named
 from phigen.spec import loads
@@ -147,9 +147,21 @@ def test_direct_step_is_no_poisson_map_and_says_so():
     assert "no Poisson map" in text
 
 
-def _emitted(compilation):
-    from phigen.compiler import emit
+@pytest.mark.parametrize("monitor", ["", "monitor: 1 + x1**2\n"])
+def test_nothing_that_is_written_calls_steps_to_truncation_poisson_maps(monitor):
+    from phigen.notation.collocation import lines
 
+    compilation = compile_spec(loads(f"phigen: 1\nname: t\n{BODY}{monitor}scheme: gauss\nstructure: to truncation\n"))
+    texts = [compilation.label, *compilation.notes, *lines(compilation)]
+    for target in ("c", "numpy", "js"):
+        texts += emit(compilation.program, target, "phigen build").values()
+    written = " ".join(" ".join(texts).split())
+    assert "no Poisson map" in written
+    assert written.count("Poisson map") == written.count("no Poisson map")
+    assert "measures it" in compilation.notes[-1]
+
+
+def _emitted(compilation):
     return emit(compilation.program, "c", "phigen build")
 
 

@@ -42,7 +42,7 @@ SOLVER = (
             "tCarry = 0;",
         ),
         ("tCarry",),
-        ("@param {ArrayLike<number>} [options.gauge] energy level e: the step is a Poisson map for each e",),
+        ("@param {ArrayLike<number>} [options.gauge] energy level e: steps with one e follow one Hamiltonian",),
     ),
     StateFields(
         "TIMED",

@@ -42,9 +42,15 @@ def _of_fixed(program: Program) -> dict[str, object]:
         "runs": ", steps if stride is None else stride, steps" * corrected,
         "flows_of_run": "BEGIN + SCHEDULE + END" if corrected else "SCHEDULE",
         "said_of_tau": _OF_TAU * bool(program.monitor),
-        "said_of_gauge": _OF_LEVEL if program.monitor else _OF_GAUGE,
+        "said_of_gauge": _of_gauge(program),
         "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), PROBE_STEP" if program.held else "values, PROBE_STEP",
     }
+
+
+def _of_gauge(program: Program) -> str:
+    """Return the sentence on the gauge; steps to truncation are Poisson maps for none."""
+    said = _OF_LEVEL if program.monitor else _OF_GAUGE
+    return said.partition(":")[0] + "." if program.truncated else said
 
 
 def _of_time(program: Program) -> dict[str, object]:

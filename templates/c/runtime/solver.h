@@ -49,7 +49,7 @@ phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t
 phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE] PHI_AND_POSITION(const double position[3]));
 
 #if PHI_MONITOR
-/* As phi_init, with the energy level e = gauge[0] in place of -H(x0). The step is a Poisson map for each fixed e. */
+/* As phi_init, with the energy level e = gauge[0] in place of -H(x0). Steps with one e follow one Hamiltonian. */
 #elif PHI_GAUGE
 /* As phi_init, with given factors of Casimirs. The step is a Poisson map for each fixed gauge. */
 #endif
