@@ -378,7 +378,8 @@ class Parser:
             return self.piecewise(token, opening)
         if arity is None:
             declared = self.scope.lookup(token.text) is not None
-            guess = did_you_mean(token.text, SPEC_FUNCTIONS) or "functions are " + ", ".join(SPEC_FUNCTIONS)
+            known = [*SPEC_FUNCTIONS, *(PIECEWISE_FUNCTIONS if self.scope.piecewise else ())]
+            guess = did_you_mean(token.text, known) or "functions are " + ", ".join(known)
             hint = f"products are written with *: {token.text}*(…)" if declared else guess
             raise self.abandon(f"{shown(token.text)} is not a function", token.index, hint)
         arguments = [] if self.here.text == ")" else [self.nested(self.sum, opening)]

@@ -371,3 +371,12 @@ def test_the_skyrmion_number_counts_skyrmions():
     for turns in (1, -1, 2):
         spins = [np.sin(polar) * np.cos(turns * angle), np.sin(polar) * np.sin(turns * angle), np.cos(polar)]
         assert solver.observables(np.array(spins))["Q"] == pytest.approx(-turns, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("mistake", "hint"), [("heavyside(z)", "did you mean 'heaviside'?"), ("step(z)", "min, max, if")]
+)
+def test_functions_of_observables_are_named_after_a_mistake(mistake, hint):
+    with pytest.raises(phigen.SpecError) as error:
+        phigen.spec.loads(FILM.replace("heaviside(z)", mistake), "film.yaml")
+    assert hint in str(error.value)
