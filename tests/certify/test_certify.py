@@ -68,7 +68,7 @@ SYSTEMS: dict[str, dict[str, Any]] = {
 
 #: Largest ratio of the bound to the error that was observed, in the coordinate where it is least: a bound beyond says
 #: nothing. Gauss methods may stop later than they do, and the sizes of many terms that cancel are added up.
-VACUOUS = {"kepler_eccentric": 40, "kowalevski_gauss": 120}
+VACUOUS = {"kepler_eccentric": 40, "kowalevski_gauss": 200}
 
 
 def problem(name: str) -> tuple[StepProblem, dict[str, str]]:
@@ -370,18 +370,35 @@ def test_kernels_that_read_the_state_without_its_carry_are_wrong_by_it() -> None
 
 def test_the_runtime_is_the_one_that_the_theorems_are_about() -> None:
     """Functions of the runtime that docs/certify.md proves things about. After a change read that page again."""
-    _, files = certificate("pendulum")
-    source = GeneratedC(files["pendulum.c"], "pendulum")
-    for name, phrases in {
-        "attempt": ("((y[i] - s->x[i]) + displacement[i]) - s->carry[i]", "size * size *", "small[i] -= slope"),
-        "advance": ("(s->x[i] - (sum - added)) + (change[i] - added)", "lost - (x[i] - sum)"),
-        "solve": ("factor = matrix[i * DIM + k] / pivot", "side[i] -= factor * side[k]"),
-        "size": ("fabs(delta[i]) / (fabs(y[i]) + FLOOR * norm + DBL_MIN)",),
-    }.items():
-        function = source.function(name)
-        assert function
-        flat = " ".join(function[1].split())
-        assert all(phrase in flat for phrase in phrases), name
+    expect_phrases(
+        "pendulum",
+        {
+            "attempt": ("((y[i] - s->x[i]) + displacement[i]) - s->carry[i]", "size * size *", "small[i] -= slope"),
+            "advance": ("(s->x[i] - (sum - added)) + (change[i] - added)", "lost - (x[i] - sum)"),
+            "solve": ("factor = matrix[i * DIM + k] / pivot", "side[i] -= factor * side[k]"),
+            "size": ("fabs(delta[i]) / (fabs(y[i]) + FLOOR * norm + DBL_MIN)",),
+        },
+    )
+    expect_phrases(
+        "kowalevski_gauss",
+        {
+            "collocate": ("square * (past->rate * past->rate) <= SOLVED * SOLVED",),
+            "judge": (
+                "slow && change <= ROUNDING",
+                "rate > fmax(STALLED, 1.5 * past->rate)",
+                "change <= NEARLY_ROUNDING",
+            ),
+            "change_of": ("(even + odd) / (double)NODES",),
+        },
+    )
+
+
+def expect_phrases(name: str, phrases: dict[str, tuple[str, ...]]) -> None:
+    source = GeneratedC(certificate(name)[1][f"{name}.c"], name)
+    for function, texts in phrases.items():
+        matched = source.function(function)
+        assert matched
+        assert all(text in " ".join(matched[1].split()) for text in texts), function
 
 
 def test_a_rate_that_gauss_solvers_remember_is_above_the_one_assumed() -> None:

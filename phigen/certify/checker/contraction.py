@@ -44,7 +44,7 @@ def gauss(c: Certificate, X: Balls, T: Ball, leaf: Certificate) -> tuple[Balls, 
     contraction = in_stages(slopes, size, mixing, noise, ratio)
     slow, risen = (stalled(contraction, part, most) for part, most in (("0.8", "4.1e-16"), ("1", "2.1e-14")))
     change = top([arb("2.1e-18") / c["rate"], slow, risen])
-    change = -change / top(-s for s in share)
+    change = -change * arb(stages).sqrt() / top(-s for s in share)  # the C measures the mean over the stages
     left = change + (q * change + shaken) / (1 - q)  # distance of the moves of the last sweep but one
     missed = [sum((noise[j][k] + turns[j][k] * spread[j] * left for j in all_stages), ZERO) for k in at]
     tape = Tape(c["series"], c["ulps"])
@@ -58,12 +58,12 @@ def gauss(c: Certificate, X: Balls, T: Ball, leaf: Certificate) -> tuple[Balls, 
 def in_stages(
     slopes: list[Any], size: Balls, mixing: list[Balls], noise: list[Balls], ratio: Ball
 ) -> tuple[Ball, Ball]:
-    """The contraction by a sweep, and its noise, in the norm of the C: the largest of Euclidean norms at stages."""
+    """The contraction by a sweep, and its noise, in the norm of the C: the root of the mean square over stages."""
     n, factors = len(size), []
     for g, row in zip(slopes, mixing, strict=True):
         g = [[g[k][m] * size[m] / size[k] for m in range(n)] for k in range(n)]
         across, down = top(sum(r, ZERO) for r in g), top(sum(r, ZERO) for r in zip(*g, strict=True))
-        factors.append((across * down).sqrt() * sum((abs(v) for v in row), ZERO))
+        factors.append((across * down).sqrt() * (len(row) * sum((square(v) for v in row), ZERO)).sqrt())
     return ratio * top(factors), 2 * ratio * top(
         sum((v / s for v, s in zip(e, size, strict=True)), ZERO) for e in noise
     )
