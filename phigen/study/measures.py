@@ -18,6 +18,8 @@ ROUNDING = 4e-16
 
 #: The factor by which distances of differences are shorter than usual.
 DISTANCES = (1.0, 256.0)
+#: Part of the largest derivative from which on differences in proportion to each coordinate are tried as well.
+ROUGH = 1e-8
 
 #: The relative displacement of a coordinate that shows the effect of its rounding on π.
 _SHARE = 1e-6
@@ -85,12 +87,15 @@ def poisson_defect(system: System, parameters: Mapping[str, float], method: Meth
 def tangent_error(method: Method, x: Floats, h: float) -> float:
     """The difference between the stated derivative and differences of the step, relative to its largest entry.
 
-    These are taken at two distances, and the better counts: near a singularity the larger leads past it.
+    These are taken at several distances, and the best counts: near a singularity the larger leads past it, and
+    coordinates may be of very different sizes.
     """
     if method.tangent is None:
         return 0.0
     tangent = method.tangent(x, h)
     apart = [float(np.max(np.abs(tangent - by_differences(method, x, h, finer)))) for finer in DISTANCES]
+    if np.nanmin(apart) > ROUGH * float(np.max(np.abs(tangent))):
+        apart.append(float(np.max(np.abs(tangent - by_differences(method, x, h, by_coordinate=True)))))
     return float(np.nanmin(apart)) / float(np.max(np.abs(tangent)))
 
 

@@ -22,7 +22,7 @@ class Method:
     """``step(x, h)`` maps states (DIM,), ``rows(x, h, steps, stride)`` gives (rows, DIM); both raise `StepError`.
 
     ``tangent(x, h)`` is the derivative (DIM, DIM) of a step that the code itself states, None if it states none. All
-    begin at one time; ``later(h)`` is the method that begins later.
+    begin at one time; ``later(h)`` is the method that begins later. ``together`` makes one step of many members.
     """
 
     name: str
@@ -30,6 +30,11 @@ class Method:
     rows: Callable[[Floats, float, int, int], Floats]
     tangent: Callable[[Floats, float], Floats] | None = None
     later: Callable[[float], Method] | None = None
+    together: Callable[[Floats, float], Floats] | None = None
+
+    def steps(self, states: Floats, h: float) -> Floats:
+        """Return the ends of a step from each of the states (members, DIM)."""
+        return self.together(states, h) if self.together else np.array([self.step(x, h) for x in states])
 
     def after(self, h: float) -> Method:
         """The method for what begins so much later."""
@@ -40,12 +45,17 @@ def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | N
     """A generated solver; with a ``gauge``, all steps are those of one map, whatever they start from."""
     fixed = solver if gauge is None else Solver(solver.backend.with_gauge(gauge), solver.interface)
     begin = t0 if solver.interface.time else None
+
+    def together(states: Floats, h: float) -> Floats:
+        return fixed.ensemble(states, h, 1, t0=begin, parameters=parameters)
+
     return Method(
         solver.target,
         lambda x, h: fixed.step(x, h, t0=begin, parameters=parameters),
         lambda x, h, steps, stride: fixed.integrate(x, h, steps, stride, t0=begin, parameters=parameters).x,
         lambda x, h: fixed.step_tangent(x, h, t0=begin, parameters=parameters)[1],
         (lambda h: of_solver(solver, parameters, gauge, t0 + h)) if solver.interface.time else None,
+        together if solver.target == "numpy" else None,
     )
 
 
@@ -104,15 +114,16 @@ def of_classical(
     return Method(name, step, rows, later=later)
 
 
-def by_differences(method: Method, x: Floats, h: float, finer: float = 1.0) -> Floats:
-    """The derivative (DIM, DIM) of a step by central differences of order 6, at so many times smaller distances."""
-    columns, size = [], float(np.max(np.abs(x))) or 1.0
-    for j in range(len(x)):
-        width = _WIDTH / finer * (max(abs(x[j]), 0.1 * size) if x[j] else 0.1 * size)
-        total = np.zeros_like(x)
-        for k, weight in _WEIGHTS:
-            move = np.zeros_like(x)
-            move[j] = k * width
-            total += weight * (method.step(x + move, h) - method.step(x - move, h))
-        columns.append(total / width)
-    return np.column_stack(columns)
+def by_differences(method: Method, x: Floats, h: float, finer: float = 1.0, *, by_coordinate: bool = False) -> Floats:
+    """The derivative (DIM, DIM) of a step by central differences of order 6, at so many times smaller distances.
+
+    These are of the size of the state or, ``by_coordinate``, of each coordinate, as momenta of small masses ask for.
+    """
+    size = float(np.max(np.abs(x))) or 1.0
+    widths = _WIDTH / finer * np.where(x == 0, 0.1 * size, np.maximum(np.abs(x), 0.0 if by_coordinate else 0.1 * size))
+    moves = [k * width * row for row, width in zip(np.eye(len(x)), widths, strict=True) for k, _ in _WEIGHTS]
+    ahead, behind = (method.steps(x + sign * np.array(moves), h) for sign in (1, -1))
+    weights = np.array([weight for _, weight in _WEIGHTS])
+    differences = (ahead - behind).reshape(len(x), len(weights), len(x))
+    slopes: Floats = (weights[:, np.newaxis] * differences).sum(axis=1) / widths[:, np.newaxis]
+    return slopes.T
