@@ -8,10 +8,9 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: cc8c201aeef2fe7e62bb1564e3764c256103a06f8cefd865ce5d580bd570e804
+ * body-sha256: b13194ae13c2c9d1ce266e994d042bc62e8ce36e612eaf199257de347a54f224
  */
 #include "food_web.h"
-#include <float.h>
 #include <limits.h>
 #include <math.h>
 #include <stdint.h>
@@ -32,16 +31,14 @@ enum { food_web_FLOWS = 25 };         /* in a step */
 /* Along each axis: the smallest size. */
 static const size_t food_web_least[food_web_AXES] = { 1 };
 
-/* Whether a part of H is that of the sites of one colour: then it has a flow for each colour. */
-enum { food_web_PARTS = 1 };
-static const unsigned char food_web_by_colour[food_web_PARTS] = { 1 };
+/* For each part of H, 1 if it belongs to the sites of one colour, and so has a flow for each colour. */
+static const unsigned char food_web_by_colour[] = { 1 };
 
-/* The part of H that a flow belongs to, from 1 on, and the colour of the sites that it updates. */
-static int food_web_part_of_flow(const food_web_solver *s, int flow, int *colour)
+/* The part of H that a flow belongs to, from 1 on; *flow becomes the colour of the sites that it updates. */
+static int food_web_part_of_flow(const food_web_solver *s, int *flow)
 {
     int part = 1;
-    for (int own; flow >= (own = food_web_by_colour[part - 1] ? s->colour_count : 1); ++part) flow -= own;
-    *colour = flow;
+    for (int n; *flow >= (n = food_web_by_colour[part - 1] ? s->colour_count : 1); ++part) *flow -= n;
     return part;
 }
 
@@ -202,15 +199,14 @@ static inline void food_web_sweep1(const double *coef, const food_web_row *row)
 /* A flow. */
 static void food_web_sweep_colour(const food_web_solver *s, int flow, const double *coef)
 {
-    int colour;
-    food_web_part_of_flow(s, flow, &colour);
+    food_web_part_of_flow(s, &flow);
     const size_t units = food_web_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
     for (size_t unit = 0; unit < units; ++unit) {
         food_web_row row = food_web_piece_of(s, unit);
-        row.chosen = colour;
+        row.chosen = flow;
         food_web_gather1(coef, &row, s->at_bonds, 1.0);
         food_web_sweep1(coef, &row);
     }
@@ -246,10 +242,7 @@ static void food_web_vector_field_row(const food_web_row *row, double *restrict 
 
 /* ---- Bonds ---- */
 /* Whether sites and bonds can be numbered. */
-static int food_web_few(size_t sites, size_t bonds)
-{
-    return sites > 0 && sites < INT_MAX && bonds < INT_MAX / 2;
-}
+static int food_web_few(size_t sites, size_t bonds) { return sites < INT_MAX && bonds < INT_MAX / 2; }
 
 /* The bytes for them, after the rows. */
 static size_t food_web_graph_size(size_t sites, size_t bonds)
@@ -285,7 +278,7 @@ static void food_web_colour(food_web_solver *s, int *taken)
         if (colour >= s->colour_count) s->colour_count = colour + 1;
     }
     s->flows = 0;
-    for (int part = 0; part < food_web_PARTS; ++part)
+    for (size_t part = 0; part < sizeof food_web_by_colour; ++part)
         s->flows += food_web_by_colour[part] ? s->colour_count : 1;
 }
 
@@ -447,8 +440,7 @@ static int food_web_all_hold(const food_web_solver *s, double *const *x)
 /* Fields, with what is beside their rows. */
 static void food_web_copy(double *const *to, double *const *from, const food_web_solver *s)
 {
-    const size_t block = (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < food_web_DIM; ++k) memcpy(to[k], from[k], block);
+    for (size_t k = 0; k < food_web_DIM; ++k) memcpy(to[k], from[k], (size_t)s->width * sizeof **from);
 }
 
 /* ---- The flows ---- */
@@ -532,8 +524,9 @@ size_t food_web_saved(const food_web_solver *s, double *x, size_t *far)
 
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields, size_t far)
 {
-    if (s == NULL || (fields != 0 && fields != food_web_DIM)) return food_web_BAD_ARGUMENT;
-    if (fields > 0 && (x == NULL || !food_web_finite(x, fields * s->sites))) return food_web_BAD_ARGUMENT;
+    if (s == NULL || (fields > 0 && (fields != food_web_DIM || x == NULL || !food_web_finite(x,
+        fields * s->sites))))
+        return food_web_BAD_ARGUMENT;
     if (food_web_set_step(s, h) != food_web_OK) return food_web_BAD_ARGUMENT;
     s->far = far;
     for (size_t k = 0; k < fields; ++k) food_web_put(s, s->before[k], x + k * s->sites);

@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9bad5e9e4f4ca1c6ebb1f27266c39fca325860d35c4c7b5c939cf1c6efcb3663
+ * body-sha256: 1ca9f97c2695a4acdccc03f4ac5dd2ce69df6cd9db17d6600a4a45560e342b42
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -36,11 +36,10 @@ typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food
    sites: copies of the other end beside each end. Only read the struct, at any time. */
 typedef struct {
     size_t sizes[food_web_AXES]; /* number of sites along each axis */
-    size_t sites, rows;          /* number of all sites, and of rows */
-    ptrdiff_t length, width;     /* sites of a row; doubles from the start of a row to that of the next */
-    /* state, written by steps: first sites of the fields, then of parameters at sites */
-    double *x[food_web_ARRAYS];
-    double *before[food_web_DIM]; /* copies of the fields before the present steps, restored if one fails */
+    size_t sites, rows; /* number of all sites, and of rows */
+    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
+    double *x[food_web_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */
+    double *before[food_web_DIM]; /* fields before the present steps, restored if one fails */
     double *gathered[food_web_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     int *bonds, *middle; /* for each site, index in other of the first bond from it, and to it */
     int *other, *number; /* for each of these, the site at the other end, and the number of the bond */
@@ -84,9 +83,9 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void food_web_state(const food_web_solver *s, double *x);
 
-/* Save and restore a run with the same bits. food_web_saved writes x[field][site] and far, and returns the
-   number of fields: at most as many as the state has, with compensated steps three times as many. To restore,
-   call food_web_init with the state, then food_web_resume with what food_web_saved wrote and returned. */
+/* Save and restore a run with the same bits: food_web_saved writes far and arrays x[field][site], and returns
+   their number, at most that of fields, with compensated steps three times that. food_web_resume takes all
+   three after food_web_init with the state. */
 size_t food_web_saved(const food_web_solver *s, double *x, size_t *far);
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields, size_t far);
 

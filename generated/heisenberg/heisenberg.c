@@ -9,10 +9,9 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: e629dfd57e412a3b5f5ed880cd0dc7a60eabc8d810064b65e263581aee154935
+ * body-sha256: b769fade2cdde27bf05ba77ffdad5bde51de698d5e86d9fac7cf658465193240
  */
 #include "heisenberg.h"
-#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -686,9 +685,9 @@ static int heisenberg_all_hold(const heisenberg_solver *s, double *const *x)
 /* Fields, with what is beside their rows. */
 static void heisenberg_copy(double *const *to, double *const *from, const heisenberg_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < heisenberg_DIM; ++k)
-        memcpy(to[k] - heisenberg_LEAD, from[k] - heisenberg_LEAD, block);
+        memcpy(to[k] - heisenberg_LEAD, from[k] - heisenberg_LEAD,
+        s->rows * (size_t)s->width * sizeof **from);
 }
 
 /* ---- The flows ---- */
@@ -902,8 +901,9 @@ size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far)
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
     size_t far)
 {
-    if (s == NULL || (fields != 0 && fields != heisenberg_DIM)) return heisenberg_BAD_ARGUMENT;
-    if (fields > 0 && (x == NULL || !heisenberg_finite(x, fields * s->sites))) return heisenberg_BAD_ARGUMENT;
+    if (s == NULL || (fields > 0 && (fields != heisenberg_DIM || x == NULL || !heisenberg_finite(x,
+        fields * s->sites))))
+        return heisenberg_BAD_ARGUMENT;
     if (heisenberg_set_step(s, h) != heisenberg_OK) return heisenberg_BAD_ARGUMENT;
     s->far = far;
     for (size_t k = 0; k < fields; ++k) heisenberg_put(s, s->before[k], x + k * s->sites);

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 95447cb9d2b8cb45f23c798ec0469b21b7e2943a2d20ebcbd036ee1202d56a9d
+ * body-sha256: 3b66db348fc74d9f06967f5c83448d7df1512c2d3be9e70477d27ebbd9803ac3
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -34,11 +34,10 @@ typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR
    other sites: copies of the other end beside each end. Only read the struct, at any time. */
 typedef struct {
     size_t sizes[heisenberg_AXES]; /* number of sites along each axis */
-    size_t sites, rows;            /* number of all sites, and of rows */
-    ptrdiff_t length, width;       /* sites of a row; doubles from the start of a row to that of the next */
-    /* state, written by steps: first sites of the fields, then of parameters at sites */
-    double *x[heisenberg_ARRAYS];
-    double *before[heisenberg_DIM]; /* copies of the fields before the present steps, restored if one fails */
+    size_t sites, rows; /* number of all sites, and of rows */
+    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
+    double *x[heisenberg_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */
+    double *before[heisenberg_DIM]; /* fields before the present steps, restored if one fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
     size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
@@ -76,10 +75,9 @@ void heisenberg_state(const heisenberg_solver *s, double *x);
 heisenberg_status heisenberg_set_state(heisenberg_solver *s, const double *x);
 heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 
-/* Save and restore a run with the same bits. heisenberg_saved writes x[field][site] and far, and returns the
-   number of fields: at most as many as the state has, with compensated steps three times as many. To restore,
-   call heisenberg_init with the state, then heisenberg_resume with what heisenberg_saved wrote and
-   returned. */
+/* Save and restore a run with the same bits: heisenberg_saved writes far and arrays x[field][site], and
+   returns their number, at most that of fields, with compensated steps three times that. heisenberg_resume
+   takes all three after heisenberg_init with the state. */
 size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
     size_t far);

@@ -11,10 +11,9 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 06da322ee266148f05fc469670e1e096caba30b212089bc907c098b6e9c699cb
+ * body-sha256: 887beac30a94c3066ebf101ed70ce40268e1011521345601cf9aab62bbe02f1f
  */
 #include "point_vortices.h"
-#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -414,8 +413,7 @@ static int point_vortices_all_hold(const point_vortices_solver *s, double *const
 /* Fields, with what is beside their rows. */
 static void point_vortices_copy(double *const *to, double *const *from, const point_vortices_solver *s)
 {
-    const size_t block = (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < point_vortices_DIM; ++k) memcpy(to[k], from[k], block);
+    for (size_t k = 0; k < point_vortices_DIM; ++k) memcpy(to[k], from[k], (size_t)s->width * sizeof **from);
 }
 
 /* ---- The stages ---- */

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4c15b11e9902e937707831ffd10912e374602033ae633752775fd11473198d21
+ * body-sha256: 920474e247d8aeefa341fdd5e1f8846e32ea75aaa2dbd50442fd6c340c29819f
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -46,10 +46,8 @@ typedef struct {
     size_t sizes[point_vortices_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    /* state, written by steps: first sites of the fields, then of parameters at sites */
-    double *x[point_vortices_ARRAYS];
-    /* copies of the fields before the present steps, restored if one fails */
-    double *before[point_vortices_DIM];
+    double *x[point_vortices_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */
+    double *before[point_vortices_DIM]; /* fields before the present steps, restored if one fails */
     double *gathered[point_vortices_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     /* solution of a stage before and after a sweep, with the parameters at sites */
     double *y[2][point_vortices_ARRAYS];

@@ -8,10 +8,9 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a485505953f79f1ec356169e4f885df7e79acdc5c1d751909d5361221bbcb5ec
+ * body-sha256: 19ebfe37a694fbc063450e732edbb75a7d6d8cd5c10716f759bbd2c6585d2a6f
  */
 #include "toda.h"
-#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -336,8 +335,8 @@ static int toda_all_hold(const toda_solver *s, double *const *x)
 /* Fields, with what is beside their rows. */
 static void toda_copy(double *const *to, double *const *from, const toda_solver *s)
 {
-    const size_t block = (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < toda_DIM; ++k) memcpy(to[k] - toda_LEAD, from[k] - toda_LEAD, block);
+    for (size_t k = 0; k < toda_DIM; ++k)
+        memcpy(to[k] - toda_LEAD, from[k] - toda_LEAD, (size_t)s->width * sizeof **from);
 }
 
 /* ---- The flows ---- */
@@ -412,8 +411,8 @@ size_t toda_saved(const toda_solver *s, double *x, size_t *far)
 
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t far)
 {
-    if (s == NULL || (fields != 0 && fields != toda_DIM)) return toda_BAD_ARGUMENT;
-    if (fields > 0 && (x == NULL || !toda_finite(x, fields * s->sites))) return toda_BAD_ARGUMENT;
+    if (s == NULL || (fields > 0 && (fields != toda_DIM || x == NULL || !toda_finite(x, fields * s->sites))))
+        return toda_BAD_ARGUMENT;
     if (toda_set_step(s, h) != toda_OK) return toda_BAD_ARGUMENT;
     s->far = far;
     for (size_t k = 0; k < fields; ++k) toda_put(s, s->before[k], x + k * s->sites);

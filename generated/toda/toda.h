@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 90c2de3b81e7c91145074f6a3542cb2c688e54900d82cbcd4e64016c48983315
+ * body-sha256: 1b2033d05ce538738354ca4069b03d89a992a41d58784a11f2b60fe25a56cf97
  */
 #ifndef TODA_H
 #define TODA_H
@@ -33,11 +33,10 @@ typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
    sites: copies of the other end beside each end. Only read the struct, at any time. */
 typedef struct {
     size_t sizes[toda_AXES]; /* number of sites along each axis */
-    size_t sites, rows;      /* number of all sites, and of rows */
+    size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    /* state, written by steps: first sites of the fields, then of parameters at sites */
-    double *x[toda_ARRAYS];
-    double *before[toda_DIM]; /* copies of the fields before the present steps, restored if one fails */
+    double *x[toda_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */
+    double *before[toda_DIM]; /* fields before the present steps, restored if one fails */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
     size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
     size_t steps; /* number of successful steps since toda_init */
@@ -69,9 +68,9 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void toda_state(const toda_solver *s, double *x);
 
-/* Save and restore a run with the same bits. toda_saved writes x[field][site] and far, and returns the number
-   of fields: at most as many as the state has, with compensated steps three times as many. To restore, call
-   toda_init with the state, then toda_resume with what toda_saved wrote and returned. */
+/* Save and restore a run with the same bits: toda_saved writes far and arrays x[field][site], and returns
+   their number, at most that of fields, with compensated steps three times that. toda_resume takes all three
+   after toda_init with the state. */
 size_t toda_saved(const toda_solver *s, double *x, size_t *far);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t far);
 

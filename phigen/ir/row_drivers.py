@@ -16,7 +16,7 @@ from phigen.ir.passes.unread import discard_unread
 from phigen.ir.walk import names_in, statements, values
 from phigen.scheme.kernel import Role
 
-S, UNIT, COEF, FAR, PART, COLOUR = (ir.fixed(name) for name in ("s", "unit", "coef", "far", "part", "colour"))
+S, UNIT, COEF, FAR, PART, FLOW = (ir.fixed(name) for name in ("s", "unit", "coef", "far", "part", "flow"))
 BEGIN, SECOND, THIRD, STOP, LOW, HIGH = (ir.fixed(name) for name in ("begin", "second", "third", "stop", "low", "high"))
 SEGMENT = ir.Prefix("&", ROW)
 LENGTH, STATE = ir.Member(S, "length"), ir.Member(S, "x")
@@ -103,9 +103,8 @@ class RowDrivers:
         return discard_unread(function)
 
     def _part_of_flow(self, *, switched: bool) -> Iterator[ir.Statement]:
-        """Yield the statements that find the part of H and the colour that a flow updates."""
-        arguments = (S, ir.fixed("flow"), ir.Prefix("&", COLOUR))
-        yield ir.Declare(ir.Type.FLAG, ((COLOUR.symbol, ir.Constant(None)),), mutable=True)
+        """Yield the statement that finds the part of H; ``flow`` becomes the colour that the flow updates."""
+        arguments = (S, ir.Prefix("&", FLOW))
         if switched:
             yield ir.Declare(ir.Type.FLAG, ((PART.symbol, ir.Called("part_of_flow", arguments)),))
         else:

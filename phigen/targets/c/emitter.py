@@ -342,7 +342,8 @@ def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others
         "times": ", ".join(map(repr, schedule.times)) if schedule else "",
         "multiples": ", ".join(map(repr, schedule.multiples)) if schedule else "",
         "path_slopes": ", ".join(map(str, step.path.slopes)) if step.path and (has["BLOCKS"] or has["TRACED"]) else "",
-        "apart": has["PACKS"] or has["ABREAST"] or any("_APART" in part for part in [text, *others]),
+        "apart": not has["DEVICE"]
+        and (has["PACKS"] or has["ABREAST"] or any("_APART" in part for part in [text, *others])),
     }
     values["middles"] = ", ".join(map(repr, program.midpoints))
     values["moments"] = ", ".join(map(repr, schedule.moments)) if schedule else ""

@@ -129,7 +129,8 @@ class _StatementPrinter:
                 yield f"PHI_CLEAR_FIRST({spell(array)}, {spell(count)});"
             case ir.Clear(array, first, count):
                 start = spell(ir.Binary("+", array, first) if first else array)
-                yield f"memset({start}, 0, {spell(ir.Cast(count, 'size'))} * sizeof *{spell(array)});"
+                pointer = f"({spell(array)})" if isinstance(array, ir.Binary) else spell(array)
+                yield f"memset({start}, 0, {spell(ir.Cast(count, 'size'))} * sizeof *{pointer});"
             case ir.Comment(text):
                 yield f"/* {text} */"
             case ir.Continue():

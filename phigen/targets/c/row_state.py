@@ -26,17 +26,12 @@ LATTICE = (
     ),
     StateBlock(
         "x",
-        members=(
-            "double *x[PHI_ARRAYS];"
-            " /* state, written by steps: first sites of the fields, then of parameters at sites */",
-        ),
+        members=("double *x[PHI_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */",),
         reset=("for (size_t k = 0; k < PHI_ARRAYS; ++k, memory += block) s->x[k] = memory;",),
     ),
     StateBlock(
         "before",
-        members=(
-            "double *before[PHI_DIM]; /* copies of the fields before the present steps, restored if one fails */",
-        ),
+        members=("double *before[PHI_DIM]; /* fields before the present steps, restored if one fails */",),
         reset=("for (size_t k = 0; k < PHI_DIM; ++k, memory += block) s->before[k] = memory;",),
     ),
     StateBlock(

@@ -42,7 +42,7 @@ def body(program: Program, step: Sweeps, language: str) -> str:
         "n": program.dimension,
         "coordinates": ", ".join(program.coordinates),
         "neighbours": len(LatticeLoops(program, step).neighbours),
-        "at_sites": ", ".join(sites.parameters),
+        "at_sites": f" ({', '.join(sites.parameters)})" if sites.parameters else "",
         "functions": functions.called(program),
         "kernels": [*_kernels(program, step)],
     }

@@ -40,6 +40,7 @@ def _of_fixed(program: Program) -> dict[str, object]:
         "corrected": corrected,
         "state_of_run": "_followed(END, stages[0], x, carry)[0]" if corrected else "x",
         "runs": ", steps if stride is None else stride, steps" * corrected,
+        "flows_of_step": "value" if corrected else "SCHEDULE",
         "flows_of_run": "BEGIN + SCHEDULE + END" if corrected else "SCHEDULE",
         "said_of_tau": _OF_TAU * bool(program.monitor),
         "said_of_gauge": _of_gauge(program),

@@ -7,7 +7,7 @@
 
 /* ---- Bonds ---- */
 /* Whether sites and bonds can be numbered. */
-static int phi_few(size_t sites, size_t bonds) { return sites > 0 && sites < INT_MAX && bonds < INT_MAX / 2; }
+static int phi_few(size_t sites, size_t bonds) { return sites < INT_MAX && bonds < INT_MAX / 2; }
 
 /* The bytes for them, after the rows. */
 static size_t phi_graph_size(size_t sites, size_t bonds)
@@ -51,7 +51,7 @@ static void phi_colour(phi_solver *s, int *taken)
         if (colour >= s->colour_count) s->colour_count = colour + 1;
     }
     s->flows = 0;
-    for (int part = 0; part < PHI_PARTS; ++part) s->flows += phi_by_colour[part] ? s->colour_count : 1;
+    for (size_t part = 0; part < sizeof phi_by_colour; ++part) s->flows += phi_by_colour[part] ? s->colour_count : 1;
 }
 
 /* The bonds of each site, in their order: first those that begin there. */

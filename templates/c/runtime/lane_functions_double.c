@@ -1,6 +1,5 @@
 #ifndef PHI_FILE_LANE_FUNCTIONS_DOUBLE
 #define PHI_FILE_LANE_FUNCTIONS_DOUBLE
-#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -76,7 +75,7 @@ static inline double phi_log_lane(double u)
     /* m - 1 is exact: f (m - 1) and what follows it are small beside it */
     const double small = q * sum * 2.0 * f + k * 1.9082149292705877e-10;
     const double rest = (m - 1.0) - f * (m - 1.0) + small + k * 0.6931471803691238;
-    return rest + (u >= DBL_MIN && u <= DBL_MAX ? 0.0 : (double)NAN);
+    return rest + (u >= 2.2250738585072014e-308 && u <= 1.7976931348623157e308 ? 0.0 : (double)NAN);
 }
 
 #if PHI_CALLS_SIN && !PHI_CALLS_COS

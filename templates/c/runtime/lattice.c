@@ -157,8 +157,7 @@ static int phi_all_hold(const phi_solver *s, double *const *x)
 /* Fields, with what is beside their rows. */
 static void phi_copy(double *const *to, double *const *from, const phi_solver *s)
 {
-    const size_t block = PHI_DOUBLES * sizeof **from;
-    for (size_t k = 0; k < PHI_DIM; ++k) memcpy(PHI_MEMORY_OF(to[k]), PHI_MEMORY_OF(from[k]), block);
+    for (size_t k = 0; k < PHI_DIM; ++k) memcpy(PHI_MEMORY_OF(to[k]), PHI_MEMORY_OF(from[k]), PHI_DOUBLES * sizeof **from);
     phi_copy_carry(s, to);
 }
 

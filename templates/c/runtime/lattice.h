@@ -71,9 +71,8 @@ void phi_state(const phi_solver *s, double *x);
 phi_status phi_set_state(phi_solver *s, const double *x);
 phi_status phi_kick(phi_solver *s, const double *change);
 
-/* Save and restore a run with the same bits. phi_saved writes x[field][site] and far, and returns the number of fields: at
-   most as many as the state has, with compensated steps three times as many. To restore, call phi_init with the state, then
-   phi_resume with what phi_saved wrote and returned. */
+/* Save and restore a run with the same bits: phi_saved writes far and arrays x[field][site], and returns their number, at
+   most that of fields, with compensated steps three times that. phi_resume takes all three after phi_init with the state. */
 size_t phi_saved(const phi_solver *s, double *x, size_t *far);
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t far);
 

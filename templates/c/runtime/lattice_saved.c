@@ -14,8 +14,8 @@ size_t phi_saved(const phi_solver *s, double *x, size_t *far)
 
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t far)
 {
-    if (s == NULL || (fields != 0 && fields != PHI_DIM)) return PHI_BAD_ARGUMENT;
-    if (fields > 0 && (x == NULL || !phi_finite(x, fields * s->sites))) return PHI_BAD_ARGUMENT;
+    if (s == NULL || (fields > 0 && (fields != PHI_DIM || x == NULL || !phi_finite(x, fields * s->sites))))
+        return PHI_BAD_ARGUMENT;
     if (phi_set_step(s, h) != PHI_OK) return PHI_BAD_ARGUMENT;
     s->far = far;
     for (size_t k = 0; k < fields; ++k) phi_put(s, s->before[k], x + k * s->sites);

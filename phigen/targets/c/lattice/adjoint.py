@@ -19,7 +19,7 @@ from phigen.ir.passes.row_transposes import Handed
 from phigen.ir.row_drivers import (
     BEGIN,
     COEF,
-    COLOUR,
+    FLOW,
     SEGMENT,
     STOP,
     UNIT,
@@ -154,7 +154,7 @@ class _Reverse:
             if receives:
                 in_first = (_ARRAYS["given"], *find_givers[:1])
             elif step.by_colour and step.by_colour[k - 1]:
-                setup = (*setup, member("chosen", COLOUR))
+                setup = (*setup, member("chosen", FLOW))
             first[k] = RowSegment(part.first, (*setup, *in_first), updated=part.undone, arrays=ir.fixed("x"))
             if part.second:
                 second[k] = RowSegment(part.second, (*setup, *find_givers))

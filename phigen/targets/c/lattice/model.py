@@ -232,7 +232,6 @@ def _tables_of_flows(step: Sweeps) -> dict[str, object]:
         "moments": ", ".join(map(repr, _moments(step))) if step.refresh and not step.equation else "",
         "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in _flows(step)),
         "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
-        "part_count": len(step.by_colour),
     }
 
 

@@ -230,7 +230,7 @@ class _PartLoops:
         """Return the statements of a part of H, where the loops have ``names`` by their code."""
         layout, coloured = self.loops.layout, self.loops.layout.step.by_colour
         setup = [row_drivers.member("varied", ir.fixed("v"))] * self.varied
-        setup += [row_drivers.member("chosen", row_drivers.COLOUR)] * bool(coloured and coloured[k])
+        setup += [row_drivers.member("chosen", row_drivers.FLOW)] * bool(coloured and coloured[k])
         near = [*_near_seams(layout, self.parts[k])] if self.by_part else []
         calls = [call for called in forms.values() for call in called]
         declared = [*_reordered(layout, [call.order for call in calls])]
