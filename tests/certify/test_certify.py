@@ -27,7 +27,7 @@ from systems import compile_anew, slow_but, spec_of
 import phigen.certify.checker
 from phigen.certify.checker import krawczyk
 from phigen.certify.checker.explicit_steps import explicit
-from phigen.certify.checker.reader import GeneratedC
+from phigen.certify.checker.reader import GeneratedC, _block, _called
 from phigen.certify.checker.replay import replayed
 from phigen.certify.checker.rounding import (
     LIBM,
@@ -45,6 +45,8 @@ from phigen.certify.samples import exact_step, observed
 from phigen.compiler import compile_spec, emit
 from phigen.errors import SpecError
 from phigen.runtime import cache as compiled
+from phigen.spec import loads
+from phigen.spec.model import Spec
 
 #: Systems of different kinds, with changes of the default problem: by a formula, by Newton's method for four kinds of
 #: brackets, with the time, with a Casimir gauge, by flows, with a monitor, by Gauss collocation.
@@ -72,8 +74,13 @@ VACUOUS = {"kepler_eccentric": 40, "kowalevski_gauss": 200}
 
 
 def problem(name: str) -> tuple[StepProblem, dict[str, str]]:
-    """The problem of a system of the corpus, in boxes of 1 % around the start of its first run, and its C."""
-    spec = spec_of(name)
+    """The problem of a system of the corpus, and its C."""
+    stated, files = problem_of_spec(spec_of(name))
+    return dataclasses.replace(stated, **SYSTEMS[name]), files
+
+
+def problem_of_spec(spec: Spec) -> tuple[StepProblem, dict[str, str]]:
+    """The problem of a spec, in boxes of 1 % around the start of its first run, and its C."""
     compilation = compile_spec(spec, profile="small")
     files = emit(compilation.program, "c", "phigen certify")
     run = next(iter(spec.runs.values()))
@@ -82,9 +89,17 @@ def problem(name: str) -> tuple[StepProblem, dict[str, str]]:
     t = float(run.start)
     time = [t, t + 5] if compilation.program.time else [t, t]
     stated = problem_of(
-        compilation, files[f"{name}.c"], float(run.step), spec.parameters_of(run), start, domain, time, 1.0, math.inf
+        compilation,
+        files[f"{spec.name}.c"],
+        float(run.step),
+        spec.parameters_of(run),
+        start,
+        domain,
+        time,
+        1.0,
+        math.inf,
     )
-    return dataclasses.replace(stated, **SYSTEMS[name]), files
+    return stated, files
 
 
 @cache
@@ -391,6 +406,40 @@ def test_the_runtime_is_the_one_that_the_theorems_are_about() -> None:
             "change_of": ("(even + odd) / (double)NODES",),
         },
     )
+
+
+def test_kicks_with_modified_potential_are_within_the_bound() -> None:
+    top = """
+phigen: 1
+name: two_tops
+coordinates: [m1, m2, m3, g1, g2, g3]
+poisson: {lie_algebra: {name: se(3), sign: minus}}
+hamiltonian: (m1**2 + m2**2)/2 + 5*m3**2/4 + 7*g3/10 + g1**2/10
+scheme: splitting
+order: 6
+runs: {swing: {initial: [0.1, 0.4, 1, 0, 0.6, 0.8], step: 0.2, steps: 10}}
+"""
+    stated, files = problem_of_spec(loads(top))
+    c = json.loads(json.dumps(certified(stated, 64)))
+    assert len(c["multiples"]) == len(c["fractions"])
+    assert any(c["multiples"])
+    pairs = list(zip(observed(c, library(files), 8), c["bound"], strict=True))
+    assert all(error <= bound for error, bound in pairs)
+    assert max(bound / error for error, bound in pairs if error > 0) < 200
+
+
+@pytest.mark.parametrize(
+    "line", ["flow0(coef(), x, moved, start);", "flow0(coef + nothing, x, moved, start);", "coef += 2**9;"]
+)
+def test_schedules_with_other_statements_are_refused(line: str) -> None:
+    statements = _block(iter([line]))
+    with pytest.raises(RefusedError, match="whole numbers"):
+        _called(statements, {"coef": 0, "ROW": 1}, [])
+
+
+def test_schedules_of_endless_loops_are_refused() -> None:
+    with pytest.raises(RefusedError):
+        _block(iter(["for (int k = 0; k < 99999999999; ++k) {", "}"]))
 
 
 def expect_phrases(name: str, phrases: dict[str, tuple[str, ...]]) -> None:

@@ -17,7 +17,10 @@ def prepared(c: Certificate, tape: Tape, T: Ball, stage: int) -> list[Value]:
         h = tape.number(c["fractions"][stage]) * h
     params = {name: tape.number(p) for name, p in c["parameters"].items()}
     gauge = [tape.number(g) for g in c["gauge"]]
-    coef: list[Value] = play(c["kernels"]["prepare"], tape.number, params=params, gauge=gauge, h=[h])["coef"]
+    kick = list[Value]()
+    if c.get("multiples"):  # of the modified potential, in units of the square of the whole step
+        kick = [tape.number(c["multiples"][stage]) * (tape.number(c["step"]) * tape.number(c["step"]))]
+    coef: list[Value] = play(c["kernels"]["prepare"], tape.number, params=params, gauge=gauge, h=[h], kick=kick)["coef"]
     if "at_time" in c["kernels"]:
         t = tape.value(T) + tape.number(c["middles"][stage]) * tape.number(c["step"])
         coef = coef + play(c["kernels"]["at_time"], tape.number, coef=coef, t=[t])["now"]

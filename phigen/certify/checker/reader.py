@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from .rounding import LIBM, SERIES, RefusedError
@@ -226,24 +227,70 @@ def _splitting(source: GeneratedC) -> dict[str, Any]:
         message = "runs begin and end with a corrector, so that a step alone is not what the solver makes"
         raise RefusedError(message, "another composition, without a corrector")
     _, body = _expect(source.function("flows"), "flows")
-    lines, depth = [], 0
-    for line in map(str.strip, body.splitlines()):
-        loop = re.fullmatch(r"for \(int (\w+) = (\d+); \w+ < (\d+); (?:\+\+\w+|\w+ \+= (\d+))\) \{", line)
-        call = re.fullmatch(r"flow(\d+)\(([\w *+()]*), x, moved, start\);", line)
-        if loop:
-            lines.append("    " * depth + f"for {loop[1]} in range({loop[2]}, {loop[3]}, {loop[4] or 1}):")
-        elif call:
-            lines.append("    " * depth + f"called.append([{call[1]}, ({call[2]}) // ROW])")
-        elif re.fullmatch(r"coef \+= [\w *]+;", line):
-            lines.append("    " * depth + line.rstrip(";"))
-        elif line and line != "}":
-            raise RefusedError(f"the C has the statement {line!r}, which certificates do not cover")
-        depth += bool(loop) - (line == "}")
-    called: list[list[int]] = []
-    names = {"coef": 0, "ROW": int(source.number("ROW")), "called": called, "range": range}
-    exec("\n".join(lines), {"__builtins__": {}}, names)  # the statements matched above, and no others
+    statements = _block(iter(map(str.strip, body.splitlines())))
+    called = _called(statements, {"coef": 0, "ROW": int(source.number("ROW"))}, [])
     moves = {str(flow): _moves(source, flow) for flow in sorted({flow for flow, _ in called})}
-    return {"fractions": source.numbers("times"), "schedule": called, "moves": moves}
+    multiples = source.numbers("multiples") if re.search(r"\bmultiples\[", source.text) else []
+    return {"fractions": source.numbers("times"), "multiples": multiples, "schedule": called, "moves": moves}
+
+
+#: Flows of a step at most, in all rounds of its loops.
+MOST_FLOWS = 10_000
+
+
+def _block(lines: Iterator[str]) -> list[tuple[str, Any]]:
+    """The statements of a block up to its end: loops with their blocks, calls of flows, and advances of ``coef``."""
+    statements = list[tuple[str, Any]]()
+    for line in itertools.takewhile(lambda line: line != "}", lines):
+        loop = re.fullmatch(r"for \(int (\w+) = (\d+); \w+ < (\d+); (?:\+\+\w+|\w+ \+= (\d+))\) \{", line)
+        call = re.fullmatch(r"flow(\d+)\((.*), x, moved, start\);", line)
+        advance = re.fullmatch(r"coef \+= (.*);", line)
+        if loop and int(loop[3]) <= MOST_FLOWS:
+            statements.append(("loop", (loop[1], range(int(loop[2]), int(loop[3]), int(loop[4] or 1)), _block(lines))))
+        elif call:
+            statements.append(("call", (int(call[1]), call[2])))
+        elif advance:
+            statements.append(("advance", advance[1]))
+        elif line:
+            raise RefusedError(f"the C has the statement {line!r}, which certificates do not cover")
+    return statements
+
+
+def _called(statements: list[tuple[str, Any]], names: dict[str, int], called: list[list[int]]) -> list[list[int]]:
+    """Add the flows that statements call to ``called``, each with its row of coefficients, and return it."""
+    for kind, about in statements:
+        if kind == "call":
+            called.append([about[0], _whole(about[1], names) // names["ROW"]])
+            if len(called) > MOST_FLOWS:
+                raise RefusedError(f"the C has more than {MOST_FLOWS} flows in a step")
+        elif kind == "advance":
+            names["coef"] += _whole(about, names)
+        else:
+            variable, rounds, inner = about
+            for names[variable] in rounds:
+                _called(inner, names, called)
+    return called
+
+
+def _whole(text: str, names: Mapping[str, int]) -> int:
+    """The value of sums and products of whole numbers and names. Raises `RefusedError` for anything else."""
+
+    def value(node: ast.expr) -> int:
+        match node:
+            case ast.Constant(int(number)):
+                return number
+            case ast.Name(name) if name in names:
+                return names[name]
+            case ast.BinOp(left, ast.Add(), right):
+                return value(left) + value(right)
+            case ast.BinOp(left, ast.Mult(), right):
+                return value(left) * value(right)
+        raise RefusedError(f"the C has {text!r} where whole numbers are expected")
+
+    try:
+        return value(ast.parse(text, mode="eval").body)
+    except (SyntaxError, ValueError, RecursionError):
+        raise RefusedError(f"the C has {text!r} where whole numbers are expected") from None
 
 
 def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
