@@ -185,15 +185,15 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
     for key, (harmless, hint) in NOT_OF_LATTICES.items() if raw.get("lattice") is not None else ():
         if raw.get(key) is not None and raw[key] not in harmless:
             problems.add(f"{key}: not available for lattices", reader.locations[key,], hint)
-    if raw.get("coordinates_from") is not None and raw.get("lattice") is not None:
-        hint = "phigen show --expand RUN writes the bodies of a run as an ordinary spec, which takes coordinates_from"
-        problems.add("coordinates_from: not available for lattices", reader.locations["coordinates_from",], hint)
     if raw.get("real") == "float" and raw.get("profile") == "fast":
         problems.add("profile: real: float needs profile: small", reader.locations["profile",], "remove profile")
     if raw.get("structure") is not None and raw.get("scheme") != "gauss":
         message = "structure belongs to scheme: gauss; other schemes are exact Poisson maps"
         problems.add(message, reader.locations["structure",], "remove structure, or scheme: gauss")
-    if raw.get("coordinates_from") is not None and raw.get("scheme") != "splitting":
+    if raw.get("coordinates_from") is not None and raw.get("lattice") is not None:
+        hint = "phigen show --expand RUN writes an ordinary spec, which takes coordinates_from with canonical momenta"
+        problems.add("coordinates_from: not available for lattices", reader.locations["coordinates_from",], hint)
+    elif raw.get("coordinates_from") is not None and raw.get("scheme") != "splitting":
         message = "coordinates_from belongs to scheme: splitting, whose parts are motions in these coordinates"
         problems.add(message, reader.locations["coordinates_from",], "scheme: splitting, or remove coordinates_from")
     how = WITHOUT_SERIES.get(raw.get("scheme", ""))
