@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; Several steps or members at once; The implicit step, by Gauss
  *   collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 8568798c3482e1e01f8d16c4e926215e548a3578ea5350870f7545ecfd38bf7b
+ * body-sha256: f2c4c73a67a6a23bae5c04922034d483dac9ee66d8dc234db613916323368c45
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -170,7 +170,7 @@ static const double kowalevski_gauss_mixing[kowalevski_gauss_NODES][kowalevski_g
 enum { kowalevski_gauss_PREDICTORS = 3 };
 /* Predictors of the stages of a step from those of the last one, then of the one before. */
 static const double kowalevski_gauss_prediction[kowalevski_gauss_PREDICTORS][kowalevski_gauss_EARLIER
-    * kowalevski_gauss_NODES][kowalevski_gauss_WIDTH] = {
+    * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH] = {
     {
         { 0.027362258095587847, 0.008906760160709794, -3.788870319635937, -70.13173821713234,
             -595.5436386120888, -2868.030992245954, -8318.339965950088, -14928.223333034968 },
@@ -276,7 +276,7 @@ static inline void kowalevski_gauss_mixed(const double matrix[kowalevski_gauss_N
 
 /* The same from the moves of two steps. */
 static void kowalevski_gauss_mixed_twice(const double matrix[kowalevski_gauss_EARLIER
-    * kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], double last[][kowalevski_gauss_WIDTH],
+    * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], double last[][kowalevski_gauss_WIDTH],
     double older[][kowalevski_gauss_WIDTH], kowalevski_gauss_lanes *z)
 {
     for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {

@@ -55,7 +55,8 @@ def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | N
         lambda x, h, steps, stride: fixed.integrate(x, h, steps, stride, t0=begin, parameters=parameters).x,
         lambda x, h: fixed.step_tangent(x, h, t0=begin, parameters=parameters)[1],
         (lambda h: of_solver(solver, parameters, gauge, t0 + h)) if solver.interface.time else None,
-        together if solver.target == "numpy" else None,
+        # members of an ensemble draw their own noise
+        together if solver.target == "numpy" and not solver.interface.noise else None,
     )
 
 

@@ -1,6 +1,7 @@
 /* Ensembles in packs against single trajectories, from inside the generated file.
    Compile with -DNAME=… -DSOURCE="…" -DSTEP=…, -DULPS=…, -DSTATE="…" (initial values separated by commas), and -DFAR=…,
    for a factor of the step at which functions of flows leave the polynomials that are used near 0. */
+#include <float.h>
 #include <stdio.h>
 #include <stdlib.h>
 
