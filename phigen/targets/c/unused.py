@@ -55,6 +55,11 @@ def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str])
 
 def functions_of(lines: Sequence[str]) -> Iterator[Function]:
     """Yield the functions that lines declare or define."""
+    return (f for f in declarations_of(lines) if f.name)
+
+
+def declarations_of(lines: Sequence[str]) -> Iterator[Function]:
+    """Yield what lines declare or define outside of functions; the name of what is no function is empty."""
     declaration, opened = _Declaration(), 0
     for line, token in _code("\n".join(lines)):
         if token.text == "}" and not opened:
@@ -65,10 +70,8 @@ def functions_of(lines: Sequence[str]) -> Iterator[Function]:
         if declaration.is_linkage:
             declaration, opened = _Declaration(), 0
         elif not opened and token.text in declaration.ends:
-            if declaration.name:
-                yield Function(
-                    declaration.name, declaration.begin, line + 1, declaration.first == "static", token.text == "}"
-                )
+            static = declaration.first == "static"
+            yield Function(declaration.name, declaration.begin, line + 1, static, token.text == "}")
             declaration = _Declaration()
 
 
@@ -93,6 +96,7 @@ class _Declaration:
     name: str = ""
     last: str = ""
     is_plain: bool = False  # whether it is no function
+    in_size: bool = False  # whether the last token was in the size of an array
     has_body: bool = False
 
     def take(self, token: CToken, line: int, *, outside: bool) -> None:
@@ -100,7 +104,8 @@ class _Declaration:
         if not self.first:
             self.first, self.begin = token.text, line
             self.is_plain = token.text in _NO_FUNCTIONS or not token.text[:1].islower()
-        if outside and not self.name and not self.is_plain:
+        self.in_size = token.text == "[" or (self.in_size and token.text != "]")
+        if outside and not self.name and not self.is_plain and not self.in_size:
             if token.text == "(":
                 self.name = self.last
             self.is_plain = token.text in ("=", "{")

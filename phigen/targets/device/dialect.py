@@ -4,29 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from phigen.targets.c.unused import functions_of
+from phigen.targets.c.unused import declarations_of
 
 #: The line from which on a file is for devices only.
 DEVICES_ONLY = "#if defined(__OPENCL_VERSION__) || defined(__CUDACC__) || defined(__HIP__)"
 
 _TABLE = "static const "
 
+#: First words of declarations of types, which have no address space.
+_TYPES = ("typedef", "enum", "struct", "union")
+
 
 def qualified(lines: Sequence[str], name: str) -> list[str]:
     """Return the lines of a solver with the qualifiers of devices before functions and tables of the part for devices.
 
-    Functions become `NAME_FUNCTION`, which is static; kernels are named in the runtime.
+    Functions become `NAME_FUNCTION`, which is static, and tables `NAME_CONSTANT`; kernels are named in the runtime.
+    Raises `ValueError` for objects that would have no address space: those of a file that are not constant, and static
+    ones of functions.
     """
     begin, linkage = lines.index(DEVICES_ONLY), {"static", "inline", f"{name}_APART"}
     spelt = [*lines]
-    for k in range(begin, len(lines)):
-        if lines[k].startswith(_TABLE):
-            spelt[k] = f"{name}_CONSTANT {lines[k].removeprefix(_TABLE)}"
-    for function in functions_of(lines):
-        words = lines[function.begin].split(" ")
-        if words[0] == f"{name}_KERNEL":
+    for declaration in declarations_of(lines):
+        line = lines[declaration.begin]
+        words = line.split(" ")
+        if declaration.begin < begin or words[0] in (*_TYPES, f"{name}_KERNEL"):
             continue
-        while words[0] in linkage:
-            words.pop(0)
-        spelt[function.begin] = " ".join([f"{name}_FUNCTION", *words])
+        if declaration.name:
+            while words[0] in linkage:
+                words.pop(0)
+            spelt[declaration.begin] = " ".join([f"{name}_FUNCTION", *words])
+        elif line.startswith(_TABLE):
+            spelt[declaration.begin] = f"{name}_CONSTANT {line.removeprefix(_TABLE)}"
+        else:
+            raise ValueError(f"{name}: an object without address space: {line}")
+    for line in spelt[begin:]:
+        if line.lstrip().startswith("static "):
+            raise ValueError(f"{name}: an object without address space: {line.strip()}")
     return spelt

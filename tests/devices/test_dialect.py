@@ -1,0 +1,51 @@
+"""Address spaces of generated code for devices, without a driver."""
+
+import re
+
+import pytest
+from support import COMMAND
+from systems import LATTICES, as_given, slow_but, small
+
+from phigen.compiler import emit
+from phigen.errors import SpecError
+from phigen.targets.device.dialect import DEVICES_ONLY, qualified
+
+#: Of each kind of step, of time, noise and a monitor.
+KINDS = (
+    *("pendulum_euler", "lotka_volterra", "kepler_eccentric", "nambu_pendulum", "kowalevski_gauss"),
+    *("seasonal_predator_prey", "thermal_spin", "fput"),
+)
+CORPUS = (*KINDS, "comet_jupiter", "kepler", "landau_lifshitz", "satellite", *LATTICES)
+
+
+@pytest.mark.parametrize("name", slow_but(KINDS, dict.fromkeys(CORPUS)))
+def test_all_objects_of_a_file_have_an_address_space(name):
+    """Emission raises `ValueError` for others; functions are spelt as functions, and tables as tables."""
+    try:
+        (text,) = emit(small(as_given(name)).program, "device", COMMAND).values()
+    except SpecError:
+        pytest.skip("refused")
+    objects = text[text.index(DEVICES_ONLY) :]
+    spelt = re.findall(rf"^{name}_(CONSTANT|FUNCTION) [^=;{{]*([=;{{])", objects, re.MULTILINE)
+    assert spelt
+    for qualifier, end in spelt:
+        assert (qualifier == "CONSTANT") == (end == "=")
+
+
+@pytest.mark.parametrize("line", ["double n_last;", "const double *n_rows[2] = { 0, 0 };", "static int n_calls = 0;"])
+def test_objects_without_an_address_space_are_errors(line):
+    with pytest.raises(ValueError, match="without address space"):
+        qualified([DEVICES_ONLY, line], "n")
+
+
+def test_a_static_table_in_a_function_is_an_error():
+    with pytest.raises(ValueError, match="without address space"):
+        qualified([DEVICES_ONLY, "static int n_f(void)", "{", "    static const int a[1] = { 0 };", "}"], "n")
+
+
+def test_tables_whose_sizes_have_casts_are_no_functions():
+    lines = [DEVICES_ONLY, "static const double n_a[2 * (int)n_B][3] = { { 0.0 } };", "static int n_f(void);"]
+    assert qualified(lines, "n")[1:] == [
+        "n_CONSTANT double n_a[2 * (int)n_B][3] = { { 0.0 } };",
+        "n_FUNCTION int n_f(void);",
+    ]
