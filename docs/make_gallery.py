@@ -25,6 +25,7 @@ from phigen.lattice.states import start_of as start_of_lattice
 from phigen.notation.lattices import described, sections
 from phigen.paper.runge_kutta import started
 from phigen.runtime.interface import BackendError
+from phigen.runtime.sections import function_of
 from phigen.runtime.session import rows_along
 from phigen.runtime.solver import Solver
 from phigen.runtime.trajectory import Trajectory
@@ -32,7 +33,6 @@ from phigen.spec.model import Run, Spec
 from phigen.study.lattice_errors import errors_of
 from phigen.study.methods import of_classical
 from phigen.study.race import TABLEAUX
-from phigen.study.sections import function_of
 from phigen.study.summary import Summary, summarise
 
 DOCS = Path(__file__).resolve().parent

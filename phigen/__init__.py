@@ -26,8 +26,8 @@ if TYPE_CHECKING:
         ToolchainError,
     )
     from phigen.geometry.system import System
+    from phigen.initial_value import solve_ivp
     from phigen.lattice.lattice_system import LatticeSystem
-    from phigen.runtime.habits import solve_ivp
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
@@ -43,7 +43,7 @@ _HOMES = {
     "LatticeSystem": "phigen.lattice.lattice_system",
     "LatticeTrajectory": "phigen.runtime.lattice",
     "Solver": "phigen.runtime.solver",
-    "solve_ivp": "phigen.runtime.habits",
+    "solve_ivp": "phigen.initial_value",
     "Trajectory": "phigen.runtime.trajectory",
     "CheckError": "phigen.errors",
     "DeviceError": "phigen.errors",

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, TypeVar, Unpack
 from phigen import progress, registry
 from phigen.compilation import Compilation, CompiledGauss, CompiledLattice, CompiledSeries, CompiledSplitting
 from phigen.errors import CheckError, Diagnostic, LimitError, PhigenWarning, SpecError
-from phigen.gauss.gauge import slowest
 from phigen.geometry.system import System, system_from_spec
 from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
@@ -35,6 +34,7 @@ from phigen.scheme.choosing import planned as plan_without_kicks
 from phigen.scheme.discretisation import discretise, expect_affordable, is_large
 from phigen.scheme.gauge import Gauge, choose, fixed_gauge, fixed_gauge_named
 from phigen.scheme.gauss import build_gauss, expect_offered, plan_gauss, realise_gauss
+from phigen.scheme.gauss_gauge import slowest
 from phigen.scheme.logarithmic import composition_of, logarithmic_of
 from phigen.scheme.monitor import monitor_of
 from phigen.scheme.order import plan_order

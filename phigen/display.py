@@ -20,6 +20,7 @@ DISPLAYS = {
     "page of a trajectory": ("phigen.notation.notebook", "trajectory_html"),
     "page of a lattice trajectory": ("phigen.notation.notebook", "lattice_trajectory_html"),
     "figure of runs": ("phigen.drawing.figures", "run_figure"),
+    "figure of a spectrum": ("phigen.drawing.spectra", "spectrum_figure"),
     "figure of a lattice run": ("phigen.drawing.lattices", "lattice_figure"),
 }
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from phigen.geometry.conservation import LARGE_ENERGY_ERROR, RELATIVE, SITES, TERMS, Unit
 from phigen.spec.model import Spec
-from phigen.study.conservation import LARGE_ENERGY_ERROR, RELATIVE, SITES, TERMS, Unit
 from phigen.study.summary import Summary
 from phigen.tuning.search import rounded_down
 

@@ -71,7 +71,7 @@ class Experiment:
 
     def function(self, expression: Expression, solver: Any) -> Function:
         """An expression of the run as a function of states, and of their times where there is a time."""
-        from phigen.study.sections import function_of
+        from phigen.runtime.sections import function_of
 
         return function_of(expression, solver.interface.coordinates, self.parameters, solver.interface.time)
 

@@ -17,11 +17,11 @@ from phigen.errors import StepError
 
 if TYPE_CHECKING:
     from phigen.cli.lattice_experiment import LatticeExperiment
+    from phigen.geometry.conservation import Unit
     from phigen.lattice.states import Start
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.runtime.lattice_series import LatticeSeries
     from phigen.spec.model import Run, Spec
-    from phigen.study.conservation import Unit
     from phigen.study.lyapunov import Spectrum
 
 
@@ -284,7 +284,7 @@ def _print(
     errors: Mapping[str, float],
     units: Mapping[str, Unit],
 ) -> None:
-    from phigen.study.conservation import stated
+    from phigen.geometry.conservation import stated
     from phigen.study.lattice_errors import BALANCE, CHANGE, ENERGY
 
     out(heading(f"{spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))

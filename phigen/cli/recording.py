@@ -25,13 +25,13 @@ from phigen.runtime.checkpoint import Checkpoint, MismatchError, objection
 from phigen.runtime.crossings import CrossingFinder, section_columns
 from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.march import Piece, march, march_at, standing
+from phigen.runtime.sections import function_of
 from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Table, opened
 from phigen.runtime.trajectory import Trajectory
 from phigen.study.averages import averages_of
 from phigen.study.lyapunov import FrameGrowth, Spectrum
-from phigen.study.sections import function_of
 from phigen.study.sketch import POINTS, Sketch, Thinned
 from phigen.study.summary import Watch
 from phigen.symbolic.readable import readable

@@ -74,7 +74,7 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
 
 def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[Floats], float] | None:
     """The largest error of a Casimir at a state, in its unit."""
-    from phigen.study.conservation import units
+    from phigen.geometry.conservation import units
     from phigen.study.precision import ROUNDING
     from phigen.symbolic.arrays import evaluate
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def print_summary(compilation: Compilation, recorder: Recorder, summaries: Sequence[Summary]) -> None:
     """The table of a run: one column for each method; then crossings and exponents, if asked for."""
-    from phigen.study.conservation import stated
+    from phigen.geometry.conservation import stated
 
     run, solver = recorder.experiment.run, recorder.solver
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))

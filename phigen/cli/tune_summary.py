@@ -137,7 +137,7 @@ def scheme_of(curve: Curve) -> str:
 
 def remarks(tuning: Tuning) -> Iterator[str]:
     """Remarks on how the numbers were obtained, and on their limits."""
-    from phigen.study.conservation import ENERGY, stated
+    from phigen.geometry.conservation import ENERGY, stated
 
     best = tuning.winner
     assert best is not None

@@ -189,7 +189,7 @@ def fallen_short(verification: Verification) -> CheckError:
 
 def print_table(v: Verification) -> None:
     """The checks as a table for people."""
-    from phigen.study.conservation import stated
+    from phigen.geometry.conservation import stated
 
     out(heading(f"{v.name}, run {v.run}") + f": {v.label}")
     out(f"  {v.made}, targets {', '.join(v.targets)}")

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from phigen.drawing.palette import MARK, SERIES
+from phigen.geometry.conservation import ENERGY, Unit, unit_of
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.conservation import ENERGY, Unit, unit_of
 from phigen.symbolic.arrays import Floats
 
 if TYPE_CHECKING:

@@ -23,9 +23,9 @@ from phigen.drawing import (
 )
 from phigen.drawing.lettering import move_apart
 from phigen.drawing.palette import PALETTE, SUFFIXES, save, styled, svg
+from phigen.geometry.conservation import Unit
 from phigen.runtime.trajectory import Trajectory
 from phigen.study.backward import Constancy
-from phigen.study.conservation import Unit
 from phigen.study.precision import Study
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
@@ -65,7 +65,7 @@ def error_figure(
 ) -> Figure:
     """The errors of energy and Casimirs against time, of several methods by their labels; one panel per quantity.
 
-    Errors are in the ``units`` of `phigen.study.conservation.units_of`. Of long runs the largest error of each of
+    Errors are in the ``units`` of `phigen.geometry.conservation.units_of`. Of long runs the largest error of each of
     some hundred windows is drawn. Zeros have a place of their own, marked 0; a cross marks where a method broke down.
     """
     figure = _figure(error_curves.height(methods))

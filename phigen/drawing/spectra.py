@@ -11,7 +11,7 @@ from phigen.drawing.palette import styled
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from phigen.study.spectra import Correlation, DynamicSpectrum
+    from phigen.runtime.spectra import Correlation, DynamicSpectrum
 
 #: Decades below the largest value that are shown: what lies below is leakage of the window, and rounding.
 DECADES = 6

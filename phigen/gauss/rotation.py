@@ -11,8 +11,8 @@ from itertools import count
 
 from phigen.attitude.elements import product as quaternion_product
 from phigen.attitude.group import Group
-from phigen.gauss.kernels import StageMap
 from phigen.gauss.realisation import AlgebraBlock
+from phigen.gauss.stage_map import StageMap
 from phigen.gauss.star_algebra import StarAlgebra, Vector, combined
 from phigen.geometry.field import Scalar
 from phigen.geometry.linear import Span

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from phigen.gauss.kernels import StageMap, at_unknowns, stage_map, vector_field
 from phigen.gauss.realisation import AlgebraBlock, Realisation
+from phigen.gauss.stage_map import StageMap, at_unknowns, stage_map, vector_field
 from phigen.gauss.star_algebra import difference
 from phigen.gauss.tableau import Tableau
 from phigen.geometry.system import System

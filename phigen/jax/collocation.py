@@ -18,8 +18,9 @@ import jax
 import numpy as np
 from jax import numpy as jnp
 
-from phigen.gauss.kernels import StageMap, at_unknowns, frame_kernel, vector_field
+from phigen.gauss.stage_map import StageMap, at_unknowns, vector_field
 from phigen.gauss.tableau import DOUBLE, SINGLE, Tableau, tableau
+from phigen.scheme.gauss_kernels import frame_kernel
 from phigen.scheme.policies import GaussAdjointPolicy, GaussPolicy
 from phigen.scheme.staging import Coefficients
 from phigen.symbolic.arrays import Arrays

@@ -13,8 +13,8 @@ from jax import numpy as jnp
 from phigen.api import load
 from phigen.errors import CheckError, Diagnostic, SpecError
 from phigen.gauss import statements as gauss_statements
-from phigen.gauss.kernels import stage_map
 from phigen.gauss.realisation import Realisation, collective, direct
+from phigen.gauss.stage_map import stage_map
 from phigen.gauss.tableau import MOST_STAGES, tableau
 from phigen.geometry.system import System, system_from_spec, system_of_lattice
 from phigen.jax.collocation import Collocation

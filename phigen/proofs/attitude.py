@@ -18,8 +18,8 @@ from phigen.attitude.group import Group
 from phigen.attitude.matrices import multiplied
 from phigen.attitude.parts import Turning, constancy, factor_elements, joined, turnings
 from phigen.compilation import Compilation, CompiledGauss, CompiledSeries, CompiledSplitting
-from phigen.gauss.kernels import at_unknowns, stage_map, vector_field
 from phigen.gauss.rotation import group_element
+from phigen.gauss.stage_map import at_unknowns, stage_map, vector_field
 from phigen.geometry.lie_algebra import LieAlgebra, Representation
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.cayley import trilinear

@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from markupsafe import Markup
 
 from phigen.compilation import Compilation
+from phigen.geometry.conservation import stated
 from phigen.registry import TARGETS
 from phigen.report import page
 from phigen.report.material import Material
-from phigen.study.conservation import stated
 from phigen.study.lyapunov import Spectrum
 from phigen.study.meanings import Meaning, meaning_of
 from phigen.study.summary import Drift, Summary

@@ -12,11 +12,11 @@ from phigen.compilation import Compilation
 from phigen.compiler import compile_spec
 from phigen.drawing.groups import Group, groups
 from phigen.errors import PhigenError
+from phigen.geometry.conservation import ENERGY, moving
 from phigen.geometry.system import System
 from phigen.report import page
 from phigen.scheme.lowering import assign, expand_powers
 from phigen.spec.model import NO_EXTRAS, Extras, Parameter, Run, Spec
-from phigen.study.conservation import ENERGY, moving
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.targets.js.emitter import emit
 from phigen.targets.js.printing import LANGUAGE

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from phigen.errors import MissingPackageError
+from phigen.packages import imported
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 def to_xarray(trajectory: Trajectory) -> xr.Dataset:
     """Return a Dataset: ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and observables (t), with attributes."""
-    xarray = _imported("xarray")
+    xarray = imported("xarray")
     dataset: xr.Dataset = xarray.Dataset(
         {
             "x": (("t", "coordinate"), trajectory.x),
@@ -36,7 +35,7 @@ def to_xarray(trajectory: Trajectory) -> xr.Dataset:
 
 def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
     """Return a DataFrame with the columns of a ``.csv``, indexed by t; its ``attrs`` hold step and parameters."""
-    pandas = _imported("pandas")
+    pandas = imported("pandas")
     names = [name for column in trajectory.columns() for name in column.names]
     frame: pd.DataFrame = pandas.DataFrame(trajectory.rows(), columns=names).set_index(names[0])
     frame.attrs.update({"h": trajectory.h, "steps": trajectory.steps, **_parameters(trajectory)})
@@ -45,7 +44,7 @@ def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
 
 def lattice_to_xarray(trajectory: LatticeTrajectory) -> xr.Dataset:
     """Return a Dataset: ``x`` (t, coordinate, *axes), ``energy`` (t), Casimirs, observables, arrays of parameters."""
-    xarray = _imported("xarray")
+    xarray = imported("xarray")
     about = trajectory.solver.interface
     axes = trajectory.axes
     arrays = {n: v for n, v in trajectory.parameters.items() if np.ndim(v)}
@@ -69,10 +68,3 @@ def lattice_to_xarray(trajectory: LatticeTrajectory) -> xr.Dataset:
 
 def _parameters(trajectory: Trajectory) -> dict[str, float]:
     return {f"parameter_{name}": value for name, value in trajectory.parameters.items()}
-
-
-def _imported(package: str) -> Any:
-    try:
-        return import_module(package)
-    except ImportError as error:
-        raise MissingPackageError(f"this needs {package}\n  hint: pip install {package}") from error

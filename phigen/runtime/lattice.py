@@ -14,8 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from phigen.display import display
 from phigen.errors import ParameterError, StepError
+from phigen.geometry.conservation import SITES, Unit, unit_of
 from phigen.memory import expect_room
-from phigen.runtime import arguments, checkpoint, ending, lattice_ensemble, lattice_gradients, lattice_series, runs
+from phigen.runtime import (
+    arguments,
+    checkpoint,
+    ending,
+    lattice_ensemble,
+    lattice_gradients,
+    lattice_series,
+    runs,
+    spectra,
+)
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.crossings import Function
 from phigen.runtime.gradients import Pullback
@@ -44,6 +54,8 @@ from phigen.runtime.lattice_run import LatticeRun
 from phigen.runtime.lattice_series import LatticeSeries, NumberRows, expect_table, recordable
 from phigen.runtime.live import LiveLattice
 from phigen.runtime.named import Named
+from phigen.runtime.sections import function_of
+from phigen.runtime.spectra import Correlation, DynamicSpectrum, Transforms
 from phigen.runtime.timed import advance_by
 from phigen.writing import replacing
 
@@ -52,8 +64,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from phigen.spec.model import Run, Spec
-    from phigen.study.conservation import Unit
-    from phigen.study.spectra import Correlation, DynamicSpectrum, Transforms
     from phigen.symbolic.expression import Expression
 
 
@@ -233,8 +243,6 @@ class LatticeTrajectory:
     @property
     def energy_unit(self) -> Unit:
         """The unit of errors of energy, with the reason for it."""
-        from phigen.study.conservation import SITES, unit_of
-
         when = float(self.t[0]) if self.solver.interface.time else None
         sites = np.abs(self.solver.density(self.x[0], when, parameters=self.parameters)).sum()
         return unit_of(float(self.energy[0]), float(sites), SITES)
@@ -288,21 +296,17 @@ class LatticeTrajectory:
         return self.x[:, self.coordinates.index(coordinate)]
 
     def spectrum(self, of: Sequence[str], *, after: float | None = None) -> DynamicSpectrum:
-        """Return the dynamic structure factor S(q, ω) of coordinates of a grid; see `phigen.study.spectra.spectrum`."""
-        from phigen.study.spectra import spectrum
-
-        return spectrum(self, of, after=after)
+        """Return the dynamic structure factor S(q, ω) of coordinates of a grid; see `spectra.spectrum`."""
+        return spectra.spectrum(self, of, after=after)
 
     def correlation(
         self, of: str, other: str | None = None, *, axis: str | None = None, up_to: int, after: float | None = None
     ) -> Floats:
         """Return ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ of two coordinates, or of one with itself, for d = 0 … ``up_to``.
 
-        The axis of d is the first by default; see `phigen.study.spectra.correlation`.
+        The axis of d is the first by default; see `spectra.correlation`.
         """
-        from phigen.study.spectra import correlation
-
-        return correlation(self, of, other or of, axis or self.axes[0], up_to, after=after)
+        return spectra.correlation(self, of, other or of, axis or self.axes[0], up_to, after=after)
 
     def at(self, times: ArrayLike) -> Floats:
         """Return the states (times, coordinates, *sizes) at given times, by steps of the method from the nearest frame.
@@ -549,14 +553,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
     def function(self, expression: Expression, values: Mapping[str, Any]) -> Function:
         """An expression in observables, parameters and the time as a function of observables (rows, observables)."""
-        from phigen.study.sections import function_of
-
         return function_of(expression, self.interface.observables, values, self.interface.time)
 
     def transforms_of(self, run: Run) -> Transforms | None:
         """Spectrum and correlation of the frames of a run, if it asks for any."""
-        from phigen.study.spectra import Transforms
-
         asked = run.lattice
         return (
             Transforms(asked.spectrum, asked.correlation) if asked and (asked.spectrum or asked.correlation) else None

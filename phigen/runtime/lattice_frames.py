@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from phigen.memory import expect_room, filled
+from phigen.packages import imported
 from phigen.reading import opened
 from phigen.runtime import checkpoint
 from phigen.runtime.checkpoint import MismatchError
@@ -246,8 +247,6 @@ def _write_store(path: Path, trajectory: LatticeTrajectory) -> None:
 
     An old store is replaced when the new one is complete.
     """
-    from phigen.sweeping.store import imported
-
     expect_store(path)
     data = trajectory.to_xarray()
     part = path.with_name(path.name + ".part")

@@ -16,7 +16,7 @@ from phigen.runtime.interface import Floats, row_steps
 from phigen.runtime.timed import EQUAL, whole_steps
 
 if TYPE_CHECKING:
-    from phigen.study.spectra import Transforms
+    from phigen.runtime.spectra import Transforms
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from phigen.runtime.members import Members
 from phigen.runtime.named import Named
 from phigen.runtime.prescribed_noise import PrescribedNoise
 from phigen.runtime.retrying import Retrying
+from phigen.runtime.sections import function_of
 from phigen.runtime.session import Followed, Session, rows_along
 from phigen.runtime.timed import along_until, states_at
 from phigen.runtime.trajectory import Trajectory, Turned, turned_into
@@ -186,8 +187,6 @@ class Solver(Named[Backend, Interface]):
 
     def _rows(self, run: Run, at: Beginning) -> Trajectory:
         """Return the trajectory of a run that ends at a zero, or whose rows have equal distances in time."""
-        from phigen.study.sections import function_of
-
         names = self.interface
         stop = function_of(run.stop, names.coordinates, at.values, names.time) if run.stop is not None else None
         session = self._started(at)

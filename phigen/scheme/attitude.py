@@ -9,8 +9,8 @@ from phigen.attitude.group import Group, refused
 from phigen.attitude.matrices import cayley as cayley_transform
 from phigen.attitude.matrices import exponential, size_of
 from phigen.attitude.parts import Turning, factor_elements, joined, turning_of, turnings
-from phigen.gauss.kernels import StageMap
 from phigen.gauss.rotation import group_element
+from phigen.gauss.stage_map import StageMap
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.gathering import staged

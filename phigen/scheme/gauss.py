@@ -6,23 +6,15 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from phigen.errors import SpecError
-from phigen.gauss.kernels import (
-    StageMap,
-    at_unknowns,
-    change_kernel,
-    elapsed_kernel,
-    field_kernel,
-    frame_kernel,
-    stage_map,
-    vector_field,
-)
 from phigen.gauss.realisation import Plain, Realisation, collective, direct
+from phigen.gauss.stage_map import StageMap, at_unknowns, stage_map, vector_field
 from phigen.gauss.tableau import MOST_STAGES, tableau
 from phigen.geometry.system import System
 from phigen.scheme.adjoint import completed, gauss_adjoint, level_adjoint
 from phigen.scheme.discretisation import expect_few
 from phigen.scheme.forces import force_facts
 from phigen.scheme.gauge import Gauge
+from phigen.scheme.gauss_kernels import change_kernel, elapsed_kernel, field_kernel, frame_kernel
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import observables
 from phigen.scheme.lowering import operation_counts

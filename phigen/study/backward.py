@@ -15,8 +15,8 @@ import numpy as np
 
 from phigen.compilation import Compilation
 from phigen.errors import LimitError, StepError
+from phigen.geometry.conservation import Unit, units
 from phigen.scheme.modified import corrections, powers
-from phigen.study.conservation import Unit, units
 from phigen.study.methods import Method
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from phigen.errors import StepError
+from phigen.geometry.conservation import SITES, Unit, unit_of
 from phigen.lattice.cell import Cell
 from phigen.lattice.energy_balance import Power, inside_ends, integral, shifted
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeTrajectory
-from phigen.study.conservation import SITES, Unit, unit_of
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 

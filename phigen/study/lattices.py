@@ -18,13 +18,13 @@ from phigen import progress
 from phigen.compilation import CompiledLattice
 from phigen.errors import StepError
 from phigen.geometry.checks import COMMUTING
+from phigen.geometry.conservation import rounding, stated
 from phigen.lattice.cell import PAIRS, Cell
 from phigen.lattice.expansion import Expansion, expand, ring
 from phigen.lattice.forcing import noise_statements
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 from phigen.study import gradients, lattice_noise, single_precision
-from phigen.study.conservation import rounding, stated
 from phigen.study.lattice_errors import BALANCE, CHANGE, ENERGY, MAX_BALANCED_SITE_STEPS, errors_of, units_of, works
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification
 from phigen.symbolic.arrays import Floats, evaluate

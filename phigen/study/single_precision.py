@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from phigen.geometry.conservation import largest_terms, rounding
 from phigen.geometry.system import System
-from phigen.study.conservation import largest_terms, rounding
 from phigen.study.methods import Method
 from phigen.study.summary import summarise
 from phigen.symbolic.arrays import Floats

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from phigen.geometry.conservation import ENERGY, RELATIVE, Unit, moving, rounding, units
 from phigen.geometry.system import System
 from phigen.spec.model import Run
 from phigen.study.balance import powers, works
-from phigen.study.conservation import ENERGY, RELATIVE, Unit, moving, rounding, units
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.symbols import ELAPSED, initial
 

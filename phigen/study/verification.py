@@ -18,9 +18,9 @@ from phigen import progress
 from phigen.compilation import Compilation
 from phigen.errors import StepError
 from phigen.geometry.checks import commuting
+from phigen.geometry.conservation import Unit, largest_terms, rounding, units_of
 from phigen.runtime.solver import Solver
 from phigen.study import backward, gradients, measures, single_precision
-from phigen.study.conservation import Unit, largest_terms, rounding, units_of
 from phigen.study.methods import Method, field_of, of_classical, of_solver, without_noise
 from phigen.study.monitored import field_in_tau, with_time
 from phigen.study.stochastic import failures, strong_order

@@ -8,9 +8,9 @@ from math import prod
 
 import numpy as np
 
+from phigen.geometry.conservation import SMALL, value_and_terms
 from phigen.geometry.system import System
 from phigen.lattice.cell import Cell
-from phigen.study.conservation import SMALL, value_and_terms
 from phigen.sweeping.store import Job
 from phigen.symbolic.arrays import Floats
 
@@ -24,7 +24,7 @@ class EnergyErrors:
 
 
 def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
-    """The stored energy errors of a sweep of an ordinary system, in the units of `phigen.study.conservation`.
+    """The stored energy errors of a sweep of an ordinary system, in the units of `phigen.geometry.conservation`.
 
     Members that failed, or wait, do not count, and none does where time, forces or noise change the energy.
     """

@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from phigen.errors import FileError, MissingPackageError
+from phigen import packages
+from phigen.errors import FileError
 from phigen.runtime.crossings import SIGNS
 from phigen.runtime.interface import STATUSES, Floats, Interface, LatticeInterface
 from phigen.sweeping.plan import Plan, values_of
@@ -34,14 +35,8 @@ OWN = ("status", "coordinate", "frame", "frames", _BESIDE)
 
 
 def imported(name: str) -> Any:
-    """A package that sweeps need. Raises `MissingPackageError`."""
-    from importlib import import_module
-
-    try:
-        return import_module(name)
-    except ImportError:
-        message = f"sweeps need {name.partition('.')[0]}\n  hint: pip install dask distributed xarray zarr"
-        raise MissingPackageError(message) from None
+    """Return a package that sweeps need. Raises `MissingPackageError`."""
+    return packages.imported(name, "sweeps", "dask distributed xarray zarr")
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from phigen.api import chosen_target, compilation_of, files_of, interface_of
 from phigen.compilation import Compilation
 from phigen.compiler import emit
 from phigen.errors import Diagnostic, FileError, SpecError
+from phigen.geometry.conservation import LARGE_ENERGY_ERROR
 from phigen.memory import expect_room
 from phigen.reading import opened_text
 from phigen.runtime.interface import BackendError, Draws, Floats
@@ -24,7 +25,6 @@ from phigen.runtime.members import Members
 from phigen.spec.model import Run, Spec, SweepSettings
 from phigen.spec.names import KEPT
 from phigen.spec.problems import did_you_mean
-from phigen.study.conservation import LARGE_ENERGY_ERROR
 from phigen.sweeping import cluster, lattices, store
 from phigen.sweeping.plan import Plan, chunk_of
 from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_errors

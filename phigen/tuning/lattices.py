@@ -11,13 +11,13 @@ import numpy as np
 from phigen.api import lattice_solver_of
 from phigen.compilation import Compilation
 from phigen.errors import SpecError
+from phigen.geometry.conservation import SITES, Unit, unit_of
 from phigen.lattice.cell import GRID, Cell
 from phigen.lattice.states import Start, start_of
 from phigen.runtime.lattice import LatticeBackend, LatticeSession
 from phigen.spec.model import Run, Spec
 from phigen.spec.names import BIREALISATIONS
 from phigen.study import classical, race
-from phigen.study.conservation import SITES, Unit, unit_of
 from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem
 from phigen.tuning.settings import CHOICES, FORMULAS, OWN, SPLITTING, Setting, direct

@@ -12,12 +12,12 @@ import numpy as np
 from phigen.api import chosen_target, solver_of
 from phigen.compilation import Compilation
 from phigen.errors import PhigenError
+from phigen.geometry.conservation import Unit, units
 from phigen.geometry.system import System
 from phigen.runtime.backend import Backend
 from phigen.runtime.interface import BackendError, row_steps
 from phigen.runtime.session import rows_along
 from phigen.study import measures, race
-from phigen.study.conservation import Unit, units
 from phigen.study.methods import Method as Step
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.tuning.settings import Setting, charts

@@ -11,7 +11,7 @@ from statistics import median
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec
 from phigen.errors import SpecError
-from phigen.study.conservation import Unit
+from phigen.geometry.conservation import Unit
 from phigen.tuning import search
 from phigen.tuning.monitors import Monitors, candidates, compare, is_uneven, settings
 from phigen.tuning.problem import ROWS, Candidate, Problem, steps_in

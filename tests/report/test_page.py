@@ -15,6 +15,7 @@ from support import compiled, slow_but
 from phigen import resources, spec
 from phigen.compiler import compile_spec
 from phigen.drawing.palette import PALETTE
+from phigen.geometry.conservation import RELATIVE, Unit
 from phigen.proofs.examination import Examination
 from phigen.report import document as pages
 from phigen.report import live, page, pictures
@@ -23,7 +24,6 @@ from phigen.report.panel import NoPanelError, panel_page
 from phigen.report.svg import inlined
 from phigen.report.viewer import MOST_NUMBERS, viewer
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.conservation import RELATIVE, Unit
 from phigen.study.summary import Drift, Summary
 from phigen.symbolic.verdict import CHECKED, PROVED, Statement
 

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from phigen.display import display
 from phigen.memory import expect_room
+from phigen.packages import imported
 from phigen.runtime.interface import Floats
 
 if TYPE_CHECKING:
@@ -52,8 +54,6 @@ class DynamicSpectrum:
 
         Raises `MissingPackageError` without zarr.
         """
-        from phigen.sweeping.store import imported
-
         root = imported("zarr").open_group(str(path), mode="w", zarr_format=2)
         for name, (dimensions, values) in self.variables("S").items():
             about = {"_ARRAY_DIMENSIONS": list(dimensions)}
@@ -65,9 +65,8 @@ class DynamicSpectrum:
 
         Raises `MissingPackageError` without matplotlib.
         """
-        from phigen.drawing.spectra import spectrum_figure
-
-        return spectrum_figure(self, title)
+        figure: Figure = display("figure of a spectrum")(self, title)
+        return figure
 
 
 @dataclass(frozen=True)

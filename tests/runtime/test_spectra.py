@@ -7,7 +7,7 @@ from click.testing import CliRunner
 import phigen
 import phigen.spec
 from phigen.cli import group
-from phigen.study.spectra import spectrum
+from phigen.runtime.spectra import spectrum
 
 #: A ferromagnetic chain near its ground state; linear spin-wave theory has ω(q) = B + 2J(1 − cos q).
 FERROMAGNET = """\

@@ -1,4 +1,4 @@
-"""Kernels of a Gauss step: the vector field of a stage, the increment of x, and the change of frame.
+"""Stages of a Gauss step: points and their vector field in terms of the unknowns, and the change of frame.
 
 The unknowns are offsets, 0 at the start of the step: x − x_start of a plain coordinate, t − t_start of the time,
 log x − log x_start of a coordinate with a logarithm, G − 1 of a group element. So small steps lose no digits.
@@ -13,28 +13,21 @@ from phigen.gauss.realisation import AlgebraBlock, Plain, Realisation
 from phigen.gauss.star_algebra import StarAlgebra, Vector, combined
 from phigen.geometry.field import Scalar
 from phigen.geometry.system import System, hamiltonian_vector_field
-from phigen.scheme.kernel import Kernel, Output
-from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import (
     ONE,
     ZERO,
     Expression,
     call,
-    fold,
     gradient,
     number,
-    raw,
     substitute,
     symbol,
     total,
 )
-from phigen.symbolic.symbols import Symbol, kind_of
+from phigen.symbolic.symbols import Symbol
 
-#: The kinds of symbols of unknowns, of derivatives that are transformed to a new frame, of velocities in Lie algebras.
-OFFSET, SLOPE, VELOCITY = "z", "k", "velocity"
-
-#: The symbol of h b_j, the weight of a stage.
-WEIGHT = Symbol("w")
+#: The kind of symbols of unknowns.
+OFFSET = "z"
 
 
 @dataclass(frozen=True)
@@ -177,38 +170,6 @@ def _with_star(
     return total(terms)
 
 
-def field_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """Return the vector field of the unknowns at a stage, multiplied by the weight h b_j of the stage."""
-    velocities: list[Expression] = []
-
-    def hold(value: Expression) -> Expression:
-        if not value.args:
-            return value
-        velocities.append(value)
-        return symbol(Symbol(VELOCITY, len(velocities) - 1))
-
-    slopes = vector_field(points, at_unknowns(points), symbol(WEIGHT), hold)
-    values = _inserted(coefficients.hoist(slopes), coefficients.hoist(velocities))
-    return Kernel(
-        "stage_field",
-        "w times the derivatives of the unknowns of a stage, which are offsets from x, the start of the step",
-        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "w": (WEIGHT,)},
-        (Output("move", tuple(values)),),
-    )
-
-
-def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with the velocities substituted, without moving numerical factors into the products."""
-
-    def visit(e: Expression, args: list[Expression]) -> Expression:
-        if e.op == "symbol" and kind_of(e.value) == VELOCITY:
-            number_of_velocity: int = e.value.key[0]
-            return velocities[number_of_velocity]
-        return raw(e.op, tuple(args), e.value) if e.args else e
-
-    return fold(roots, visit)
-
-
 def at_unknowns(points: StageMap) -> dict[str, Expression]:
     """Return the coordinates and the time at a stage, in terms of the unknowns."""
     system = points.system
@@ -291,41 +252,12 @@ def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expre
     return [total(t) for t in terms]
 
 
-def elapsed_kernel(points: StageMap, monitor: Expression, coefficients: Coefficients) -> Kernel:
-    """Kernel of the time that passes at a stage: the weight times dt/dτ."""
-    (rate,) = coefficients.hoist(substitute([monitor], at_unknowns(points)))
-    return Kernel(
-        "elapsed",
-        "w times dt/dtau at a stage",
-        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "w": (WEIGHT,)},
-        (Output("elapsed", (symbol(WEIGHT) * rate,)),),
-    )
-
-
-def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the increment of the coordinates in a step."""
-    return Kernel(
-        "stage_change",
-        "the change of the coordinates from x, by the unknowns",
-        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns},
-        (Output("change", tuple(coefficients.hoist(points.change))),),
-    )
-
-
-def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
-    """Return the derivatives of group elements in the frame of the next step: G* = G⁻¹ times the derivatives."""
-    if not points.realisation.groups:
-        return None
-    slopes = [symbol(Symbol(SLOPE, k)) for k in range(len(points.unknowns))]
-    values = slopes[: points.starts[0]]
+def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) -> list[Expression]:
+    """Return derivatives of the unknowns as seen from the end of a step: G* = G⁻¹ times those of group elements."""
+    values = list(slopes[: points.starts[0]])
     for group, first in zip(points.realisation.groups, points.starts, strict=True):
         algebra = group.algebra
         w = [symbol(s) for s in points.unknowns[first : first + algebra.dimension]]
         k = slopes[first : first + algebra.dimension]
         values += [a + b for a, b in zip(k, _multiplied(algebra, _element(algebra, algebra.star, w), k), strict=True)]
-    return Kernel(
-        "next_frame",
-        "derivatives k of the unknowns as seen from the end z of a step, where the next one starts",
-        {"coef": coefficients.slots, "z": points.unknowns, "k": tuple(Symbol(SLOPE, i) for i in range(len(slopes)))},
-        (Output("seen", tuple(coefficients.hoist(values))),),
-    )
+    return values

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from phigen.api import compile
 from phigen.errors import StepError
 from phigen.runtime import arguments
 from phigen.runtime.crossings import CrossingFinder
@@ -219,8 +220,6 @@ class _Problem:
 
 
 def _compiled(system: System | str | PathLike[str], target: str, order: int | None) -> Solver:
-    from phigen.api import compile
-
     solver = compile(system, target=target, order=order)
     if not isinstance(solver, Solver):
         raise TypeError("solve_ivp is for systems of coordinates; lattices have solver.integrate")

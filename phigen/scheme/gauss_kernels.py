@@ -1,0 +1,84 @@
+"""Kernels of a Gauss step: the vector field of a stage, the increment of x, and the change of frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phigen.gauss.stage_map import StageMap, at_unknowns, derivatives_in_next_frame, vector_field
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.staging import Coefficients
+from phigen.symbolic.expression import Expression, fold, raw, substitute, symbol
+from phigen.symbolic.symbols import Symbol, kind_of
+
+#: The kinds of symbols of derivatives that are transformed to a new frame, and of velocities in Lie algebras.
+SLOPE, VELOCITY = "k", "velocity"
+
+#: The symbol of h b_j, the weight of a stage.
+WEIGHT = Symbol("w")
+
+
+def field_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
+    """Return the vector field of the unknowns at a stage, multiplied by the weight h b_j of the stage."""
+    velocities: list[Expression] = []
+
+    def hold(value: Expression) -> Expression:
+        if not value.args:
+            return value
+        velocities.append(value)
+        return symbol(Symbol(VELOCITY, len(velocities) - 1))
+
+    slopes = vector_field(points, at_unknowns(points), symbol(WEIGHT), hold)
+    values = _inserted(coefficients.hoist(slopes), coefficients.hoist(velocities))
+    return Kernel(
+        "stage_field",
+        "w times the derivatives of the unknowns of a stage, which are offsets from x, the start of the step",
+        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "w": (WEIGHT,)},
+        (Output("move", tuple(values)),),
+    )
+
+
+def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> list[Expression]:
+    """Return the roots with the velocities substituted, without moving numerical factors into the products."""
+
+    def visit(e: Expression, args: list[Expression]) -> Expression:
+        if e.op == "symbol" and kind_of(e.value) == VELOCITY:
+            number_of_velocity: int = e.value.key[0]
+            return velocities[number_of_velocity]
+        return raw(e.op, tuple(args), e.value) if e.args else e
+
+    return fold(roots, visit)
+
+
+def elapsed_kernel(points: StageMap, monitor: Expression, coefficients: Coefficients) -> Kernel:
+    """Kernel of the time that passes at a stage: the weight times dt/dτ."""
+    (rate,) = coefficients.hoist(substitute([monitor], at_unknowns(points)))
+    return Kernel(
+        "elapsed",
+        "w times dt/dtau at a stage",
+        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "w": (WEIGHT,)},
+        (Output("elapsed", (symbol(WEIGHT) * rate,)),),
+    )
+
+
+def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
+    """Return the kernel of the increment of the coordinates in a step."""
+    return Kernel(
+        "stage_change",
+        "the change of the coordinates from x, by the unknowns",
+        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns},
+        (Output("change", tuple(coefficients.hoist(points.change))),),
+    )
+
+
+def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
+    """Return the derivatives of group elements in the frame of the next step: G* = G⁻¹ times the derivatives."""
+    if not points.realisation.groups:
+        return None
+    slopes = tuple(Symbol(SLOPE, k) for k in range(len(points.unknowns)))
+    values = derivatives_in_next_frame(points, [symbol(s) for s in slopes])
+    return Kernel(
+        "next_frame",
+        "derivatives k of the unknowns as seen from the end z of a step, where the next one starts",
+        {"coef": coefficients.slots, "z": points.unknowns, "k": slopes},
+        (Output("seen", tuple(coefficients.hoist(values))),),
+    )
