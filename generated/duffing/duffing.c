@@ -7,9 +7,9 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
- *   Newton's method; The solver
- * body-sha256: 98aadcf3cb85d0505fbce4d3df9d7829cf79b53d99a7d781dbefabd00f2ff23c
+ * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
+ *   method; The solver
+ * body-sha256: 5eaa384f587586ca6de79fecff8356d0c557928423037a2b053d3c6977628fe9
  */
 #include "duffing.h"
 #include <float.h>
@@ -146,8 +146,8 @@ static int duffing_finite(const double *values, int count)
     return count == 0;
 }
 
-/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the
-   change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
+   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
 static int duffing_advance(duffing_solver *s, const double *change, const double *small)
 {
     double x[duffing_DIM], carry[duffing_DIM];
@@ -163,7 +163,7 @@ static int duffing_advance(duffing_solver *s, const double *change, const double
     return 1;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
 static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[duffing_DIM])
 {
     for (int k = 0; k < duffing_DIM; ++k) {
@@ -193,11 +193,11 @@ static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[d
     return 1;
 }
 
-/* ---- Starting guesses ---- */
+/* ---- Predictors ---- */
 #define duffing_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
 
-/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
-   equation of a step has solutions that have nothing to do with the motion. */
+/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
+   away, where the equation of a step has solutions unrelated to the motion. */
 static int duffing_predict(const duffing_history *history, double value[duffing_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -210,7 +210,7 @@ static int duffing_predict(const duffing_history *history, double value[duffing_
     return history->order > 0 && distance <= duffing_REACH * size;
 }
 
-/* Take in a solved value. The guess of order k missed it by its k-th difference: the next has the best. */
+/* Update the predictor with a solution; the k-th difference is the error of the prediction of order k. */
 static void duffing_remember(duffing_history *history, const double value[duffing_DIM])
 {
     double least = HUGE_VAL, next[duffing_DIM];
@@ -235,8 +235,8 @@ static void duffing_remember(duffing_history *history, const double value[duffin
 #define duffing_PLAUSIBLE 1.5         /* length of steps always accepted, in sizes of state and motion */
 #define duffing_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
-   by a point far away, at another energy, that has nothing to do with it. */
+/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
+   at another energy, and unrelated to the motion. */
 static int duffing_plausible(const duffing_solver *s, const double increment[duffing_DIM])
 {
     double moved = 0.0, size = 0.0, field[duffing_DIM], point[duffing_DIM], H[3];
@@ -248,7 +248,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
     duffing_vector_field(&s->params, s->t, s->x, field);
     for (int i = 0; i < duffing_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= duffing_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < duffing_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = duffing_hamiltonian(&s->params, s->t, point);
     }
@@ -256,7 +256,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
+/* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
 #define duffing_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
@@ -276,9 +276,9 @@ static double duffing_size(const double y[duffing_DIM], const double delta[duffi
     return size;
 }
 
-/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   last correction changes the increment to first order, without an evaluation: it is accepted if the error
-   that remains, quadratic in it, is below duffing_TOLERANCE. */
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
+   last correction changes the increment to first order, without another evaluation: it is accepted if the
+   remaining error, quadratic in it, is below duffing_TOLERANCE. */
 static duffing_status duffing_attempt(duffing_solver *s)
 {
     double y[duffing_DIM], delta[duffing_DIM], displacement[duffing_DIM], increment[duffing_DIM];
@@ -298,7 +298,7 @@ static duffing_status duffing_attempt(duffing_solver *s)
         const int stalled = previous < duffing_NEARLY_SOLVED && size > duffing_SHRINKING * previous;
         previous = size;
         if (!(remaining <= duffing_TOLERANCE || stalled)) continue;
-        double small[duffing_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        double small[duffing_DIM] = { 0.0 }; /* correction of the increment, and compensation */
         for (int i = 0; i < duffing_DIM; ++i)
             for (int j = 0; j < duffing_DIM; ++j) small[i] -= slope[i * duffing_DIM + j] * delta[j];
         for (int i = 0; i < duffing_DIM; ++i) small[i] += s->carry[i];
@@ -336,13 +336,13 @@ duffing_status duffing_init(duffing_solver *s, const duffing_params *params, con
     return duffing_init_at(s, params, x0, 0.0);
 }
 
-/* Compute the coefficients of the next step that are functions of the time or of the noise. */
+/* Compute the coefficients of the next step that depend on the time or on the noise. */
 static void duffing_renew(duffing_solver *s)
 {
     duffing_at_time(s->coef, s->t + duffing_middles * s->h, s->coef + duffing_PREPARED);
 }
 
-/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
 static duffing_status duffing_stage(duffing_solver *s)
 {
     const duffing_status status = duffing_attempt(s);
@@ -380,7 +380,7 @@ duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM])
     memcpy(from, s->x, sizeof from);
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
-    /* what guesses begin from moves with the state */
+    /* shift the predictors with the state */
     for (int i = 0; i < duffing_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
     return duffing_OK;
 }
@@ -397,7 +397,7 @@ duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM])
 
 const char *duffing_status_string(duffing_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case duffing_OK: return "ok";
     case duffing_NO_CONVERGENCE: return "no convergence: the step is too large";
     case duffing_SINGULAR: return "singular Newton matrix: the step is too large";

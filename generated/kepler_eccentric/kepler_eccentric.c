@@ -8,9 +8,9 @@
  *   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build kepler_eccentric
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; The explicit step; What a monitored trajectory holds fixed: e = -H(x0), so that
- *   K = monitor (H + e) is 0 along it; The solver
- * body-sha256: 82499a8ec07dea02c0697ab0fc7df10ea6cc0cc435b47dd29c14677cb464f86e
+ * Contents: The model; The explicit step; Energy level e = -H(x0): K = monitor (H + e) is 0 along a
+ *   monitored trajectory; The solver
+ * body-sha256: 4d43c27fa80296e0a52f946a6eaf8898b797d94c4d2d25b4c43e9ba5c162815b
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -84,8 +84,8 @@ static int kepler_eccentric_finite(const double *values, int count)
     return count == 0;
 }
 
-/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the
-   change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
+   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
 static int kepler_eccentric_advance(kepler_eccentric_solver *s, const double *change, const double *small)
 {
     double x[kepler_eccentric_DIM], carry[kepler_eccentric_DIM];
@@ -101,7 +101,7 @@ static int kepler_eccentric_advance(kepler_eccentric_solver *s, const double *ch
     return 1;
 }
 
-/* The time that has passed gains that of a stage. */
+/* Add the physical time of a stage to the time of a step. */
 static void kepler_eccentric_pass(kepler_eccentric_solver *s, double elapsed)
 {
     const double sum = s->t + elapsed, added = sum - s->t;
@@ -112,7 +112,7 @@ static void kepler_eccentric_pass(kepler_eccentric_solver *s, double elapsed)
 
 double kepler_eccentric_solver_time(const kepler_eccentric_solver *s) { return s->t + s->t_carry; }
 
-/* In a step from start, moved holds the sum of the changes so far, and the carry; x is start + moved,
+/* Within a step, moved holds the sum of the increments so far and the compensation term; x is start + moved,
    rounded. */
 static inline void kepler_eccentric_add(double x[kepler_eccentric_DIM], double moved[kepler_eccentric_DIM],
     const double start[kepler_eccentric_DIM], int i, double change)
@@ -121,7 +121,7 @@ static inline void kepler_eccentric_add(double x[kepler_eccentric_DIM], double m
     x[i] = start[i] + moved[i];
 }
 
-/* The end of a step: x + moved in compensated arithmetic. */
+/* At the end of a step, add moved to x in compensated arithmetic. */
 static void kepler_eccentric_settle(double x[kepler_eccentric_DIM], double carry[kepler_eccentric_DIM],
     const double moved[kepler_eccentric_DIM])
 {
@@ -212,10 +212,12 @@ static void kepler_eccentric_prepare(const kepler_eccentric_params *params,
     }
 }
 
-/* What flows move: the state, the physical time, and a sum that is no number where a logarithm has none. */
+/* Quantities that flows update: the state, the physical time, and a sum that becomes NaN outside the domain
+   of a logarithm. */
 enum { kepler_eccentric_TIME = kepler_eccentric_DIM, kepler_eccentric_DOMAIN, kepler_eccentric_ALONG };
 
-/* One step: the exact flows of the parts of K, one after the other. If it fails, the state is as before. */
+/* Make one step: the exact flows of the parts of K, one after the other. If it fails, the state is
+   unchanged. */
 static kepler_eccentric_status kepler_eccentric_stages(kepler_eccentric_solver *s)
 {
     double x[kepler_eccentric_ALONG] = { 0.0 }, moved[kepler_eccentric_ALONG] = { 0.0 },
@@ -232,7 +234,7 @@ static kepler_eccentric_status kepler_eccentric_stages(kepler_eccentric_solver *
     return kepler_eccentric_OK;
 }
 
-/* ---- What a monitored trajectory holds fixed: e = -H(x0), so that K = monitor (H + e) is 0 along it ---- */
+/* ---- Energy level e = -H(x0): K = monitor (H + e) is 0 along a monitored trajectory ---- */
 static void kepler_eccentric_choose_gauge(const kepler_eccentric_params *params,
     const double x[kepler_eccentric_DIM], double gauge[kepler_eccentric_GAUGES])
 {
@@ -298,7 +300,8 @@ kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s, double
     return kepler_eccentric_integrate(s, h, 1);
 }
 
-/* The level of s->x, which was moved from elsewhere; 0, and back there, where it has none. */
+/* Set the energy level after the state was moved to s->x. Returns 0, with the former state, if that has
+   none. */
 static int kepler_eccentric_take_level(kepler_eccentric_solver *s, const double from[kepler_eccentric_DIM],
     const double carry[kepler_eccentric_DIM])
 {
@@ -311,7 +314,7 @@ static int kepler_eccentric_take_level(kepler_eccentric_solver *s, const double 
         return 0;
     }
     memcpy(s->gauge, level, sizeof level);
-    /* where s->h is NaN the next step does it again */
+    /* if s->h is NaN, the next step computes them */
         kepler_eccentric_prepare(&s->params, s->gauge, s->h, s->coef);
     return 1;
 }
@@ -346,7 +349,7 @@ kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
 
 const char *kepler_eccentric_status_string(kepler_eccentric_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case kepler_eccentric_OK: return "ok";
     case kepler_eccentric_NO_CONVERGENCE: return "no convergence: the step is too large";
     case kepler_eccentric_SINGULAR: return "singular Newton matrix: the step is too large";

@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3cfd8bdfd1edf382474e9ac17d6da33995d1c18a5b70f9b25a450ca543c90248
+ * body-sha256: 52f1c727fb41b92a7944be9afd1c181e2f57b9646c9b53d3bc99e6689d50dcb8
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -32,7 +32,7 @@ double kepler_eccentric_monitor(const kepler_eccentric_params *params, const dou
 
 typedef enum { kepler_eccentric_OK = 0, kepler_eccentric_NO_CONVERGENCE, kepler_eccentric_SINGULAR,
     kepler_eccentric_NOT_FINITE, kepler_eccentric_BAD_ARGUMENT } kepler_eccentric_status;
-const char *kepler_eccentric_status_string(kepler_eccentric_status status); /* what a status means */
+const char *kepler_eccentric_status_string(kepler_eccentric_status status); /* the meaning of a status */
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {

@@ -7,9 +7,9 @@
  *   one evaluation at a stage: 72 additions, 95 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Compensated sums; Several steps or members at once; The implicit step, by Gauss
- *   collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: f2c4c73a67a6a23bae5c04922034d483dac9ee66d8dc234db613916323368c45
+ * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
+ *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles
+ * body-sha256: cc0c51b96879c1fa03c90c7a3cbbd67cb9c993b724f2a807efb48bf2e5b063bf
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -101,12 +101,12 @@ static int kowalevski_gauss_finite(const double *values, int count)
     return count == 0;
 }
 
-/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the
-   change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
+   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
 static int kowalevski_gauss_advance(kowalevski_gauss_solver *s, const double *change, const double *small)
 {
     double x[kowalevski_gauss_DIM], carry[kowalevski_gauss_DIM];
-    /* x is known after two sums; nothing waits for the rest */
+    /* x is available after two additions; the others are off the critical path */
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) {
         const double moved = change[i] + small[i], more = moved - change[i];
         const double sum = s->x[i] + moved, added = sum - s->x[i];
@@ -120,19 +120,19 @@ static int kowalevski_gauss_advance(kowalevski_gauss_solver *s, const double *ch
     return 1;
 }
 
-/* ---- Several steps or members at once ---- */
-/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
-   at once. Compilers make vector instructions of the loops over lanes. */
-enum { kowalevski_gauss_LANES = 8 }; /* what one vector of AVX-512 holds */
+/* ---- SIMD lanes: several steps or members at once ---- */
+/* The functions below evaluate the formulas of a step for several steps of a trajectory, or members of an
+   ensemble, together. Compilers turn the loops over lanes into vector instructions. */
+enum { kowalevski_gauss_LANES = 8 }; /* numbers in one vector of AVX-512 */
 
 #if defined(__GNUC__)
-/* a value in each lane */
+/* one value in each lane */
 typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES] __attribute__((aligned(64)));
 #else
 typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES];
 #endif
 
-/* Before a loop over lanes: tells compilers that they are independent. */
+/* Before a loop over lanes: tells the compiler that iterations are independent. */
 #if defined(__clang__)
 #define kowalevski_gauss_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic push
@@ -365,24 +365,24 @@ static void kowalevski_gauss_next_frame_lanes(const double coef[1], const double
 }
 
 /* ---- The implicit step, by Gauss collocation ---- */
-/* Where a step starts: the coordinates, and the time if H depends on it. */
+/* Start of a step: the coordinates, and the time if H depends on it. */
 static void kowalevski_gauss_start(const kowalevski_gauss_solver *s, double point[kowalevski_gauss_POINT])
 {
     memcpy(point, s->x, sizeof s->x);
 }
 
-/* The sum of the moves of all stages. */
+/* Sum of the increments of all stages. */
 static void kowalevski_gauss_end(kowalevski_gauss_lanes *moves, double end[kowalevski_gauss_UNKNOWNS])
 {
     for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
-        double even = 0.0, odd = 0.0; /* which need not wait for one another */
+        double even = 0.0, odd = 0.0; /* partial sums, which do not depend on each other */
         for (int i = 0; i < kowalevski_gauss_NODES; i += 2) even += moves[k][i];
         for (int i = 1; i < kowalevski_gauss_NODES; i += 2) odd += moves[k][i];
         end[k] = even + odd;
     }
 }
 
-/* h b_j times the vector field at all stages, where the unknowns are z; the weights are h b_j. */
+/* h b_j times the vector field at each stage, for unknowns z; the weights are h b_j. */
 static inline void kowalevski_gauss_slopes(const kowalevski_gauss_solver *s,
     double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *weights, kowalevski_gauss_lanes *z,
     kowalevski_gauss_lanes *moves)
@@ -390,7 +390,7 @@ static inline void kowalevski_gauss_slopes(const kowalevski_gauss_solver *s,
     kowalevski_gauss_stage_field_lanes(s->coef, point, z, weights, moves);
 }
 
-/* The factor of squares of changes of coordinates: 1 / |x|^2; where x is 0 moves have the part of x. */
+/* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
 static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowalevski_gauss_lanes *moves)
 {
     double square = DBL_MIN;
@@ -401,8 +401,8 @@ static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowal
     return 1.0 / square;
 }
 
-/* The square of the change by a sweep, as a mean over the stages, in sizes of the unknowns: of coordinates
-   that of x, of group elements 1. */
+/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, 1 for
+   group elements. */
 static inline double kowalevski_gauss_change_of(double scale, kowalevski_gauss_lanes *before,
     kowalevski_gauss_lanes *after)
 {
@@ -419,10 +419,10 @@ static inline double kowalevski_gauss_change_of(double scale, kowalevski_gauss_l
     return (even + odd) / (double)kowalevski_gauss_NODES;
 }
 
-/* The values of the unknowns that a predictor derives from the moves of the last steps. */
+/* Values of the unknowns that a predictor derives from the increments of the last steps. */
 static void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predictor, kowalevski_gauss_lanes *z)
 {
-    if (predictor + 1 < kowalevski_gauss_PREDICTORS) { /* the last one reads the last step only */
+    if (predictor + 1 < kowalevski_gauss_PREDICTORS) { /* the last predictor reads the last step only */
         kowalevski_gauss_mixed_twice(kowalevski_gauss_prediction[predictor], past->moves[past->latest],
             past->moves[1 - past->latest], z);
         return;
@@ -430,7 +430,7 @@ static void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predict
     kowalevski_gauss_mixed(kowalevski_gauss_prediction[predictor], past->moves[past->latest], z);
 }
 
-/* The predictor that would have come nearest to the values z of the unknowns. */
+/* Index of the predictor that would have been nearest to the values z of the unknowns. */
 static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale,
     kowalevski_gauss_lanes *z)
 {
@@ -448,17 +448,17 @@ static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, doubl
     return best;
 }
 
-/* Moves as seen from the end of a step, where the next one starts. */
+/* Stage increments in the frame of the end of a step, where the next step starts. */
 static void kowalevski_gauss_see(const kowalevski_gauss_solver *s,
     const double end[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_lanes *moves,
     double seen[kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH])
 {
     kowalevski_gauss_lanes turned[kowalevski_gauss_UNKNOWNS];
     kowalevski_gauss_next_frame_lanes(s->coef, end, moves, turned);
-    memcpy(seen, turned, sizeof turned); /* which need not be aligned as lanes are */
+    memcpy(seen, turned, sizeof turned); /* may be unaligned */
 }
 
-/* Store the moves of a step with this end, for the prediction of the next one. */
+/* Store the stage increments of a step with this end, to predict the next step. */
 static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, const double end[kowalevski_gauss_UNKNOWNS],
     kowalevski_gauss_lanes *moves)
 {
@@ -487,9 +487,9 @@ enum {
 /* so is the second up to this that changes no less than the one before */
 #define kowalevski_gauss_NEARLY_ROUNDING 2e-14
 
-/* Whether changes shrink no more since they are rounding: 1; 0 if they still shrink, and -1 if they do not
-   converge. By the changes so far, of which last is the one before; past->rate follows the rate of
-   changes. */
+/* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if they do not
+   converge. last is the change before the latest one; past->rate is updated to the factor by which changes
+   shrink. */
 typedef struct {
     double last;
     int rising, rises;
@@ -505,17 +505,17 @@ static int kowalevski_gauss_judge(kowalevski_gauss_history *past, kowalevski_gau
     if (rate >= 1.0 && change <= kowalevski_gauss_NEARLY_ROUNDING) ++sweeps->rises;
     sweeps->last = change;
     if ((slow && change <= kowalevski_gauss_ROUNDING) || sweeps->rises > 1) {
-        /* or the first change was rounding too */
+        /* or the first change was at rounding level */
         past->sweeps = (sweep == past->sweeps || rate > 2.0 * past->rate ? past->sweeps : sweep) - 1;
         return 1;
     }
-    /* transients may rise over as many sweeps as there are stages */
+    /* transients may grow for as many sweeps as there are stages */
     sweeps->rising = rate >= 1.0 ? sweeps->rising + 1 : 0;
     return sweeps->rising < (int)kowalevski_gauss_NODES + kowalevski_gauss_MOST_RISING ? 0 : -1;
 }
 
-/* Solve for the moves of all stages by sweeps, from those that the last steps predict. The change by a sweep
-   is looked at from that one on that is expected to be the last. */
+/* Solve for the increments of all stages by fixed-point sweeps, starting from the prediction. Changes are
+   measured only from the sweep on that is expected to be the last. */
 static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solver *s,
     double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *moves)
 {
@@ -545,7 +545,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
             if (!isfinite(square)) return kowalevski_gauss_NOT_FINITE;
             if (judgement < 0) return kowalevski_gauss_NO_CONVERGENCE;
             if (judgement > 0) {
-                /* the sweep before had left about as much as this one changed */
+                /* the remaining error of the sweep before was about the latest change */
                 if (solved)
                     past->sweeps = square <= 16.0 * kowalevski_gauss_SOLVED * kowalevski_gauss_SOLVED
                     ? sweep - 1 : sweep;
@@ -561,7 +561,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
     return kowalevski_gauss_NO_CONVERGENCE;
 }
 
-/* One step. If it fails, the state is as before. */
+/* Make one step. If it fails, the state is unchanged. */
 static kowalevski_gauss_status kowalevski_gauss_attempt(kowalevski_gauss_solver *s)
 {
     double point[kowalevski_gauss_POINT], end[kowalevski_gauss_UNKNOWNS], change[kowalevski_gauss_DIM];
@@ -594,7 +594,7 @@ kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     return kowalevski_gauss_OK;
 }
 
-/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
 static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s)
 {
     const kowalevski_gauss_status status = kowalevski_gauss_attempt(s);
@@ -648,7 +648,7 @@ kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
 
 const char *kowalevski_gauss_status_string(kowalevski_gauss_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case kowalevski_gauss_OK: return "ok";
     case kowalevski_gauss_NO_CONVERGENCE: return "no convergence: the step is too large";
     case kowalevski_gauss_SINGULAR: return "singular Newton matrix: the step is too large";
@@ -662,14 +662,14 @@ size_t kowalevski_gauss_solver_size(void) { return sizeof(kowalevski_gauss_solve
 size_t kowalevski_gauss_solver_steps_done(const kowalevski_gauss_solver *s) { return s->steps; }
 
 /* ---- Members of an ensemble ---- */
-/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
-   where it is 0, all have the first. */
+/* Arguments of an ensemble. own = 1: member m has the parameters params[m] and the step h[m]; own = 0: all
+   have those of member 0. */
 typedef struct {
     double *x;
     size_t members, steps, own;
     const kowalevski_gauss_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;         /* 0 where there are no frames */
+    size_t stride;         /* 0 without frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } kowalevski_gauss_members;
@@ -688,7 +688,7 @@ static kowalevski_gauss_members kowalevski_gauss_asked(const kowalevski_gauss_pa
     return all;
 }
 
-/* Start a member at a state, with what is its own, and with all that its step size asks for. */
+/* Initialise a member at a state, with its parameters and all coefficients for its step size. */
 static kowalevski_gauss_status kowalevski_gauss_begin_member(const kowalevski_gauss_members *all, size_t m,
     const double x[kowalevski_gauss_DIM], kowalevski_gauss_solver *s)
 {
@@ -697,7 +697,7 @@ static kowalevski_gauss_status kowalevski_gauss_begin_member(const kowalevski_ga
     return status == kowalevski_gauss_OK ? kowalevski_gauss_integrate(s, all->h[m * all->own], 0) : status;
 }
 
-/* The same at the state that the ensemble has for it, which is x then. */
+/* Initialise a member at its state in the ensemble, which is copied to x. */
 static kowalevski_gauss_status kowalevski_gauss_take_member(const kowalevski_gauss_members *all, size_t m,
     double x[kowalevski_gauss_DIM], kowalevski_gauss_solver *s)
 {
@@ -705,7 +705,7 @@ static kowalevski_gauss_status kowalevski_gauss_take_member(const kowalevski_gau
     return kowalevski_gauss_begin_member(all, m, x, s);
 }
 
-/* How many steps there are to the next frame, or to the end. */
+/* Number of steps to the next frame, or to the end. */
 static size_t kowalevski_gauss_to_frame(const kowalevski_gauss_members *all, size_t done)
 {
     const size_t left = all->steps - done;
@@ -713,7 +713,7 @@ static size_t kowalevski_gauss_to_frame(const kowalevski_gauss_members *all, siz
         : left;
 }
 
-/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+/* Write the frame of a member, if one is due after this number of steps: x, or NaN if x is NULL. */
 static void kowalevski_gauss_put_frame(const kowalevski_gauss_members *all, size_t m, size_t done,
     const double *x)
 {
@@ -722,7 +722,7 @@ static void kowalevski_gauss_put_frame(const kowalevski_gauss_members *all, size
             ? x[i] : (double)NAN;
 }
 
-/* The steps of a member after so many, by itself. */
+/* Make the remaining steps of a member, one by one. */
 static kowalevski_gauss_status kowalevski_gauss_end_member(const kowalevski_gauss_members *all, size_t m,
     size_t done, kowalevski_gauss_solver *s, kowalevski_gauss_status status)
 {
@@ -735,7 +735,7 @@ static kowalevski_gauss_status kowalevski_gauss_end_member(const kowalevski_gaus
     return status;
 }
 
-/* Where a member ends. */
+/* Write the final state of a member. */
 static void kowalevski_gauss_put_member(const kowalevski_gauss_members *all, size_t m,
     const double x[kowalevski_gauss_DIM], kowalevski_gauss_status status)
 {
@@ -744,7 +744,7 @@ static void kowalevski_gauss_put_member(const kowalevski_gauss_members *all, siz
 }
 
 /* ---- Ensembles ---- */
-/* All members. The first status that is not OK. */
+/* Integrate all members. Returns the first status that is not OK. */
 static kowalevski_gauss_status kowalevski_gauss_run(const kowalevski_gauss_members *all)
 {
     kowalevski_gauss_status result = kowalevski_gauss_OK;

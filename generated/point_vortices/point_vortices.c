@@ -10,8 +10,8 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
- *   method where sweeps fail; What is seen at sites
- * body-sha256: 887beac30a94c3066ebf101ed70ce40268e1011521345601cf9aab62bbe02f1f
+ *   method, for stages that fixed-point sweeps do not solve; Energy, Casimirs, right-hand side
+ * body-sha256: ac80c3d6733a81bc4b3d9cf627ef926e751da35326af4766d187bc191e9bb90a
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -55,7 +55,7 @@ static void point_vortices_prepare(const point_vortices_params *params, double h
 }
 
 /* ---- Rows of sites ---- */
-/* A piece of a row, and what loops over its sites are told. */
+/* Segment of a row, with the pointers and numbers that loops over its sites read. */
 typedef struct {
     const point_vortices_solver *s;
     double *const *x;                  /* see point_vortices_solver */
@@ -64,7 +64,7 @@ typedef struct {
     double *const *varied;             /* tangent vector: a variation of x */
 } point_vortices_row;
 
-/* Before a loop over sites: tells compilers that they are independent. */
+/* Before a loop over sites: tells the compiler that iterations are independent. */
 #if defined(__clang__)
 #define point_vortices_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -74,13 +74,14 @@ typedef struct {
 #define point_vortices_EACH_SITE
 #endif
 
-/* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
+/* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
     if (sizes == NULL || sizes[0] < point_vortices_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share lines of the cache */
+    /* rows a multiple of a page apart would compete for the same cache sets */
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide);
     return 1;
 }
 
@@ -96,15 +97,15 @@ static inline point_vortices_row point_vortices_row_of(const point_vortices_solv
     return row;
 }
 
-enum { point_vortices_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
+enum { point_vortices_PIECE = 256 }; /* sites of a work item, for any number of threads */
 
-/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+/* Number of segments of the row; the last one is the longest, so that halos copy from one segment only. */
 static size_t point_vortices_units(const point_vortices_solver *s)
 {
     return s->length < 2 * point_vortices_PIECE ? 1 : (size_t)s->length / point_vortices_PIECE;
 }
 
-/* The piece of that number. */
+/* Segment with this number, a work item of threads. */
 static inline point_vortices_row point_vortices_piece_of(const point_vortices_solver *s, size_t unit)
 {
     point_vortices_row row = point_vortices_row_of(s);
@@ -275,7 +276,7 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 /* ---- The lattice ---- */
 #define point_vortices_PROBE_STEP 1e-100 /* so short that coefficients are finite */
 
-/* Before a loop over pieces: they are worked at in parallel. */
+/* Before a loop over row segments: threads share its iterations. */
 #ifdef _OPENMP
 #define point_vortices_EACH_PIECE _Pragma("omp parallel for if (s->sites > 512)")
 #define point_vortices_ONE_BY_ONE _Pragma("omp critical")
@@ -284,10 +285,10 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 #define point_vortices_ONE_BY_ONE
 #endif
 
-enum { point_vortices_BUFFER = 256 }; /* densities that are added in one go */
+enum { point_vortices_BUFFER = 256 }; /* number of densities summed in one pass */
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
+/* Doubles from one array to the next. Arrays start at different places of their pages: a load that has the
+   page offset of a pending store would wait for it. */
 static size_t point_vortices_block(size_t rows, ptrdiff_t width)
 {
     const size_t block = rows * (size_t)width, apart = 512 / point_vortices_ARRAYS / 8 * 8;
@@ -303,7 +304,7 @@ size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
     return doubles * sizeof(double) + 64;
 }
 
-/* Values of sites, the last axis fastest, into rows. */
+/* Copy values of sites, the last axis fastest, into rows. */
 static void point_vortices_put(const point_vortices_solver *s, double *rows, const double *values)
 {
     double *row = rows;
@@ -311,14 +312,14 @@ static void point_vortices_put(const point_vortices_solver *s, double *rows, con
     memcpy(row, values, (size_t)s->length * sizeof *row);
 }
 
-/* The sites of fields, without what is beside their rows. */
+/* Copy fields to x[field][site], without the halo. */
 static void point_vortices_take(const point_vortices_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k)
         memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
-/* The values of a parameter at sites, or one value for all. */
+/* Store the values of a parameter at sites, or one value for all sites. */
 static void point_vortices_put_parameter(const point_vortices_solver *s, double *rows, const double *values,
     double value)
 {
@@ -389,7 +390,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     return point_vortices_OK;
 }
 
-/* What depends on the step size; nothing where that is as before. */
+/* Compute coefficients for the step size h, if h has changed. */
 static point_vortices_status point_vortices_set_step(point_vortices_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return point_vortices_BAD_ARGUMENT;
@@ -410,7 +411,7 @@ static int point_vortices_all_hold(const point_vortices_solver *s, double *const
     return 1;
 }
 
-/* Fields, with what is beside their rows. */
+/* Copy fields with their halo. */
 static void point_vortices_copy(double *const *to, double *const *from, const point_vortices_solver *s)
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k) memcpy(to[k], from[k], (size_t)s->width * sizeof **from);
@@ -427,15 +428,14 @@ enum {
 #define point_vortices_SLOW 0.6               /* slower changes are left to Newton's method, ... */
 #define point_vortices_NEARLY_SETTLED 0x1p-30 /* ... unless they are below this */
 
-enum { point_vortices_WIDTH = 32 }; /* numbers that are kept apart, so that loops vectorise */
+enum { point_vortices_WIDTH = 32 }; /* number of partial results, so that loops vectorise */
 
 static inline void point_vortices_raise(double *largest, double value)
 {
     *largest = value > *largest ? value : *largest;
 }
 
-/* Takes what y was and is in a piece into the largest change and the largest y of each field; what is no
-   number is left out. */
+/* Update the largest change and the largest |y| of each field by a row segment; NaN is left out. */
 static void point_vortices_measure(const point_vortices_solver *s, int now, size_t unit, double *change,
     double *size)
 {
@@ -465,8 +465,8 @@ static void point_vortices_measure(const point_vortices_solver *s, int now, size
     }
 }
 
-/* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y
-   is not. */
+/* Make a fixed-point sweep from s->y[now] to the other array; coef = NULL keeps what is there. Returns the
+   change of y relative to the size of each field, not finite if y is not. */
 static double point_vortices_relaxed(point_vortices_solver *s, const double *coef, int now)
 {
     const size_t units = point_vortices_units(s);
@@ -480,13 +480,13 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
     for (int k = 0; k < point_vortices_DIM; ++k) point_vortices_raise(&largest, size[k]);
     for (int k = 0; k < point_vortices_DIM; ++k) {
         s->usual[k] = size[k] + point_vortices_LEAST_SIZE * largest + 1e-300;
-        change[k] /= s->usual[k]; /* no number where both are infinite */
+        change[k] /= s->usual[k]; /* NaN if both are infinite */
         moved = isnan(change[k]) || change[k] > moved ? change[k] : moved;
     }
     return moved;
 }
 
-/* x and the extrapolated y - x into s->y[0], with the copied ends. */
+/* Predict: s->y[0] = x + extrapolated y - x, with the halo. */
 static void point_vortices_predict(const point_vortices_solver *s, double *const *x, int stage)
 {
     point_vortices_EACH_PIECE
@@ -501,8 +501,8 @@ static void point_vortices_predict(const point_vortices_solver *s, double *const
         }
 }
 
-/* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best
-   order. */
+/* Update the predictor with the solution y of a stage. The error of the prediction of order d is the d-th
+   difference; the order with the smallest error is used next. */
 static void point_vortices_remember(point_vortices_solver *s, double *const *from, int stage, int now)
 {
     point_vortices_guess *guess = &s->guess[stage];
@@ -536,7 +536,7 @@ static void point_vortices_remember(point_vortices_solver *s, double *const *fro
     if (guess->count < point_vortices_DIFFERENCES) ++guess->count;
 }
 
-/* Begin without guesses, and with sweeps. */
+/* Clear the predictors, and return to fixed-point sweeps. */
 static void point_vortices_forget(point_vortices_solver *s)
 {
     s->stiff = 0;
@@ -550,7 +550,7 @@ static void point_vortices_forget(point_vortices_solver *s)
 #define point_vortices_USEFUL 0.9    /* ... and how well it has to */
 #define point_vortices_PLAUSIBLE 1.5 /* the motion reaches no further, in sizes of x and of its motion */
 
-/* The sum of x y over all sites and fields, in usual sizes. Those of pieces are added in their order: the
+/* Scalar product of x and y, in units of the usual size of each field. Row segments are added in order: the
    bits do not depend on threads. */
 static double point_vortices_product(const point_vortices_solver *s, double *const *x, double *const *y)
 {
@@ -575,7 +575,7 @@ static double point_vortices_product(const point_vortices_solver *s, double *con
     return sum;
 }
 
-/* to = a x + b y, with the copied ends. */
+/* to = a x + b y, with the halo. */
 static void point_vortices_combine(const point_vortices_solver *s, double *const *to, double a,
     double *const *x, double b, double *const *y)
 {
@@ -592,7 +592,7 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
     }
 }
 
-/* to = v - what a sweep, or its transpose, does to that variation of s->y[now]. */
+/* to = v - (derivative of a sweep at s->y[now], or its transpose) v. */
 static void point_vortices_multiply(const point_vortices_solver *s, const double *coef, int now,
     double *const *v, double *const *to)
 {
@@ -602,9 +602,9 @@ static void point_vortices_multiply(const point_vortices_solver *s, const double
     point_vortices_combine(s, to, 1.0, v, -1.0, to);
 }
 
-/* to = from - what solves matrix(v) = s->space[0], as well as a space of so many directions allows: GMRES,
-   after Y. Saad and M. H. Schultz, without a restart. The matrix is that of point_vortices_multiply. The
-   length of s->space[0]; not finite if this is of no use. */
+/* to = from - v, where matrix(v) = s->space[0] is solved by GMRES (Y. Saad and M. H. Schultz) with
+   point_vortices_DIRECTIONS directions, without restart. The matrix is that of point_vortices_multiply.
+   Returns the norm of s->space[0], or infinity if the solution is useless. */
 static double point_vortices_krylov(point_vortices_solver *s, const double *coef, int now,
     double *const *from, double *const *to)
 {
@@ -647,8 +647,8 @@ static double point_vortices_krylov(point_vortices_solver *s, const double *coef
     return length;
 }
 
-/* ---- Newton's method where sweeps fail ---- */
-/* The sum of the distances of y from x; with x added that of the sizes of x. */
+/* ---- Newton's method, for stages that fixed-point sweeps do not solve ---- */
+/* Sum of the distances of y from x, plus added times the sum of the sizes of x. */
 static double point_vortices_distance(const point_vortices_solver *s, int side, double added)
 {
     double sum = 0.0;
@@ -659,8 +659,8 @@ static double point_vortices_distance(const point_vortices_solver *s, int side, 
     return sum;
 }
 
-/* The correction of s->y[now] by the matrix, which is kept while it serves, or as well as a Krylov space
-   allows, to the other: how far y moves, in sizes of each field. Not a number if it cannot be made. */
+/* Correct s->y[now] by a Newton step, with a matrix that is reused while it contracts or with a Krylov space,
+   into the other array. Returns the change relative to the size of each field; not finite on failure. */
 static double point_vortices_corrected(point_vortices_solver *s, const double *coef, int now)
 {
     if (!isfinite(point_vortices_relaxed(s, coef, now))) return HUGE_VAL;
@@ -669,7 +669,7 @@ static double point_vortices_corrected(point_vortices_solver *s, const double *c
     return point_vortices_relaxed(s, NULL, now);
 }
 
-/* How far from x a solution is one of the motion. */
+/* Largest distance from x at which a solution is accepted as part of the motion. */
 static double point_vortices_range(point_vortices_solver *s, const double *coef)
 {
     point_vortices_copy(s->y[0], s->x, s);
@@ -677,8 +677,8 @@ static double point_vortices_range(point_vortices_solver *s, const double *coef)
     return point_vortices_PLAUSIBLE * point_vortices_distance(s, 1, 1.0);
 }
 
-/* y in the middle of a stage, from the guess in s->y[0] until only rounding would change: by sweeps or, where
-   these have failed, by corrections, and then no farther from x than in that range. It is in s->y[*now]. */
+/* Solve for y of a stage from the prediction in s->y[0], to rounding level: by fixed-point sweeps or, if
+   s->stiff, by Newton corrections, which must end within range of x. The solution is s->y[*now]. */
 static point_vortices_status point_vortices_middle(point_vortices_solver *s, const double *coef, double range,
     int *now)
 {
@@ -692,7 +692,7 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
         ++s->sweeps;
         *now = 1 - *now;
         if (!isfinite(change)) return failed;
-        /* what further sweeps would change, with the rate change / before; or changes shrink no more */
+        /* expected change by further sweeps, at the rate change / before; or rounding level */
         if (change * change <= shrunk * point_vortices_SETTLED || (shrunk <= 0.0
             && change <= point_vortices_ROUNDING && count > 0))
             return (s->stiff ? point_vortices_distance(s, *now, 0.0) <= range : point_vortices_all_hold(s,
@@ -704,7 +704,7 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
     return point_vortices_NO_CONVERGENCE;
 }
 
-/* The stages of a step. */
+/* Make the stages of a step. */
 static point_vortices_status point_vortices_stages(point_vortices_solver *s)
 {
     const size_t units = point_vortices_units(s);
@@ -730,7 +730,7 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s)
     return point_vortices_all_hold(s, s->x) ? point_vortices_OK : point_vortices_NOT_FINITE;
 }
 
-/* One step; if it cannot be made, none. */
+/* Make one step, or leave the state unchanged. */
 static point_vortices_status point_vortices_try(point_vortices_solver *s)
 {
     point_vortices_copy(s->before, s->x, s);
@@ -761,11 +761,11 @@ point_vortices_status point_vortices_step(point_vortices_solver *s, double h)
 
 void point_vortices_state(const point_vortices_solver *s, double *x) { point_vortices_take(s, s->x, x); }
 
-/* To x and so many times what is there. */
+/* Set the state to x + kept * state. */
 static point_vortices_status point_vortices_move(point_vortices_solver *s, const double *x, double kept)
 {
     if (s == NULL || x == NULL) return point_vortices_BAD_ARGUMENT;
-    for (int moving = 0; moving < 2; ++moving) /* nothing, unless all of it can be */
+    for (int moving = 0; moving < 2; ++moving) /* first check all values, then change them */
         for (size_t r = 0; r < point_vortices_DIM * s->rows; ++r) {
             double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
             for (ptrdiff_t i = 0; i < s->length; ++i) {
@@ -787,7 +787,7 @@ point_vortices_status point_vortices_kick(point_vortices_solver *s, const double
     return point_vortices_move(s, change, 1.0);
 }
 
-/* ---- What is seen at sites ---- */
+/* ---- Energy, Casimirs, right-hand side ---- */
 double point_vortices_hamiltonian(const point_vortices_solver *s)
 {
     double density[point_vortices_BUFFER], sum = 0.0, rest = 0.0;
@@ -796,7 +796,7 @@ double point_vortices_hamiltonian(const point_vortices_solver *s)
         row.from = row.to;
         row.to = s->length - row.from > point_vortices_BUFFER ? row.from + point_vortices_BUFFER : s->length;
         point_vortices_energy_row(&row, density);
-        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated summation after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -821,7 +821,7 @@ void point_vortices_vector_field(const point_vortices_solver *s, double *out)
 
 const char *point_vortices_status_string(point_vortices_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case point_vortices_OK: return "ok";
     case point_vortices_NO_CONVERGENCE: return "no convergence: the step is too large";
     case point_vortices_SINGULAR: return "singular Newton matrix: the step is too large";

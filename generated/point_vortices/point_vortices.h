@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 920474e247d8aeefa341fdd5e1f8846e32ea75aaa2dbd50442fd6c340c29819f
+ * body-sha256: 2880603f540fbccd08f4198c665544deec91074c7867654c2a3c62e9cfbffffd
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -67,7 +67,7 @@ typedef struct {
     double t_before_h;
 } point_vortices_solver;
 
-/* The bytes of memory that point_vortices_init needs for these sizes; 0 if they are not admissible. */
+/* Bytes of memory that point_vortices_init needs for these sizes; 0 if they are not admissible. */
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has

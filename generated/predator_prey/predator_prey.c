@@ -7,9 +7,9 @@
  *   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build predator_prey
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
- *   Newton's method; The solver
- * body-sha256: 477f306094e3eed70b6725120d5b56fcafb476bf9d721cf92d0ca77b7ae8a5c5
+ * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
+ *   method; The solver
+ * body-sha256: 32a4a274312f2d3c8a53cc2ec10b844df0c5522fb77e51ee9b794c5f99cc2517
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -117,8 +117,8 @@ static int predator_prey_finite(const double *values, int count)
     return count == 0;
 }
 
-/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the
-   change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
+   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
 static int predator_prey_advance(predator_prey_solver *s, const double *change, const double *small)
 {
     double x[predator_prey_DIM], carry[predator_prey_DIM];
@@ -134,7 +134,7 @@ static int predator_prey_advance(predator_prey_solver *s, const double *change, 
     return 1;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
 static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_DIM],
     double side[predator_prey_DIM])
 {
@@ -167,11 +167,11 @@ static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_D
     return 1;
 }
 
-/* ---- Starting guesses ---- */
+/* ---- Predictors ---- */
 #define predator_prey_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
 
-/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
-   equation of a step has solutions that have nothing to do with the motion. */
+/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
+   away, where the equation of a step has solutions unrelated to the motion. */
 static int predator_prey_predict(const predator_prey_history *history, double value[predator_prey_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -184,7 +184,7 @@ static int predator_prey_predict(const predator_prey_history *history, double va
     return history->order > 0 && distance <= predator_prey_REACH * size;
 }
 
-/* Take in a solved value. The guess of order k missed it by its k-th difference: the next has the best. */
+/* Update the predictor with a solution; the k-th difference is the error of the prediction of order k. */
 static void predator_prey_remember(predator_prey_history *history, const double value[predator_prey_DIM])
 {
     double least = HUGE_VAL, next[predator_prey_DIM];
@@ -210,8 +210,8 @@ static void predator_prey_remember(predator_prey_history *history, const double 
 #define predator_prey_PLAUSIBLE 1.5
 #define predator_prey_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
-   by a point far away, at another energy, that has nothing to do with it. */
+/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
+   at another energy, and unrelated to the motion. */
 static int predator_prey_plausible(const predator_prey_solver *s, const double increment[predator_prey_DIM])
 {
     double moved = 0.0, size = 0.0, field[predator_prey_DIM], point[predator_prey_DIM], H[3];
@@ -223,7 +223,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
     predator_prey_vector_field(&s->params, s->x, field);
     for (int i = 0; i < predator_prey_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= predator_prey_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < predator_prey_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = predator_prey_hamiltonian(&s->params, point);
     }
@@ -231,7 +231,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
+/* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
 #define predator_prey_FLOOR 0.0 /* components of y are measured no finer than by this part of the largest */
 
@@ -251,9 +251,9 @@ static double predator_prey_size(const double y[predator_prey_DIM], const double
     return size;
 }
 
-/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   last correction changes the increment to first order, without an evaluation: it is accepted if the error
-   that remains, quadratic in it, is below predator_prey_TOLERANCE. */
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
+   last correction changes the increment to first order, without another evaluation: it is accepted if the
+   remaining error, quadratic in it, is below predator_prey_TOLERANCE. */
 static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
 {
     double y[predator_prey_DIM], delta[predator_prey_DIM], displacement[predator_prey_DIM],
@@ -276,7 +276,7 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
             && size > predator_prey_SHRINKING * previous;
         previous = size;
         if (!(remaining <= predator_prey_TOLERANCE || stalled)) continue;
-        double small[predator_prey_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        double small[predator_prey_DIM] = { 0.0 }; /* correction of the increment, and compensation */
         for (int i = 0; i < predator_prey_DIM; ++i)
             for (int j = 0; j < predator_prey_DIM; ++j)
                 small[i] -= slope[i * predator_prey_DIM + j] * delta[j];
@@ -309,7 +309,7 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     return predator_prey_OK;
 }
 
-/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
 static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 {
     const predator_prey_status status = predator_prey_attempt(s);
@@ -350,7 +350,7 @@ predator_prey_status predator_prey_set_state(predator_prey_solver *s, const doub
     memcpy(from, s->x, sizeof from);
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
-    /* what guesses begin from moves with the state */
+    /* shift the predictors with the state */
     for (int i = 0; i < predator_prey_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
     return predator_prey_OK;
 }
@@ -367,7 +367,7 @@ predator_prey_status predator_prey_kick(predator_prey_solver *s, const double ch
 
 const char *predator_prey_status_string(predator_prey_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case predator_prey_OK: return "ok";
     case predator_prey_NO_CONVERGENCE: return "no convergence: the step is too large";
     case predator_prey_SINGULAR: return "singular Newton matrix: the step is too large";

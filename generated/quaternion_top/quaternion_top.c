@@ -8,9 +8,9 @@
  *   one evaluation of the equation for p: 271 additions, 462 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build quaternion_top
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
- *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 685e0d4e215e16bf295f18e21a6c2ea01056b4062f7708ed34723d1fec438973
+ * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
+ *   dm/dt = pi(m) p; The solver
+ * body-sha256: 9156f618fbb05e0231a140f7618b5c075007fca3d741c7ac2645218c8579dbc4
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -290,8 +290,8 @@ static int quaternion_top_finite(const double *values, int count)
     return count == 0;
 }
 
-/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the
-   change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
+   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
 static int quaternion_top_advance(quaternion_top_solver *s, const double *change, const double *small)
 {
     double x[quaternion_top_DIM], carry[quaternion_top_DIM];
@@ -307,7 +307,7 @@ static int quaternion_top_advance(quaternion_top_solver *s, const double *change
     return 1;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
 static int quaternion_top_solve(double matrix[quaternion_top_DIM * quaternion_top_DIM],
     double side[quaternion_top_DIM])
 {
@@ -340,11 +340,11 @@ static int quaternion_top_solve(double matrix[quaternion_top_DIM * quaternion_to
     return 1;
 }
 
-/* ---- Starting guesses ---- */
+/* ---- Predictors ---- */
 #define quaternion_top_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
 
-/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
-   equation of a step has solutions that have nothing to do with the motion. */
+/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
+   away, where the equation of a step has solutions unrelated to the motion. */
 static int quaternion_top_predict(const quaternion_top_history *history, double value[quaternion_top_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -357,7 +357,7 @@ static int quaternion_top_predict(const quaternion_top_history *history, double 
     return history->order > 0 && distance <= quaternion_top_REACH * size;
 }
 
-/* Take in a solved value. The guess of order k missed it by its k-th difference: the next has the best. */
+/* Update the predictor with a solution; the k-th difference is the error of the prediction of order k. */
 static void quaternion_top_remember(quaternion_top_history *history, const double value[quaternion_top_DIM])
 {
     double least = HUGE_VAL, next[quaternion_top_DIM];
@@ -383,8 +383,8 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
 #define quaternion_top_PLAUSIBLE 1.5
 #define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
-   by a point far away, at another energy, that has nothing to do with it. */
+/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
+   at another energy, and unrelated to the motion. */
 static int quaternion_top_plausible(const quaternion_top_solver *s,
     const double increment[quaternion_top_DIM])
 {
@@ -397,7 +397,7 @@ static int quaternion_top_plausible(const quaternion_top_solver *s,
     quaternion_top_vector_field(&s->params, s->x, field);
     for (int i = 0; i < quaternion_top_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= quaternion_top_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < quaternion_top_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = quaternion_top_hamiltonian(&s->params, point);
     }
@@ -697,8 +697,9 @@ enum {
 /* part of the residual that an iteration with a useful Jacobian leaves at most */
 #define quaternion_top_CONTRACTING 0.05
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
-   its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope. An expansion with gaps
+   between its terms, like t + t^9, or across the kink of an absolute value, may only seem to have
+   converged. */
 static int quaternion_top_holds(const double *coef, const double p[quaternion_top_DIM],
     const double m[quaternion_top_DIM], const double slope[quaternion_top_DIM])
 {
@@ -710,8 +711,8 @@ static int quaternion_top_holds(const double *coef, const double p[quaternion_to
     return 1;
 }
 
-/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m -
-   start. The number of terms follows from their size; 0 if quaternion_top_TERMS do not suffice. */
+/* Path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m - start.
+   The size of the terms decides their number. Returns 0 if quaternion_top_TERMS terms do not suffice. */
 static int quaternion_top_piece(const double *coef, const double p[quaternion_top_DIM],
     const double start[quaternion_top_DIM], double change[quaternion_top_DIM],
     double mean[quaternion_top_DIM])
@@ -743,8 +744,8 @@ static int quaternion_top_piece(const double *coef, const double p[quaternion_to
     return 0;
 }
 
-/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the
-   path lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all
+/* Whole path from x, in 1, 2, 4, ... pieces until each expansion converges. For any p, the end of the path
+   lies on the symplectic leaf of x. Returns 0 if the path is too long or leaves the domain. *made counts all
    pieces. */
 static int quaternion_top_path(const double *coef, const double x[quaternion_top_DIM],
     const double p[quaternion_top_DIM], double change[quaternion_top_DIM], double mean[quaternion_top_DIM],
@@ -772,8 +773,8 @@ static int quaternion_top_path(const double *coef, const double x[quaternion_top
     return 0;
 }
 
-/* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
-   x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
+/* Residual p - grad S_h(mean) of the equation for p, where mean is that of the path; also the change of x
+   along the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
 static int quaternion_top_residual(quaternion_top_solver *s, const double *coef,
     const double p[quaternion_top_DIM], double y[quaternion_top_DIM], double residual[quaternion_top_DIM],
     double change[quaternion_top_DIM], double jacobian[quaternion_top_DIM * quaternion_top_DIM], int *made)
@@ -787,7 +788,7 @@ static int quaternion_top_residual(quaternion_top_solver *s, const double *coef,
     return 1;
 }
 
-/* The Jacobian by differences, for steps so large that the approximate one does not contract. */
+/* Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
 static int quaternion_top_differences(quaternion_top_solver *s, const double *coef,
     const double p[quaternion_top_DIM], const double residual[quaternion_top_DIM],
     double jacobian[quaternion_top_DIM * quaternion_top_DIM], int *made)
@@ -805,9 +806,8 @@ static int quaternion_top_differences(quaternion_top_solver *s, const double *co
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
-   than quaternion_top_MOST_PIECES pieces of paths, the step is so large that a solution would mean
-   nothing. */
+/* Solve p = grad S_h(mean of the path from x with covector p), and move to the end of that path. If that
+   needs more than quaternion_top_MOST_PIECES pieces, the step is too large for a meaningful solution. */
 static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
 {
     const double *coef = s->coef;
@@ -845,8 +845,8 @@ static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
 }
 
 /* ---- The solver ---- */
-/* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
-   that gives nothing finite. */
+/* For each Casimir C the multiple c that minimises |grad H - c grad C| at the initial state; zero where it is
+   not finite. */
 static void quaternion_top_choose_gauge(const quaternion_top_params *params,
     const double x[quaternion_top_DIM], double gauge[quaternion_top_GAUGES])
 {
@@ -886,7 +886,7 @@ quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quater
     return quaternion_top_init_gauge(s, params, x0, NULL);
 }
 
-/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
 static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 {
     const quaternion_top_status status = quaternion_top_attempt(s);
@@ -927,7 +927,7 @@ quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const d
     memcpy(from, s->x, sizeof from);
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
-    /* what guesses begin from moves with the state */
+    /* shift the predictors with the state */
     for (int i = 0; i < quaternion_top_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
     return quaternion_top_OK;
 }
@@ -944,7 +944,7 @@ quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double
 
 const char *quaternion_top_status_string(quaternion_top_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case quaternion_top_OK: return "ok";
     case quaternion_top_NO_CONVERGENCE: return "no convergence: the step is too large";
     case quaternion_top_SINGULAR: return "singular Newton matrix: the step is too large";

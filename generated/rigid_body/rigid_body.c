@@ -9,10 +9,11 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
- *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
- *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
- *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 5f7e340995c68864c1bfbf7b59f2aea2dfc4bf290d61bc0ec54df4d4959f030d
+ *   Predictors; The implicit step, by Newton's method; The choice of the gauge: multiples of Casimirs
+ *   subtracted from H; The solver; SIMD lanes: several steps or members at once; Newton's method in
+ *   lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members:
+ *   implicit steps; Ensembles
+ * body-sha256: 0e8960ac866b6baa0aec11578486641192d291282b2f9e1cdfcb98f5728544ec
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -355,8 +356,8 @@ static int rigid_body_finite(const double *values, int count)
     return count == 0;
 }
 
-/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the
-   change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
+   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
 static int rigid_body_advance(rigid_body_solver *s, const double *change, const double *small)
 {
     double x[rigid_body_DIM], carry[rigid_body_DIM];
@@ -372,10 +373,9 @@ static int rigid_body_advance(rigid_body_solver *s, const double *change, const 
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot with a larger one is far from 1 */
-#define rigid_body_LARGEST_RECIPROCAL 1e3
+#define rigid_body_LARGEST_RECIPROCAL 1e3 /* a pivot with a larger reciprocal is far from 1 */
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
 static int rigid_body_solve_pivoting(double matrix[rigid_body_DIM * rigid_body_DIM],
     double side[rigid_body_DIM])
 {
@@ -407,7 +407,7 @@ static int rigid_body_solve_pivoting(double matrix[rigid_body_DIM * rigid_body_D
 }
 
 /* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
+   suffices unless a pivot is far from 1; then rows are exchanged. Returns 0 if singular. */
 static int rigid_body_solve(double matrix[rigid_body_DIM * rigid_body_DIM], double side[rigid_body_DIM])
 {
     double solution[rigid_body_DIM], reciprocal[rigid_body_DIM], largest = 0.0;
@@ -420,23 +420,23 @@ static int rigid_body_solve(double matrix[rigid_body_DIM * rigid_body_DIM], doub
 }
 
 /* ---- Recurrences fitted to the last values ---- */
-/* A recurrence uses no more values than leave so little, in sizes of the largest. */
+/* A fit stops adding values once the residual is below this, relative to the largest value. */
 #define rigid_body_ENOUGH 3e-12
 
-/* The ridge of the least squares: the level of rounding. */
+/* Regularisation of the least squares: the level of rounding. */
 #define rigid_body_RIDGE 1e-15
 
-/* How far a recurrence may miss values that it was not fitted to, in sizes of the largest: beyond, the motion
-   is chaotic or the step long, and other guesses are as good. */
+/* Largest accepted error of a recurrence for values it was not fitted to, relative to the largest value.
+   Beyond it, the motion is chaotic or the step long, and other predictors are as good. */
 #define rigid_body_HOPELESS 1e-7
 
-/* equations of the least squares */
+/* equations of the least-squares problem */
 enum { rigid_body_ROWS = (int)rigid_body_REMEMBERED - rigid_body_WINDOW - rigid_body_AHEAD - rigid_body_CHECKS
     + 1 };
 
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
-   the eight, those up to it stay as they are, and inverse becomes one over its squared length. The number of
-   rows is even. */
+/* Subtract multiples of one column, stored in r, from eight columns, to make them orthogonal to it. If that
+   column is one of the eight, columns up to it are unchanged, and inverse becomes 1 over its squared norm.
+   The number of rows is even. */
 static void rigid_body_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8],
     double r[8])
 {
@@ -458,7 +458,7 @@ static void rigid_body_project(int rows, double (*one)[8], int column, double *i
     }
 }
 
-/* By how much recurrences miss the last of these values. */
+/* Error of the recurrences for the last of these values. */
 static double rigid_body_missed(const double *value, double (*weight)[8])
 {
     enum { AHEAD = rigid_body_AHEAD, WINDOW = rigid_body_WINDOW, CHECKS = rigid_body_CHECKS };
@@ -473,10 +473,9 @@ static double rigid_body_missed(const double *value, double (*weight)[8])
 }
 
 /* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... rigid_body_AHEAD -
-   1, to the history of a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of
-   rounding. Columns are taken in by eights, until they leave next to nothing of the right-hand sides. How
-   many past values are used; 0 if the recurrences do not foresee the last values, which they were not fitted
-   to. */
+   1, to the history of a component, by least squares with Tikhonov regularisation (modified Gram-Schmidt).
+   Columns are added eight at a time, until the residuals are negligible. Returns the number of past values
+   used, or 0 if the recurrences do not predict the last values, which were left out of the fit. */
 static int rigid_body_train(rigid_body_history *history, int component)
 {
     enum { AHEAD = rigid_body_AHEAD, WINDOW = rigid_body_WINDOW, ROWS = rigid_body_ROWS };
@@ -495,7 +494,7 @@ static int rigid_body_train(rigid_body_history *history, int component)
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
     while (terms < WINDOW && left > rigid_body_ENOUGH * largest) {
-        /* further rows of the ridge are zero in these columns */
+        /* later rows of the regularisation are zero in these columns */
         const int part = terms / 8, rows = ROWS + terms + 8;
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
@@ -519,11 +518,11 @@ static int rigid_body_train(rigid_body_history *history, int component)
     return rigid_body_missed(value + ROWS, weight) <= rigid_body_HOPELESS * largest ? terms : 0;
 }
 
-/* ---- Starting guesses ---- */
+/* ---- Predictors ---- */
 #define rigid_body_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
 
-/* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
-   nothing to do with the motion. */
+/* Whether a prediction is near the state. Far away the equation of a step has solutions unrelated to the
+   motion. */
 static int rigid_body_near(const double guess[rigid_body_DIM], const double last[rigid_body_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -535,13 +534,12 @@ static int rigid_body_near(const double guess[rigid_body_DIM], const double last
 }
 
 enum {
-    /* values that extrapolation uses at most: more amplify rounding more than they gain */
-    rigid_body_HISTORY = 8,
-    rigid_body_REPAY = 150,      /* steps that a fit costs, about */
-    rigid_body_LONG_WAIT = 20000 /* steps until a recurrence that often needs fitting is fitted again */
+    rigid_body_HISTORY = 8, /* most values that the extrapolation uses; more would amplify rounding errors */
+    rigid_body_REPAY = 150, /* cost of a fit, in steps; measured */
+    rigid_body_LONG_WAIT = 20000 /* steps until the next fit of a recurrence that has needed many */
 };
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
+/* Predict the next value (y) from earlier ones. Returns 0 if there is no prediction. */
 static int rigid_body_predict(const rigid_body_history *history, double value[rigid_body_DIM])
 {
     const int last = history->count - 1;
@@ -563,7 +561,7 @@ static int rigid_body_predict(const rigid_body_history *history, double value[ri
     return last >= 0 && rigid_body_near(value, history->past[last]);
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
+/* Select the predictor that would have been best for a solution that took several iterations. */
 static void rigid_body_judge(rigid_body_history *history, const double value[rigid_body_DIM])
 {
     double row[rigid_body_HISTORY + 1][rigid_body_DIM], guess[rigid_body_DIM], least = HUGE_VAL,
@@ -590,7 +588,7 @@ static void rigid_body_judge(rigid_body_history *history, const double value[rig
     if (history->extrapolation_order == 0) history->extrapolation_order = 1;
 }
 
-/* Drop what is old, if so many values would not fit into the history. */
+/* Drop the oldest values if the history has no room for `count` more. */
 static void rigid_body_make_room(rigid_body_history *history, int values)
 {
     if (history->count + values <= rigid_body_KEPT) return;
@@ -599,8 +597,8 @@ static void rigid_body_make_room(rigid_body_history *history, int values)
     history->count = rigid_body_REMEMBERED;
 }
 
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. Whether it
-   foresees. */
+/* Fit the recurrence to the last values; the wait until the next fit grows with every fit. Returns whether
+   the recurrence predicts well. */
 static int rigid_body_fit(rigid_body_history *history)
 {
     int found = 1;
@@ -619,7 +617,7 @@ static int rigid_body_fit(rigid_body_history *history)
     return found;
 }
 
-/* Take in the solved value: what took one iteration needs no better guess. */
+/* Update the predictor with a solution. A solve of one iteration needs no better prediction. */
 static void rigid_body_remember(rigid_body_history *history, const double value[rigid_body_DIM],
     int iterations)
 {
@@ -634,8 +632,8 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
 #define rigid_body_PLAUSIBLE 1.5         /* length of steps always accepted, in sizes of state and motion */
 #define rigid_body_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
-   by a point far away, at another energy, that has nothing to do with it. */
+/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
+   at another energy, and unrelated to the motion. */
 static int rigid_body_plausible(const rigid_body_solver *s, const double increment[rigid_body_DIM])
 {
     double moved = 0.0, size = 0.0, field[rigid_body_DIM], point[rigid_body_DIM], H[3];
@@ -647,7 +645,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
     rigid_body_vector_field(&s->params, s->x, field);
     for (int i = 0; i < rigid_body_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= rigid_body_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < rigid_body_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = rigid_body_hamiltonian(&s->params, point);
     }
@@ -655,7 +653,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
+/* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
 #define rigid_body_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
@@ -675,9 +673,9 @@ static double rigid_body_size(const double y[rigid_body_DIM], const double delta
     return size;
 }
 
-/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   last correction changes the increment to first order, without an evaluation: it is accepted if the error
-   that remains, quadratic in it, is below rigid_body_TOLERANCE. */
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
+   last correction changes the increment to first order, without another evaluation: it is accepted if the
+   remaining error, quadratic in it, is below rigid_body_TOLERANCE. */
 static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
 {
     double y[rigid_body_DIM], delta[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM];
@@ -698,7 +696,7 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
         const int stalled = previous < rigid_body_NEARLY_SOLVED && size > rigid_body_SHRINKING * previous;
         previous = size;
         if (!(remaining <= rigid_body_TOLERANCE || stalled)) continue;
-        double small[rigid_body_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        double small[rigid_body_DIM] = { 0.0 }; /* correction of the increment, and compensation */
         for (int i = 0; i < rigid_body_DIM; ++i)
             for (int j = 0; j < rigid_body_DIM; ++j) small[i] -= slope[i * rigid_body_DIM + j] * delta[j];
         for (int i = 0; i < rigid_body_DIM; ++i) small[i] += s->carry[i];
@@ -710,7 +708,7 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
     return rigid_body_NO_CONVERGENCE;
 }
 
-/* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
+/* ---- The choice of the gauge: multiples of Casimirs subtracted from H ---- */
 enum {
     rigid_body_SAMPLES = 32, /* states along a short piece of the trajectory */
     /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */
@@ -725,7 +723,7 @@ enum {
 /* errors, in sizes of all on a line, that are as good: rounding does not decide */
 #define rigid_body_CLOSE_CALL 1e-12
 
-/* The direction of the motion at a point, of size 1; 0 where there is none. */
+/* Direction of the motion at a point, a unit vector; 0 at equilibria. */
 static void rigid_body_direction(const rigid_body_params *params, const double at[rigid_body_DIM],
     double direction[rigid_body_DIM])
 {
@@ -735,8 +733,8 @@ static void rigid_body_direction(const rigid_body_params *params, const double a
     for (int i = 0; i < rigid_body_DIM; ++i) direction[i] /= speed;
 }
 
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of one length: steps of one time
-   would leave the neighbourhood of a state that hardly moves by far too much. */
+/* Sample a short piece of the trajectory from x, by a Runge-Kutta method whose steps have equal length in
+   phase space: with steps of equal time, a slow state would leave its neighbourhood. */
 static void rigid_body_sample(const rigid_body_params *params, const double x[rigid_body_DIM],
     double samples[][rigid_body_DIM])
 {
@@ -766,7 +764,7 @@ static double rigid_body_gauge_error(const rigid_body_params *params, const doub
     return sum;
 }
 
-/* The error polynomial at centre + t width, by Newton's formula from forward differences. */
+/* Value of the error polynomial at centre + t width, by Newton's formula from forward differences. */
 static double rigid_body_on_line(const double difference[rigid_body_DEGREE + 1], double t)
 {
     double error = difference[rigid_body_DEGREE];
@@ -775,8 +773,8 @@ static double rigid_body_on_line(const double difference[rigid_body_DEGREE + 1],
     return error;
 }
 
-/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one
-   before. */
+/* Shift of the multiple with index c, in units of width, that minimises the error: searched on successively
+   finer grids. */
 static double rigid_body_least_on_line(const rigid_body_params *params, const double gauge[rigid_body_GAUGES],
     int c, double width, double samples[][rigid_body_DIM])
 {
@@ -804,8 +802,8 @@ static double rigid_body_least_on_line(const rigid_body_params *params, const do
     return best;
 }
 
-/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
-   from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing
+/* Multiples that minimise the leading error along a short piece of the trajectory, one after the other,
+   starting from the least-squares solution of grad H = sum of multiples of grad C. Zero where a result is not
    finite. */
 static void rigid_body_choose_gauge(const rigid_body_params *params, const double x[rigid_body_DIM],
     double gauge[rigid_body_GAUGES])
@@ -864,7 +862,7 @@ rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params 
     return rigid_body_init_gauge(s, params, x0, NULL);
 }
 
-/* One stage. If it fails from the value that its predictor gives, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
 static rigid_body_status rigid_body_stage(rigid_body_solver *s)
 {
     const rigid_body_status status = rigid_body_attempt(s);
@@ -897,13 +895,13 @@ static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h,
     return rigid_body_OK;
 }
 
-/* how far the state may be moved, in its own size, for guesses to move with it */
+/* largest relative change of the state after which predictors are shifted rather than cleared */
 #define rigid_body_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs: to where a motion through x
-   would have had them, which differs from the motion as it was by what moved the state, and by the difference
-   of their slopes. Recurrences are of the motion as it was. From far away all begins anew, with the next
-   step. */
+/* Shift the predictors with the state, for as many past values as the extrapolation needs: a motion through x
+   would have had past values that differ by the change of the state and by the difference of the slopes.
+   Recurrences are dropped, as they were fitted to the former motion. After a large change, the next step
+   clears the predictors. */
 static void rigid_body_move_guesses(rigid_body_solver *s, const double from[rigid_body_DIM])
 {
     double distance = 0.0, size = 0.0, before[rigid_body_DIM], slope[rigid_body_DIM];
@@ -952,7 +950,7 @@ rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigi
 
 const char *rigid_body_status_string(rigid_body_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case rigid_body_OK: return "ok";
     case rigid_body_NO_CONVERGENCE: return "no convergence: the step is too large";
     case rigid_body_SINGULAR: return "singular Newton matrix: the step is too large";
@@ -965,18 +963,18 @@ const char *rigid_body_status_string(rigid_body_status status)
 size_t rigid_body_solver_size(void) { return sizeof(rigid_body_solver); }
 size_t rigid_body_solver_steps_done(const rigid_body_solver *s) { return s->steps; }
 
-/* ---- Several steps or members at once ---- */
-/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
-   at once. Compilers make vector instructions of the loops over lanes. */
-enum { rigid_body_LANES = 8 }; /* what one vector of AVX-512 holds */
+/* ---- SIMD lanes: several steps or members at once ---- */
+/* The functions below evaluate the formulas of a step for several steps of a trajectory, or members of an
+   ensemble, together. Compilers turn the loops over lanes into vector instructions. */
+enum { rigid_body_LANES = 8 }; /* numbers in one vector of AVX-512 */
 
 #if defined(__GNUC__)
-typedef double rigid_body_lanes[rigid_body_LANES] __attribute__((aligned(64))); /* a value in each lane */
+typedef double rigid_body_lanes[rigid_body_LANES] __attribute__((aligned(64))); /* one value in each lane */
 #else
 typedef double rigid_body_lanes[rigid_body_LANES];
 #endif
 
-/* Before a loop over lanes: tells compilers that they are independent. */
+/* Before a loop over lanes: tells the compiler that iterations are independent. */
 #if defined(__clang__)
 #define rigid_body_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic push
@@ -1180,7 +1178,7 @@ static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_b
 }
 
 /* ---- Newton's method in lanes ---- */
-/* A stage in all lanes, linearised around y. */
+/* Linearisation of a stage around y, in all lanes. */
 typedef struct {
     rigid_body_lanes y[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM],
         residual[rigid_body_DIM];
@@ -1188,8 +1186,8 @@ typedef struct {
     rigid_body_lanes inverse[rigid_body_DIM * rigid_body_DIM], gain[rigid_body_DIM * rigid_body_DIM];
 } rigid_body_model;
 
-/* Units of corrections of y, so that matrices are reused down to the same relative size as in
-   rigid_body_size, or larger: the least that a component is in the stages. */
+/* Units in which corrections of y are measured, so that matrices are reused down to the same relative
+   accuracy as in rigid_body_size: the smallest magnitude of each component in the stages. */
 static void rigid_body_measure(const rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM])
 {
     rigid_body_lanes norm = { 0.0 };
@@ -1209,7 +1207,7 @@ static void rigid_body_measure(const rigid_body_model *model, rigid_body_lanes u
     }
 }
 
-/* Take a correction from y; its size, summed over the components. */
+/* Subtract a correction from y; returns its size, summed over the components. */
 static void rigid_body_take(rigid_body_model *model, rigid_body_lanes delta[restrict rigid_body_DIM],
     rigid_body_lanes unit[restrict rigid_body_DIM], rigid_body_lanes size)
 {
@@ -1223,8 +1221,8 @@ static void rigid_body_take(rigid_body_model *model, rigid_body_lanes delta[rest
     }
 }
 
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits
-   of such numbers have their order, and those of what is no number are larger. */
+/* Largest value over the lanes, none of which is negative; infinite if one is not finite. The bits of such
+   numbers have the same order as integers, and those of NaN are larger still. */
 static double rigid_body_largest(const rigid_body_lanes size)
 {
     uint64_t bits[rigid_body_LANES], most = 0;
@@ -1235,7 +1233,7 @@ static double rigid_body_largest(const rigid_body_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
-/* Each lane of most becomes the larger one, in the same order. */
+/* Replace each lane of most by the larger value, in the same order. */
 static void rigid_body_keep_largest(rigid_body_lanes most, const rigid_body_lanes size)
 {
     uint64_t bits[rigid_body_LANES], bits_of_most[rigid_body_LANES];
@@ -1246,7 +1244,7 @@ static void rigid_body_keep_largest(rigid_body_lanes most, const rigid_body_lane
     memcpy(most, bits_of_most, sizeof bits);
 }
 
-/* The product of a matrix and a vector. */
+/* Product of a matrix and a vector. */
 static void rigid_body_apply(rigid_body_lanes matrix[restrict rigid_body_DIM * rigid_body_DIM],
     rigid_body_lanes vector[restrict rigid_body_DIM], rigid_body_lanes product[restrict rigid_body_DIM])
 {
@@ -1261,14 +1259,14 @@ static void rigid_body_apply(rigid_body_lanes matrix[restrict rigid_body_DIM * r
     }
 }
 
-/* What a residual takes from the increment. */
+/* Corrections of the increment by the residual. */
 static void rigid_body_gain(rigid_body_model *model, rigid_body_lanes residual[restrict rigid_body_DIM],
     rigid_body_lanes gained[restrict rigid_body_DIM])
 {
     rigid_body_apply(model->gain, residual, gained);
 }
 
-/* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
+/* Correct y by the residuals, with the inverse of the Newton matrix, and measure the corrections. */
 static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
     rigid_body_lanes size)
 {
@@ -1277,17 +1275,16 @@ static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes unit[re
     rigid_body_take(model, delta, unit, size);
 }
 
-/* Corrections below the first go on with the matrices of the last pass. After the square of so small a
-   correction as the second, there is rounding only, if the next is below the third. */
+/* After corrections below rigid_body_FROZEN the matrices are reused. After a correction below
+   rigid_body_SMALL, whose square is rounding, one below rigid_body_BLOCK_ROUNDING is the last. */
 #define rigid_body_FROZEN 1e-4
 #define rigid_body_SMALL 1e-8
 #define rigid_body_BLOCK_ROUNDING 1e-10
-/* frozen matrices leave twice what new ones did, of the same correction; this is far more */
+/* reused matrices contract half as fast as new ones; the factor 32 is a wide safety margin */
 #define rigid_body_CAUTION 32.0
 
-/* What corrections of this size leave, after those of the size before: the first leave their square, later
-   ones the part of themselves that they are of those before, or less. Nothing, where all that is left is
-   rounding. */
+/* Expected next correction: the square of the first; later the latest times the ratio of the latest to the
+   one before. 0 at rounding level. */
 static void rigid_body_leave(const rigid_body_lanes size, const rigid_body_lanes before,
     rigid_body_lanes left)
 {
@@ -1300,7 +1297,7 @@ static void rigid_body_leave(const rigid_body_lanes size, const rigid_body_lanes
     }
 }
 
-/* Linearise a stage around the points y. The matrices are I + O(h): where a pivot is far from 1, all is
+/* Linearise a stage around the points y. The matrices are I + O(h): where a pivot is far from 1, results are
    infinite. */
 static void rigid_body_linearise_stage(rigid_body_lanes coef[restrict], rigid_body_model *model)
 {
@@ -1316,7 +1313,7 @@ static void rigid_body_linearise_stage(rigid_body_lanes coef[restrict], rigid_bo
     }
 }
 
-/* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
+/* Evaluate a stage at the points y, with new matrices or with those of the last iteration. */
 static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model *model, int matrices)
 {
     if (matrices) rigid_body_linearise_stage(coef, model);
@@ -1324,9 +1321,9 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 }
 
 /* ---- The residuals of a block ---- */
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
-   carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
-   apart. most is the largest correction in each lane. */
+/* Advance through the steps of a block in order, each by the linear model of its lane. If the start X of a
+   step (the state with its compensation term) changes, increment - gain residual gives the change of its end,
+   and so the next residual. X itself is summed apart. most is the largest correction in each lane. */
 static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
     double x[rigid_body_DIM], double carry[rigid_body_DIM], rigid_body_lanes most)
 {
@@ -1338,7 +1335,7 @@ static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[rest
     }
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
         const int after = (lane + 1) % rigid_body_LANES;
-        /* two sums, so that no long chain of additions is waited for */
+        /* two partial sums shorten the chain of dependent additions */
         double even[rigid_body_DIM] = { 0.0 }, odd[rigid_body_DIM] = { 0.0 };
         for (int i = 0; i < rigid_body_DIM; ++i) {
             model->residual[i][lane] = residual[i];
@@ -1364,14 +1361,14 @@ static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[rest
 }
 
 /* ---- Blocks of steps ---- */
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
-   foreseen. */
+/* Data shared by all blocks: coefficients, equal in all lanes, and the recurrences that predict the
+   solutions. */
 typedef struct {
     int fits; /* number of the fit that weight belongs to; -1 for none */
     rigid_body_lanes coef[rigid_body_COEFFICIENTS], weight[rigid_body_WINDOW][rigid_body_DIM];
 } rigid_body_table;
 
-/* rigid_body_near for the points of all stages and lanes, seen from one value. */
+/* rigid_body_near for the points of all stages and lanes, relative to one reference value. */
 static int rigid_body_near_lanes(rigid_body_model *model, const double last[rigid_body_DIM])
 {
     rigid_body_lanes most = { 0.0 };
@@ -1387,7 +1384,8 @@ static int rigid_body_near_lanes(rigid_body_model *model, const double last[rigi
     return rigid_body_largest(most) <= rigid_body_REACH * size;
 }
 
-/* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
+/* Update the table of a stage: its coefficients, and the weights of its recurrences if they were fitted
+   since. */
 static void rigid_body_refresh(const rigid_body_solver *s, rigid_body_table *table)
 {
     if (table->fits == s->history.fits) return;
@@ -1398,7 +1396,7 @@ static void rigid_body_refresh(const rigid_body_solver *s, rigid_body_table *tab
         (size_t)s->history.recurrence_terms * rigid_body_DIM * sizeof(rigid_body_lanes));
 }
 
-/* Guesses for the next rigid_body_LANES values of a stage, by its recurrences. */
+/* Predict the next rigid_body_LANES solutions of a stage by its recurrences. */
 static void rigid_body_foresee(const rigid_body_history *history,
     rigid_body_lanes weight[restrict][rigid_body_DIM], rigid_body_lanes y[restrict rigid_body_DIM])
 {
@@ -1417,7 +1415,7 @@ static void rigid_body_foresee(const rigid_body_history *history,
     }
 }
 
-/* Add the values of all lanes to the history, one after the other. */
+/* Append the solutions of all lanes to the history, in order of time. */
 static void rigid_body_record_lanes(rigid_body_history *history, rigid_body_lanes y[restrict rigid_body_DIM])
 {
     rigid_body_make_room(history, rigid_body_LANES);
@@ -1426,14 +1424,14 @@ static void rigid_body_record_lanes(rigid_body_history *history, rigid_body_lane
     history->count += rigid_body_LANES;
 }
 
-/* The vector field at x; with a monitor, per unit of tau. */
+/* Vector field at x; with a monitor, per unit of tau. */
 static void rigid_body_slope(const rigid_body_solver *s, const double x[rigid_body_DIM],
     double slope[rigid_body_DIM])
 {
     rigid_body_vector_field(&s->params, x, slope);
 }
 
-/* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
+/* Step of size h by the classical Runge-Kutta method. x becomes the end of the step, mean the mean slope. */
 static void rigid_body_runge_kutta(const rigid_body_solver *s, double h, double x[rigid_body_DIM],
     double mean[rigid_body_DIM])
 {
@@ -1452,7 +1450,7 @@ static void rigid_body_runge_kutta(const rigid_body_solver *s, double h, double 
     for (int i = 0; i < rigid_body_DIM; ++i) x[i] += h * mean[i];
 }
 
-/* y becomes the points whose alpha and beta have these means. */
+/* Replace y by the points whose alpha and beta have these means, to leading order. */
 static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_model *model)
 {
     rigid_body_evaluate_lanes(coef, model->y, model->displacement, model->increment);
@@ -1463,8 +1461,8 @@ static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_mo
     }
 }
 
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
-   Runge-Kutta method, to leading order. */
+/* Predictor without recurrences: points whose alpha and beta have the means of classical Runge-Kutta steps,
+   to leading order. */
 static void rigid_body_guess_by_march(const rigid_body_solver *s, rigid_body_table *table,
     rigid_body_model *model)
 {
@@ -1480,8 +1478,8 @@ static void rigid_body_guess_by_march(const rigid_body_solver *s, rigid_body_tab
     rigid_body_from_means(table->coef, model);
 }
 
-/* Guess the points of all stages and steps, by recurrences or else by a march. 0 if they are not near the
-   state. */
+/* Predict the solutions of all stages and steps, by recurrences or else by approximate integration. Returns 0
+   if they are not near the state. */
 static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid_body_model *model)
 {
     if (!s->blocks.use_recurrences) rigid_body_guess_by_march(s, table, model);
@@ -1489,9 +1487,9 @@ static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid
     return rigid_body_near_lanes(model, s->x);
 }
 
-/* rigid_body_LANES steps at once: guess the points of all, and correct them together until the error that
-   remains is as small as after a single step. How many passes that took; 0, and the solver as before, where
-   it takes more than most. */
+/* Make rigid_body_LANES steps at once: predict the solutions of all, and correct them together until the
+   remaining error is as small as after a single step. Returns the number of iterations, or 0, with the solver
+   unchanged, if it exceeds most. */
 static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int most)
 {
     rigid_body_model model;
@@ -1531,13 +1529,15 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
 }
 
 enum {
-    rigid_body_REPAY_BLOCKS = 4 * rigid_body_REPAY, /* steps that fits for whole blocks are saved in */
-    rigid_body_MOST_SINGLE_STEPS = 1000,            /* before blocks are tried again */
-    rigid_body_TOO_MANY = 5 * rigid_body_LANES      /* of these: recurrences are to blame */
+    /* give up recurrences when a failure is followed by more single steps */
+    rigid_body_REPAY_BLOCKS = 4 * rigid_body_REPAY,
+    rigid_body_MOST_SINGLE_STEPS = 1000, /* most single steps after a failed block */
+    /* after this number of failures, recurrences are replaced */
+    rigid_body_TOO_MANY = 5 * rigid_body_LANES
 };
-#define rigid_body_LATEST 0.125 /* the weight of the latest step in the mean of evaluations */
+#define rigid_body_LATEST 0.125 /* weight of the latest step in the running mean of evaluations */
 
-/* Recurrences are given up for a while, the longer the more often that happens. */
+/* Stop using recurrences for a while, which doubles with every failure. */
 static void rigid_body_give_up(rigid_body_solver *s)
 {
     s->blocks.use_recurrences = s->blocks.last_single_steps = s->blocks.single_steps = 0;
@@ -1545,8 +1545,8 @@ static void rigid_body_give_up(rigid_body_solver *s)
     s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
 }
 
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
+/* Choose the predictor of the next block: recurrences, fitted as soon as the steps to come, or those already
+   made, are enough to repay the fit. */
 static void rigid_body_choose_guess(rigid_body_solver *s, size_t steps)
 {
     if (s->history.count < rigid_body_REMEMBERED) {
@@ -1561,8 +1561,9 @@ static void rigid_body_choose_guess(rigid_body_solver *s, size_t steps)
     if (!s->blocks.use_recurrences) rigid_body_give_up(s);
 }
 
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens.
-   Recurrences that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
+/* Update the measurements after a block. After a failed one, single steps are made, more with every failure.
+   Recurrences that fail repeatedly, or need more iterations than Runge-Kutta predictions did, are
+   abandoned. */
 static void rigid_body_learn_from(rigid_body_solver *s, int passes)
 {
     if (passes > 0) {
@@ -1581,7 +1582,7 @@ static void rigid_body_learn_from(rigid_body_solver *s, int passes)
     }
 }
 
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
+/* Make a single step, and update the running mean of evaluations for each of its stages. */
 static rigid_body_status rigid_body_single(rigid_body_solver *s)
 {
     const size_t before = s->evaluations;
@@ -1591,12 +1592,13 @@ static rigid_body_status rigid_body_single(rigid_body_solver *s)
     return status;
 }
 
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as
-   rigid_body_PASSES for each evaluation in a single step. The results differ by round-off only. */
+/* Solve steps in blocks while that costs less than single steps, with at most rigid_body_PASSES iterations of
+   a block for each evaluation in a single step. Results differ from single steps by round-off only. */
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps)
 {
     rigid_body_table table;
-    rigid_body_status status = rigid_body_single_steps(s, h, 0); /* makes all that depends on h */
+    /* so that all coefficients for h are computed */
+    rigid_body_status status = rigid_body_single_steps(s, h, 0);
     table.fits = -1;
     while (status == rigid_body_OK && steps > 0) {
         if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) rigid_body_choose_guess(s, steps);
@@ -1622,15 +1624,15 @@ rigid_body_status rigid_body_step(rigid_body_solver *s, double h)
 }
 
 /* ---- Members of an ensemble ---- */
-/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
-   where it is 0, all have the first. */
+/* Arguments of an ensemble. own = 1: member m has the parameters params[m] and the step h[m]; own = 0: all
+   have those of member 0. */
 typedef struct {
     double *x;
     size_t members, steps, own;
     const rigid_body_params *params; /* NULL for the defaults */
     const double *h;
     const double *gauge;   /* gauges, or NULL to choose them at the start */
-    size_t stride;         /* 0 where there are no frames */
+    size_t stride;         /* 0 without frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } rigid_body_members;
@@ -1649,7 +1651,7 @@ static rigid_body_members rigid_body_asked(const rigid_body_params *params, doub
     return all;
 }
 
-/* Start a member at a state, with what is its own, and with all that its step size asks for. */
+/* Initialise a member at a state, with its parameters and all coefficients for its step size. */
 static rigid_body_status rigid_body_begin_member(const rigid_body_members *all, size_t m,
     const double x[rigid_body_DIM], const double *gauge, rigid_body_solver *s)
 {
@@ -1658,7 +1660,7 @@ static rigid_body_status rigid_body_begin_member(const rigid_body_members *all, 
     return status == rigid_body_OK ? rigid_body_integrate(s, all->h[m * all->own], 0) : status;
 }
 
-/* The same at the state that the ensemble has for it, which is x then. */
+/* Initialise a member at its state in the ensemble, which is copied to x. */
 static rigid_body_status rigid_body_take_member(const rigid_body_members *all, size_t m,
     double x[rigid_body_DIM], rigid_body_solver *s)
 {
@@ -1667,7 +1669,7 @@ static rigid_body_status rigid_body_take_member(const rigid_body_members *all, s
         s);
 }
 
-/* How many steps there are to the next frame, or to the end. */
+/* Number of steps to the next frame, or to the end. */
 static size_t rigid_body_to_frame(const rigid_body_members *all, size_t done)
 {
     const size_t left = all->steps - done;
@@ -1675,7 +1677,7 @@ static size_t rigid_body_to_frame(const rigid_body_members *all, size_t done)
         : left;
 }
 
-/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+/* Write the frame of a member, if one is due after this number of steps: x, or NaN if x is NULL. */
 static void rigid_body_put_frame(const rigid_body_members *all, size_t m, size_t done, const double *x)
 {
     for (size_t i = 0; i < rigid_body_DIM && all->frames != NULL && done % all->stride == 0; ++i)
@@ -1683,7 +1685,7 @@ static void rigid_body_put_frame(const rigid_body_members *all, size_t m, size_t
             : (double)NAN;
 }
 
-/* The steps of a member after so many, by itself. */
+/* Make the remaining steps of a member, one by one. */
 static rigid_body_status rigid_body_end_member(const rigid_body_members *all, size_t m, size_t done,
     rigid_body_solver *s, rigid_body_status status)
 {
@@ -1696,7 +1698,7 @@ static rigid_body_status rigid_body_end_member(const rigid_body_members *all, si
     return status;
 }
 
-/* Where a member ends. */
+/* Write the final state of a member. */
 static void rigid_body_put_member(const rigid_body_members *all, size_t m, const double x[rigid_body_DIM],
     rigid_body_status status)
 {
@@ -1704,43 +1706,43 @@ static void rigid_body_put_member(const rigid_body_members *all, size_t m, const
     if (all->status != NULL) all->status[m] = (unsigned char)status;
 }
 
-/* ---- Groups of members ---- */
+/* ---- SIMD batches of members: implicit steps ---- */
 enum {
     rigid_body_GROUP = rigid_body_LANES, /* members, one in each lane */
-    rigid_body_FEWEST = 3,               /* fewer members are quicker one by one */
-    /* steps that fits cost: of eight values at once, only one is foreseen */
+    rigid_body_FEWEST = 3,               /* measured: fewer members are faster one by one */
+    /* steps to repay a fit; it predicts one value only, where a fit for a block predicts eight */
     rigid_body_GROUP_REPAY = 5000 * rigid_body_DIM,
     /* steps until recurrences that did not help are fitted again */
     rigid_body_HOPELESS_WAIT = 100 * rigid_body_REPAY
 };
 
-/* Members of an ensemble, each in its lane. */
+/* Members of an ensemble, one in each lane. */
 typedef struct {
     rigid_body_lanes x[rigid_body_DIM], carry[rigid_body_DIM], coef[rigid_body_COEFFICIENTS];
-    rigid_body_lanes past[rigid_body_REMEMBERED][rigid_body_DIM]; /* solved values, in a ring */
-    /* of past values, the latest first, for the next */
+    rigid_body_lanes past[rigid_body_REMEMBERED][rigid_body_DIM]; /* solutions, in a ring buffer */
+    /* factors of past solutions, the latest first */
     rigid_body_lanes weight[rigid_body_WINDOW][rigid_body_DIM];
-    int latest; /* the row of the latest values */
+    int latest; /* row of the latest solutions */
     int count; /* rows in use */
-    int extrapolation_order; /* how many of them the extrapolation uses */
-    int recurrence_terms; /* how many of them the recurrences use */
-    int use_recurrences; /* whether these are the better guess */
-    int fits; /* how often recurrences have been fitted */
-    int slow_steps; /* how many of the last steps took more than one iteration */
-    int slow_steps_allowed; /* how many of those before recurrences are fitted again */
-    int active[rigid_body_LANES]; /* whether the lane has a member that has not failed */
-    size_t steps_left[rigid_body_LANES]; /* that are still to be made, where one has */
+    int extrapolation_order; /* number of solutions that the extrapolation uses */
+    int recurrence_terms; /* number of solutions that the recurrences use */
+    int use_recurrences; /* whether recurrences predict better */
+    int fits; /* number of fits of the recurrences */
+    int slow_steps; /* recent steps that took more than one iteration */
+    int slow_steps_allowed; /* slow_steps at which recurrences are fitted again */
+    int active[rigid_body_LANES]; /* whether the lane holds a member that has not failed */
+    size_t steps_left[rigid_body_LANES]; /* steps left to make, for active lanes */
     double gauge[rigid_body_LANES][rigid_body_GAUGES]; /* of each member */
 } rigid_body_group;
 
-/* The past values of a stage, the latest for k = 0. */
+/* The past solutions of a stage, the latest for k = 0. */
 static rigid_body_lanes *rigid_body_group_past(rigid_body_group *group, int k)
 {
     const int row = group->latest + k;
     return group->past[row < rigid_body_REMEMBERED ? row : row - rigid_body_REMEMBERED];
 }
 
-/* Guess the values of a stage by the recurrences of the members. */
+/* Predict the solutions of a stage by the recurrences of the members. */
 static void rigid_body_group_foresee(rigid_body_group *group, rigid_body_lanes y[restrict rigid_body_DIM])
 {
     memset(y, 0, rigid_body_DIM * sizeof y[0]);
@@ -1753,7 +1755,7 @@ static void rigid_body_group_foresee(rigid_body_group *group, rigid_body_lanes y
     }
 }
 
-/* Extrapolate the values of a stage. */
+/* Extrapolate the solutions of a stage. */
 static void rigid_body_group_extrapolate(rigid_body_group *group, rigid_body_lanes y[restrict rigid_body_DIM])
 {
     const int order = group->extrapolation_order;
@@ -1770,7 +1772,7 @@ static void rigid_body_group_extrapolate(rigid_body_group *group, rigid_body_lan
     }
 }
 
-/* The sum over members of the absolute values of all components. */
+/* Sum over members of the absolute values of all components. */
 static double rigid_body_group_sum(const rigid_body_group *group, rigid_body_lanes y[rigid_body_DIM])
 {
     double sum = 0.0;
@@ -1789,7 +1791,7 @@ static void rigid_body_group_subtract(rigid_body_lanes y[restrict rigid_body_DIM
     }
 }
 
-/* Choose the guess that would have been best for these values. */
+/* Select the predictor that would have been best for these solutions. */
 static void rigid_body_group_judge(rigid_body_group *group, rigid_body_lanes y[rigid_body_DIM])
 {
     rigid_body_lanes row[rigid_body_HISTORY + 1][rigid_body_DIM];
@@ -1812,8 +1814,8 @@ static void rigid_body_group_judge(rigid_body_group *group, rigid_body_lanes y[r
     group->use_recurrences = rigid_body_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if
-   it did not help. */
+/* Fit the recurrences of all members. The wait until the next fit grows with every fit, and is long if a fit
+   did not help. */
 static void rigid_body_group_fit(rigid_body_group *group)
 {
     rigid_body_history member;
@@ -1838,7 +1840,8 @@ static void rigid_body_group_fit(rigid_body_group *group)
         ? 2 * group->slow_steps_allowed + rigid_body_REPAY : rigid_body_HOPELESS_WAIT;
 }
 
-/* Replace guesses that are not near the last values, as rigid_body_near has it, by these; lane by lane. */
+/* Replace, lane by lane, predictions that are not near the last solutions (rigid_body_near) by the given
+   values. */
 static void rigid_body_stay_near(rigid_body_lanes y[restrict rigid_body_DIM],
     rigid_body_lanes last[restrict rigid_body_DIM])
 {
@@ -1857,8 +1860,8 @@ static void rigid_body_stay_near(rigid_body_lanes y[restrict rigid_body_DIM],
     }
 }
 
-/* How many lanes are still to be solved after corrections of this size, by what they leave; those where
-   nothing is finite leave the group. */
+/* Number of lanes whose corrections are still above the tolerance. Lanes with values that are not finite
+   leave the group. */
 static int rigid_body_group_open(rigid_body_group *group, const rigid_body_lanes size,
     const rigid_body_lanes left)
 {
@@ -1871,7 +1874,8 @@ static int rigid_body_group_open(rigid_body_group *group, const rigid_body_lanes
     return open;
 }
 
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+/* Predict the solution of a stage: by recurrences or extrapolation, or by the state where the prediction is
+   not near it. */
 static void rigid_body_group_predict(rigid_body_group *group, rigid_body_lanes y[rigid_body_DIM])
 {
     if (group->use_recurrences) rigid_body_group_foresee(group, y);
@@ -1879,8 +1883,8 @@ static void rigid_body_group_predict(rigid_body_group *group, rigid_body_lanes y
     rigid_body_stay_near(y, group->x);
 }
 
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the
-   most allowed, lanes that are not solved leave the group. */
+/* Newton's method for a stage, until all lanes have converged. Returns the number of iterations; if that is
+   the maximum, lanes that have not converged leave the group. */
 static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *model)
 {
     rigid_body_lanes unit[rigid_body_DIM], size, before, left;
@@ -1910,7 +1914,7 @@ static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *mod
     return iterations;
 }
 
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+/* Add the increments, corrected to first order, in compensated arithmetic, as in a single step. */
 static void rigid_body_group_advance(rigid_body_lanes x[restrict rigid_body_DIM],
     rigid_body_lanes carry[restrict rigid_body_DIM], rigid_body_model *model)
 {
@@ -1928,8 +1932,8 @@ static void rigid_body_group_advance(rigid_body_lanes x[restrict rigid_body_DIM]
     }
 }
 
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and
-   leave. How many stay. */
+/* Members that failed, or whose new state is not finite or not near the old one, keep the old state and leave
+   the group. Returns the number of active members. */
 static int rigid_body_group_leave(rigid_body_group *group, rigid_body_lanes x[rigid_body_DIM],
     rigid_body_lanes carry[rigid_body_DIM], size_t remaining)
 {
@@ -1959,7 +1963,7 @@ static int rigid_body_group_leave(rigid_body_group *group, rigid_body_lanes x[ri
     return active;
 }
 
-/* One step of all members, of as many as remain. How many members are left. */
+/* Make one step of all active members. Returns the number of members that are still active. */
 static int rigid_body_group_step(rigid_body_group *group, size_t remaining)
 {
     rigid_body_lanes x[rigid_body_DIM], carry[rigid_body_DIM];
@@ -1983,7 +1987,7 @@ static int rigid_body_group_step(rigid_body_group *group, size_t remaining)
     return rigid_body_group_leave(group, x, carry, remaining);
 }
 
-/* Put a member into a lane: its state, and its coefficients. */
+/* Assign a member to a lane: its state and its coefficients. */
 static rigid_body_status rigid_body_group_join(rigid_body_group *group, int lane,
     const rigid_body_members *all, size_t m)
 {
@@ -1998,7 +2002,7 @@ static rigid_body_status rigid_body_group_join(rigid_body_group *group, int lane
     return status;
 }
 
-/* The frames after so many steps, of the members that are active. */
+/* Write the frames of active members after a number of steps. */
 static void rigid_body_group_frame(const rigid_body_group *group, const rigid_body_members *all, size_t first,
     size_t done)
 {
@@ -2009,7 +2013,7 @@ static void rigid_body_group_frame(const rigid_body_group *group, const rigid_bo
     }
 }
 
-/* The end of a member; the steps that the group did not make with it, it makes by itself. */
+/* Write the results of a member. Steps that the group did not make for it are made by single steps. */
 static rigid_body_status rigid_body_group_end(const rigid_body_group *group, int lane,
     const rigid_body_members *all, size_t m, rigid_body_status status)
 {
@@ -2028,7 +2032,7 @@ static rigid_body_status rigid_body_group_end(const rigid_body_group *group, int
     return status;
 }
 
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
+/* Integrate one group, from member first on. Returns the first status that is not OK. */
 static rigid_body_status rigid_body_group_run(const rigid_body_members *all, size_t first)
 {
     rigid_body_group group;
@@ -2053,7 +2057,7 @@ static rigid_body_status rigid_body_group_run(const rigid_body_members *all, siz
 }
 
 /* ---- Ensembles ---- */
-/* All members. The first status that is not OK. */
+/* Integrate all members. Returns the first status that is not OK. */
 static rigid_body_status rigid_body_run(const rigid_body_members *all)
 {
     rigid_body_status result = rigid_body_OK;

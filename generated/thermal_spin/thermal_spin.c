@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 1e4352891d0a6040e1b124a3dd325927f44985f6e74ec2b354f7b6b0369f3002
+ * body-sha256: 2bb86dccdaaabe8bd12611aad35d2be6cc4e67eb68c34cf565a557af96ca9c4e
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -211,8 +211,8 @@ static int thermal_spin_finite(const double *values, int count)
     return count == 0;
 }
 
-/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the
-   change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
+   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
 static int thermal_spin_advance(thermal_spin_solver *s, const double *change, const double *small)
 {
     double x[thermal_spin_DIM], carry[thermal_spin_DIM];
@@ -228,7 +228,7 @@ static int thermal_spin_advance(thermal_spin_solver *s, const double *change, co
     return 1;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
 static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM],
     double side[thermal_spin_DIM])
 {
@@ -262,8 +262,8 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
 #define thermal_spin_PLAUSIBLE 1.5         /* length of steps always accepted, in sizes of state and motion */
 #define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
-   by a point far away, at another energy, that has nothing to do with it. */
+/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
+   at another energy, and unrelated to the motion. */
 static int thermal_spin_plausible(const thermal_spin_solver *s, const double increment[thermal_spin_DIM])
 {
     double moved = 0.0, size = 0.0, field[thermal_spin_DIM], point[thermal_spin_DIM], H[3];
@@ -279,7 +279,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
     for (int k = 0; k < thermal_spin_SOURCES * thermal_spin_DIM; ++k)
         size += fabs(s->dw[k / thermal_spin_DIM] * fields[k]);
     if (moved <= thermal_spin_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < thermal_spin_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = thermal_spin_hamiltonian(&s->params, point);
     }
@@ -287,7 +287,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
+/* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
 #define thermal_spin_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
@@ -307,9 +307,9 @@ static double thermal_spin_size(const double y[thermal_spin_DIM], const double d
     return size;
 }
 
-/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   last correction changes the increment to first order, without an evaluation: it is accepted if the error
-   that remains, quadratic in it, is below thermal_spin_TOLERANCE. */
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
+   last correction changes the increment to first order, without another evaluation: it is accepted if the
+   remaining error, quadratic in it, is below thermal_spin_TOLERANCE. */
 static thermal_spin_status thermal_spin_attempt(thermal_spin_solver *s)
 {
     double y[thermal_spin_DIM], delta[thermal_spin_DIM], displacement[thermal_spin_DIM],
@@ -331,7 +331,7 @@ static thermal_spin_status thermal_spin_attempt(thermal_spin_solver *s)
         const int stalled = previous < thermal_spin_NEARLY_SOLVED && size > thermal_spin_SHRINKING * previous;
         previous = size;
         if (!(remaining <= thermal_spin_TOLERANCE || stalled)) continue;
-        double small[thermal_spin_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        double small[thermal_spin_DIM] = { 0.0 }; /* correction of the increment, and compensation */
         for (int i = 0; i < thermal_spin_DIM; ++i)
             for (int j = 0; j < thermal_spin_DIM; ++j) small[i] -= slope[i * thermal_spin_DIM + j] * delta[j];
         for (int i = 0; i < thermal_spin_DIM; ++i) small[i] += s->carry[i];
@@ -359,13 +359,13 @@ static void thermal_spin_philox(uint32_t counter[4], uint32_t key0, uint32_t key
     }
 }
 
-/* 53 of the bits of two words, as a number from 0 up to, but not including, 2^53. */
+/* A number from 0 up to, but not including, 2^53, from 53 bits of two words. */
 static double thermal_spin_bits(uint32_t high, uint32_t low)
 {
     return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
 }
 
-/* Two independent normal variates of variance 1 by Box and Muller, cut off at thermal_spin_BOUND, from a
+/* Two independent normal variates of variance 1 by Box and Muller, truncated at thermal_spin_BOUND, from a
    counter. */
 static void thermal_spin_two_normals(uint64_t seed, uint32_t c[4], double normals[2])
 {
@@ -378,7 +378,7 @@ static void thermal_spin_two_normals(uint64_t seed, uint32_t c[4], double normal
 }
 
 /* ---- Noise ---- */
-/* Independent normal variates of variance 1. */
+/* Draw independent normal variates of variance 1. */
 static void thermal_spin_normals(uint64_t seed, uint32_t member, uint64_t step,
     double normals[thermal_spin_DRAWS])
 {
@@ -391,14 +391,14 @@ static void thermal_spin_normals(uint64_t seed, uint32_t member, uint64_t step,
     }
 }
 
-/* The increments of the next step: those given, or random ones. 0 if one is not finite. */
+/* Increments of the next step: the given ones, or random ones. Returns 0 if one is not finite. */
 static int thermal_spin_draw(thermal_spin_solver *s, const double *given)
 {
     if (given != NULL) {
         memmove(s->dw, given, sizeof s->dw);
     } else {
         thermal_spin_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
-        /* so that a step of -h undoes one of h */
+        /* so that a step of -h inverts one of h */
         const double size = copysign(sqrt(fabs(s->h) / (double)thermal_spin_PARTS), s->h);
         for (int k = 0; k < thermal_spin_DRAWS; ++k) s->dw[k] *= size;
     }
@@ -442,13 +442,13 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
     return thermal_spin_OK;
 }
 
-/* Compute the coefficients of the next step that are functions of the time or of the noise. */
+/* Compute the coefficients of the next step that depend on the time or on the noise. */
 static void thermal_spin_renew(thermal_spin_solver *s)
 {
     thermal_spin_at_step(s->coef, s->dw, s->coef + thermal_spin_PREPARED);
 }
 
-/* One stage. */
+/* Make one stage. */
 static thermal_spin_status thermal_spin_stage(thermal_spin_solver *s) { return thermal_spin_attempt(s); }
 
 thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double h, size_t steps,
@@ -495,7 +495,7 @@ thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double chang
 
 const char *thermal_spin_status_string(thermal_spin_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case thermal_spin_OK: return "ok";
     case thermal_spin_NO_CONVERGENCE: return "no convergence: the step is too large";
     case thermal_spin_SINGULAR: return "singular Newton matrix: the step is too large";

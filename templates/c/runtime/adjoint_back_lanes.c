@@ -12,20 +12,20 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
     phi_traced g;
     phi_lanes coef[PHI_COEFFICIENTS], slopes[PHI_COEFFICIENTS];
     phi_status status = PHI_OK;
-    size_t at = steps; /* the step that s is before */
+    size_t at = steps; /* the step after the one being processed */
     g.coef = coef;
     memset(g.after, 0, sizeof g.after);
     memset(g.change, 0, sizeof g.change);
     for (size_t left = PHI_ALL_STAGES(steps); left > 0 && status == PHI_OK;) {
         const int count = left < PHI_LANES ? (int)left : PHI_LANES;
-        for (int lane = PHI_LANES - 1; lane >= 0; --lane) { /* lanes without a stage of their own repeat the last */
+        for (int lane = PHI_LANES - 1; lane >= 0; --lane) { /* unused lanes repeat the last stage */
             const size_t k = left - (size_t)count + (size_t)(lane < count ? lane : count - 1);
             PHI_TAKE_STAGE_OF(k)
             for (; at > PHI_STEP_OF(k); --at) phi_go_back(s);
             phi_load(&g, lane, s PHI_AND_STAGE, PHI_OF(trail[PHI_STEP_OF(k)], stage));
         }
         phi_linearise_back(&g);
-        phi_solve_lanes(g.jacobian, g.gain, PHI_DIM, g.wrong); /* for any cotangents, which are not known yet */
+        phi_solve_lanes(g.jacobian, g.gain, PHI_DIM, g.wrong); /* linearise now, before the cotangents are known */
         for (int lane = count - 1; lane >= 0 && status == PHI_OK; --lane) {
             const size_t k = left - (size_t)count + (size_t)lane;
             PHI_TAKE_STAGE_OF(k)

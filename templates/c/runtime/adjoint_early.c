@@ -4,7 +4,8 @@
 
 #include "adjoint_stage.c"
 
-/* Transform the derivatives by coefficients that are functions of the time into derivatives by the others of their row. */
+/* Pull derivatives by the coefficients that are functions of the time back to derivatives by the other coefficients of
+   their row. */
 static void phi_early(const double *coef, double *coef_bar, double t)
 {
     double found[PHI_PREPARED + 1];

@@ -2,7 +2,7 @@
 #define PHI_FILE_ADJOINT_EARLY_STAGES
 #include "adjoint_early.c"
 
-/* The same for all coefficients of a step, which begins at the time of s. */
+/* Apply the reverse pass of time-dependent coefficients to all rows of a step that begins at the time of s. */
 static void phi_all_early(const phi_solver *s, phi_cotangent *bar)
 {
     PHI_EACH_STAGE

@@ -5,7 +5,7 @@
 #include <string.h>
 #include "adjoint_stage.c"
 
-/* Pull a cotangent back through a stage that began at y. */
+/* Pull a cotangent back through a stage that started at y. */
 static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM], phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {

@@ -10,7 +10,7 @@
 
 #include "gauss_adjoint_policy.h"
 
-/* Cotangents of the unknowns at all stages, from those of the moves: the transpose of phi_slopes. */
+/* Cotangents of the unknowns at all stages, from those of the stage increments: the transpose of phi_slopes. */
 static void phi_unknowns_bar(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
     phi_lanes *moves_bar, phi_lanes *z_bar)
 {
@@ -27,13 +27,14 @@ static void phi_unknowns_bar(const phi_solver *s, double point[PHI_POINT], phi_l
 #endif
 }
 
-/* Add what all stages give to the cotangents of the start of the step and of coefficients, from those of the moves. */
+/* Add the contributions of all stages to the cotangents of the start of the step and of the coefficients, from the
+   cotangents of the stage increments. */
 static void phi_add_stages(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
     phi_lanes *moves_bar, phi_cotangent *bar)
 {
 #if PHI_STAGED
     phi_lanes x[PHI_DIM], coef[PHI_COEFFICIENTS];
-    memset(coef, 0, sizeof coef); /* which may be none */
+    memset(coef, 0, sizeof coef); /* there may be no such cotangents */
     phi_stage_start_adjoint_lanes(s->coef, point, z, weights, moves_bar, x, coef);
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_DIM; ++k) bar->x[k] += x[k][i];
@@ -51,7 +52,8 @@ static void phi_add_stages(const phi_solver *s, double point[PHI_POINT], phi_lan
 #endif
 }
 
-/* Cotangents of the moves, from that of their sum and those of the unknowns: sums by the transpose of mu, 1 - mu. */
+/* Cotangents of the stage increments, from those of their sum and of the unknowns: sums with the transposes of mu and 1
+   - mu. */
 static void phi_mixed_back(const double end_bar[PHI_UNKNOWNS], phi_lanes *z_bar, phi_lanes *moves_bar)
 {
     phi_mixed(phi_mixing, z_bar, moves_bar);
@@ -63,7 +65,7 @@ static void phi_mixed_back(const double end_bar[PHI_UNKNOWNS], phi_lanes *z_bar,
     }
 }
 
-/* The largest change at any stage: of cotangents, whose squares may be too small. */
+/* Largest change of a cotangent at any stage; no squares, which could underflow. */
 static double phi_change_back(phi_lanes *before, phi_lanes *after)
 {
     double largest = 0.0;
@@ -74,11 +76,11 @@ static double phi_change_back(phi_lanes *before, phi_lanes *after)
         for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] += fabs(now[lane] - old[lane]);
     }
     for (int i = 0; i < PHI_NODES; ++i)
-        if (!(sum[i] <= largest)) largest = sum[i]; /* or not a number */
+        if (!(sum[i] <= largest)) largest = sum[i]; /* also true for NaN */
     return largest;
 }
 
-/* Solve for the cotangents of the moves by sweeps, from that of their sum. */
+/* Solve for the cotangents of the stage increments by fixed-point sweeps, from the cotangent of their sum. */
 static phi_status phi_collocate_back(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
     const double end_bar[PHI_UNKNOWNS], phi_lanes *moves_bar)
 {
@@ -102,7 +104,7 @@ static phi_status phi_collocate_back(const phi_solver *s, double point[PHI_POINT
     return PHI_NO_CONVERGENCE;
 }
 
-/* Pull a cotangent back through the step that s has made from the start of the trail. */
+/* Pull a cotangent back through the step that s has just made from the start on the tape. */
 static phi_status phi_stage_adjoint(const phi_solver *s, const double *trail, phi_cotangent *bar)
 {
     double point[PHI_POINT], end[PHI_UNKNOWNS], end_bar[PHI_UNKNOWNS], x[PHI_DIM], coef[PHI_COEFFICIENTS] = { 0.0 };

@@ -4,9 +4,9 @@
 
 #include "adjoint_stage.c"
 
-#define PHI_AT_ONCE ((size_t)1) /* steps after which their solutions are read from the predictors */
+#define PHI_AT_ONCE ((size_t)1) /* number of steps after which their solutions are read from the predictor */
 
-/* Read the solution of the last step from the predictor of a stage. 0 for more steps. */
+/* Read the solution of the last step from the predictor of a stage. Returns 0 if more than one step is asked for. */
 static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_kept *trail)
 {
     if (steps > 1) return 0;

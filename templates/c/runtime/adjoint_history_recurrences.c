@@ -4,9 +4,9 @@
 
 #include "adjoint_stage.c"
 
-#define PHI_AT_ONCE ((size_t)PHI_REMEMBERED) /* steps after which their solutions are read from the predictors */
+#define PHI_AT_ONCE ((size_t)PHI_REMEMBERED) /* number of steps after which their solutions are read from the predictor */
 
-/* Read the solutions of the last steps from the predictor of a stage. 0 if it has fewer. */
+/* Read the solutions of the last steps from the predictor of a stage. Returns 0 if it stores fewer. */
 static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_kept *trail)
 {
     const size_t count = (size_t)history->count;

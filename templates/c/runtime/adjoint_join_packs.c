@@ -2,7 +2,7 @@
 #define PHI_FILE_ADJOINT_JOIN_PACKS
 #include "adjoint_abreast.c"
 
-/* Put a member at its start into its lane. 0 if it cannot start. */
+/* Initialise a lane with a member at its initial state. Returns 0 if the member cannot start. */
 static int phi_pull_join(phi_group *group, int m, const phi_pulled *all, size_t first)
 {
     const int lane = m % PHI_LANES, k = m / PHI_LANES;
@@ -17,7 +17,7 @@ static int phi_pull_join(phi_group *group, int m, const phi_pulled *all, size_t 
     return 1;
 }
 
-/* The state of a member. */
+/* Read the state of a member from its lane. */
 static void phi_pull_state(const phi_group *group, int m, double x[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) x[i] = group->pack[m / PHI_LANES].x[i][m % PHI_LANES];

@@ -5,14 +5,14 @@
 #include "adjoint_abreast.c"
 #include "model.h"
 
-/* Of explicit stages the points where they begin are kept, of implicit ones those that they have solved for: so few that no
-   step is made again. */
-enum { PHI_POINT = PHI_DIM * PHI_LANES }; /* numbers of a point in all lanes */
+/* The tape holds the starting points of explicit stages, or the solutions of implicit ones, of all steps. So no step is
+   repeated. */
+enum { PHI_POINT = PHI_DIM * PHI_LANES }; /* doubles on the tape for one point in all lanes */
 
 #include "adjoint_kept_groups.c"
 #include "adjoint_kept_packs.c"
 
-/* Make all steps, and leave their points. 0 where that would have to go on with too few members. */
+/* Make all steps and write the tape. Returns 0 if too few members remain active. */
 static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, size_t first)
 {
     double *trail = all->trail;

@@ -4,7 +4,7 @@
 
 #include "adjoint_kept.c"
 
-/* Pull the cotangents of rows back through all steps. */
+/* Reverse pass of all steps, which adds the cotangents of rows on its way. */
 static void phi_pull_back(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
 {
     phi_lanes y[PHI_DIM];

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "adjoint_kept.c"
 
-/* Pull cotangents x back through a stage that began at y. */
+/* Pull the cotangents x back through a stage that started at y. */
 static inline void phi_pull_stage(phi_lanes *coef, phi_lanes y[restrict PHI_DIM], phi_lanes x[restrict PHI_DIM],
     phi_lanes coef_bar[restrict PHI_COEFFICIENTS])
 {

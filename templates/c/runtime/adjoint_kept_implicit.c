@@ -4,7 +4,8 @@
 #include <string.h>
 #include "adjoint_kept.c"
 
-/* Pull cotangents x back through a stage that has solved for g->y. They become infinite where lanes do not suffice. */
+/* Pull the cotangents x back through a stage whose solution is g->y. They become infinite in lanes where elimination
+   without pivoting fails. */
 static void phi_pull_stage(phi_traced *g, phi_lanes x[restrict PHI_DIM], phi_lanes coef_bar[restrict PHI_COEFFICIENTS])
 {
     phi_lanes slopes[PHI_COEFFICIENTS];

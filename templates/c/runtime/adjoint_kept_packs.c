@@ -4,8 +4,8 @@
 
 #include "adjoint_kept.c"
 
-/* Make a step, of as many as remain, and leave the points of its stages; the end of what was left. NULL where too few
-   members are left to go on. */
+/* Make one step of all active members and write the points of its stages to the tape. Returns the end of what was
+   written, or NULL if too few members remain active. */
 static double *phi_pull_step(phi_group *group, size_t remaining, double *trail)
 {
     (void)remaining;

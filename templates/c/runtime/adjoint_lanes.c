@@ -9,19 +9,20 @@
 #include "model_lanes.h"
 #include "solver.c"
 
-/* ---- The transpose of steps in lanes ---- */
-/* What stages are linearised around is known before anything is pulled back. So the derivatives of several are computed at
-   once, and a cotangent takes a small matrix through each. */
+/* ---- Reverse pass, vectorised over stages ---- */
+/* The tape gives the points at which stages are linearised, before any cotangent is known. So the derivatives of
+   several stages are computed together, one in each lane; then the cotangent passes through them one after the other,
+   as a product with a small matrix. */
 
-/* Stages that are gone back through at once, linearised: jacobian and gain are the transposes of the derivatives of alpha(y)
-   and of the increment. A cotangent after of the end of one becomes after + change, where jacobian change = gain after;
-   wrong is infinite where lanes do not suffice. */
+/* Linearised stages, one in each lane. jacobian and gain are the transposes of the derivatives of alpha(y) and of the
+   increment. The cotangent `after` at the end of a stage becomes after + change, where jacobian change = gain after.
+   wrong is infinite in lanes where elimination without pivoting fails. */
 typedef struct {
 #include "state_of_traced.h"
 } phi_traced;
 
-/* Solve matrix * solutions = sides, both overwritten, of so many sides in each row, by elimination without pivoting:
-   matrices are I + O(h). wrong becomes infinite where a pivot is far from 1. */
+/* Solve matrix * solutions = sides, both overwritten, by elimination without pivoting: matrices are I + O(h). sides has
+   the given number of columns. wrong becomes infinite in lanes where a pivot is far from 1. */
 static void phi_solve_lanes(phi_lanes *matrix, phi_lanes *sides, int count, phi_lanes wrong)
 {
     for (int k = 0; k < PHI_DIM; ++k) {
@@ -59,7 +60,7 @@ static void phi_solve_lanes(phi_lanes *matrix, phi_lanes *sides, int count, phi_
 #include "adjoint_newton_lanes.c"
 #include "adjoint_path_lanes.c"
 
-/* Load a stage of the step that at is before, into a lane. */
+/* Load one stage of the step before *at from the tape into a lane. */
 static void phi_load(phi_traced *g, int lane, const phi_solver *at PHI_AND_INT_STAGE, const double y[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) g->y[i][lane] = y[i];
@@ -67,7 +68,8 @@ static void phi_load(phi_traced *g, int lane, const phi_solver *at PHI_AND_INT_S
     PHI_NOTE_TIME_OF_LANE(g, at)
 }
 
-/* Pull a cotangent back through a stage that was linearised; where that was not possible, by itself. */
+/* Pull a cotangent back through a linearised stage; where its lane failed, through the stage by itself, with
+   pivoting. */
 static phi_status phi_through(phi_traced *g, int lane, phi_cotangent *bar, double coef_bar[PHI_COEFFICIENTS])
 {
     double change[PHI_DIM] = { 0.0 };

@@ -4,7 +4,7 @@
 
 #include "solver.h"
 
-/* Subtract what a derivative by e = -H contributes to those by the parameters of H. */
+/* Subtract the part of the derivatives by the parameters of H that acts through e = -H. */
 static void phi_subtract_level(phi_params *params_bar, double e_bar, const double slope[])
 {
     double sums[sizeof(phi_params) / sizeof(double)];

@@ -4,7 +4,7 @@
 #include "model.h"
 #include "solver.c"
 
-/* What phi_pullback_each was asked for; each is how many numbers the rows of a member have. */
+/* Arguments of phi_pullback_each; each is the number of doubles in the rows of one member. */
 typedef struct {
     const phi_params *params;
     const double *x0, *h, *rows_bar;
@@ -15,7 +15,7 @@ typedef struct {
     unsigned char *status;
 } phi_pulled;
 
-/* Start a member where it begins. */
+/* Initialise the solver of one member at its initial state. */
 static phi_status phi_pull_begin(const phi_pulled *all, size_t m, phi_solver *s)
 {
     const phi_params *params = all->params != NULL ? all->params + m : NULL;
@@ -25,7 +25,7 @@ static phi_status phi_pull_begin(const phi_pulled *all, size_t m, phi_solver *s)
 
 #include "adjoint_members_level.c"
 
-/* Pull a member back by itself. */
+/* Reverse pass of one member by itself. */
 static phi_status phi_pull_member(const phi_pulled *all, size_t m)
 {
     const double *rows_bar = all->rows_bar + m * all->each;

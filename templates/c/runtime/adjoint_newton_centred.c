@@ -4,7 +4,7 @@
 
 #include "adjoint_lanes.c"
 
-/* Linearise the stages. */
+/* Linearise the stages at their solutions. */
 static void phi_linearise_back(phi_traced *g)
 {
     phi_lanes displacement[PHI_DIM], increment[PHI_DIM], jacobian[PHI_DIM * PHI_DIM];
@@ -16,7 +16,7 @@ static void phi_linearise_back(phi_traced *g)
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane) {
                 g->jacobian[to][lane] = jacobian[from][lane];
-                g->gain[to][lane] = 2.0 * ((i == j ? 1.0 : 0.0) - jacobian[from][lane]); /* y is the mean of the ends */
+                g->gain[to][lane] = 2.0 * ((i == j ? 1.0 : 0.0) - jacobian[from][lane]); /* y is the mean of start and end */
             }
         }
 }

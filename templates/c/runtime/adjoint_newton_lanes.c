@@ -7,7 +7,7 @@
 #include "adjoint_newton_centred.c"
 #include "adjoint_newton_general.c"
 
-/* The cotangents of coefficients, from those of ends and of residuals. */
+/* Cotangents of the coefficients, from those of the ends of stages and of the residuals. */
 static void phi_slopes_back(phi_traced *g, phi_lanes slopes[restrict PHI_COEFFICIENTS])
 {
     phi_lanes minus[PHI_DIM];

@@ -4,7 +4,7 @@
 
 #include "adjoint_lanes.c"
 
-/* Clear matrices whose zeros are not stored. */
+/* Set matrices to 0: the generated kernels write non-zero entries only. */
 static void phi_clear_zeros(phi_lanes jacobian[PHI_DIM * PHI_DIM], phi_lanes slope[PHI_DIM * PHI_DIM])
 {
     memset(jacobian, 0, PHI_DIM * PHI_DIM * sizeof jacobian[0]);

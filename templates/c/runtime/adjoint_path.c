@@ -6,19 +6,20 @@
 #include "adjoint_stage.c"
 #include "adjoint_path.h"
 
-#define PHI_BACK_NEGLIGIBLE 1e-18    /* terms that rounding hides in their sum, in sizes of start and sum */
-#define PHI_BACK_ROUNDED_SLOPE 1e-13 /* rounding of slopes, in sizes of the path and its slope */
-#define PHI_ANCHORED 8               /* rounds at most that bring an end to where it was ... */
-#define PHI_ANCHORED_TO 1e-15        /* ... so well, in sizes of the state */
+#define PHI_BACK_NEGLIGIBLE 1e-18    /* largest terms that rounding hides in their sum, relative to start and sum */
+#define PHI_BACK_ROUNDED_SLOPE 1e-13 /* rounding of slopes, relative to the path and its slope */
+#define PHI_ANCHORED 8               /* most iterations that bring an end to its place ... */
+#define PHI_ANCHORED_TO 1e-15        /* ... with this accuracy, relative to the state */
 
-/* The sizes of the groups of what is traced back: the state, its cotangent, and those of p and of coefficients. */
+/* Offsets of the groups of quantities in a path that is integrated backward: the state, its cotangent, and the
+   cotangents of p and of the coefficients. */
 static void phi_back_sizes(const double values[PHI_BACK], double sizes[4])
 {
     for (int g = 0; g < 4; ++g) sizes[g] = 0.0;
     for (int i = 0; i < PHI_BACK; ++i) sizes[i < 3 * PHI_DIM ? i / PHI_DIM : 3] += fabs(values[i]);
 }
 
-/* Whether a path that is traced back satisfies its equation at m, where its expansion has the given slope. */
+/* Whether a path that is integrated backward satisfies its equation at m, where its expansion has the given slope. */
 static int phi_back_holds(const double *coef, const double p[PHI_BACK], const double m[PHI_BACK],
     const double slope[PHI_BACK])
 {
@@ -33,8 +34,8 @@ static int phi_back_holds(const double *coef, const double p[PHI_BACK], const do
     return 1;
 }
 
-/* A path that is traced back with its cotangents, 0 <= t <= 1, by their Taylor series: change is the end minus the start.
-   0 if PHI_TERMS terms do not suffice. */
+/* Path integrated backward with its cotangents, 0 <= t <= 1, by Taylor series: change is the end minus the start.
+   Returns 0 if PHI_TERMS terms do not suffice. */
 static int phi_back_piece(const double *coef, const double p[PHI_BACK], const double start[PHI_BACK],
     double change[PHI_BACK])
 {
@@ -68,8 +69,8 @@ static int phi_back_piece(const double *coef, const double p[PHI_BACK], const do
     return 0;
 }
 
-/* The cotangents of the start of a path, of p and of the coefficients that it depends on (found, after the state), from
-   those of its end and of its mean. 0 if it cannot be followed. */
+/* Cotangents of the start of a path, of p and of the coefficients that it depends on (found, after the state), from
+   those of its end and of its mean. Returns 0 if the path cannot be followed. */
 static int phi_traced_back(const double *coef, const double end[PHI_DIM], const double p[PHI_DIM],
     const double bar[PHI_DIM], const double mean_bar[PHI_DIM], double found[PHI_BACK])
 {
@@ -92,8 +93,8 @@ static int phi_traced_back(const double *coef, const double end[PHI_DIM], const 
     return 0;
 }
 
-/* Move the end of a path, which is known nearly, to where the mean is y, as far as that brings it nearer: on long paths the
-   mean may follow the end by more than the end was moved. 0 if it cannot be followed. */
+/* Correct an approximate end of a path so that the mean becomes y, as long as corrections shrink the error: on long
+   paths the mean may change by more than the end does. Returns 0 if the path cannot be followed. */
 static int phi_anchor(const double *coef, const double p[PHI_DIM], const double y[PHI_DIM], double end[PHI_DIM])
 {
     double minus[PHI_DIM], change[PHI_DIM], mean[PHI_DIM], miss[PHI_DIM], moved[PHI_DIM], before = HUGE_VAL;
@@ -119,8 +120,8 @@ static int phi_anchor(const double *coef, const double p[PHI_DIM], const double 
     return 1;
 }
 
-/* Pull a cotangent back through a stage whose path had the mean y. With p = grad S_h(y) the cotangent w of p is
-   b + B H w: b is what the path gives for that of its end, B for those of its mean, and H the Hessian of S_h. */
+/* Pull a cotangent back through a stage whose path had the mean y. With p = grad S_h(y), the cotangent w of p is b + B
+   H w. Here b comes from the cotangent of the end of the path, B from that of its mean, and H is the Hessian of S_h. */
 static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM], phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {

@@ -4,11 +4,11 @@
 #include <string.h>
 #include "adjoint_lanes.c"
 
-#define PHI_BACK_SETTLED 1e-15  /* accuracy of middles */
-#define PHI_BACK_ACCURACY 1e-17 /* of the derivatives of paths */
+#define PHI_BACK_SETTLED 1e-15  /* accuracy of the middles of paths */
+#define PHI_BACK_ACCURACY 1e-17 /* accuracy of the derivatives of paths */
 
 #if PHI_ALONG
-/* The derivatives of the paths along the coefficients that pi depends on, by as many orders as those along p. */
+/* Derivatives of the paths by the coefficients that pi depends on, to as many orders as those by p. */
 static void phi_vary_coefficients(phi_expansion *e)
 {
     memset(e->w[0], 0, sizeof e->w[0]);
@@ -35,7 +35,7 @@ static void phi_vary_coefficients(phi_expansion *e)
 }
 
 #endif
-/* The derivatives of start and change of the paths, along their middles and p: what even and odd terms add up to. */
+/* Derivatives of start and change of the paths, by their middles and p: sums of the even and of the odd terms. */
 static void phi_ends_of_slopes(phi_expansion *e)
 {
     for (int i = 0; i < 2 * PHI_DIM * PHI_DIM; ++i) {
@@ -47,7 +47,7 @@ static void phi_ends_of_slopes(phi_expansion *e)
     }
 }
 
-/* Follow the paths with mean y under p, and their derivatives. */
+/* Integrate the paths with mean y and covector p, and their derivatives. */
 static void phi_trace(phi_traced *g, phi_lanes hessian[restrict PHI_DIM * PHI_DIM])
 {
     phi_lanes middle[PHI_DIM];
@@ -72,8 +72,8 @@ static void phi_trace(phi_traced *g, phi_lanes hessian[restrict PHI_DIM * PHI_DI
     }
 }
 
-/* Linearise the stages. With M and N the derivatives of the mean along middle and p = grad S_h(y), and H the Hessian of
-   S_h, the middle follows y by M^-1 (1 - N H). So the derivatives of the start and of the change along y are known. */
+/* Linearise the stages. M and N are the derivatives of the mean by the middle and by p = grad S_h(y), H is the Hessian
+   of S_h. The derivative of the middle by y is M^-1 (1 - N H); those of the start and of the change follow from it. */
 static void phi_linearise_back(phi_traced *g)
 {
     phi_lanes hessian[PHI_DIM * PHI_DIM], matrix[PHI_DIM * PHI_DIM], follows[PHI_DIM * PHI_DIM];
@@ -107,10 +107,11 @@ static void phi_linearise_back(phi_traced *g)
         }
 }
 
-/* The cotangents of coefficients, from those of ends and starts: of p first, then by p and by the paths. */
+/* Cotangents of the coefficients from those of ends and starts: first the cotangent of p, then contributions through p
+   and through the paths. */
 static void phi_slopes_back(phi_traced *g, phi_lanes slopes[restrict PHI_COEFFICIENTS])
 {
-    phi_lanes matrix[PHI_DIM * PHI_DIM], mean[PHI_DIM], covector[PHI_DIM], known = { 0.0 }; /* the pivots are those of before */
+    phi_lanes matrix[PHI_DIM * PHI_DIM], mean[PHI_DIM], covector[PHI_DIM], known = { 0.0 }; /* reuses the pivots of the factorisation */
     const phi_expansion *e = &g->e;
     for (int i = 0; i < PHI_DIM; ++i) {
         phi_lanes along_m = { 0.0 }, along_p = { 0.0 };

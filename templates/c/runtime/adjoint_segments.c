@@ -6,13 +6,13 @@
 #include "adjoint_abreast.c"
 #include "model.h"
 
-/* The reverse pass of splittings goes from segment to segment. The tape has the states where segments begin. */
+/* The reverse pass of splittings goes from segment to segment. The tape holds the states at the starts of segments. */
 #include "adjoint_flows_lanes.h"
 
 #include "adjoint_segments_far.c"
 #include "adjoint_segments_near.c"
 
-/* Make all steps, and write where segments begin, but for the first, to the tape. */
+/* Make all steps and write the states at the starts of segments, except the first, to the tape. */
 static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
 {
     double *trail = all->trail;
@@ -37,7 +37,7 @@ static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, si
     return 1;
 }
 
-/* Where a segment begins: its states, and what adding them has lost. */
+/* Start of a segment on the tape: states, then compensation terms. */
 static const double *phi_pull_left(const phi_group *group, int k, const phi_pulled *all, size_t begin)
 {
     return all->trail + ((begin / PHI_SEGMENT - 1) * (size_t)group->packs + (size_t)k) * 2 * PHI_DIM * PHI_LANES;

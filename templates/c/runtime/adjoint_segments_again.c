@@ -15,7 +15,7 @@ static void phi_pull_again(phi_group *group, int steps, phi_back_group *bar)
     }
 }
 
-/* Pull the cotangents of rows back through all steps. */
+/* Reverse pass of all steps, which adds the cotangents of rows on its way. */
 static void phi_pull_back(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
 {
     for (size_t end = all->steps; end > 0;) {

@@ -5,12 +5,12 @@
 
 #include "adjoint_segments.c"
 
-/* The states before flows are recomputed by the inverse flows, each over -h, with the functions that its transpose reads.
-   Rounding errors do not pass from one segment to the next. */
-#define PHI_UNLIKE 1e-13 /* largest difference, in sizes of the state, from the state where a segment begins */
+/* The states before flows are recomputed by the inverse flows, each over -h, with the functions that its transpose
+   reads. Each segment restarts from a stored state, so rounding errors do not accumulate over segments. */
+#define PHI_UNLIKE 1e-13 /* largest accepted difference from the stored state at the start of a segment, relative to the state */
 
-/* Take the state where a segment begins, after all its steps have been recomputed by the inverse flow. The derivatives of
-   members become infinite if that has led to another state. */
+/* Restore the state at the start of a segment, after all its steps have been recomputed by the inverse flow. If a
+   recomputed state differs too much, the derivatives of that member become infinite. */
 static void phi_pull_arrive(phi_group *group, const phi_pulled *all, size_t begin, phi_back_group *bar)
 {
     for (int k = 0; k < group->packs; ++k) {
@@ -32,7 +32,7 @@ static void phi_pull_arrive(phi_group *group, const phi_pulled *all, size_t begi
     }
 }
 
-/* Pull the cotangents of rows back through all steps. */
+/* Reverse pass of all steps, which adds the cotangents of rows on its way. */
 static void phi_pull_back(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
 {
     for (size_t end = all->steps; end > 0;) {

@@ -6,7 +6,7 @@
 #include "adjoint_stage.c"
 #include "adjoint_flows.h"
 
-/* Pull a cotangent back through flows of a run of one step, from the last one on; they began at y. */
+/* Pull a cotangent back through the flows of a run of one step, the last one first; they started at y. */
 static void phi_flows_back(const double *coef, phi_kept y, int first, int last, phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {
@@ -16,7 +16,7 @@ static void phi_flows_back(const double *coef, phi_kept y, int first, int last, 
     }
 }
 
-/* Pull a cotangent back through a step whose flows began at y. */
+/* Pull a cotangent back through a step whose flows started at y. */
 static phi_status phi_stage_adjoint(const double *coef, phi_kept y, phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {

@@ -8,14 +8,14 @@
 #include "model.h"
 #include "solver.c"
 
-/* ---- The transpose of steps ---- */
+/* ---- Reverse pass of steps ---- */
 /* Derivatives of a number L, which the reverse pass carries from step to step. */
 typedef struct {
 #include "state_of_cotangent.h"
 } phi_cotangent;
 
-/* The tape of one step: the states before its flows; or the start and the changes of stages of a Gauss method; or the
-   solutions of implicit stages; or the starts of explicit ones. */
+/* Tape of one step: the states before its flows (splitting), the start and the stage increments (Gauss), the solutions
+   of implicit stages, or the starts of explicit stages. */
 typedef PHI_RECORD_OF_STEP;
 
 #include "adjoint_path.c"

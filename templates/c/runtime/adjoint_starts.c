@@ -4,7 +4,7 @@
 
 #include "adjoint_stage.c"
 
-/* Compute the starts of the other stages of a step from that of the first. */
+/* Compute the starts of all later stages of a step from that of the first. */
 static void phi_find_starts(const phi_solver *s, phi_kept trail)
 {
     double change[PHI_DIM];

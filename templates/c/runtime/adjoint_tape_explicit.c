@@ -5,9 +5,9 @@
 #include "adjoint.c"
 #include "adjoint_starts.c"
 
-#define PHI_AT_ONCE ((size_t)1) /* the tape has the state before each step */
+#define PHI_AT_ONCE ((size_t)1) /* the tape holds the state before each step */
 
-/* Make a step, and write its tape. On failure *s is unchanged. */
+/* Make a step and write its tape. On failure *s is unchanged. */
 static phi_status phi_leave_few(phi_solver *s, size_t steps, phi_kept *trail)
 {
     const phi_solver before = *s;

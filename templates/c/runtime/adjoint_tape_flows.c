@@ -4,9 +4,9 @@
 
 phi_status phi_integrate(phi_solver *s, double h, size_t steps) { return phi_integrate_leaving(s, h, steps, NULL); }
 
-#define PHI_AT_ONCE ((size_t)-1) /* any number of steps writes its tape as it is made */
+#define PHI_AT_ONCE ((size_t)-1) /* flows write the tape while steps are made, for any number of steps */
 
-/* Make a few steps, and write their tape. On failure *s is unchanged. */
+/* Make a few steps and write their tape. On failure *s is unchanged. */
 static phi_status phi_leave_few(phi_solver *s, size_t steps, phi_kept *trail)
 {
     const phi_solver before = *s;

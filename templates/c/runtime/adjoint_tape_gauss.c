@@ -4,9 +4,9 @@
 
 #include "adjoint.c"
 
-#define PHI_AT_ONCE ((size_t)1) /* the predictor stores the changes of the stages of the last step only */
+#define PHI_AT_ONCE ((size_t)1) /* the predictor stores the stage increments of the last step only */
 
-/* Make a step, and write its tape. On failure *s is unchanged. */
+/* Make a step and write its tape. On failure *s is unchanged. */
 static phi_status phi_leave_few(phi_solver *s, size_t steps, phi_kept *trail)
 {
     const phi_solver before = *s;

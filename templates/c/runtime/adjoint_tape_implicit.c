@@ -4,7 +4,8 @@
 #include "adjoint_history_recurrences.c"
 #include "adjoint_history_differences.c"
 
-/* Write the tape of the last steps, from the solutions that the predictors store. 0 if they do not store all. */
+/* Write the tape of the last steps, from the solutions stored by the predictors. Returns 0 if they do not store all of
+   them. */
 static int phi_remembered(const phi_solver *s, size_t steps, phi_kept *trail)
 {
     PHI_EACH_STAGE
@@ -12,12 +13,12 @@ static int phi_remembered(const phi_solver *s, size_t steps, phi_kept *trail)
     return 1;
 }
 
-/* Make a few steps, and write their tape. On failure *s is unchanged. */
+/* Make a few steps and write their tape. On failure *s is unchanged. */
 static phi_status phi_leave_few(phi_solver *s, size_t steps, phi_kept *trail)
 {
     const phi_solver before = *s;
     phi_status status = phi_integrate(s, s->h, steps);
-    if (status == PHI_OK && !phi_remembered(s, steps, trail)) { /* a step has cleared its predictor */
+    if (status == PHI_OK && !phi_remembered(s, steps, trail)) { /* a step has reset its predictor */
         *s = before;
         for (size_t k = 0; k < steps && status == PHI_OK; ++k) {
             status = phi_step(s, s->h);

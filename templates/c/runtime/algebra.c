@@ -9,13 +9,13 @@ PHI_CHAPTER_OF_ALGEBRA
 #include "finite.c"
 #include "device_finite.c"
 
-/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the change,
-   corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms: rounded
+   together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
 static int phi_advance(phi_solver *s, const double *change, const double *small)
 {
     double x[PHI_DIM], carry[PHI_DIM];
 #if PHI_GAUSS
-    for (int i = 0; i < PHI_DIM; ++i) { /* x is known after two sums; nothing waits for the rest */
+    for (int i = 0; i < PHI_DIM; ++i) { /* x is available after two additions; the others are off the critical path */
         const double moved = change[i] + small[i], more = moved - change[i];
         const double sum = s->x[i] + moved, added = sum - s->x[i];
         x[i] = sum;
@@ -38,14 +38,15 @@ static int phi_advance(phi_solver *s, const double *change, const double *small)
 
 #include "elapsed.c"
 
-/* In a step from start, moved holds the sum of the changes so far, and the carry; x is start + moved, rounded. */
+/* Within a step, moved holds the sum of the increments so far and the compensation term; x is start + moved, rounded.
+   */
 static inline void phi_add(double x[PHI_DIM], double moved[PHI_DIM], const double start[PHI_DIM], int i, double change)
 {
     moved[i] += change;
     x[i] = start[i] + moved[i];
 }
 
-/* The end of a step: x + moved in compensated arithmetic. */
+/* At the end of a step, add moved to x in compensated arithmetic. */
 static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double moved[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) {
@@ -57,12 +58,12 @@ static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double mo
 
 #if PHI_IMPLICIT
 #if PHI_UNROLLED || PHI_BLOCKS || PHI_TRACED
-#define PHI_LARGEST_RECIPROCAL 1e3 /* Newton matrices are I + O(h): a pivot with a larger one is far from 1 */
+#define PHI_LARGEST_RECIPROCAL 1e3 /* a pivot with a larger reciprocal is far from 1 */
 
 #endif
 #include "device_linear.c"
 #if !PHI_DEVICE
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
 #if PHI_UNROLLED
 static int phi_solve_pivoting(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 #else
@@ -97,8 +98,8 @@ static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 
 #endif
 #if PHI_UNROLLED
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting suffices
+   unless a pivot is far from 1; then rows are exchanged. Returns 0 if singular. */
 static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 {
     double solution[PHI_DIM], reciprocal[PHI_DIM], largest = 0.0;
@@ -112,8 +113,8 @@ static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 
 #endif
 #if PHI_NEWTON && PHI_ADJOINT
-/* Solve matrix^T * solution = side, both overwritten; the zeros of the matrix^T are not where those of the matrix are.
-   0 if singular. */
+/* Solve matrix^T * solution = side, both overwritten. matrix^T has another pattern of zeros than matrix, so it has
+   elimination code of its own. Returns 0 if singular. */
 static int phi_solve_transposed(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 {
 #if PHI_UNROLLED_TRANSPOSE

@@ -11,8 +11,9 @@
 #include "attitude_position.c"
 #include "attitude_gauge.c"
 
-/* Multiply the group element of the attitude by the factor of a step, less the identity, in compensated arithmetic. A gauge
-   rotation, if there is one, is the same factor in all steps and multiplies from the other side; it may be NULL. */
+/* Multiply the group element of the attitude by the attitude increment of a step, given minus the identity, in
+   compensated arithmetic. A gauge rotation, if there is one, multiplies from the other side by the same factor in every
+   step; it may be NULL. */
 static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT] PHI_AND_DOUBLE_ASIDE)
 {
     double change[PHI_ELEMENT], element[PHI_ELEMENT], carry[PHI_ELEMENT];
@@ -31,7 +32,7 @@ static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT] PHI_AND
 #include "attitude_element.c"
 #include "attitude_covector.c"
 
-/* The product of two factors in place of the first; all are less the identity. */
+/* Replace the first increment by the product of both; all are given minus the identity. */
 static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_ELEMENT], double both[PHI_ELEMENT])
 {
     double whole[PHI_ELEMENT], change[PHI_ELEMENT];
@@ -41,15 +42,15 @@ static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_
     for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = first[i] + change[i];
 }
 
-/* Multiply by the factors of the stages of a block in turn. */
+/* Multiply the attitude by the increments of the stages of a block, in their order. */
 static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int count)
 {
-    for (; count % 2 == 0; count /= 2) /* neighbours first: their products do not wait for one another */
+    for (; count % 2 == 0; count /= 2) /* products of neighbours first: they do not depend on each other */
         for (int k = 0; k < count / 2; ++k) phi_joined(sequence[2 * k], sequence[2 * k + 1], sequence[k]);
     for (int k = 0; k < count; ++k) phi_turn_by(s, sequence[k] PHI_AND_ASIDE_OF_BLOCK);
 }
 
-/* Begin with a group element at the present state. */
+/* Initialise the group element at the present state. */
 static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
 {
     memset(s->turned_carry, 0, sizeof s->turned_carry);
@@ -58,7 +59,7 @@ static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
     phi_read_attitude(s);
 }
 
-/* Begin with the identity. */
+/* Initialise the attitude with the identity. */
 static void phi_begin_unturned(phi_solver *s)
 {
     double identity[PHI_ELEMENT] = { 0.0 };
@@ -66,7 +67,7 @@ static void phi_begin_unturned(phi_solver *s)
     phi_begin_attitude(s, identity);
 }
 
-/* Update the attitude that users read, at the end of a run; returns the status of the run. */
+/* Update the public attitude at the end of a run; returns the status of the run. */
 static phi_status phi_end_turning(phi_solver *s, phi_status status)
 {
     phi_read_attitude(s);

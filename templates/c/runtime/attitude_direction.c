@@ -4,7 +4,7 @@
 #include "model.h"
 #include "attitude_quaternions.c"
 
-/* Make a factor, given less 1, of which only the direction matters, one by which the length of q becomes 1. */
+/* Normalise an increment, given minus 1, whose scale is arbitrary, so that the quaternion q gets length 1. */
 static inline void phi_normalise(const double q[4], double factor[4])
 {
     const double own = (factor[0] * (2.0 + factor[0]) + factor[1] * factor[1])

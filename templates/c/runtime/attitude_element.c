@@ -2,7 +2,7 @@
 #define PHI_FILE_ATTITUDE_ELEMENT
 #include "model.h"
 
-/* The factor of a stage whose equation is solved by y, less the identity. */
+/* Attitude increment of a stage with solution y, minus the identity. */
 static inline void phi_factor(const phi_solver *s PHI_AND_INT_STAGE, const double y[PHI_DIM], double factor[PHI_ELEMENT])
 {
     phi_turn(PHI_OF(s->coef, stage), y, factor);

@@ -4,8 +4,9 @@
 #include "attitude_matrices.c"
 #include "attitude_quaternions.c"
 
-/* ---- Gauge rotation: in the frame where momenta are constant, the Casimirs subtracted from H turn the body uniformly ---- */
-/* Take the gauge rotation of a step, less the identity, into an element and its compensation term; NULL for none. */
+/* ---- Gauge rotation: in the frame where momenta are constant, subtracting multiples of Casimirs from H adds a uniform
+   rotation of the body ---- */
+/* Copy the gauge rotation of a step, minus the identity, into an element and its compensation term; zeros for NULL. */
 static inline void phi_add_aside(phi_solver *s, const double *aside, double element[PHI_ELEMENT], double carry[PHI_ELEMENT])
 {
     double change[PHI_ELEMENT];
@@ -15,14 +16,14 @@ static inline void phi_add_aside(phi_solver *s, const double *aside, double elem
     for (int i = 0; i < PHI_ELEMENT; ++i) carry[i] += change[i];
 }
 
-/* Compute the gauge rotation of one step, and of a block of steps, if there are blocks. */
+/* Compute the gauge rotation of one step and, if steps are solved in blocks, of a block of steps. */
 static void phi_set_aside(phi_solver *s)
 {
     phi_uniform(s->rate, s->h, s->aside);
     PHI_SET_ASIDE_OF_BLOCK(s)
 }
 
-/* Compute the rate of the gauge rotation, after x or the attitude has been set. */
+/* Compute the rate of the gauge rotation after x or the attitude has been set. */
 static void phi_take_rate(phi_solver *s)
 {
     phi_rate(&s->params PHI_AND_GAUGE(s->gauge), s->x, s->rate);

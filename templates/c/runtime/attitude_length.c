@@ -3,7 +3,7 @@
 #include "model.h"
 #include "attitude_quaternions.c"
 
-/* Make a factor, given less 1, one by which the length of q comes nearer to 1. */
+/* Bring the length of the quaternion q of an increment, given minus 1, nearer to 1 by one Newton iteration. */
 static inline void phi_normalise(const double q[4], double factor[4])
 {
     const double half = 0.5 * phi_excess(q);

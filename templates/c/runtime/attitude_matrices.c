@@ -25,7 +25,7 @@ static inline void phi_add_identity(double element[PHI_ELEMENT])
 
 #include "attitude_orthogonal.c"
 
-/* By how many halvings P becomes so small that its exponential is a short sum. */
+/* Number of halvings after which the exponential of P is a short sum. */
 static int phi_doublings(double square)
 {
     int doublings = 0;
@@ -33,12 +33,12 @@ static int phi_doublings(double square)
     return doublings;
 }
 
-/* exp(P) - 1: that of P/2^k, doubled k times. Rounding errors double too; if the matrices are orthogonal, that is restored each
-   time. */
+/* exp(P) - 1 by scaling and squaring: exp(P/2^k) - 1, doubled k times. Rounding errors double too; for orthogonal
+   matrices orthogonality is restored after each doubling. */
 static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[PHI_ELEMENT])
 {
     double small[PHI_COVECTOR], square[PHI_ELEMENT];
-    int doublings = phi_doublings(p[PHI_COVECTOR - 1]); /* a bound for the square of the size of P */
+    int doublings = phi_doublings(p[PHI_COVECTOR - 1]); /* bound for the squared norm of P */
     if (doublings == 0) {
         phi_exponential(p, element);
         return;
@@ -52,7 +52,7 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
     }
 }
 
-/* The element, less 1, of the motion with a constant rate, for some time. */
+/* Element, minus 1, of the motion with a constant rate over a given time. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
     double p[PHI_RATE];
@@ -61,7 +61,7 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     phi_matrix_exponential(p, element);
 }
 
-/* Start from an element: s->turned is the product of all factors after it. */
+/* Set the initial element: s->turned is the product of all later increments. */
 static void phi_take_element(phi_solver *s, const double first[PHI_ELEMENT])
 {
     memmove(s->first, first, sizeof s->first);
@@ -69,6 +69,6 @@ static void phi_take_element(phi_solver *s, const double first[PHI_ELEMENT])
     phi_add_identity(s->turned);
 }
 
-/* Update the attitude that users read. */
+/* Update the public attitude. */
 static void phi_read_attitude(phi_solver *s) { PHI_READ_PRODUCT(s) }
 #endif

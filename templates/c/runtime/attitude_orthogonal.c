@@ -4,7 +4,8 @@
 
 #include "attitude_matrices.c"
 
-/* Correct a factor, less the identity, so that its product with a nearly orthogonal matrix is nearer to an orthogonal one. */
+/* Correct an increment, given minus the identity, so that its product with a nearly orthogonal matrix is nearer to an
+   orthogonal one. */
 static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT])
 {
     enum { N = PHI_ROWS_OF_ATTITUDE };
@@ -19,7 +20,7 @@ static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT
     for (int i = 0; i < PHI_ELEMENT; ++i) factor[i] -= excess[i] + change[i];
 }
 
-/* The same for a nearly orthogonal matrix itself, less the identity. */
+/* Correct a nearly orthogonal matrix, given minus the identity. */
 static void phi_make_orthogonal(double element[PHI_ELEMENT])
 {
     double whole[PHI_ELEMENT];

@@ -3,20 +3,20 @@
 #include <string.h>
 #include "model.h"
 
-/* Set the last three numbers of an element to a position in space, or for NULL to the origin. */
+/* Set the last three numbers of an element to a position in space; NULL is the origin. */
 static void phi_take_position(const double position[3], double element[PHI_ELEMENT])
 {
     if (position != NULL) memcpy(element + 4, position, 3 * sizeof element[0]);
     else memset(element + 4, 0, 3 * sizeof element[0]);
 }
 
-/* Update the position that users read. */
+/* Update the public position. */
 static void phi_read_position(phi_solver *s) { memcpy(s->position, s->turned + 4, sizeof s->position); }
 
-/* Write the position behind the attitude. */
+/* Write the position after the attitude. */
 static void phi_put_position(const phi_solver *s, double out[PHI_ELEMENT]) { memcpy(out + 4, s->position, sizeof s->position); }
 
-/* The displacement by a rotation and a velocity that are constant for the time t: the scale is that of the rotation. */
+/* Displacement by a rotation and a velocity that are constant for the time t; scale is that of the rotation. */
 static inline void phi_uniform_position(const double rate[PHI_RATE], double t, double speed, double scale, double element[PHI_ELEMENT])
 {
     const double *w = rate, *v = rate + 3, reach = speed > 0.0 ? 2.0 * (scale * (1.0 + element[0])) : t;

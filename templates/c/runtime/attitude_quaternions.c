@@ -9,7 +9,7 @@
 #include "attitude_velocity_first.c"
 #include "attitude_velocity_last.c"
 
-/* The product of two quaternions. */
+/* Product of two quaternions. */
 static inline void phi_group_product(const double a[4], const double b[4], double product[4])
 {
     product[0] = (a[0] * b[0] - a[1] * b[1]) - (a[2] * b[2] + a[3] * b[3]);
@@ -18,7 +18,7 @@ static inline void phi_group_product(const double a[4], const double b[4], doubl
     product[3] = (a[0] * b[3] + a[3] * b[0]) + (a[1] * b[2] - a[2] * b[1]);
 }
 
-/* What rotating a vector by a quaternion adds to it. */
+/* Change of a vector under rotation by a quaternion. */
 static void phi_rotation(const double q[4], const double v[3], double change[3])
 {
     const double x = q[2] * v[2] - q[3] * v[1], y = q[3] * v[0] - q[1] * v[2], z = q[1] * v[1] - q[2] * v[0];
@@ -27,7 +27,7 @@ static void phi_rotation(const double q[4], const double v[3], double change[3])
     change[2] = 2.0 * (q[0] * z + (q[1] * y - q[2] * x));
 }
 
-/* What a factor from the left adds to an element. The quaternion of the factor is given less 1. */
+/* Change of an element under multiplication from the left. The quaternion of the factor is given minus 1. */
 static inline void phi_added_left(const double element[PHI_ELEMENT], const double factor[PHI_ELEMENT],
     double change[PHI_ELEMENT])
 {
@@ -37,7 +37,7 @@ static inline void phi_added_left(const double element[PHI_ELEMENT], const doubl
     for (int i = 4; i < 7; ++i) change[i] += factor[i];
 }
 
-/* What a factor from the right adds to an element. The quaternion of the factor is given less 1. */
+/* Change of an element under multiplication from the right. The quaternion of the factor is given minus 1. */
 static inline void phi_added_right(const double element[PHI_ELEMENT], const double factor[PHI_ELEMENT],
     double change[PHI_ELEMENT])
 {
@@ -46,7 +46,7 @@ static inline void phi_added_right(const double element[PHI_ELEMENT], const doub
     for (int i = 4; i < 7; ++i) change[i] += factor[i];
 }
 
-/* The element, less 1, of the motion with a constant rate, for some time. */
+/* Element, minus 1, of the motion with a constant rate over a given time. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
     const double speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2])), quarter = 0.25 * (t * speed);
@@ -56,7 +56,7 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     phi_uniform_position(rate, t, speed, scale, element);
 }
 
-/* Take a rate to the frame where momenta are constant, by the element of the attitude. */
+/* Rotate a rate into the frame where momenta are constant, by the element of the attitude. */
 static void phi_carry_rate(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
     double change[3];
@@ -69,8 +69,7 @@ static void phi_carry_rate(const double element[PHI_ELEMENT], double rate[PHI_RA
     phi_reach_position(element, rate);
 }
 
-/* By how much the square of the length of a quaternion is more than 1. What rounding leaves of that has no direction, and does
-   not add up. */
+/* Squared length of a quaternion minus 1. Its rounding errors have no preferred sign and do not accumulate. */
 static inline double phi_excess(const double q[4])
 {
     return ((q[0] * q[0] - 1.0) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
@@ -82,17 +81,17 @@ static inline double phi_excess(const double q[4])
 /* Add the identity to an element. */
 static inline void phi_add_identity(double element[PHI_ELEMENT]) { element[0] += 1.0; }
 
-/* Start from an element. */
+/* Set the initial element. */
 static void phi_take_element(phi_solver *s, const double first[PHI_ELEMENT]) { memcpy(s->turned, first, sizeof s->turned); }
 
-/* Update the attitude that users read. */
+/* Update the public attitude. */
 static void phi_read_attitude(phi_solver *s)
 {
     memcpy(s->attitude, s->turned, sizeof s->attitude);
     phi_read_position(s);
 }
 
-/* Divide a quaternion by its length, unless that is 1 to round-off; the size is its largest number. */
+/* Divide a quaternion by its length, unless that is 1 to round-off; size is the magnitude of its largest number. */
 static void phi_make_unit(double quaternion[PHI_ELEMENT], double size)
 {
     double square = 0.0;

@@ -2,7 +2,7 @@
 #define PHI_FILE_ATTITUDE_VELOCITY_FIRST
 #include "model.h"
 
-/* The velocity of another point of the body, in body coordinates: before the rate is rotated to these. */
+/* Velocity of a point fixed in the body, in body coordinates: before the rate is rotated into these. */
 static inline void phi_leave_position(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
     const double *p = element + 4, *w = rate;

@@ -2,7 +2,7 @@
 #define PHI_FILE_ATTITUDE_VELOCITY_LAST
 #include "model.h"
 
-/* The velocity of another point of the body, in space coordinates: after the rate has been rotated to these. */
+/* Velocity of a point fixed in the body, in space coordinates: after the rate has been rotated into these. */
 static inline void phi_reach_position(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
     const double *p = element + 4, *w = rate;

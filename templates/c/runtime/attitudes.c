@@ -8,7 +8,7 @@
 #include "noise.c"
 
 /* ---- Members with attitudes ---- */
-/* Start a member with the attitude and the random numbers that the ensemble has for it. */
+/* Initialise a member with its attitude and random numbers in the ensemble. */
 static phi_status phi_take_turned(const phi_members *all, size_t m, double x[PHI_DIM], phi_solver *s)
 {
     double element[PHI_ELEMENT];
@@ -21,7 +21,7 @@ static phi_status phi_take_turned(const phi_members *all, size_t m, double x[PHI
     return status;
 }
 
-/* One member, from its start to its end. */
+/* Integrate one member from start to end. */
 static phi_status phi_turn_member(const phi_members *all, size_t m)
 {
     phi_solver s;
@@ -35,7 +35,7 @@ static phi_status phi_turn_member(const phi_members *all, size_t m)
     return status;
 }
 
-/* The arguments are in the order of phi_ensemble_each and phi_ensemble_of. */
+/* Arguments in the order of phi_ensemble_each and phi_ensemble_of. */
 phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *attitude, size_t members,
     PHI_OWN_POINTER
     const double *h, size_t steps,

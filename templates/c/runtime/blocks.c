@@ -12,12 +12,12 @@
 /* ---- Blocks of steps ---- */
 #include "blocks_slopes.h"
 
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+/* Data shared by all blocks: coefficients, equal in all lanes, and the recurrences that predict the solutions. */
 typedef struct {
 #include "state_of_table.h"
 } phi_table;
 
-/* phi_near for the points of all stages and lanes, seen from one value. */
+/* phi_near for the points of all stages and lanes, relative to one reference value. */
 static int phi_near_lanes(phi_model *model, const double last[PHI_DIM])
 {
     phi_lanes most = { 0.0 };
@@ -34,7 +34,7 @@ static int phi_near_lanes(phi_model *model, const double last[PHI_DIM])
     return phi_largest(most) <= PHI_REACH * size;
 }
 
-/* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
+/* Update the table of a stage: its coefficients, and the weights of its recurrences if they were fitted since. */
 static void phi_refresh(const phi_solver *s PHI_AND_INT_STAGE, phi_table *table)
 {
     if (PHI_OF(table->fits, stage) == PHI_OF(s->history, stage).fits) return;
@@ -47,7 +47,7 @@ static void phi_refresh(const phi_solver *s PHI_AND_INT_STAGE, phi_table *table)
 
 #include "blocks_renewed.c"
 
-/* Guesses for the next PHI_LANES values of a stage, by its recurrences. */
+/* Predict the next PHI_LANES solutions of a stage by its recurrences. */
 static void phi_foresee(const phi_history *history, phi_lanes weight[restrict][PHI_DIM],
     phi_lanes y[restrict PHI_DIM])
 {
@@ -66,7 +66,7 @@ static void phi_foresee(const phi_history *history, phi_lanes weight[restrict][P
     }
 }
 
-/* Add the values of all lanes to the history, one after the other. */
+/* Append the solutions of all lanes to the history, in order of time. */
 static void phi_record_lanes(phi_history *history, phi_lanes y[restrict PHI_DIM])
 {
     phi_make_room(history, PHI_LANES);
@@ -75,14 +75,14 @@ static void phi_record_lanes(phi_history *history, phi_lanes y[restrict PHI_DIM]
     history->count += PHI_LANES;
 }
 
-/* The vector field at x; with a monitor, per unit of tau. */
+/* Vector field at x; with a monitor, per unit of tau. */
 static void phi_slope(const phi_solver *s PHI_AND_DOUBLE_T, const double x[PHI_DIM], double slope[PHI_DIM])
 {
     phi_vector_field(&s->params PHI_AND_T(t), x, slope);
     phi_make_per_tau(&s->params, x, slope);
 }
 
-/* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
+/* Step of size h by the classical Runge-Kutta method. x becomes the end of the step, mean the mean slope. */
 static void phi_runge_kutta(const phi_solver *s PHI_AND_DOUBLE_T, double h, double x[PHI_DIM], double mean[PHI_DIM])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
@@ -103,7 +103,8 @@ static void phi_runge_kutta(const phi_solver *s PHI_AND_DOUBLE_T, double h, doub
 #include "blocks_adams.c"
 #include "blocks_guess.c"
 
-/* Guess the points of all stages and steps, by recurrences or else by a march. 0 if they are not near the state. */
+/* Predict the solutions of all stages and steps, by recurrences or else by approximate integration. Returns 0 if they
+   are not near the state. */
 static int phi_guess(phi_solver *s, phi_table *table, phi_model *model)
 {
     if (!s->blocks.use_recurrences) phi_guess_by_march(s, table, model);
@@ -117,8 +118,9 @@ static int phi_guess(phi_solver *s, phi_table *table, phi_model *model)
 
 #include "blocks_turned.c"
 
-/* PHI_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+/* Make PHI_LANES steps at once: predict the solutions of all, and correct them together until the remaining error is as
+   small as after a single step. Returns the number of iterations, or 0, with the solver unchanged, if it exceeds most.
+   */
 static int phi_block(phi_solver *s, phi_table *table, int most)
 {
     phi_model PHI_OF(model, PHI_STAGES);
@@ -165,13 +167,13 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 }
 
 enum {
-    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* steps that fits for whole blocks are saved in */
-    PHI_MOST_SINGLE_STEPS = 1000,     /* before blocks are tried again */
-    PHI_TOO_MANY = 5 * PHI_LANES      /* of these: recurrences are to blame */
+    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* give up recurrences when a failure is followed by more single steps */
+    PHI_MOST_SINGLE_STEPS = 1000,     /* most single steps after a failed block */
+    PHI_TOO_MANY = 5 * PHI_LANES      /* after this number of failures, recurrences are replaced */
 };
-#define PHI_LATEST 0.125 /* the weight of the latest step in the mean of evaluations */
+#define PHI_LATEST 0.125 /* weight of the latest step in the running mean of evaluations */
 
-/* Recurrences are given up for a while, the longer the more often that happens. */
+/* Stop using recurrences for a while, which doubles with every failure. */
 static void phi_give_up(phi_solver *s)
 {
     s->blocks.use_recurrences = s->blocks.last_single_steps = s->blocks.single_steps = 0;
@@ -179,8 +181,8 @@ static void phi_give_up(phi_solver *s)
     s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
 }
 
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
+/* Choose the predictor of the next block: recurrences, fitted as soon as the steps to come, or those already made, are
+   enough to repay the fit. */
 static void phi_choose_guess(phi_solver *s, size_t steps)
 {
     PHI_EACH_STAGE
@@ -196,8 +198,8 @@ static void phi_choose_guess(phi_solver *s, size_t steps)
     if (!s->blocks.use_recurrences) phi_give_up(s);
 }
 
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
+/* Update the measurements after a block. After a failed one, single steps are made, more with every failure.
+   Recurrences that fail repeatedly, or need more iterations than Runge-Kutta predictions did, are abandoned. */
 static void phi_learn_from(phi_solver *s, int passes)
 {
     if (passes > 0) {
@@ -214,7 +216,7 @@ static void phi_learn_from(phi_solver *s, int passes)
     }
 }
 
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
+/* Make a single step, and update the running mean of evaluations for each of its stages. */
 static phi_status phi_single(phi_solver *s)
 {
     const size_t before = s->evaluations;
@@ -224,12 +226,12 @@ static phi_status phi_single(phi_solver *s)
     return status;
 }
 
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as PHI_PASSES for each
-   evaluation in a single step. The results differ by round-off only. */
+/* Solve steps in blocks while that costs less than single steps, with at most PHI_PASSES iterations of a block for each
+   evaluation in a single step. Results differ from single steps by round-off only. */
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     phi_table table;
-    phi_status status = phi_single_steps(s, h, 0); /* makes all that depends on h */
+    phi_status status = phi_single_steps(s, h, 0); /* so that all coefficients for h are computed */
     PHI_EACH_STAGE PHI_OF(table.fits, stage) = -1;
     phi_end_march(&table);
     while (status == PHI_OK && steps > 0) {

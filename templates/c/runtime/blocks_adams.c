@@ -5,17 +5,17 @@
 #include "blocks.c"
 
 enum {
-    PHI_STRIDES = 2, /* of the Runge-Kutta method in a step: errors that all stages of it share */
-    PHI_MEETINGS = 2 /* evaluations of a stage until its point is nearly where alpha(y) = x; the first takes one more */
+    PHI_STRIDES = 2, /* factor of the Runge-Kutta error, which all stages of a step share */
+    PHI_MEETINGS = 2 /* evaluations of a stage until its point nearly satisfies alpha(y) = x; the first stage takes one more */
 };
 
-#define PHI_ASTRAY 1e-3 /* how far a prediction may be from its correction, in sizes of the value and of the step */
-#define PHI_FADING 0.4  /* how much of what was found out from a stage still counts after the next */
+#define PHI_ASTRAY 1e-3 /* largest difference of prediction and correction, relative to value and increment; measured */
+#define PHI_FADING 0.4  /* weight of the earlier stages in the fitted factor, per stage; measured */
 
-/* The next steps are no block: slopes are computed anew in the next one. */
+/* The next steps are not a block: the next block computes its slopes anew. */
 static void phi_end_march(phi_table *table) { table->marching = 0; }
 
-/* A step by the Runge-Kutta method, of one size or the other, from the time t. */
+/* Runge-Kutta step of size h from the time t. */
 static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM])
 {
     double mean[PHI_DIM];
@@ -24,7 +24,7 @@ static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM
         phi_runge_kutta(s PHI_AND_T(t + part * h / (double)PHI_STRIDES), h / (double)PHI_STRIDES, x, mean);
 }
 
-/* The slope at x, where so many steps are done, counted from those of the last block. */
+/* Store the vector field at x after done steps, counted from the first slope in the table. */
 static void phi_note_slope(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, const double x[PHI_DIM])
 {
     double here[PHI_DIM];
@@ -32,9 +32,9 @@ static void phi_note_slope(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES
     for (int i = 0; i < PHI_DIM; ++i) slope[i][done] = here[i];
 }
 
-/* Make a step by Adams' method of order 9, predicted by that of order 8, from x, where so many steps are done. 0, and x as
-   before, where the two differ much: the steps are too long for them then. Slopes are known as far as x, and become known
-   where the prediction leads. */
+/* Make a step of Adams' method of order 9, predicted by that of order 8, from x after done steps. Returns 0, with x
+   unchanged, where both differ much: then the step is too long for them. Slopes up to x must be known; the slope at the
+   prediction is stored. */
 static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, double x[PHI_DIM])
 {
     static const double predict[PHI_PAST] = { -36799.0 / 120960.0, 295767.0 / 120960.0, -1041723.0 / 120960.0,
@@ -62,7 +62,7 @@ static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int
     return 1;
 }
 
-/* The slopes where steps of this size would have come from. */
+/* Slopes at the ends of earlier steps of this size, by integrating backward from the state. */
 static void phi_look_back(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES])
 {
     double x[PHI_DIM];
@@ -73,8 +73,8 @@ static void phi_look_back(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES]
     }
 }
 
-/* Where all steps begin, one after the other: by Adams' method, as long as that will do, or else by that of Runge and
-   Kutta. */
+/* Starts of all steps, one after the other: by Adams' method while it is accurate enough, else by the Runge-Kutta
+   method. */
 static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI_DIM])
 {
     double x[PHI_DIM];
@@ -93,7 +93,7 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI
     table->marching = 1;
 }
 
-/* What a stage moves by along the exact motion, in all lanes. */
+/* Increment of the exact motion over one stage, in all lanes. */
 static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lanes moved[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) {
@@ -107,7 +107,8 @@ static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lan
     }
 }
 
-/* Begin a stage with half of what the exact motion moves by, less what half of it is thought to miss. */
+/* Start the iteration of a stage at its begin plus half of the increment of the exact motion, minus the expected error
+   of that. */
 static void phi_begin_stage(phi_model *model, phi_lanes begin[restrict PHI_DIM], phi_lanes moved[restrict PHI_DIM],
     phi_lanes missed[restrict PHI_DIM], double part)
 {
@@ -118,7 +119,7 @@ static void phi_begin_stage(phi_model *model, phi_lanes begin[restrict PHI_DIM],
     }
 }
 
-/* Bring the points of a stage nearer to where alpha(y) is its begin. */
+/* Fixed-point iteration of alpha(y) = begin for the points of a stage. */
 static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin[restrict PHI_DIM])
 {
     phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
@@ -128,9 +129,9 @@ static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin
     }
 }
 
-/* Guesses where no recurrence is known. From the beginnings of all steps on each lane makes the stages of its own step, by
-   iteration. What half of the exact motion misses is of third order in the size of a stage, where y is the mean of its ends,
-   and otherwise of second: the factor is fitted to the stages before. */
+/* Predictor without recurrences. From the approximate starts of all steps, each lane iterates the stages of its own
+   step. The error of half the exact increment is of third order in the size of a stage where y is the mean of its ends,
+   else of second order; its factor is fitted to the stages before. */
 static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     phi_lanes begin[PHI_DIM], moved[PHI_DIM], missed[PHI_DIM];

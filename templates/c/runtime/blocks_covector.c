@@ -18,7 +18,7 @@ static void phi_matrix_exponential_lanes(phi_lanes p[PHI_COVECTOR], phi_lanes el
     }
 }
 
-/* The factors of a stage in all lanes. */
+/* Attitude increments of a stage in all lanes. */
 static void phi_factor_lanes(phi_lanes *coef, phi_lanes *y, phi_lanes turns[PHI_ELEMENT])
 {
     phi_lanes p[PHI_COVECTOR];

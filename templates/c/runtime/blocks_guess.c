@@ -4,7 +4,7 @@
 #include <string.h>
 #include "blocks.c"
 
-/* y becomes the points whose alpha and beta have these means. */
+/* Replace y by the points whose alpha and beta have these means, to leading order. */
 static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
 {
     phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
@@ -15,8 +15,8 @@ static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
     }
 }
 
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
+/* Predictor without recurrences: points whose alpha and beta have the means of classical Runge-Kutta steps, to leading
+   order. */
 static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     double x[PHI_DIM], mean[PHI_DIM];

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "blocks.c"
 
-/* What depends on the times of the next steps, which differ from lane to lane. */
+/* Compute coefficients that depend on the times of the next steps, which differ from lane to lane. */
 static void phi_renew_lanes(const phi_solver *s, phi_table *table)
 {
     const double done = (double)(s->steps - s->steps_before_h);

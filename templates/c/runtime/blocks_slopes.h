@@ -3,7 +3,7 @@
 #include "newton_lanes.c"
 
 enum {
-    PHI_PAST = 8, /* slopes from which a step by Adams' method extrapolates */
+    PHI_PAST = 8, /* slopes that a step of Adams' method reads */
     PHI_SLOPES = PHI_PAST + PHI_LANES + 1 /* slopes at the starts of steps: of the last block, of this one, and at its end */
 };
 #endif

@@ -4,9 +4,9 @@
 #include "model.h"
 #include "newton_lanes.c"
 
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. most is the largest
-   correction in each lane. */
+/* Advance through the steps of a block in order, each by the linear model of its lane. If the start X of a step (the
+   state with its compensation term) changes, increment - gain residual gives the change of its end, and so the next
+   residual. X itself is summed apart. most is the largest correction in each lane. */
 static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double x[PHI_DIM], double carry[PHI_DIM],
     phi_lanes most)
 {
@@ -38,7 +38,7 @@ static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double
             sum[i] = total;
         }
 #else
-        double even[PHI_DIM] = { 0.0 }, odd[PHI_DIM] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
+        double even[PHI_DIM] = { 0.0 }, odd[PHI_DIM] = { 0.0 }; /* two partial sums shorten the chain of dependent additions */
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_IN(model, stage, residual)[i][lane] = residual[i];
             for (int j = 0; j < PHI_DIM; j += 2) even[i] += PHI_IN(model, stage, gain)[i * PHI_DIM + j][lane] * residual[j];

@@ -4,7 +4,7 @@
 #include "model.h"
 #include "newton_lanes.c"
 
-/* What a step makes of a residual of its first stage, one of the next step: each stage makes 1 + gain of it. */
+/* Propagate a residual of the first stage of a step to that of the next step: each stage multiplies it by 1 + gain. */
 static void phi_turn_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM])
 {
     memset(turn, 0, PHI_DIM * PHI_DIM * sizeof turn[0]);
@@ -25,8 +25,8 @@ static void phi_turn_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM
     }
 }
 
-/* By how much the residual of a stage would change to that of the next, did it not turn. After the last stage comes the first
-   of the next lane; in the last lane it is of no use. */
+/* Difference between the residuals of successive stages, except for the factor 1 + gain. The last stage of a lane is
+   followed by the first of the next lane; the value of the last lane is unused. */
 static void phi_shift(const phi_model *model, int stage, phi_lanes shift[restrict PHI_DIM])
 {
     const phi_model *this_stage = model + stage, *next_stage = model + (stage + 1) % PHI_STAGES;
@@ -47,7 +47,7 @@ static void phi_shift(const phi_model *model, int stage, phi_lanes shift[restric
     }
 }
 
-/* The residuals of the first stages of all steps: each step is affine in that of its first stage. */
+/* Residuals of the first stages of all steps, by the affine maps from step to step. */
 static void phi_first_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], const double x[PHI_DIM],
     const double carry[PHI_DIM], phi_lanes residual[restrict PHI_DIM])
 {
@@ -76,7 +76,7 @@ static void phi_first_residuals(phi_model *model, phi_lanes turn[restrict PHI_DI
     }
 }
 
-/* What a residual takes from y, and from the increment. */
+/* Corrections of y and of the increment by a residual. */
 static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes delta[restrict PHI_DIM],
     phi_lanes gained[restrict PHI_DIM])
 {
@@ -91,9 +91,9 @@ static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], p
 #endif
 }
 
-/* Correct the points of all stages by the residuals along their linear models, and find where the steps lead. As X, the
-   state with its carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
-   apart. most is the largest correction in each lane. */
+/* Correct the points of all stages by their residuals, along their linear models, and compute the ends of all steps. X,
+   the state with its compensation term, gains increment - gain residual, which gives the next residual; X itself is
+   summed apart. most is the largest correction in each lane. */
 static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], phi_lanes unit[restrict PHI_DIM],
     double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)
 {

@@ -7,17 +7,18 @@
 /* ---- The kernel of ensembles ---- */
 /* Each work item integrates one member; work items beyond members do nothing, so that any size of work groups or blocks
    gives the same results. x[i * members + m] is coordinate i of member m, first at the start, then at the end; failed
-   members have the last good state. Where own_params is 1, member m has the parameters params[m], where it is 0 all have
-   params[0]; own_h says the same of h. */
+   members have the last good state. If own_params is 1, member m has the parameters params[m]; if it is 0, all have
+   params[0]. own_h selects h[m] or h[0] likewise. */
 #if PHI_TIMED
-/* So does own_start of the initial times t0. */
+/* own_start selects t0[m] or t0[0] likewise. */
 #elif PHI_GAUGE
-/* So does own_start of gauge, PHI_GAUGES numbers for a member; gauge may be NULL: chosen at the initial states. */
+/* own_start selects the PHI_GAUGES numbers of each member, or those of member 0, in gauge. NULL: gauges chosen at the
+   initial states. */
 #endif
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
    coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before. status[m] is a phi_status. */
 #if PHI_NOISE
-/* Member m takes the random numbers of first_member + m, from the step first_step on, as phi_ensemble_of does. */
+/* Member m has the random numbers of first_member + m, from the step first_step on, as in phi_ensemble_of. */
 #endif
 PHI_KERNEL void phi_ensemble_kernel(uint64_t members, PHI_GLOBAL const phi_params *params, int own_params,
     PHI_GLOBAL double *x,

@@ -4,7 +4,7 @@
 #include "gauge_formula.c"
 #include "level.c"
 
-/* The gauge of a member: the given one, or for NULL the one chosen at its initial state. */
+/* Gauge of a member; for NULL the gauge chosen at its initial state. */
 static void phi_gauge_of(const phi_params *params, const double x0[PHI_DIM], PHI_GLOBAL const double *given,
     double gauge[PHI_GAUGES])
 {

@@ -6,6 +6,6 @@ typedef struct {
     PHI_SHARED double *difference; /* the solution, then differences, each of PHI_DIM numbers; in shared memory */
 } phi_history;
 
-/* Numbers of shared memory that the predictors of a work item need. */
+/* Doubles of shared memory for the predictors of one work item. */
 enum { PHI_LENT = PHI_ALL_STAGES(PHI_DIFFERENCES * PHI_DIM) };
 #endif

@@ -3,15 +3,15 @@
 #include "model.h"
 #include "predictor_policy.h"
 
-/* The place of entry i of difference k among those of the work items of a group. */
+/* Index of entry i of difference k in the shared memory of a work group. */
 static int phi_place_of(int k, int i) { return (k * PHI_DIM + i) * PHI_GROUP; }
 
 
 /* All loops have constant bounds, and selections in place of branches, so that a compiler can keep all values in
    registers. */
 
-/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the equation of
-   a step has solutions that have nothing to do with the motion. */
+/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far away, where
+   the equation of a step has solutions unrelated to the motion. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -26,7 +26,8 @@ static int phi_predict(const phi_history *history, double value[PHI_DIM])
     return history->order > 0 && distance <= PHI_REACH * size;
 }
 
-/* Take in a solved value. The guess of order k missed it by its k-th difference: the next has the best. */
+/* Update the predictor with a solution. The error of the prediction of order k is the k-th difference; the order with
+   the smallest error is used next. */
 static void phi_remember(phi_history *history, const double value[PHI_DIM])
 {
     double least = HUGE_VAL, next[PHI_DIM];

@@ -3,7 +3,7 @@
 #include "history_gauss.h"
 #include "device_history.h"
 
-/* A solver in the memory of one work item. The functions below are for kernels of your own too. */
+/* A solver in the memory of one work item. Kernels of your own may call the functions below. */
 typedef struct {
 #include "state_members.h"
 } phi_solver;
@@ -12,18 +12,18 @@ typedef struct {
    parameter that must be positive is not. */
 phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM]);
 
-/* The same at the time t0; phi_init starts at the time 0. */
+/* As phi_init, at the time t0; phi_init starts at the time 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0);
 
-/* The same with a given gauge: see PHI_GAUGES. phi_init chooses it. */
+/* As phi_init, with a given gauge: see PHI_GAUGES. phi_init chooses the gauge. */
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
     const double gauge[PHI_GAUGES]);
 
 /* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
-/* The same with given increments of the noise: dw[k * PHI_DRAWS + i] is that of source i in step k. NULL for random
-   ones. */
+/* As phi_integrate, with given increments of the noise: dw[k * PHI_DRAWS + i] is that of source i in step k. NULL for
+   random ones. */
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw);
 
 /* Select the random numbers of the next steps. They are a function of the seed, the member and the number of the step

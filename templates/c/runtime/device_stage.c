@@ -2,14 +2,14 @@
 #define PHI_FILE_DEVICE_STAGE
 #include "device_solver.h"
 
-/* Forget the solutions from which the starting values of the next iterations are extrapolated. */
+/* Clear the predictors of all stages. */
 static void phi_forget(phi_history *history)
 {
     history->count = 0;
     PHI_FORGET_ORDER(history)
 }
 
-/* One stage. A guess from earlier steps may have misled it: then once more without. */
+/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
 static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 {
     phi_status status = PHI_OK;

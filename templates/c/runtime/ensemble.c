@@ -13,7 +13,7 @@
 /* ---- Ensembles ---- */
 #endif
 #if PHI_GROUPS || PHI_PACKS
-/* All members. The first status that is not OK. */
+/* Integrate all members. Returns the first status that is not OK. */
 static phi_status phi_run(const phi_members *all)
 {
     phi_status result = PHI_OK;
@@ -36,7 +36,7 @@ static phi_status phi_run(const phi_members *all)
 }
 
 #elif PHI_EACH
-/* All members. The first status that is not OK. */
+/* Integrate all members. Returns the first status that is not OK. */
 static phi_status phi_run(const phi_members *all)
 {
     phi_status result = PHI_OK;

@@ -12,30 +12,30 @@
 
 /* ---- Paths in lanes ---- */
 enum {
-    PHI_TERMS_OF_LANES = 16, /* most of the expansion of a path from its middle */
-    PHI_ROUNDS = 12          /* of the iteration for the middle, which gains some digits in each */
+    PHI_TERMS_OF_LANES = 16, /* most iterations of the expansion of a path from its middle */
+    PHI_ROUNDS = 12          /* most iterations for the middle, each of which gains some digits */
 };
 
-#define PHI_GAIN_OF_ROUND 1e-4 /* what a round leaves of the error at best: so long an expansion it gets */
+#define PHI_GAIN_OF_ROUND 1e-4 /* smallest factor by which an iteration reduces the error; it sets the length of the expansion */
 
-/* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to 1, and need
-   fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first; slope goes on with the
-   entries of d(pi p)/dm and of pi, from which v follows, the derivatives along middle and p, row by row. */
+/* Paths of all lanes as Taylor series about their middle, for half of p: so the time goes from -1 to 1, and fewer terms
+   are needed than from their start. s[i][k] is coefficient k of series i. The coordinates come first; slope continues
+   with the entries of d(pi p)/dm and of pi, from which v, the derivatives by middle and p, follows row by row. */
 typedef struct {
     phi_lanes p[PHI_DIM], fixed[PHI_FIXED], slope_fixed[PHI_SLOPE_FIXED], value[PHI_SERIES];
     phi_lanes s[PHI_SERIES][PHI_TERMS_OF_LANES + 1], slope[PHI_SLOPE_SERIES][PHI_SLOPE_TERMS + 1];
     phi_lanes v[PHI_SLOPE_TERMS + 1][2 * PHI_DIM * PHI_DIM];
-    phi_lanes even[PHI_DIM], odd[PHI_DIM], mean[PHI_DIM]; /* sums of terms, those of even order also as means over time */
+    phi_lanes even[PHI_DIM], odd[PHI_DIM], mean[PHI_DIM]; /* sums of terms; those of even order also as means over time */
     phi_lanes v_even[2 * PHI_DIM * PHI_DIM], v_odd[2 * PHI_DIM * PHI_DIM], v_mean[2 * PHI_DIM * PHI_DIM];
 #if PHI_ALONG
-    phi_lanes w[PHI_SLOPE_TERMS + 1][PHI_DIM * PHI_USED]; /* the derivatives along coefficients */
+    phi_lanes w[PHI_SLOPE_TERMS + 1][PHI_DIM * PHI_USED]; /* derivatives by coefficients */
     phi_lanes w_even[PHI_DIM * PHI_USED], w_odd[PHI_DIM * PHI_USED], w_mean[PHI_DIM * PHI_USED];
 #endif
-    phi_lanes unit[PHI_DIM]; /* what terms are multiplied by to be measured */
-    int terms, varied; /* orders that are known, of the paths and of their derivatives */
+    phi_lanes unit[PHI_DIM]; /* weights of the terms in the error estimate */
+    int terms, varied; /* known orders of the paths and of their derivatives */
 } phi_expansion;
 
-/* The largest of the lanes; what is not finite does not count: that lane has failed. */
+/* Largest value over the lanes. Lanes that are not finite have failed and are left out. */
 static double phi_largest_finite(const phi_lanes size)
 {
     phi_lanes finite;
@@ -46,7 +46,7 @@ static double phi_largest_finite(const phi_lanes size)
 
 #include "path_model_lanes.h"
 
-/* Order k of the series, and with it order k + 1 of the coordinates. */
+/* Compute order k of the series, and order k + 1 of the coordinates. */
 static void phi_next_order(phi_lanes coef[restrict], phi_expansion *e, int k)
 {
     if (k > 0) phi_follow(coef, e, k);
@@ -57,7 +57,7 @@ static void phi_next_order(phi_lanes coef[restrict], phi_expansion *e, int k)
     }
 }
 
-/* Begin to expand the paths with the middles m. */
+/* Start the expansions of the paths at the middles m. */
 static void phi_begin(phi_lanes coef[restrict], phi_expansion *e, phi_lanes m[restrict PHI_DIM])
 {
     phi_lanes norm = { 0.0 };
@@ -81,7 +81,7 @@ static void phi_begin(phi_lanes coef[restrict], phi_expansion *e, phi_lanes m[re
     }
 }
 
-/* Add the terms of the odd order k and of the next; their size. */
+/* Add the terms of the odd order k and of the next order; returns their size. */
 static double phi_add_terms(phi_expansion *e, int k)
 {
     phi_lanes size = { 0.0 };
@@ -99,8 +99,8 @@ static double phi_add_terms(phi_expansion *e, int k)
     return phi_largest_finite(size);
 }
 
-/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite, or PHI_TERMS_OF_LANES are known: whether
-   they suffice is checked at the ends. */
+/* Extend by two orders at a time, until the terms are below accuracy in all finite lanes or PHI_TERMS_OF_LANES are
+   known. The equations at the ends check whether the terms suffice. */
 static void phi_extend(phi_lanes coef[restrict], phi_expansion *e, double accuracy)
 {
     double size = HUGE_VAL;
@@ -131,7 +131,7 @@ static void phi_check_end(phi_lanes coef[restrict], phi_expansion *e, phi_lanes 
     }
 }
 
-/* The same at both ends. */
+/* Check the equation at both ends of the paths. */
 static void phi_check_ends(phi_lanes coef[restrict], phi_expansion *e, phi_lanes wrong)
 {
     phi_lanes start[PHI_DIM], end[PHI_DIM], start_slope[PHI_DIM], end_slope[PHI_DIM];
@@ -156,7 +156,7 @@ static void phi_check_ends(phi_lanes coef[restrict], phi_expansion *e, phi_lanes
     phi_check_end(coef, e, end, end_slope, wrong);
 }
 
-/* Begin to expand the paths with mean y, from their middles as far as these are known. */
+/* Start the expansions of the paths with mean y, from the best known middles. */
 static void phi_begin_at(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
     phi_expansion *e)
 {
@@ -168,8 +168,8 @@ static void phi_begin_at(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM]
     phi_begin(coef, e, m);
 }
 
-/* Find the middles of the paths with mean y by iteration, which gains some digits each time, with expansions as short as
-   that allows; the last can be gone on with. Infinite where that does not converge to the accuracy. */
+/* Find the middles of the paths with mean y by iteration. Each iteration gains some digits and expands no further than
+   these digits need; the last expansion can be extended. Lanes that do not converge to the accuracy become infinite. */
 static void phi_find_middles(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
     phi_expansion *e, double accuracy)
 {
@@ -201,7 +201,7 @@ static void phi_find_middles(phi_lanes coef[restrict], phi_lanes y[restrict PHI_
         if (!(size[lane] <= accuracy)) middle[0][lane] = HUGE_VAL;
 }
 
-/* Half of p: paths take the time from -1 to 1. */
+/* Half of p, since the time of paths goes from -1 to 1. */
 static void phi_halve(phi_lanes p[restrict PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) {
@@ -210,7 +210,7 @@ static void phi_halve(phi_lanes p[restrict PHI_DIM])
     }
 }
 
-/* Order k + 1 of the derivatives; order 0 is 1 along the middle, and 0 along p. */
+/* Order k + 1 of the derivatives; order 0 is 1 for the middle, and 0 for p. */
 static void phi_vary_order(phi_expansion *e, int k)
 {
     memset(e->v[k + 1], 0, 2 * PHI_DIM * PHI_DIM * sizeof e->v[0][0]);
@@ -218,8 +218,8 @@ static void phi_vary_order(phi_expansion *e, int k)
     for (int j = 0; j < k; ++j) phi_vary_by(e, j, k);
 }
 
-/* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
-   those along p beside their first. */
+/* Add the terms of the odd order k of the derivatives and of the next order, and measure them: those by the middle
+   relative to 1, those by p relative to the first. */
 static void phi_add_slopes(phi_expansion *e, int k, phi_lanes size)
 {
     phi_lanes parts[2] = { { 0.0 } }, first = { 0.0 };
@@ -241,11 +241,11 @@ static void phi_add_slopes(phi_expansion *e, int k, phi_lanes size)
         size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
 }
 
-/* The derivatives of the paths along their middles and p. Infinite where PHI_SLOPE_TERMS terms do not suffice. */
+/* Derivatives of the paths by their middles and p. Infinite where PHI_SLOPE_TERMS terms do not suffice. */
 static void phi_vary(phi_lanes coef[restrict], phi_expansion *e, double accuracy)
 {
     phi_lanes slope[PHI_SLOPE_SERIES], size;
-    double largest = 1.0, next = 1.0; /* the last two orders, and what is to be expected of the next */
+    double largest = 1.0, next = 1.0; /* the last two orders, and the expected next one */
     phi_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
     for (int i = 0; i < PHI_SLOPE_SERIES; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
     memset(e->v_even, 0, sizeof e->v_even);

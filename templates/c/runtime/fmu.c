@@ -11,22 +11,22 @@
 
 /* ---- The model between communication points ---- */
 
-/* A communication point is on the grid of whole steps if it is less than this part of a step away from it: times that
-   are sums of step sizes are no multiples of them. */
+/* A communication point counts as a grid point of whole steps if it is within this fraction of a step: sums of rounded
+   step sizes are not exact multiples of them. */
 static const double phi_fmu_slack = 1e-9;
-/* Whole steps of one communication step, at most: their count fits a size_t on every machine. */
+/* Most whole steps in a communication step: the number fits a size_t on every machine. */
 static const double phi_fmu_most_steps = 1e9;
 
 typedef enum { PHI_INSTANTIATED, PHI_INITIALISING, PHI_STEPPING, PHI_AT_EVENT, PHI_TERMINATED } phi_fmu_mode;
 
-/* All that changes while an FMU runs, without pointers: a copy is the state of the FMU. */
+/* Complete state of an FMU, without pointers: a copy is an FMU state. */
 typedef struct {
-    phi_solver grid; /* after whole steps; not later than now */
-    phi_solver now;  /* at the communication point: grid, or a part of a step further */
-    double origin;   /* time of the environment less that of the solver */
-    double time;     /* of the communication point */
+    phi_solver grid; /* state on the grid of whole steps, at the communication point or before */
+    phi_solver now;  /* state at the communication point */
+    double origin;   /* time of the environment minus that of the solver */
+    double time;     /* time of the communication point */
     double step;     /* size of a whole step */
-    int32_t seed;    /* of random numbers */
+    int32_t seed;    /* seed of the random numbers */
     int32_t mode;    /* a phi_fmu_mode */
     int32_t changed; /* whether parameters or inputs have been set since the last step */
 } phi_fmu_state;
@@ -44,7 +44,7 @@ static void phi_fmu_reset(phi_fmu_state *f)
     f->mode = PHI_INSTANTIATED;
 }
 
-/* The time of the environment at which a solver stands. */
+/* Time of the environment for the state of a solver. */
 static double phi_fmu_time(const phi_fmu_state *f, const phi_solver *s)
 {
 #if PHI_MONITOR
@@ -54,7 +54,7 @@ static double phi_fmu_time(const phi_fmu_state *f, const phi_solver *s)
 #endif
 }
 
-/* Begin at f->time with the values that have been set. */
+/* Initialise at f->time with the values that have been set. */
 static phi_status phi_fmu_start(phi_fmu_state *f)
 {
     phi_solver fresh;
@@ -80,10 +80,10 @@ static phi_status phi_fmu_start(phi_fmu_state *f)
     return PHI_OK;
 }
 
-/* Go on from the communication point with parameters that have been set: whole steps are counted from here. */
+/* Continue from the communication point with newly set parameters: the grid of whole steps starts here. */
 static phi_status phi_fmu_restart(phi_fmu_state *f)
 {
-    phi_solver trial; /* refuses what no step can be made with */
+    phi_solver trial; /* checks the parameters */
 #if PHI_TIMED
     const phi_status status = phi_init_at(&trial, &f->now.params, f->now.x, f->now.t);
 #elif PHI_GAUGE && !PHI_MONITOR
@@ -95,7 +95,7 @@ static phi_status phi_fmu_restart(phi_fmu_state *f)
 #if PHI_MONITOR
     memcpy(f->now.gauge, trial.gauge, sizeof f->now.gauge); /* e = -H, with the new parameters */
 #endif
-    f->now.h = (phi_real)NAN; /* so that the next step computes what depends on parameters */
+    f->now.h = (phi_real)NAN; /* so that the next step computes the coefficients */
 #if PHI_TIMED
     f->now.t = (phi_real)f->time;
 #else
@@ -106,7 +106,7 @@ static phi_status phi_fmu_restart(phi_fmu_state *f)
     return PHI_OK;
 }
 
-/* How near to the target a time has to be, to count as the target. */
+/* Largest distance from the target at which a time counts as the target. */
 static double phi_fmu_tolerance(const phi_fmu_state *f, double target)
 {
     const double roundoff = (sizeof(phi_real) == sizeof(double) ? 1e-15 : 5e-7) * fmax(fabs(target), fabs(f->origin));
@@ -114,19 +114,20 @@ static double phi_fmu_tolerance(const phi_fmu_state *f, double target)
 }
 
 #if PHI_MONITOR
-/* Make one whole step, of tau, if that ends at the target or before it; `advanced` says whether one was made. */
+/* Make one whole step, in tau, if it ends at the target or before it; `advanced` reports whether a step was made. */
 static phi_status phi_fmu_whole_step(phi_fmu_state *f, double target, bool *advanced)
 {
     phi_solver next = f->grid;
     const phi_status status = phi_step(&next, (phi_real)f->step);
     *advanced = status == PHI_OK && phi_fmu_time(f, &next) <= target + phi_fmu_tolerance(f, target);
-    if (!*advanced) return PHI_OK; /* a step that fails may lead beyond the target: a part of it is tried */
-    if (!(phi_fmu_time(f, &next) > phi_fmu_time(f, &f->grid))) return PHI_NO_CONVERGENCE; /* the time stands still */
+    if (!*advanced) return PHI_OK; /* a step that fails may lead beyond the target: then part of it is tried */
+    if (!(phi_fmu_time(f, &next) > phi_fmu_time(f, &f->grid))) return PHI_NO_CONVERGENCE; /* the time does not advance */
     f->grid = next;
     return PHI_OK;
 }
 
-/* Stand at the target, a part of a step behind the grid: the part is found by Newton's iteration, as dt/dtau is known. */
+/* Move the output state to the target, by part of a step beyond the grid: Newton's iteration finds the part from
+   dt/dtau. */
 static phi_status phi_fmu_part(phi_fmu_state *f, double target)
 {
     double part = 0.0;
@@ -154,14 +155,14 @@ static phi_status phi_fmu_whole_steps(phi_fmu_state *f, double target)
 }
 
 #else
-/* The number of whole steps that end at the target or before it; negative where they cannot be counted. */
+/* Number of whole steps that end at the target or before it; negative if there are too many. */
 static double phi_fmu_ahead(const phi_fmu_state *f, double target)
 {
     const double count = floor((target - phi_fmu_time(f, &f->grid) + phi_fmu_tolerance(f, target)) / f->step);
     return count >= 0.0 && count <= phi_fmu_most_steps ? count : -1.0;
 }
 
-/* Make one whole step, if that ends at the target or before it; `advanced` says whether one was made. */
+/* Make one whole step, if it ends at the target or before it; `advanced` reports whether a step was made. */
 static phi_status phi_fmu_whole_step(phi_fmu_state *f, double target, bool *advanced)
 {
     const double count = phi_fmu_ahead(f, target);
@@ -177,7 +178,7 @@ static phi_status phi_fmu_whole_steps(phi_fmu_state *f, double target)
     return count < 0.0 ? PHI_BAD_ARGUMENT : phi_integrate(&f->grid, (phi_real)f->step, (size_t)count);
 }
 
-/* Stand at the target, a part of a step behind the grid. */
+/* Move the output state to the target, by part of a step beyond the grid. */
 static phi_status phi_fmu_part(phi_fmu_state *f, double target)
 {
     const double part = target - phi_fmu_time(f, &f->grid);
@@ -193,7 +194,7 @@ static phi_status phi_fmu_part(phi_fmu_state *f, double target)
 #endif
 /* ---- Variables ---- */
 
-/* A variable of the model: false where there is none of that number. */
+/* Read a variable of the model. Returns false if no variable has this number. */
 static bool phi_fmu_get(const phi_fmu_state *f, uint32_t variable, double *value)
 {
     const phi_solver *s = &f->now;
@@ -236,7 +237,7 @@ static bool phi_fmu_get(const phi_fmu_state *f, uint32_t variable, double *value
     return true;
 }
 
-/* Set a variable: parameters until the end, initial values before the start. False where that is not allowed. */
+/* Set a variable: parameters at any time, initial values before the start. Returns false if that is not allowed. */
 static bool phi_fmu_set(phi_fmu_state *f, uint32_t variable, double value)
 {
     const bool before = f->mode <= PHI_INITIALISING;
@@ -262,7 +263,7 @@ static bool phi_fmu_set(phi_fmu_state *f, uint32_t variable, double value)
     return true;
 }
 
-/* The seed is the only variable with whole numbers; without noise there is none. */
+/* The seed is the only integer variable, and exists with noise only. */
 static bool phi_fmu_is_whole(uint32_t variable)
 {
 #if PHI_NOISE
@@ -273,7 +274,7 @@ static bool phi_fmu_is_whole(uint32_t variable)
 #endif
 }
 
-/* A variable with whole numbers: false where there is none of that number. */
+/* Read an integer variable. Returns false if no variable has this number. */
 static bool phi_fmu_get_whole(const phi_fmu_state *f, uint32_t variable, int32_t *value)
 {
     if (!phi_fmu_is_whole(variable)) return false;
@@ -281,7 +282,7 @@ static bool phi_fmu_get_whole(const phi_fmu_state *f, uint32_t variable, int32_t
     return true;
 }
 
-/* Set a variable with whole numbers before the start. False where that is not allowed. */
+/* Set an integer variable before the start. Returns false if that is not allowed. */
 static bool phi_fmu_set_whole(phi_fmu_state *f, uint32_t variable, int32_t value)
 {
     if (!phi_fmu_is_whole(variable) || value < 0 || f->mode > PHI_INITIALISING) return false;
@@ -301,7 +302,7 @@ static uint64_t phi_fmu_checksum(const unsigned char *bytes, size_t count)
     return sum;
 }
 
-/* The token of the FMU, a checksum and the state: on machines of one kind only. */
+/* Serialised state: token of the FMU, checksum, state. It can be read on machines of the same kind only. */
 static void phi_fmu_write(const phi_fmu_state *f, unsigned char *bytes)
 {
     const uint64_t sum = phi_fmu_checksum((const unsigned char *)f, sizeof *f);
@@ -310,7 +311,7 @@ static void phi_fmu_write(const phi_fmu_state *f, unsigned char *bytes)
     memcpy(bytes + PHI_FMU_TOKEN + sizeof sum, f, sizeof *f);
 }
 
-/* False where the bytes are not those of a state of this FMU. */
+/* Restore a serialised state. Returns false if the bytes are not a state of this FMU. */
 static bool phi_fmu_read(phi_fmu_state *f, const unsigned char *bytes, size_t count)
 {
     uint64_t sum;
@@ -323,7 +324,7 @@ static bool phi_fmu_read(phi_fmu_state *f, const unsigned char *bytes, size_t co
 
 /* ---- Instances ---- */
 
-/* Reports to the environment why a call failed. */
+/* Report the reason of a failed call to the environment. */
 typedef void (*phi_fmu_logger)(void *instance, const char *message);
 
 typedef struct {
@@ -331,8 +332,8 @@ typedef struct {
     char *name;
     void *environment;
     phi_fmu_logger log;
-    void (*callback)(void); /* the logger of the environment */
-    void (*update)(void);   /* what hears of whole steps, or NULL */
+    void (*callback)(void); /* logger of the environment */
+    void (*update)(void);   /* callback for whole steps, or NULL */
     bool logging, may_return_early;
 } phi_fmu;
 
@@ -341,7 +342,7 @@ static void phi_fmu_say(phi_fmu *instance, const char *message)
     if (instance->logging && instance->callback != NULL) instance->log(instance, message);
 }
 
-/* NULL where there is no memory, or the token is that of another FMU. */
+/* Allocate an instance. Returns NULL without memory, or if the token is that of another FMU. */
 static phi_fmu *phi_fmu_instantiate(const char *name, const char *token)
 {
     phi_fmu *instance;
@@ -365,17 +366,18 @@ static void phi_fmu_free(phi_fmu *instance)
     free(instance);
 }
 
-/* Whether a step may be made from a time, of a size: both finite, and the time is where the FMU stands. */
+/* Whether a communication step may start at this time with this size: both finite, and the time is the present
+   communication point. */
 static bool phi_fmu_may_step(const phi_fmu_state *f, double from, double size)
 {
     if (f->mode != PHI_STEPPING || !isfinite(from) || !(size >= 0.0) || !isfinite(size)) return false;
     return fabs(from - f->time) <= phi_fmu_tolerance(f, fmax(fabs(from), fabs(from + size)));
 }
 
-/* Hears of a whole step that has been made, and whether the environment has the step end here. */
+/* Callback for a completed whole step; returns whether the environment ends the communication step here. */
 typedef bool (*phi_fmu_listener)(phi_fmu *instance, double time);
 
-/* A communication step. If it fails all is as before. */
+/* Make a communication step. If it fails, the state is unchanged. */
 static phi_status phi_fmu_do_step(phi_fmu *instance, double target, phi_fmu_listener listener)
 {
     phi_fmu_state *f = &instance->state;

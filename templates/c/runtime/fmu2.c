@@ -92,7 +92,7 @@ FMI2_STATUS(EnterInitializationMode)(fmi2Component of)
     return phi_fmi2_status(phi_fmi3_enter(of, PHI_INSTANTIATED, PHI_INITIALISING));
 }
 
-/* Functions that are those of FMI 3 by another name. */
+/* Functions that FMI 3 has under other names. */
 #define FMI2_SAME(name, name3, arguments, passed) \
     FMI2_STATUS(name) arguments { return phi_fmi2_status(FMI3_NAME(name3) passed); }
 FMI2_SAME(ExitInitializationMode, ExitInitializationMode, (fmi2Component of), (of))
@@ -116,7 +116,7 @@ FMI2_SAME(DeSerializeFMUstate, DeserializeFMUState,
     (fmi2Component of, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state),
     (of, (const fmi3Byte *)bytes, size, state))
 
-/* Types without variables, and derivatives: none can be got or set, and a call with none of them is no error. */
+/* Types without variables, and derivatives: calls for 0 variables succeed, all others fail. */
 #define FMI2_NONE(name, arguments) \
     FMI2_STATUS(name) arguments { return of != NULL && n == 0 ? fmi2OK : fmi2Error; }
 #if defined(__GNUC__)

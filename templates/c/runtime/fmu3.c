@@ -3,7 +3,7 @@
 
 /* ---- FMI 3.0 ---- */
 
-#ifndef fmi3Functions_h /* the headers of the standard may be included before */
+#ifndef fmi3Functions_h /* the headers of the standard may be included before this file */
 typedef void *fmi3Instance, *fmi3InstanceEnvironment, *fmi3FMUState;
 typedef uint32_t fmi3ValueReference;
 typedef float fmi3Float32;
@@ -33,7 +33,7 @@ typedef void (*fmi3LockPreemptionCallback)(void);
 typedef void (*fmi3UnlockPreemptionCallback)(void);
 #endif
 
-/* Names of functions: as they are in a library, with a prefix where several FMUs are linked into one program. */
+/* Exported names: plain in a library, with a prefix if several FMUs are linked into one program. */
 #if defined(FMI3_FUNCTION_PREFIX) && !defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
 #define FMI3_PASTED(prefix, name) prefix##fmi3##name
 #define FMI3_PREFIXED(prefix, name) FMI3_PASTED(prefix, name)
@@ -156,7 +156,7 @@ FMI3_STATUS(ExitInitializationMode)(fmi3Instance of)
 {
     if (phi_fmi3_expect(of, PHI_INITIALISING) != fmi3OK) return fmi3Error;
     const phi_status status = phi_fmu_start(phi_fmi3_state(of));
-    if (status != PHI_OK) return phi_fmi3_refuse(of, phi_status_string(status)); /* other values may be set and tried */
+    if (status != PHI_OK) return phi_fmi3_refuse(of, phi_status_string(status)); /* values may be set, and initialisation computed again */
     return phi_fmi3_enter(of, PHI_INITIALISING, PHI_STEPPING);
 }
 
@@ -221,7 +221,7 @@ FMI3_STATUS(SetInt32)(fmi3Instance of, const fmi3ValueReference variables[], siz
     return fmi3OK;
 }
 
-/* Types of which there are no variables: nothing can be got or set, which is no error. */
+/* Types without variables: calls for 0 variables succeed, all others fail. */
 static fmi3Status phi_fmi3_none(fmi3Instance of, size_t count)
 {
     return of != NULL && count == 0 ? fmi3OK : phi_fmi3_refuse(of, "no such variable");
@@ -306,7 +306,7 @@ FMI3_ABSENT(ActivateModelPartition, (fmi3Instance of, fmi3ValueReference v, fmi3
 #pragma GCC diagnostic pop
 #endif
 
-/* Parameters that were set take effect with the next step; nothing else happens at events. */
+/* Newly set parameters take effect with the next step; events do nothing else. */
 FMI3_STATUS(UpdateDiscreteStates)(fmi3Instance of, fmi3Boolean *again, fmi3Boolean *terminate,
     fmi3Boolean *nominals, fmi3Boolean *states, fmi3Boolean *has_next, fmi3Float64 *next)
 {
@@ -368,7 +368,7 @@ FMI3_STATUS(DeserializeFMUState)(fmi3Instance of, const fmi3Byte bytes[], size_t
     return fmi3OK;
 }
 
-/* Reports a whole step to the environment, which may ask for the end of the communication step. */
+/* Report a whole step to the environment, which may end the communication step. */
 static bool phi_fmi3_listener(phi_fmu *instance, double time)
 {
     const fmi3IntermediateUpdateCallback update = (fmi3IntermediateUpdateCallback)instance->update;

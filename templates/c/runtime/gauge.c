@@ -6,10 +6,10 @@
 
 #include "model.h"
 
-/* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
+/* ---- The choice of the gauge: multiples of Casimirs subtracted from H ---- */
 #include "gauge_search.h"
 
-/* The direction of the motion at a point, of size 1; 0 where there is none. */
+/* Direction of the motion at a point, a unit vector; 0 at equilibria. */
 static void phi_direction(const phi_params *params, const double at[PHI_DIM], double direction[PHI_DIM])
 {
     double speed = DBL_MIN;
@@ -18,8 +18,8 @@ static void phi_direction(const phi_params *params, const double at[PHI_DIM], do
     for (int i = 0; i < PHI_DIM; ++i) direction[i] /= speed;
 }
 
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of one length: steps of one time would
-   leave the neighbourhood of a state that hardly moves by far too much. */
+/* Sample a short piece of the trajectory from x, by a Runge-Kutta method whose steps have equal length in phase space:
+   with steps of equal time, a slow state would leave its neighbourhood. */
 static void phi_sample(const phi_params *params, const double x[PHI_DIM], double samples[][PHI_DIM])
 {
     double direction[PHI_DIM], middle[PHI_DIM], length = 0.0;
@@ -47,7 +47,7 @@ static double phi_gauge_error(const phi_params *params, const double gauge[PHI_G
     return sum;
 }
 
-/* The error polynomial at centre + t width, by Newton's formula from forward differences. */
+/* Value of the error polynomial at centre + t width, by Newton's formula from forward differences. */
 static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
 {
     double error = difference[PHI_DEGREE];
@@ -55,7 +55,8 @@ static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
     return error;
 }
 
-/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one before. */
+/* Shift of the multiple with index c, in units of width, that minimises the error: searched on successively finer
+   grids. */
 static double phi_least_on_line(const phi_params *params, const double gauge[PHI_GAUGES], int c, double width,
     double samples[][PHI_DIM])
 {
@@ -82,8 +83,8 @@ static double phi_least_on_line(const phi_params *params, const double gauge[PHI
     return best;
 }
 
-/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other, from the
-   least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing finite. */
+/* Multiples that minimise the leading error along a short piece of the trajectory, one after the other, starting from
+   the least-squares solution of grad H = sum of multiples of grad C. Zero where a result is not finite. */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
 {
     double samples[PHI_SAMPLES][PHI_DIM], out[1 + 2 * PHI_GAUGES], sums[1 + 2 * PHI_GAUGES] = { 0.0 };

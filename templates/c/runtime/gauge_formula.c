@@ -6,8 +6,8 @@
 
 #include "model.h"
 
-/* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where that gives
-   nothing finite. */
+/* For each Casimir C the multiple c that minimises |grad H - c grad C| at the initial state; zero where it is not
+   finite. */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
 {
     double out[1 + 2 * PHI_GAUGES];

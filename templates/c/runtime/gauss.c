@@ -10,7 +10,7 @@
 #if PHI_STAGED
 #include "lanes.c"
 #else
-typedef double phi_lanes[PHI_WIDTH]; /* a value at each stage */
+typedef double phi_lanes[PHI_WIDTH]; /* one value for each stage */
 #define PHI_EACH_LANE
 
 #endif
@@ -20,7 +20,7 @@ typedef double phi_lanes[PHI_WIDTH]; /* a value at each stage */
 #endif
 
 /* ---- The implicit step, by Gauss collocation ---- */
-/* Where a step starts: the coordinates, and the time if H depends on it. */
+/* Start of a step: the coordinates, and the time if H depends on it. */
 static void phi_start(const phi_solver *s, double point[PHI_POINT])
 {
     PHI_COPY(point, s->x, s->x, PHI_DIM);
@@ -29,18 +29,18 @@ static void phi_start(const phi_solver *s, double point[PHI_POINT])
 #endif
 }
 
-/* The sum of the moves of all stages. */
+/* Sum of the increments of all stages. */
 static void phi_end(phi_lanes *moves, double end[PHI_UNKNOWNS])
 {
     for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        double even = 0.0, odd = 0.0; /* which need not wait for one another */
+        double even = 0.0, odd = 0.0; /* partial sums, which do not depend on each other */
         for (int i = 0; i < PHI_NODES; i += 2) even += moves[k][i];
         for (int i = 1; i < PHI_NODES; i += 2) odd += moves[k][i];
         end[k] = even + odd;
     }
 }
 
-/* h b_j times the vector field at all stages, where the unknowns are z; the weights are h b_j. */
+/* h b_j times the vector field at each stage, for unknowns z; the weights are h b_j. */
 static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z, phi_lanes *moves)
 {
 #if PHI_STAGED
@@ -55,7 +55,7 @@ static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_
 #endif
 }
 
-/* The factor of squares of changes of coordinates: 1 / |x|^2; where x is 0 moves have the part of x. */
+/* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
 static double phi_scale(const double x[PHI_DIM], phi_lanes *moves)
 {
     double square = DBL_MIN;
@@ -66,8 +66,8 @@ static double phi_scale(const double x[PHI_DIM], phi_lanes *moves)
     return 1.0 / square;
 }
 
-/* The square of the change by a sweep, as a mean over the stages, in sizes of the unknowns: of coordinates that of x, of
-   group elements 1. */
+/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, 1 for group
+   elements. */
 static inline double phi_change_of(double scale, phi_lanes *before, phi_lanes *after)
 {
     phi_lanes sum = { 0.0 };
@@ -82,11 +82,11 @@ static inline double phi_change_of(double scale, phi_lanes *before, phi_lanes *a
     return (even + odd) / (double)PHI_NODES;
 }
 
-/* The values of the unknowns that a predictor derives from the moves of the last steps. */
+/* Values of the unknowns that a predictor derives from the increments of the last steps. */
 static void phi_predict(phi_history *past, int predictor, phi_lanes *z)
 {
 #if PHI_STAGED
-    if (predictor + 1 < PHI_PREDICTORS) { /* the last one reads the last step only */
+    if (predictor + 1 < PHI_PREDICTORS) { /* the last predictor reads the last step only */
         phi_mixed_twice(phi_prediction[predictor], past->moves[past->latest], past->moves[1 - past->latest], z);
         return;
     }
@@ -95,7 +95,7 @@ static void phi_predict(phi_history *past, int predictor, phi_lanes *z)
 }
 
 #if PHI_STAGED
-/* The predictor that would have come nearest to the values z of the unknowns. */
+/* Index of the predictor that would have been nearest to the values z of the unknowns. */
 static int phi_best_predictor(phi_history *past, double scale, phi_lanes *z)
 {
     phi_lanes predicted[PHI_UNKNOWNS];
@@ -114,13 +114,13 @@ static int phi_best_predictor(phi_history *past, double scale, phi_lanes *z)
 
 #endif
 #if PHI_FRAMED
-/* Moves as seen from the end of a step, where the next one starts. */
+/* Stage increments in the frame of the end of a step, where the next step starts. */
 static void phi_see(const phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *moves, double seen[PHI_UNKNOWNS][PHI_WIDTH])
 {
 #if PHI_STAGED
     phi_lanes turned[PHI_UNKNOWNS];
     phi_next_frame_lanes(s->coef, end, moves, turned);
-    memcpy(seen, turned, sizeof turned); /* which need not be aligned as lanes are */
+    memcpy(seen, turned, sizeof turned); /* may be unaligned */
 #else
     double move[PHI_UNKNOWNS], turned[PHI_UNKNOWNS];
     for (int i = 0; i < PHI_NODES; ++i) {
@@ -132,7 +132,7 @@ static void phi_see(const phi_solver *s, const double end[PHI_UNKNOWNS], phi_lan
 }
 
 #endif
-/* Store the moves of a step with this end, for the prediction of the next one. */
+/* Store the stage increments of a step with this end, to predict the next step. */
 static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *moves)
 {
     phi_history *past = &s->history;
@@ -157,8 +157,8 @@ static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lane
 
 #include "gauss_policy.h"
 
-/* Whether changes shrink no more since they are rounding: 1; 0 if they still shrink, and -1 if they do not converge. By the
-   changes so far, of which last is the one before; past->rate follows the rate of changes. */
+/* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if they do not converge. last
+   is the change before the latest one; past->rate is updated to the factor by which changes shrink. */
 typedef struct {
     double last;
     int rising, rises;
@@ -172,16 +172,16 @@ static int phi_judge(phi_history *past, phi_progress *sweeps, int sweep, double 
     if (rate >= 1.0 && change <= PHI_NEARLY_ROUNDING) ++sweeps->rises;
     sweeps->last = change;
     if ((slow && change <= PHI_ROUNDING) || sweeps->rises > 1) {
-        /* or the first change was rounding too */
+        /* or the first change was at rounding level */
         past->sweeps = (sweep == past->sweeps || rate > 2.0 * past->rate ? past->sweeps : sweep) - 1;
         return 1;
     }
-    sweeps->rising = rate >= 1.0 ? sweeps->rising + 1 : 0; /* transients may rise over as many sweeps as there are stages */
+    sweeps->rising = rate >= 1.0 ? sweeps->rising + 1 : 0; /* transients may grow for as many sweeps as there are stages */
     return sweeps->rising < (int)PHI_NODES + PHI_MOST_RISING ? 0 : -1;
 }
 
-/* Solve for the moves of all stages by sweeps, from those that the last steps predict. The change by a sweep is looked at from
-   that one on that is expected to be the last. */
+/* Solve for the increments of all stages by fixed-point sweeps, starting from the prediction. Changes are measured only
+   from the sweep on that is expected to be the last. */
 static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lanes *moves)
 {
     phi_history *past = &s->history;
@@ -206,7 +206,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
             if (!isfinite(square)) return PHI_NOT_FINITE;
             if (judgement < 0) return PHI_NO_CONVERGENCE;
             if (judgement > 0) {
-                /* the sweep before had left about as much as this one changed */
+                /* the remaining error of the sweep before was about the latest change */
                 if (solved) past->sweeps = square <= 16.0 * PHI_SOLVED * PHI_SOLVED ? sweep - 1 : sweep;
                 if (past->sweeps < 2) past->sweeps = 2;
 #if PHI_STAGED
@@ -222,7 +222,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
 }
 
 #if PHI_MONITOR
-/* The time that a step takes: the integral of dt/dtau by the values at its stages. */
+/* Physical time of a step: the integral of dt/dtau over its stages. */
 static double phi_time_of(const phi_solver *s, double point[PHI_POINT], phi_lanes *moves)
 {
     double sum = 0.0;
@@ -245,7 +245,7 @@ static double phi_time_of(const phi_solver *s, double point[PHI_POINT], phi_lane
 }
 
 #endif
-/* One step. If it fails, the state is as before. */
+/* Make one step. If it fails, the state is unchanged. */
 static phi_status phi_attempt(phi_solver *s)
 {
     double point[PHI_POINT], end[PHI_UNKNOWNS], change[PHI_DIM];

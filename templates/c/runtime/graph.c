@@ -6,10 +6,10 @@
 #include "model.h"
 
 /* ---- Bonds ---- */
-/* Whether sites and bonds can be numbered. */
+/* Whether the numbers of sites and bonds fit their types. */
 static int phi_few(size_t sites, size_t bonds) { return sites < INT_MAX && bonds < INT_MAX / 2; }
 
-/* The bytes for them, after the rows. */
+/* Bytes for sites and bonds, after the rows of fields. */
 static size_t phi_graph_size(size_t sites, size_t bonds)
 {
 #if PHI_BY_COLOUR
@@ -24,7 +24,7 @@ static size_t phi_graph_size(size_t sites, size_t bonds)
 #endif
 }
 
-/* Whether bonds can be numbered and all run between two different sites. */
+/* Whether all bonds connect two different existing sites. */
 static int phi_connected(const phi_bonds *bonds, size_t sites)
 {
     if (!phi_few(sites, bonds != NULL ? bonds->count : 0)) return 0;
@@ -36,7 +36,7 @@ static int phi_connected(const phi_bonds *bonds, size_t sites)
     return 1;
 }
 
-/* Each site takes the first colour that none before it has at the other end of a bond. */
+/* Greedy colouring: each site takes the first colour that none of its earlier neighbours has. */
 static void phi_colour(phi_solver *s, int *taken)
 {
     const int sites = (int)s->sites;
@@ -54,7 +54,7 @@ static void phi_colour(phi_solver *s, int *taken)
     for (size_t part = 0; part < sizeof phi_by_colour; ++part) s->flows += phi_by_colour[part] ? s->colour_count : 1;
 }
 
-/* The bonds of each site, in their order: first those that begin there. */
+/* List the bonds of each site in order, those that start at the site first. */
 static void phi_connect(phi_solver *s, const phi_bonds *bonds, double *memory)
 {
     const size_t sites = s->sites, count = bonds != NULL ? bonds->count : 0;
@@ -71,13 +71,13 @@ static void phi_connect(phi_solver *s, const phi_bonds *bonds, double *memory)
         ++s->bonds[bonds->ends[2 * k]];
         ++s->middle[bonds->ends[2 * k + 1]];
     }
-    int end = 0; /* of the bonds so far */
+    int end = 0; /* number of bonds so far */
     for (size_t i = 0; i < sites; ++i) {
         s->bonds[i] = end += s->bonds[i];
         s->middle[i] = end += s->middle[i];
     }
     s->bonds[sites] = end;
-    for (size_t k = count; k-- > 0;) { /* backwards, so that ends become beginnings */
+    for (size_t k = count; k-- > 0;) { /* backwards, which turns ends of lists into their starts */
         const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
         const int begins = --s->bonds[a], ends = --s->middle[b];
         s->other[begins] = (int)b;

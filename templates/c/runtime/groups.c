@@ -7,40 +7,40 @@
 #include "members.c"
 #include "model.h"
 
-/* ---- Groups of members ---- */
+/* ---- SIMD batches of members: implicit steps ---- */
 enum {
     PHI_GROUP = PHI_LANES,              /* members, one in each lane */
-    PHI_FEWEST = 3,                     /* fewer members are quicker one by one */
-    PHI_GROUP_REPAY = 5000 * PHI_DIM,   /* steps that fits cost: of eight values at once, only one is foreseen */
+    PHI_FEWEST = 3,                     /* measured: fewer members are faster one by one */
+    PHI_GROUP_REPAY = 5000 * PHI_DIM,   /* steps to repay a fit; it predicts one value only, where a fit for a block predicts eight */
     PHI_HOPELESS_WAIT = 100 * PHI_REPAY /* steps until recurrences that did not help are fitted again */
 };
 
-/* Members of an ensemble, each in its lane. */
+/* Members of an ensemble, one in each lane. */
 typedef struct {
     phi_lanes x[PHI_DIM], carry[PHI_DIM], PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS];
-    phi_lanes PHI_OF(past, PHI_STAGES)[PHI_REMEMBERED][PHI_DIM]; /* solved values, in a ring */
-    phi_lanes PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
+    phi_lanes PHI_OF(past, PHI_STAGES)[PHI_REMEMBERED][PHI_DIM]; /* solutions, in a ring buffer */
+    phi_lanes PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM]; /* factors of past solutions, the latest first */
+    int latest;     /* row of the latest solutions */
     int count;      /* rows in use */
-    int PHI_OF(extrapolation_order, PHI_STAGES); /* how many of them the extrapolation uses */
-    int PHI_OF(recurrence_terms, PHI_STAGES);    /* how many of them the recurrences use */
-    int PHI_OF(use_recurrences, PHI_STAGES);     /* whether these are the better guess */
-    int fits;               /* how often recurrences have been fitted */
-    int slow_steps;         /* how many of the last steps took more than one iteration */
-    int slow_steps_allowed; /* how many of those before recurrences are fitted again */
-    int active[PHI_LANES];  /* whether the lane has a member that has not failed */
-    size_t steps_left[PHI_LANES]; /* that are still to be made, where one has */
+    int PHI_OF(extrapolation_order, PHI_STAGES); /* number of solutions that the extrapolation uses */
+    int PHI_OF(recurrence_terms, PHI_STAGES);    /* number of solutions that the recurrences use */
+    int PHI_OF(use_recurrences, PHI_STAGES);     /* whether recurrences predict better */
+    int fits;               /* number of fits of the recurrences */
+    int slow_steps;         /* recent steps that took more than one iteration */
+    int slow_steps_allowed; /* slow_steps at which recurrences are fitted again */
+    int active[PHI_LANES];  /* whether the lane holds a member that has not failed */
+    size_t steps_left[PHI_LANES]; /* steps left to make, for active lanes */
     PHI_GAUGES_OF_MEMBERS
 } phi_group;
 
-/* The past values of a stage, the latest for k = 0. */
+/* The past solutions of a stage, the latest for k = 0. */
 static phi_lanes *phi_group_past(phi_group *group PHI_AND_INT_STAGE, int k)
 {
     const int row = group->latest + k;
     return PHI_OF(group->past, stage)[row < PHI_REMEMBERED ? row : row - PHI_REMEMBERED];
 }
 
-/* Guess the values of a stage by the recurrences of the members. */
+/* Predict the solutions of a stage by the recurrences of the members. */
 static void phi_group_foresee(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[restrict PHI_DIM])
 {
     memset(y, 0, PHI_DIM * sizeof y[0]);
@@ -53,7 +53,7 @@ static void phi_group_foresee(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[re
     }
 }
 
-/* Extrapolate the values of a stage. */
+/* Extrapolate the solutions of a stage. */
 static void phi_group_extrapolate(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[restrict PHI_DIM])
 {
     const int order = PHI_OF(group->extrapolation_order, stage);
@@ -70,7 +70,7 @@ static void phi_group_extrapolate(phi_group *group PHI_AND_INT_STAGE, phi_lanes 
     }
 }
 
-/* The sum over members of the absolute values of all components. */
+/* Sum over members of the absolute values of all components. */
 static double phi_group_sum(const phi_group *group, phi_lanes y[PHI_DIM])
 {
     double sum = 0.0;
@@ -87,7 +87,7 @@ static void phi_group_subtract(phi_lanes y[restrict PHI_DIM], phi_lanes other[re
     }
 }
 
-/* Choose the guess that would have been best for these values. */
+/* Select the predictor that would have been best for these solutions. */
 static void phi_group_judge(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PHI_DIM])
 {
     phi_lanes row[PHI_HISTORY + 1][PHI_DIM];
@@ -110,7 +110,7 @@ static void phi_group_judge(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PHI_
     PHI_OF(group->use_recurrences, stage) = phi_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+/* Fit the recurrences of all members. The wait until the next fit grows with every fit, and is long if a fit did not
    help. */
 static void phi_group_fit(phi_group *group)
 {
@@ -137,7 +137,7 @@ static void phi_group_fit(phi_group *group)
     group->slow_steps_allowed = helped && group->slow_steps_allowed < PHI_LONG_WAIT / 2 ? 2 * group->slow_steps_allowed + PHI_REPAY : PHI_HOPELESS_WAIT;
 }
 
-/* Replace guesses that are not near the last values, as phi_near has it, by these; lane by lane. */
+/* Replace, lane by lane, predictions that are not near the last solutions (phi_near) by the given values. */
 static void phi_stay_near(phi_lanes y[restrict PHI_DIM], phi_lanes last[restrict PHI_DIM])
 {
     phi_lanes distance = { 0.0 }, size = { 0.0 };
@@ -155,8 +155,8 @@ static void phi_stay_near(phi_lanes y[restrict PHI_DIM], phi_lanes last[restrict
     }
 }
 
-/* How many lanes are still to be solved after corrections of this size, by what they leave; those where nothing is finite
-   leave the group. */
+/* Number of lanes whose corrections are still above the tolerance. Lanes with values that are not finite leave the
+   group. */
 static int phi_group_open(phi_group *group, const phi_lanes size, const phi_lanes left)
 {
     int open = 0;
@@ -168,7 +168,8 @@ static int phi_group_open(phi_group *group, const phi_lanes size, const phi_lane
     return open;
 }
 
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+/* Predict the solution of a stage: by recurrences or extrapolation, or by the state where the prediction is not near
+   it. */
 static void phi_group_predict(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PHI_DIM])
 {
     if (PHI_OF(group->use_recurrences, stage)) phi_group_foresee(group PHI_AND_STAGE, y);
@@ -176,8 +177,8 @@ static void phi_group_predict(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PH
     phi_stay_near(y, group->x);
 }
 
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
+/* Newton's method for a stage, until all lanes have converged. Returns the number of iterations; if that is the
+   maximum, lanes that have not converged leave the group. */
 static int phi_group_solve(phi_group *group PHI_AND_INT_STAGE, phi_model *model)
 {
     phi_lanes unit[PHI_DIM], size, before, left;
@@ -206,7 +207,7 @@ static int phi_group_solve(phi_group *group PHI_AND_INT_STAGE, phi_model *model)
     return iterations;
 }
 
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+/* Add the increments, corrected to first order, in compensated arithmetic, as in a single step. */
 static void phi_group_advance(phi_lanes x[restrict PHI_DIM], phi_lanes carry[restrict PHI_DIM], phi_model *model)
 {
     PHI_GAIN(model)
@@ -222,8 +223,8 @@ static void phi_group_advance(phi_lanes x[restrict PHI_DIM], phi_lanes carry[res
     }
 }
 
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
+/* Members that failed, or whose new state is not finite or not near the old one, keep the old state and leave the
+   group. Returns the number of active members. */
 static int phi_group_leave(phi_group *group, phi_lanes x[PHI_DIM], phi_lanes carry[PHI_DIM],
     size_t remaining)
 {
@@ -252,7 +253,7 @@ static int phi_group_leave(phi_group *group, phi_lanes x[PHI_DIM], phi_lanes car
     return active;
 }
 
-/* One step of all members, of as many as remain. How many members are left. */
+/* Make one step of all active members. Returns the number of members that are still active. */
 static int phi_group_step(phi_group *group, size_t remaining)
 {
     phi_lanes x[PHI_DIM], carry[PHI_DIM];
@@ -277,7 +278,7 @@ static int phi_group_step(phi_group *group, size_t remaining)
     return phi_group_leave(group, x, carry, remaining);
 }
 
-/* Put a member into a lane: its state, and its coefficients. */
+/* Assign a member to a lane: its state and its coefficients. */
 static phi_status phi_group_join(phi_group *group, int lane, const phi_members *all, size_t m)
 {
     phi_solver s;
@@ -292,7 +293,7 @@ static phi_status phi_group_join(phi_group *group, int lane, const phi_members *
     return status;
 }
 
-/* The frames after so many steps, of the members that are active. */
+/* Write the frames of active members after a number of steps. */
 static void phi_group_frame(const phi_group *group, const phi_members *all, size_t first, size_t done)
 {
     double x[PHI_DIM];
@@ -302,7 +303,7 @@ static void phi_group_frame(const phi_group *group, const phi_members *all, size
     }
 }
 
-/* The end of a member; the steps that the group did not make with it, it makes by itself. */
+/* Write the results of a member. Steps that the group did not make for it are made by single steps. */
 static phi_status phi_group_end(const phi_group *group, int lane, const phi_members *all, size_t m,
     phi_status status)
 {
@@ -321,7 +322,7 @@ static phi_status phi_group_end(const phi_group *group, int lane, const phi_memb
     return status;
 }
 
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
+/* Integrate one group, from member first on. Returns the first status that is not OK. */
 static phi_status phi_group_run(const phi_members *all, size_t first)
 {
     phi_group group;

@@ -10,8 +10,8 @@
 #include "predictor.c"
 #include "plausibility_policy.h"
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
+/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away, at another
+   energy, and unrelated to the motion. */
 static int phi_plausible(const phi_solver *s PHI_AND_INT_STAGE, const double increment[PHI_DIM])
 {
     double moved = 0.0, size = 0.0, field[PHI_DIM], point[PHI_DIM], H[3];
@@ -33,7 +33,7 @@ static int phi_plausible(const phi_solver *s PHI_AND_INT_STAGE, const double inc
     for (int k = 0; k < PHI_SOURCES * PHI_DIM; ++k) size += fabs(s->dw[k / PHI_DIM] * fields[k]);
 #endif
     if (moved <= PHI_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < PHI_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = phi_hamiltonian(&s->params PHI_AND_T(s->t), point);
     }

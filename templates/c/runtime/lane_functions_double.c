@@ -8,7 +8,7 @@
 #define PHI_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
 
 #endif
-/* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
+/* exp(u) - 2^k, and 2^k, where u = k log 2 + r; branch-free. */
 static inline double phi_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
@@ -33,7 +33,7 @@ static inline double phi_exp_parts(double u, double *power)
     return *power * sum;
 }
 
-/* exp(u) for the loops over lanes. No number beyond |u| = 700. */
+/* exp(u) for loops over lanes. NaN for |u| > 700. */
 static inline double phi_exp_lane(double u)
 {
     double power;
@@ -41,7 +41,7 @@ static inline double phi_exp_lane(double u)
     return rest + power + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* exp(u) - 1 for the loops over lanes. No number beyond |u| = 700. */
+/* exp(u) - 1 for loops over lanes. NaN for |u| > 700. */
 static inline double phi_expm1_lane(double u)
 {
     double power;
@@ -49,8 +49,8 @@ static inline double phi_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* log u for the loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2, no branches. No number where u is not
-   positive, or not normal. */
+/* log u for loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2; branch-free. NaN unless u is positive and
+   normal. */
 static inline double phi_log_lane(double u)
 {
     uint64_t bits, exponent, digits;
@@ -72,20 +72,19 @@ static inline double phi_log_lane(double u)
     sum = sum * qq + 0.14285714285714285;
     other = other * qq + 0.2;
     sum = (sum * q + other) * q + 0.3333333333333333;
-    /* m - 1 is exact: f (m - 1) and what follows it are small beside it */
+    /* m - 1 is exact; f (m - 1) and the later terms are small compared with it */
     const double small = q * sum * 2.0 * f + k * 1.9082149292705877e-10;
     const double rest = (m - 1.0) - f * (m - 1.0) + small + k * 0.6931471803691238;
     return rest + (u >= 2.2250738585072014e-308 && u <= 1.7976931348623157e308 ? 0.0 : (double)NAN);
 }
 
 #if PHI_CALLS_SIN && !PHI_CALLS_COS
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+/* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^6. */
 static inline double phi_sin_lane(double u)
 {
     const double shifted = u * 0.3183098861837907 + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
 #elif PHI_CALLS_COS
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number beyond
-   |u| = 10^6. */
+/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^6. */
 static inline double phi_turned_sin(double u, double offset)
 {
     const double shifted = (u * 0.3183098861837907 + offset) + PHI_ROUNDER, k = (shifted - PHI_ROUNDER) - offset;
@@ -93,7 +92,7 @@ static inline double phi_turned_sin(double u, double offset)
 #if PHI_CALLS_SIN || PHI_CALLS_COS
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
+    uint64_t parity, bits; /* the last bit of shifted is the parity of the rounded u */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -114,10 +113,10 @@ static inline double phi_turned_sin(double u, double offset)
 
 #endif
 #if PHI_CALLS_SIN && PHI_CALLS_COS
-/* sin u for the loops over lanes. */
+/* sin u for loops over lanes. */
 static inline double phi_sin_lane(double u) { return phi_turned_sin(u, 0.0); }
 
 #endif
-/* cos u for the loops over lanes. */
+/* cos u for loops over lanes. */
 static inline double phi_cos_lane(double u) { return phi_turned_sin(u, 0.5); }
 #endif

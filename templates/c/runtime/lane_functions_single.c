@@ -9,7 +9,7 @@
 #define PHI_ROUNDER 12582912.0f /* 1.5 2^23: adding it rounds to an integer */
 
 #endif
-/* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
+/* exp(u) - 2^k, and 2^k, where u = k log 2 + r; branch-free. */
 static inline float phi_exp_parts(float u, float *power)
 {
     const float shifted = u * 1.442695f + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
@@ -27,7 +27,7 @@ static inline float phi_exp_parts(float u, float *power)
     return *power * sum;
 }
 
-/* exp(u) for the loops over lanes. No number beyond |u| = 87. */
+/* exp(u) for loops over lanes. NaN for |u| > 87. */
 static inline float phi_exp_lane(float u)
 {
     float power;
@@ -35,7 +35,7 @@ static inline float phi_exp_lane(float u)
     return rest + power + (fabsf(u) <= 87.0f ? 0.0f : (float)NAN);
 }
 
-/* exp(u) - 1 for the loops over lanes. No number beyond |u| = 87. */
+/* exp(u) - 1 for loops over lanes. NaN for |u| > 87. */
 static inline float phi_expm1_lane(float u)
 {
     float power;
@@ -43,8 +43,8 @@ static inline float phi_expm1_lane(float u)
     return rest + (power - 1.0f) + (fabsf(u) <= 87.0f ? 0.0f : (float)NAN);
 }
 
-/* log u for the loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2, no branches. No number where u is not
-   positive, or not normal. */
+/* log u for loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2; branch-free. NaN unless u is positive and
+   normal. */
 static inline float phi_log_lane(float u)
 {
     uint32_t bits, exponent, digits;
@@ -59,20 +59,19 @@ static inline float phi_log_lane(float u)
     const float f = (m - 1.0f) / (m + 1.0f), q = f * f;
     sum = (other * q + sum) * q + 0.2f;
     sum = sum * q + 0.33333334f;
-    /* m - 1 is exact: f (m - 1) and what follows it are small beside it */
+    /* m - 1 is exact; f (m - 1) and the later terms are small compared with it */
     const float small = q * sum * 2.0f * f - k * 2.1219444e-4f;
     const float rest = (m - 1.0f) - f * (m - 1.0f) + small + k * 0.693359375f;
     return rest + (u >= FLT_MIN && u <= FLT_MAX ? 0.0f : (float)NAN);
 }
 
 #if PHI_CALLS_SIN && !PHI_CALLS_COS
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 8192. */
+/* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 8192. */
 static inline float phi_sin_lane(float u)
 {
     const float shifted = u * 0.31830987f + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
 #elif PHI_CALLS_COS
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number beyond
-   |u| = 8192. */
+/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2; branch-free. NaN for |u| > 8192. */
 static inline float phi_turned_sin(float u, float offset)
 {
     const float shifted = (u * 0.31830987f + offset) + PHI_ROUNDER, k = (shifted - PHI_ROUNDER) - offset;
@@ -80,7 +79,7 @@ static inline float phi_turned_sin(float u, float offset)
 #if PHI_CALLS_SIN || PHI_CALLS_COS
     const float near = (u - k * 3.140625f) - k * 9.67502594e-4f;
     const float r = (near - k * 1.50990672e-7f) - k * 5.1266883e-12f, q = r * r, qq = q * q;
-    uint32_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
+    uint32_t parity, bits; /* the last bit of shifted is the parity of the rounded u */
     float value, sum = -2.5052108e-8f, other = 1.6059044e-10f;
     sum = sum * qq + -1.9841270e-4f;
     other = other * qq + 2.7557319e-6f;
@@ -96,10 +95,10 @@ static inline float phi_turned_sin(float u, float offset)
 
 #endif
 #if PHI_CALLS_SIN && PHI_CALLS_COS
-/* sin u for the loops over lanes. */
+/* sin u for loops over lanes. */
 static inline float phi_sin_lane(float u) { return phi_turned_sin(u, 0.0f); }
 
 #endif
-/* cos u for the loops over lanes. */
+/* cos u for loops over lanes. */
 static inline float phi_cos_lane(float u) { return phi_turned_sin(u, 0.5f); }
 #endif

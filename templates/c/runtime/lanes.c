@@ -2,29 +2,29 @@
 #define PHI_FILE_LANES
 #include "model.h"
 
-/* ---- Several steps or members at once ---- */
-/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble, at once.
-   Compilers make vector instructions of the loops over lanes. */
+/* ---- SIMD lanes: several steps or members at once ---- */
+/* The functions below evaluate the formulas of a step for several steps of a trajectory, or members of an ensemble,
+   together. Compilers turn the loops over lanes into vector instructions. */
 #if PHI_NARROW
-enum { PHI_LANES = 4 }; /* more would need too much room on the stack */
+enum { PHI_LANES = 4 }; /* more would need too much stack */
 #else
-enum { PHI_LANES = 8 }; /* what one vector of AVX-512 holds */
+enum { PHI_LANES = 8 }; /* numbers in one vector of AVX-512 */
 #endif
 
 #if defined(__GNUC__)
 #if PHI_NARROW
-typedef double phi_lanes[PHI_LANES] __attribute__((aligned(32))); /* a value in each lane */
+typedef double phi_lanes[PHI_LANES] __attribute__((aligned(32))); /* one value in each lane */
 #else
-typedef double phi_lanes[PHI_LANES] __attribute__((aligned(64))); /* a value in each lane */
+typedef double phi_lanes[PHI_LANES] __attribute__((aligned(64))); /* one value in each lane */
 #endif
 #else
 typedef double phi_lanes[PHI_LANES];
 #endif
 
-/* Before a loop over lanes: tells compilers that they are independent. */
+/* Before a loop over lanes: tells the compiler that iterations are independent. */
 #if defined(__clang__)
 #if PHI_PACKS
-/* Loops over lanes that clang unrolls first make it look for vectors in the loops around them. */
+/* Loops over lanes are not unrolled by clang, which would then vectorise the loops around them instead. */
 #define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
 #else
 #define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
@@ -38,7 +38,7 @@ typedef double phi_lanes[PHI_LANES];
 #endif
 
 #if PHI_PACKS
-/* Before a function that compilers put in the place of its calls, one for each value of a constant argument. */
+/* Marks functions that must be inlined, once for each value of a constant argument. */
 #if defined(__GNUC__)
 #define PHI_IN_PLACE __attribute__((always_inline))
 #else

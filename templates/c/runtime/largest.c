@@ -6,8 +6,8 @@
 
 #include "lanes.c"
 
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
+/* Largest value over the lanes, none of which is negative; infinite if one is not finite. The bits of such numbers have
+   the same order as integers, and those of NaN are larger still. */
 static double phi_largest(const phi_lanes size)
 {
     uint64_t bits[PHI_LANES], most = 0;
@@ -19,7 +19,7 @@ static double phi_largest(const phi_lanes size)
 }
 #if PHI_BLOCKS
 
-/* Each lane of most becomes the larger one, in the same order. */
+/* Replace each lane of most by the larger value, in the same order. */
 static void phi_keep_largest(phi_lanes most, const phi_lanes size)
 {
     uint64_t bits[PHI_LANES], bits_of_most[PHI_LANES];

@@ -17,11 +17,11 @@
 #include "lattice_pieces.c"
 #include "lattice_share.c"
 
-enum { PHI_BUFFER = 256 }; /* densities that are added in one go */
+enum { PHI_BUFFER = 256 }; /* number of densities summed in one pass */
 
 #if PHI_SPREAD
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for what is being
-   written at the same place of another page. */
+/* Doubles from one array to the next. Arrays start at different places of their pages: a load that has the page offset
+   of a pending store would wait for it. */
 static size_t phi_block(size_t rows, ptrdiff_t width)
 {
     const size_t block = rows * (size_t)width, apart = 512 / PHI_ARRAYS / 8 * 8;
@@ -41,7 +41,7 @@ size_t phi_work_size(PHI_SIZES_OF_WORK)
     return doubles * sizeof(double) PHI_AND_TABLES + 64;
 }
 
-/* Values of sites, the last axis fastest, into rows. */
+/* Copy values of sites, the last axis fastest, into rows. */
 static void phi_put(const phi_solver *s, double *rows, const double *values)
 {
     PHI_EACH_ROW {
@@ -52,7 +52,7 @@ static void phi_put(const phi_solver *s, double *rows, const double *values)
     }
 }
 
-/* The sites of fields, without what is beside their rows. */
+/* Copy fields to x[field][site], without the halo. */
 static void phi_take(const phi_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < PHI_DIM; ++k)
@@ -62,7 +62,7 @@ static void phi_take(const phi_solver *s, double *const *fields, double *x)
 
 #include "lattice_seams.c"
 
-/* The values of a parameter at sites, or one value for all. */
+/* Store the values of a parameter at sites, or one value for all sites. */
 static void phi_put_parameter(const phi_solver *s, double *rows, const double *values, double value)
 {
     for (ptrdiff_t i = PHI_LEAST; i < PHI_MEMORY_OF(PHI_BEYOND); ++i) rows[i] = value;
@@ -128,7 +128,7 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
 
 #include "lattice_time.c"
 
-/* What depends on the step size; nothing where that is as before. */
+/* Compute coefficients for the step size h, if h has changed. */
 static phi_status phi_set_step(phi_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
@@ -154,7 +154,7 @@ static int phi_all_hold(const phi_solver *s, double *const *x)
     return 1;
 }
 
-/* Fields, with what is beside their rows. */
+/* Copy fields with their halo. */
 static void phi_copy(double *const *to, double *const *from, const phi_solver *s)
 {
     for (size_t k = 0; k < PHI_DIM; ++k) memcpy(PHI_MEMORY_OF(to[k]), PHI_MEMORY_OF(from[k]), PHI_DOUBLES * sizeof **from);
@@ -180,7 +180,7 @@ void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
 #include "lattice_saved_compensated.c"
 #include "lattice_saved_noise.c"
 
-/* ---- What is seen at sites ---- */
+/* ---- Energy, Casimirs, right-hand side ---- */
 double phi_hamiltonian(const phi_solver *s)
 {
     double density[PHI_BUFFER], sum = 0.0, rest = 0.0;
@@ -190,7 +190,7 @@ double phi_hamiltonian(const phi_solver *s)
             row.from = row.to;
             row.to = s->length - row.from > PHI_BUFFER ? row.from + PHI_BUFFER : s->length;
             phi_energy_row(&row, density);
-            for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
+            for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated summation after A. Neumaier */
                 const double total = sum + density[i];
                 rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
                 sum = total;

@@ -11,8 +11,8 @@
 #include "lattice_adjoint_stages.c"
 #include "lattice_adjoint_flows.c"
 
-/* ---- The transpose of runs ---- */
-/* The cotangents of coefficients: sums over all pieces, in their order, which are 0 then. */
+/* ---- Reverse pass of runs ---- */
+/* Add the cotangents of coefficients over all row segments, in their order, and clear them. */
 static void phi_add_up(const phi_solver *s, phi_transpose *g, double coef_bar[PHI_SUMS])
 {
     const size_t units = phi_units(s);
@@ -25,7 +25,7 @@ static void phi_add_up(const phi_solver *s, phi_transpose *g, double coef_bar[PH
 
 #include "lattice_adjoint_renewed.c"
 
-/* Add the cotangents of parameters, those of numbers by way of the coefficients. */
+/* Add the cotangents of parameters; those of parameters with one value follow from the cotangents of coefficients. */
 static void phi_add_parameters(const phi_solver *s, const phi_transpose *g, const double coef_bar[PHI_SUMS],
     phi_params_bar *params_bar)
 {
@@ -41,7 +41,7 @@ static void phi_add_parameters(const phi_solver *s, const phi_transpose *g, cons
         phi_add_numbers(found, params_bar);
     }
 #if PHI_SERIES && PHI_GATHER
-    phi_add_numbers(coef_bar + PHI_COEFFICIENTS, params_bar); /* what bonds or pairs add up is made of these themselves */
+    phi_add_numbers(coef_bar + PHI_COEFFICIENTS, params_bar); /* sums over bonds or pairs depend on parameters directly */
 #endif
 #else
     (void)coef_bar;
@@ -50,7 +50,7 @@ static void phi_add_parameters(const phi_solver *s, const phi_transpose *g, cons
 }
 
 #if PHI_NEAR
-/* Whether what has been found for parameters is finite: functions for small arguments may be called for these only. */
+/* Whether the cotangents of parameters are finite: if not, small-argument functions had arguments out of range. */
 static int phi_parameters_hold(const phi_solver *s, const phi_transpose *g, const double coef_bar[PHI_SUMS])
 {
     int hold = phi_finite(coef_bar, PHI_SUMS);
@@ -63,7 +63,8 @@ static int phi_parameters_hold(const phi_solver *s, const phi_transpose *g, cons
 }
 
 #endif
-/* How many steps the next segment has of those that are left, more than the longest; without room for another state all but these. */
+/* Number of steps in the next segment, out of the steps left; at least g->longest. Without room for another checkpoint,
+   all but the last g->longest steps. */
 static size_t phi_onward(const phi_transpose *g, size_t left)
 {
     const size_t free = g->most - g->count, parts = free > 1 ? free / 2 + 1 : 2;
@@ -75,7 +76,7 @@ static size_t phi_onward(const phi_transpose *g, size_t left)
 #endif
 }
 
-/* Cotangents of rows, pulled back through the steps from done to until, the last of a segment: s stands at its end. */
+/* Reverse pass of the last segment, from step until back to step done; s holds its final state. */
 static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done, size_t until, size_t stride, size_t steps,
     const double *rows_bar, double coef_bar[PHI_SUMS])
 {
@@ -87,7 +88,7 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
 #if PHI_RENEWED
         next = k - 1;
 #else
-        next = row * stride > done + leg * g->leg ? row * stride : done + leg * g->leg; /* one row, or leg, at once */
+        next = row * stride > done + leg * g->leg ? row * stride : done + leg * g->leg; /* at most to the next row or leg */
         next = k - next > most ? k - most : next;
 #endif
         if (g->anew) {
@@ -131,7 +132,7 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
     return status;
 }
 
-/* All steps of a run and all segments of it, from the last. */
+/* Reverse pass of a run, segment by segment, from the last. */
 static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, size_t stride, double *rows,
     const double *rows_bar, double coef_bar[PHI_SUMS])
 {
@@ -175,7 +176,7 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
     return status;
 }
 
-/* The same from where s stands, with cotangents of coefficients that are 0 before. */
+/* Reverse pass of a run from the present state of s; cotangents of coefficients start from 0. */
 static phi_status phi_attempt(phi_solver *s, phi_transpose *g, size_t steps, size_t stride, double *rows,
     const double *rows_bar, double coef_bar[PHI_SUMS], void *trail, size_t size)
 {
@@ -194,7 +195,7 @@ static phi_status phi_attempt(phi_solver *s, phi_transpose *g, size_t steps, siz
 }
 
 #if PHI_NEAR || PHI_UNDONE
-/* Whether all is to be done once more, in another way, from where all steps began. */
+/* Whether the reverse pass must be repeated, with full-range functions or shorter legs; restores the initial state. */
 static int phi_begins_again(phi_solver *s, phi_transpose *g)
 {
 #if PHI_UNDONE
@@ -229,7 +230,7 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 #if PHI_UNDONE
     g.leg = PHI_STRETCH;
 #if !PHI_NEAR
-    g.far = 1; /* there are no others */
+    g.far = 1; /* full-range functions are the only ones */
 #endif
 #endif
     status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar, trail, size);

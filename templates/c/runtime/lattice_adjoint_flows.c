@@ -7,9 +7,9 @@
 #include "rows.c"
 #include "lattice_trail.c"
 
-/* ---- The transpose of flows ---- */
+/* ---- Reverse pass of flows ---- */
 #if !PHI_TAKES
-/* The sweep of that number in a flow; -1 if there are no more. */
+/* Index of sweep `number` in a flow; -1 if the flow has fewer. */
 static int phi_sweep_of(const phi_solver *s, int flow, int number)
 {
     const int part = phi_flow_parts[flow];
@@ -27,7 +27,7 @@ static int phi_sweep_of(const phi_solver *s, int flow, int number)
 #endif
 }
 
-/* The part of H that a sweep belongs to, from 0 on. */
+/* The part of H that a sweep belongs to, counted from 0. */
 static int phi_part_of(const phi_solver *s, int sweep)
 {
 #if PHI_BY_COLOUR
@@ -44,7 +44,7 @@ static int phi_part_of(const phi_solver *s, int sweep)
 #include "lattice_undoing.c"
 #include "lattice_keeping.c"
 
-/* Pull the cotangent of a row back, which is the state after so many steps, and add it. */
+/* Pull the cotangent of a row, the state after a number of steps, back through the last flow, and add it. */
 static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, const double *row_bar)
 {
     for (size_t f = 0; f < PHI_DIM; ++f) phi_put(s, g->row_bar[f], row_bar + f * s->sites);
@@ -55,7 +55,7 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
             phi_flow last;
             size_t count = 0;
             phi_find_flow(s, steps - 1, PHI_FLOWS - 1, &last);
-            phi_sweep_part(s, last.part, last.coef PHI_AND_FAR(g->far)); /* to be undone */
+            phi_sweep_part(s, last.part, last.coef PHI_AND_FAR(g->far)); /* the reverse pass inverts this flow */
 #if PHI_TAKES
             phi_hand_nothing(s, g, phi_number_of(steps, 0) + 1);
             phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar, &last, &count, 1);
@@ -84,8 +84,8 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
     }
 }
 
-/* Take the steps from done to until, of a run that has not ended before; rows, where not NULL, get the states after stride, 2 stride, ...
-   steps and at the end. What the way back needs is kept if so wanted. */
+/* Make the steps from done to until. rows, if not NULL, receives the states after stride, 2 stride, ... steps and at
+   the end. keeping = 1 writes the tape. */
 static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t until, size_t stride, size_t steps,
     double *rows, int keeping)
 {
@@ -130,7 +130,7 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
     return status;
 }
 
-/* Stand after all steps, or before them. */
+/* Set the state after all steps or, on failure, before them. */
 static phi_status phi_settle(phi_solver *s, phi_transpose *g, size_t steps, phi_status status)
 {
     if (status != PHI_OK || steps == 0) {

@@ -3,7 +3,8 @@
 #include "lattice.h"
 #include "model.h"
 
-/* The same after a step after so many others, where those of what depends on the time are pulled back to the others. */
+/* Add the cotangents of coefficients of one step, after pulling those of time-dependent coefficients back to the
+   others. */
 static void phi_add_up_step(const phi_solver *s, phi_transpose *g, size_t steps, double coef_bar[PHI_SUMS])
 {
     double found[PHI_SUMS] = { 0.0 }, early[PHI_PREPARED];

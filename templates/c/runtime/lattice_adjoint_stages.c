@@ -8,9 +8,10 @@
 #include "rows.c"
 #include "lattice_trail.c"
 
-/* ---- The transpose of stages ---- */
-/* y solves y = r(x, y), and x moves by a(y): the cotangent m of y solves m = (dr/dy)^T m + (da/dy)^T v, where v is that of x after the
-   stage, and that of x before it is v + (dr/dx)^T m. The equation for m is solved as that for y is, by the same code. */
+/* ---- Reverse pass of stages ---- */
+/* A stage solves y = r(x, y) and adds a(y) to x. With v the cotangent of x after the stage, the cotangent m of y solves
+   m = (dr/dy)^T m + (da/dy)^T v, and the cotangent of x before the stage is v + (dr/dx)^T m. The code that solves for y
+   also solves for m. */
 
 /* Add the cotangent of a row. */
 static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, const double *row_bar)
@@ -22,7 +23,7 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
     (void)steps;
 }
 
-/* Pull cotangents back through a stage, from the y that it has kept. */
+/* Pull cotangents back through a stage, from its solution on the tape. */
 static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept PHI_AND_INT_STAGE)
 {
     const double *coef = PHI_ROW_OF(s->coef, stage);
@@ -57,7 +58,7 @@ static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept P
     return PHI_OK;
 }
 
-/* Pull cotangents back through the step after so many, from what its stages have kept. */
+/* Pull cotangents back through one step, from the solutions of its stages on the tape. */
 static phi_status phi_step_back(phi_solver *s, phi_transpose *g, size_t steps, double *kept)
 {
     double *x[PHI_DIM], *left = kept + g->of_step;
@@ -78,8 +79,8 @@ static phi_status phi_step_back(phi_solver *s, phi_transpose *g, size_t steps, d
     return status;
 }
 
-/* Take the steps from done to until, of a run that has not ended before; rows, where not NULL, get the states after stride, 2 stride, ...
-   steps and at the end, from where guesses begin anew, as those of phi_integrate do. The y of stages are kept if so wanted. */
+/* Make the steps from done to until. rows, if not NULL, receives the states after stride, 2 stride, ... steps and at
+   the end, where predictors restart as in phi_integrate. keeping = 1 writes the tape. */
 static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t until, size_t stride, size_t steps,
     double *rows, int keeping)
 {
@@ -100,7 +101,7 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
     return status;
 }
 
-/* Stand after all steps, or before them. */
+/* Set the state after all steps or, on failure, before them. */
 static phi_status phi_settle(phi_solver *s, phi_transpose *g, size_t steps, phi_status status)
 {
     if (status == PHI_OK && steps > 0) {

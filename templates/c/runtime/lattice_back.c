@@ -6,11 +6,11 @@
 #include "model.h"
 #include "rows.c"
 
-/* ---- The transpose of sweeps ---- */
+/* ---- Reverse pass of sweeps ---- */
 #include "lattice_shares.c"
 
-/* Keep the values of some pieces of rows, with the copies beside rows, which another thread may be making of one row. Pairs read
-   numbers beyond the last site too, but leave what they find of them. */
+/* Copy row segments to the tape, with their halo, which another thread may be writing for a single row. Pairs read
+   beyond the last site, but do not use these values. */
 static void phi_keep_units(const phi_solver *s, const double *from, double *to, size_t first, size_t end)
 {
 #if PHI_ONE_ROW
@@ -28,7 +28,7 @@ static void phi_keep_units(const phi_solver *s, const double *from, double *to, 
 #endif
 }
 
-/* The rows from which a row is handed what is its own; beyond open ends a row of zeros after all others. */
+/* Rows whose terms contribute cotangents to a row; beyond open ends the row of zeros after all others. */
 static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
 {
     ptrdiff_t place[PHI_AXES];
@@ -42,7 +42,7 @@ static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_
     }
 }
 
-/* The derivatives along a parameter at sites, added to those of the caller, unless that wants none. */
+/* Add the derivatives by a parameter at sites to those of the caller, unless `to` is NULL. */
 static void phi_add_at_sites(const phi_solver *s, const double *bar, double *to)
 {
     if (to == NULL) return;
@@ -53,7 +53,7 @@ static void phi_add_at_sites(const phi_solver *s, const double *bar, double *to)
 }
 
 #if PHI_BOND_PARAMETERS
-/* The derivatives along a parameter at bonds, added to those of the caller, unless that wants none. */
+/* Add the derivatives by a parameter at bonds to those of the caller, unless `to` is NULL. */
 static void phi_add_at_bonds(const phi_solver *s, const double *bar, double *to)
 {
     for (int k = 0; to != NULL && k < s->bonds[s->sites]; ++k) to[s->number[k]] += bar[k];
@@ -63,7 +63,8 @@ static void phi_add_at_bonds(const phi_solver *s, const double *bar, double *to)
 #include "adjoint_sweeps.h"
 #if PHI_SERIES
 
-/* to = from, or 0, with what v gives by the transpose of a kernel where y is s->y[2], for pieces of rows: all threads come here at once. */
+/* to = from (or 0) + the transpose of a kernel at y = s->y[2] times v, for row segments. Called by all threads
+   together. */
 static void phi_pull_rows(const phi_solver *s, int kernel, const double *coef, double *const *v, double *const *from,
     double *const *to, size_t first, size_t end)
 {

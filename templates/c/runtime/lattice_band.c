@@ -16,7 +16,7 @@ static void phi_swap(double *a, double *b)
     *b = held;
 }
 
-/* The row of the largest of some entries. */
+/* Row of the entry with the largest magnitude. */
 static ptrdiff_t phi_largest(const double *entries, ptrdiff_t count)
 {
     ptrdiff_t found = 0;
@@ -25,8 +25,8 @@ static ptrdiff_t phi_largest(const double *entries, ptrdiff_t count)
     return found;
 }
 
-/* LU of a matrix of so many columns, which are so far apart, with entry (i, j) at column[j][i - low[j]]: the band's A, or D.
-   Entries beside the diagonal are below rows, above rows far. */
+/* LU factorisation with pivoting of a band matrix (A), or with middle < 0 of a full one (D). Columns are `tall` apart,
+   with at most `below` entries under the diagonal. */
 static int phi_decompose(double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, double *pivots)
 {
     ptrdiff_t last = 0;
@@ -48,7 +48,7 @@ static int phi_decompose(double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middl
     return 1;
 }
 
-/* Solve with it, in place. */
+/* Solve with the factors, in place. */
 static void phi_substitute(
     const double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, const double *pivots, double *x)
 {
@@ -78,7 +78,8 @@ static void phi_put_entry(const phi_matrix *m, ptrdiff_t i, ptrdiff_t j, double 
         m->d[(j - m->inner) * m->border + i - m->inner] = value;
 }
 
-/* The columns of one field at every PHI_APART-th site, or at one that is left over, from what a sweep does to them. */
+/* Compute the matrix columns of one field at every PHI_APART-th site, or at a single remaining site, by differences of
+   a sweep. */
 static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, int now, ptrdiff_t first, ptrdiff_t count, int f)
 {
     const ptrdiff_t sites = s->length, apart = 2 * PHI_REACH + 1;
@@ -105,7 +106,7 @@ static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, in
         }
 }
 
-/* The matrix at s->y[now], factorised; 0 if it is singular. */
+/* Assemble and factorise the matrix at s->y[now]. Returns 0 if it is singular. */
 static int phi_factorise(phi_solver *s, const double *coef, int now)
 {
     phi_matrix m;
@@ -126,7 +127,7 @@ static int phi_factorise(phi_solver *s, const double *coef, int now)
     return phi_decompose(m.d, border, border, -1, border, m.pivots + inner);
 }
 
-/* Solve the equation of the matrix, in place. */
+/* Solve with the factorised matrix, in place. */
 static void phi_solve(const phi_matrix *m)
 {
     const ptrdiff_t inner = m->inner, border = m->border;
@@ -139,7 +140,7 @@ static void phi_solve(const phi_matrix *m)
         for (ptrdiff_t i = 0; i < inner; ++i) m->side[i] -= m->b[j * inner + i] * lower[j];
 }
 
-/* Solve with the transpose of what phi_decompose has made, in place. */
+/* Solve with the transpose of the factors of phi_decompose, in place. */
 static void phi_substitute_back(
     const double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, const double *pivots, double *x)
 {
@@ -157,7 +158,7 @@ static void phi_substitute_back(
     }
 }
 
-/* Solve the equation of the transpose of the matrix: with (A^-1 B)^T first, then D, then C^T and A. */
+/* Solve with the transposed matrix: first (A^-1 B)^T, then D, then C^T and A. */
 static void phi_solve_back(const phi_matrix *m)
 {
     const ptrdiff_t inner = m->inner, border = m->border;
@@ -170,7 +171,7 @@ static void phi_solve_back(const phi_matrix *m)
     phi_substitute_back(m->a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m->pivots, m->side);
 }
 
-/* s->y[now] with the correction by a sweep to the other, in place of what the sweep has made. */
+/* Apply the Newton correction: s->y[now] corrected by a sweep, stored in place of the result of the sweep. */
 static void phi_eliminate(phi_solver *s, int now)
 {
     phi_matrix m;

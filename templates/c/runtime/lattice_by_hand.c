@@ -5,8 +5,8 @@
 #include "rows.c"
 #include "sweeps.h"
 
-/* ---- Steps by hand ---- */
-/* Sweeps that have a number: those of a step, and the joined one, which with noise there is not. */
+/* ---- Caller-driven stepping ---- */
+/* Sweeps with a number: those of a step and, without noise, the merged last and first one. */
 #if PHI_NOISE
 enum { PHI_NUMBERED = PHI_FLOWS };
 #else
@@ -24,7 +24,7 @@ phi_status phi_describe(size_t number, phi_stage *about)
 
 phi_status phi_begin(phi_solver *s, double h) { return phi_set_step(s, h); }
 
-/* The rows of a plane. */
+/* Number of rows in a plane. */
 static size_t phi_rows_of_plane(const phi_solver *s) { return s->rows / s->sizes[0]; }
 
 phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t to)

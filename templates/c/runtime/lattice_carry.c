@@ -4,13 +4,13 @@
 #include "model.h"
 #include "rows.c"
 
-/* Go on as if rounding had left out nothing. */
+/* Clear the compensation terms. */
 static void phi_clear_carry(phi_solver *s)
 {
     for (size_t k = 0; k < PHI_DIM; ++k) memset(PHI_MEMORY_OF(s->carry[k]), 0, PHI_DOUBLES * sizeof *s->carry[k]);
 }
 
-/* What rounding has left out goes with the fields, of which some are x and the others those before. */
+/* Copy the compensation terms with the fields: those of x are first, those of s->before after them. */
 static void phi_copy_carry(const phi_solver *s, double *const *to)
 {
     const size_t block = PHI_DOUBLES * sizeof **to, into = to == s->before ? PHI_DIM : 0;

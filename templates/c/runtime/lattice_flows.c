@@ -6,23 +6,23 @@
 #include "sweeps.h"
 
 /* ---- The flows ---- */
-enum { PHI_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
+enum { PHI_STRETCH = 32 }; /* steps between checks for finite values; values that are not finite stay so */
 #if PHI_NEAR
-enum { PHI_FAR_STEPS = 64 }; /* steps by functions for large arguments, after one that needed them */
+enum { PHI_FAR_STEPS = 64 }; /* steps with full-range functions, after one that needed them */
 #endif
 
 #if PHI_SHARED
 #if PHI_BY_COLOUR
-/* One part of H, of one colour. */
+/* Apply the flow of one part of H, one colour. */
 static void phi_sweep_colour(const phi_solver *s, int part, const double *coef PHI_AND_INT_FAR)
 #else
-/* One part of H. */
+/* Apply the flow of one part of H. */
 static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI_AND_INT_FAR)
 #endif
 {
     size_t first, end = phi_share(phi_units(s), &first);
 #if PHI_TANGENT
-    for (size_t k = 0; k < s->vectors; ++k) { /* of what a part moves only the site itself is read: no thread need wait */
+    for (size_t k = 0; k < s->vectors; ++k) { /* a flow reads its own fields at the same site only: threads need not wait */
         double *v[PHI_DIM];
         phi_vector(s, k, v);
         phi_tangent_rows(s, part, coef, v, first, end);
@@ -34,11 +34,11 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI
 
 #endif
 #if PHI_BY_COLOUR
-/* The first flow, those between it and the last, the last, or those between, backwards. */
+/* Apply the flow kind: 0 first, 1 all inner ones, 2 last, 3 inner ones in reverse order. */
 static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI_AND_INT_FAR)
 {
 #if PHI_TIMED
-    const int last = s->flows; /* the time advances after all of them */
+    const int last = s->flows; /* the last flow advances the time */
 #else
     const int last = s->flows - 1;
 #endif
@@ -58,7 +58,7 @@ static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first,
 #include "lattice_waves.c"
 
 #if PHI_NOISE && PHI_SHARED
-/* The increments of a part of a step after so many, at all sites. */
+/* Draw the increments of a part of a step, at all sites. */
 static void phi_draw(const phi_solver *s, size_t steps, int part)
 {
     size_t first, end = phi_share(phi_units(s), &first);
@@ -68,9 +68,9 @@ static void phi_draw(const phi_solver *s, size_t steps, int part)
 
 #endif
 #if PHI_NOISE
-/* Some steps: the flows of the noise, those of H, and those of the noise backwards, with other increments. */
+/* Make some steps: the flows of the noise, those of H, and those of the noise in reverse order, with new increments. */
 #else
-/* Some steps, joined, without the last flow; no steps are that flow alone. */
+/* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
 #endif
 #if PHI_SHARED
 static void phi_shared_steps(const phi_solver *s, size_t steps)
@@ -114,7 +114,7 @@ static size_t phi_numbers_kept(const phi_solver *s);
 static void phi_keep_steps(const phi_solver *s, size_t steps);
 
 #endif
-/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+/* Make some steps from the state in s->before, or restore it and return 0 if values are not finite. */
 static int phi_try(phi_solver *s, size_t steps)
 {
 #if PHI_ADJOINT && !PHI_UNDONE
@@ -128,7 +128,7 @@ static int phi_try(phi_solver *s, size_t steps)
     return 0;
 }
 
-/* The last flow of a step, by functions for large arguments if need be; whether it leads to finite values. */
+/* Apply the last flow of a step, with full-range functions if needed; returns whether values are finite. */
 static int phi_close(phi_solver *s)
 {
     if (phi_try(s, 0)) return 1;
@@ -140,13 +140,13 @@ static int phi_close(phi_solver *s)
 }
 
 #if PHI_NEAR
-/* Functions for small arguments give no number for larger ones. The state is looked at after a stretch of steps only: where
-   it is not finite, these are made again one by one, and that which fails by functions for arguments of any size. */
+/* Small-argument functions return NaN out of range. Values are checked after several steps; if they are not finite,
+   these steps are repeated one by one, and a failing step once more with full-range functions. */
 #else
-/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
+/* Values are checked after several steps; if they are not finite, these steps are repeated one by one. */
 #endif
 #if PHI_ADJOINT
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+/* Make steps from s->before, equal to s->x, without the last flow of the last step. */
 static phi_status phi_march(phi_solver *s, size_t steps)
 {
     phi_status status = PHI_OK;
@@ -158,7 +158,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
-    if (s->open) phi_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
+    if (s->open) phi_copy(s->x, s->before, s); /* drop the last flow: it is merged with the next one */
     else phi_copy(s->before, s->x, s);
 #endif
 #endif
@@ -202,13 +202,13 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
-    if (s->open) phi_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
+    if (s->open) phi_copy(s->x, s->before, s); /* drop the last flow: it is merged with the next one */
     else phi_copy(s->before, s->x, s);
 #endif
     status = phi_march(s, steps);
 #endif
 #if !PHI_NOISE
-    if (s->open && !PHI_TRY_FLOWS) { /* the last flow of the last step, before which steps go on */
+    if (s->open && !PHI_TRY_FLOWS) { /* the last flow of the last step; s->before stays before it */
         status = PHI_NOT_FINITE;
         s->open = 0;
         --s->steps;

@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* x and the extrapolated y - x into s->y[0], with the copied ends. */
+/* Predict: s->y[0] = x + extrapolated y - x, with the halo. */
 static void phi_predict(const phi_solver *s, double *const *x PHI_AND_INT_STAGE)
 {
     PHI_EACH_PIECE
@@ -18,7 +18,8 @@ static void phi_predict(const phi_solver *s, double *const *x PHI_AND_INT_STAGE)
         }
 }
 
-/* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best order. */
+/* Update the predictor with the solution y of a stage. The error of the prediction of order d is the d-th difference;
+   the order with the smallest error is used next. */
 static void phi_remember(phi_solver *s, double *const *from PHI_AND_INT_STAGE, int now)
 {
     phi_guess *guess = &PHI_OF(s->guess, stage);
@@ -52,7 +53,7 @@ static void phi_remember(phi_solver *s, double *const *from PHI_AND_INT_STAGE, i
     if (guess->count < PHI_DIFFERENCES) ++guess->count;
 }
 
-/* Begin without guesses, and with sweeps. */
+/* Clear the predictors, and return to fixed-point sweeps. */
 static void phi_forget(phi_solver *s)
 {
     s->stiff = 0;

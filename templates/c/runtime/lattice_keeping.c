@@ -7,8 +7,8 @@
 #include "rows.c"
 #include "lattice_trail.c"
 
-/* ---- Fields that are kept ---- */
-/* The numbers that a step keeps. */
+/* ---- Tape of fields ---- */
+/* Doubles on the tape for one step. */
 static size_t phi_numbers_kept(const phi_solver *s)
 {
     size_t fields = 0;
@@ -18,7 +18,8 @@ static size_t phi_numbers_kept(const phi_solver *s)
     return (fields > 0 ? fields : 1) * phi_block(s->rows, s->width);
 }
 
-/* Keep the fields that a sweep will change, and that anything reads on the way back; returns where the next ones are kept. */
+/* Write the fields that a sweep will change, and that the reverse pass reads, to the tape; returns the end of the
+   tape. */
 static double *phi_keep(const phi_solver *s, int sweep, double *to)
 {
     size_t first, end = phi_share(phi_units(s), &first);
@@ -30,7 +31,7 @@ static double *phi_keep(const phi_solver *s, int sweep, double *to)
     return to;
 }
 
-/* The same as phi_steps, but for none; what flows change is kept in s->kept. */
+/* As phi_steps for at least one step, but write the tape to s->kept. */
 static void phi_keep_steps(const phi_solver *s, size_t steps)
 {
     const size_t of_step = phi_numbers_kept(s);
@@ -53,7 +54,7 @@ static void phi_keep_steps(const phi_solver *s, size_t steps)
     }
 }
 
-/* Pull cotangents back through one sweep, x being the fields before it. */
+/* Pull cotangents back through one sweep; x are the fields before it. */
 static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int sweep, const double *coef, int row,
     double *const *x, double *const *bar)
 {
@@ -71,8 +72,8 @@ static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int swee
 #endif
 }
 
-/* Pull cotangents back through a flow in a step after so many; of its sweeps kept has the fields that they change, and
-   ends with them; x becomes the fields before it. Returns where what was kept before begins. */
+/* Pull cotangents back through a flow. kept is the end of its fields on the tape, or NULL; x becomes the fields before
+   the flow. Returns the end of the tape before the flow. */
 static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t steps, int number,
     double *kept, double **x, double *const *bar)
 {
@@ -92,7 +93,7 @@ static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t
     return kept;
 }
 
-/* Pull the cotangents of all sweeps of the step after so many back, from where its sweeps have kept what they changed. */
+/* Pull cotangents back through one step, from its fields on the tape. */
 static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, int continues, double *kept)
 {
     PHI_PARALLEL
@@ -103,7 +104,7 @@ static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, i
         for (int flow = PHI_OWN_FLOWS - 1; flow >= 0; --flow)
             left = phi_flow_back(s, g, steps, phi_joined(flow, continues), left, x, g->bar);
     }
-    double *left = kept; /* what the step began with */
+    double *left = kept; /* the fields at the start of the step */
     int seen[PHI_DIM] = { 0 };
     for (int flow = 0; flow < PHI_OWN_FLOWS; ++flow)
         for (int k = 0, sweep; (sweep = phi_sweep_of(s, flow, k)) >= 0; ++k)

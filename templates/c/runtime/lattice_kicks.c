@@ -4,11 +4,11 @@
 #include "model.h"
 #include "rows.c"
 
-/* To x and so many times what is there. */
+/* Set the state to x + kept * state. */
 static phi_status phi_move(phi_solver *s, const double *x, double kept)
 {
     if (s == NULL || x == NULL) return PHI_BAD_ARGUMENT;
-    for (int moving = 0; moving < 2; ++moving) /* nothing, unless all of it can be */
+    for (int moving = 0; moving < 2; ++moving) /* first check all values, then change them */
         for (size_t r = 0; r < PHI_DIM * s->rows; ++r) {
             double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
             for (ptrdiff_t i = 0; i < s->length; ++i) {

@@ -10,8 +10,8 @@
 /* ---- Krylov spaces ---- */
 #include "lattice_newton_policy.h"
 
-/* The sum of x y over all sites and fields, in usual sizes. Those of pieces are added in their order: the bits do not depend on
-   threads. */
+/* Scalar product of x and y, in units of the usual size of each field. Row segments are added in order: the bits do not
+   depend on threads. */
 static double phi_product(const phi_solver *s, double *const *x, double *const *y)
 {
     const size_t units = phi_units(s);
@@ -35,7 +35,7 @@ static double phi_product(const phi_solver *s, double *const *x, double *const *
     return sum;
 }
 
-/* to = a x + b y, with the copied ends. */
+/* to = a x + b y, with the halo. */
 static void phi_combine(const phi_solver *s, double *const *to, double a, double *const *x, double b, double *const *y)
 {
     const size_t units = phi_units(s);
@@ -57,9 +57,9 @@ static void phi_combine(const phi_solver *s, double *const *to, double a, double
 
 #include "lattice_site_blocks.c"
 
-/* to = from - what solves matrix(v) = s->space[0], as well as a space of so many directions allows: GMRES, after Y. Saad
-   and M. H. Schultz, without a restart. The matrix is that of phi_multiply. The length of s->space[0]; not finite if this
-   is of no use. */
+/* to = from - v, where matrix(v) = s->space[0] is solved by GMRES (Y. Saad and M. H. Schultz) with PHI_DIRECTIONS
+   directions, without restart. The matrix is that of phi_multiply. Returns the norm of s->space[0], or infinity if the
+   solution is useless. */
 static double phi_krylov(phi_solver *s, const double *coef, int now, double *const *from, double *const *to)
 {
     double matrix[PHI_DIRECTIONS][PHI_DIRECTIONS], cosine[PHI_DIRECTIONS], sine[PHI_DIRECTIONS], side[PHI_DIRECTIONS + 1];

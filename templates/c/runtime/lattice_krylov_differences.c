@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* to = v - what a sweep, which makes s->y[1 - now], does to that variation of s->y[now], by a difference. */
+/* to = v - (derivative of a sweep at s->y[now]) v, by a difference; s->y[1 - now] is the result of the sweep. */
 static void phi_multiply(const phi_solver *s, const double *coef, int now, double *const *v, double *const *to)
 {
     const size_t units = phi_units(s);

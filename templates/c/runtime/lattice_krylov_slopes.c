@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* to = v - what a sweep, or its transpose, does to that variation of s->y[now]. */
+/* to = v - (derivative of a sweep at s->y[now], or its transpose) v. */
 static void phi_multiply(const phi_solver *s, const double *coef, int now, double *const *v, double *const *to)
 {
     const size_t units = phi_units(s);

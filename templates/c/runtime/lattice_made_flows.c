@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+/* Apply the flow with this number in a step; number PHI_FLOWS is the last and the first flow merged. */
 static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 {
 #if PHI_RENEWED

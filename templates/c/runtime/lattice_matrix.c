@@ -3,19 +3,19 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Unknowns are numbered site by site. The matrix 1 - (what a sweep does to a variation of y) has a band; what couples the
-   two ends of a ring lies outside. So the last sites are a border, all of them where there are few: of the blocks
-   (A B; C D), A is a band, factorised with pivoting, B becomes A^-1 B, and D becomes D - C A^-1 B, factorised too. */
+/* Unknowns are numbered site by site. The matrix 1 - (derivative of a sweep) is banded, except for entries that couple
+   the two ends of a ring. So the last sites form a border; small lattices are all border. Of the blocks (A B; C D), A
+   is a band factorised with pivoting, B becomes A^-1 B, and D becomes D - C A^-1 B, factorised too. */
 enum { PHI_FEW = 6 * PHI_REACH + 6, PHI_TALL = 3 * PHI_BAND + 1 };
 
 typedef struct {
-    ptrdiff_t inner, border; /* unknowns */
+    ptrdiff_t inner, border; /* numbers of unknowns */
     double *a, *b, *c, *d;   /* by columns; a is banded: entry (i, j) is in row 2 PHI_BAND + i - j */
-    double *side;            /* a right-hand side, in both */
-    double *pivots;          /* of A, then of D: the rows that were swapped */
+    double *side;            /* right-hand side: inner unknowns, then border */
+    double *pivots;          /* swapped rows of A, then of D */
 } phi_matrix;
 
-/* Where the parts are, and the doubles that they take. */
+/* Set the pointers of *m into memory, if not NULL; returns the number of doubles. */
 static size_t phi_matrix_of(size_t sites, double *memory, phi_matrix *m)
 {
     const size_t few = sites <= PHI_FEW ? sites : phi_open[0] ? 0 : PHI_REACH;

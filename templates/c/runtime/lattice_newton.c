@@ -10,11 +10,11 @@
 #include "lattice_band.c"
 #include "lattice_krylov.c"
 
-/* ---- Newton's method where sweeps fail ---- */
+/* ---- Newton's method, for stages that fixed-point sweeps do not solve ---- */
 #include "lattice_newton_policy.h"
 #include "lattice_sweep_policy.h"
 
-/* The sum of the distances of y from x; with x added that of the sizes of x. */
+/* Sum of the distances of y from x, plus added times the sum of the sizes of x. */
 static double phi_distance(const phi_solver *s, int side, double added)
 {
     double sum = 0.0;
@@ -26,8 +26,8 @@ static double phi_distance(const phi_solver *s, int side, double added)
     return sum;
 }
 
-/* The correction of s->y[now] by the matrix, which is kept while it serves, or as well as a Krylov space allows, to the other: how far
-   y moves, in sizes of each field. Not a number if it cannot be made. */
+/* Correct s->y[now] by a Newton step, with a matrix that is reused while it contracts or with a Krylov space, into the
+   other array. Returns the change relative to the size of each field; not finite on failure. */
 static double phi_corrected(phi_solver *s, const double *coef, int now)
 {
 #if PHI_BANDED
@@ -46,7 +46,7 @@ static double phi_corrected(phi_solver *s, const double *coef, int now)
     return phi_relaxed(s, NULL PHI_AND_FAR(1), now);
 }
 
-/* How far from x a solution is one of the motion. */
+/* Largest distance from x at which a solution is accepted as part of the motion. */
 static double phi_range(phi_solver *s, const double *coef)
 {
     phi_copy(s->y[0], s->x, s);
@@ -55,8 +55,8 @@ static double phi_range(phi_solver *s, const double *coef)
 }
 
 
-/* y in the middle of a stage, from the guess in s->y[0] until only rounding would change: by sweeps or, where these have failed, by
-   corrections, and then no farther from x than in that range. It is in s->y[*now]. */
+/* Solve for y of a stage from the prediction in s->y[0], to rounding level: by fixed-point sweeps or, if s->stiff, by
+   Newton corrections, which must end within range of x. The solution is s->y[*now]. */
 static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FAR, double range, int *now)
 {
     double before = 0.0;
@@ -67,7 +67,7 @@ static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FAR, 
         ++s->sweeps;
         *now = 1 - *now;
         if (!isfinite(change)) return failed;
-        /* what further sweeps would change, with the rate change / before; or changes shrink no more */
+        /* expected change by further sweeps, at the rate change / before; or rounding level */
         if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && count > 0))
             return (s->stiff ? phi_distance(s, *now, 0.0) <= range : phi_all_hold(s, s->y[*now])) ? PHI_OK : failed;
         if (!s->stiff && count >= PHI_PATIENCE && change > PHI_SLOW * before && change > PHI_NEARLY_SETTLED) break;

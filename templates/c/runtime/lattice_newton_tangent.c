@@ -5,7 +5,8 @@
 
 #include "lattice_tangent_policy.h"
 
-/* A tangent vector after a stage whose y is s->y[now]: dy = (what a sweep does to dy) + side is solved, and moves it. */
+/* Carry a tangent vector through a stage with solution s->y[now]: solve dy = (derivative of a sweep) dy + side, and add
+   its increment. */
 static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t number)
 {
     const size_t units = phi_units(s);

@@ -9,7 +9,7 @@
 
 /* ---- Noise ---- */
 #if PHI_BY_HAND || !PHI_ONE_ROW
-/* The number of a site in the whole lattice, of which this one may be some planes. */
+/* Number of a site in the whole lattice, of which this solver may hold some planes. */
 static uint64_t phi_site(const phi_solver *s, size_t row, ptrdiff_t i)
 {
 #if PHI_BY_HAND && PHI_ONE_ROW
@@ -25,8 +25,8 @@ static uint64_t phi_site(const phi_solver *s, size_t row, ptrdiff_t i)
 }
 
 #endif
-/* The increments of a part of a step after so many others, a function of seed, member, step, part and site alone. A step of -h
-   has them in the order in which it undoes one of h. */
+/* Draw the increments of a part of a step: a function of seed, member, step, part and site only. A step of -h has them
+   in reverse order, so that it inverts a step of h. */
 #if PHI_SHARED || PHI_SERIES
 static void phi_draw_pieces(const phi_solver *s, size_t steps, int part, size_t first, size_t end)
 #else

@@ -4,7 +4,8 @@
 #include "model.h"
 #include "rows.c"
 
-/* Adds densities of one observable to their sum, compensated after A. Neumaier, or takes the largest or least of them. */
+/* Reduce the densities of one observable: add them, compensated after A. Neumaier, or take the largest or the
+   smallest. */
 static void phi_reduce(int kind, size_t count, const double *density, double *sum, double *rest)
 {
     for (size_t i = 0; i < count; ++i) {
@@ -13,7 +14,7 @@ static void phi_reduce(int kind, size_t count, const double *density, double *su
             *rest += fabs(*sum) >= fabs(next) ? (*sum - total) + next : (next - total) + *sum;
             *sum = total;
         } else if (next != next || (kind == 2 ? next > *sum : next < *sum)) {
-            *sum = next; /* one that is not a number stays, as no other is larger or less */
+            *sum = next; /* NaN stays: no comparison with it is true */
         }
     }
 }

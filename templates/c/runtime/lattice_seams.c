@@ -5,7 +5,7 @@
 #include "rows.c"
 
 /* ---- Seams ---- */
-/* Where the seams are: along each axis what is left of its size behind whole periods of colours. */
+/* Where boundary seams begin: along each axis the remainder of its size after whole periods of colours. */
 static void phi_find_seams(phi_solver *s)
 {
     for (int a = 0; a < PHI_AXES; ++a) {
@@ -18,7 +18,7 @@ static void phi_find_seams(phi_solver *s)
     }
 }
 
-/* The kind of each site: its colour, and as many more for each seam that it is on. */
+/* Kind of each site: its colour, plus the number of colours for each seam that contains the site. */
 static void phi_put_kinds(const phi_solver *s)
 {
     PHI_EACH_ROW {

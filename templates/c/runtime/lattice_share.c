@@ -4,7 +4,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_num_threads(void); /* declared as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
 #ifdef __cplusplus
 }
@@ -22,7 +22,7 @@ int omp_get_thread_num(void);
 #define PHI_THREAD (size_t)0
 #endif
 
-/* The part of so many units that a thread works at, from *first on; returns its end. */
+/* The share of a thread in a number of work items: from *first on; returns its end. */
 static size_t phi_share(size_t units, size_t *first)
 {
     const size_t threads = PHI_THREADS, own = PHI_THREAD, each = units / threads, more = units % threads;
@@ -30,11 +30,11 @@ static size_t phi_share(size_t units, size_t *first)
     return *first + each + (own < more);
 }
 
-/* Until all threads are here. */
+/* Wait for all threads. */
 static void phi_wait(void)
 {
 #ifdef _OPENMP
-    if (PHI_THREADS > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (PHI_THREADS > 1) { /* a barrier may cost a system call even for one thread */
 #pragma omp barrier
     }
 #endif

@@ -4,8 +4,8 @@
 #include "model.h"
 
 #if !PHI_SWEPT
-/* Sums over sites, in lanes of eight: compilers may not write a loop over these out and make vectors of the loop around it. Clang
-   would keep such sums in memory: it is told of one loop over all sites, and that it may add in any order. */
+/* Sums over sites have eight partial sums. Compilers must not unroll the loop over these and vectorise the loop around
+   it. Clang would store such sums in memory: it gets one loop over all sites, and may reorder the additions. */
 #if defined(__clang__) && __clang_major__ >= 13
 #define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) interleave_count(1)")
 #define PHI_LANES(sites) (sites)
@@ -23,16 +23,16 @@
 #endif
 
 #endif
-/* The sum of all lanes, which are changed. */
+/* Total of the partial sums, which are overwritten. */
 static inline double phi_total(double lanes[8])
 {
     for (int l = 0; l < 4; ++l) lanes[l] += lanes[l + 4];
     return lanes[0] + lanes[2] + (lanes[1] + lanes[3]);
 }
 
-enum { PHI_ADDED = 64 }; /* sites whose shares in a sum are kept apart before they are added */
+enum { PHI_ADDED = 64 }; /* number of sites whose contributions are stored before they are added */
 
-/* The sum of some values, in an order that lets loops vectorise. */
+/* Sum of some values, in an order that lets loops vectorise. */
 static inline double phi_added(const double *values, ptrdiff_t count)
 {
     double lanes[8] = { 0.0 }, rest = 0.0;

@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* The inverse of a matrix in its place; 1 where there is none. */
+/* Invert a matrix in place; a singular one becomes 1. */
 static void phi_invert_block(double b[PHI_DIM][PHI_DIM])
 {
     double zero = 0.0;
@@ -22,8 +22,8 @@ static void phi_invert_block(double b[PHI_DIM][PHI_DIM])
     for (int k = 0; zero != 0.0 && k < PHI_DIM * PHI_DIM; ++k) b[k / PHI_DIM][k % PHI_DIM] = k % (PHI_DIM + 1) == 0;
 }
 
-/* Where fields at a site act on each other by much, as a momentum and its field do, a space of the matrix times the inverses of what
-   it does at the sites themselves takes half as many directions. These inverses at s->y[now]. */
+/* Preconditioner: the inverse of the diagonal block of each site, at s->y[now]. Where fields of one site are strongly
+   coupled, like a momentum and its field, it halves the number of Krylov directions. */
 static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
 {
     const size_t units = phi_units(s);
@@ -45,7 +45,7 @@ static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
     }
 }
 
-/* to = from + these inverses times v; without from that alone. */
+/* to = from + preconditioner times v; from may be NULL for 0. */
 static void phi_apply_blocks(const phi_solver *s, double *const *v, double *const *from, double *const *to)
 {
     const size_t units = phi_units(s);

@@ -10,11 +10,11 @@
 
 /* ---- The stages ---- */
 #include "lattice_sweep_policy.h"
-enum { PHI_WIDTH = 32 }; /* numbers that are kept apart, so that loops vectorise */
+enum { PHI_WIDTH = 32 }; /* number of partial results, so that loops vectorise */
 
 static inline void phi_raise(double *largest, double value) { *largest = value > *largest ? value : *largest; }
 
-/* Takes what y was and is in a piece into the largest change and the largest y of each field; what is no number is left out. */
+/* Update the largest change and the largest |y| of each field by a row segment; NaN is left out. */
 static void phi_measure(const phi_solver *s, int now, size_t unit, double *change, double *size)
 {
     const phi_row row = phi_piece_of(s, unit);
@@ -44,7 +44,7 @@ static void phi_measure(const phi_solver *s, int now, size_t unit, double *chang
 }
 
 #if PHI_ADJOINT
-/* to = from, or 0, with what v gives by the transpose of a kernel where y is s->y[2]. */
+/* to = from (or 0) + the transpose of a kernel at y = s->y[2] times v. */
 static void phi_pull(const phi_solver *s, int kernel, const double *coef, double *const *v, double *const *from, double *const *to)
 {
     PHI_PARALLEL
@@ -54,10 +54,12 @@ static void phi_pull(const phi_solver *s, int kernel, const double *coef, double
     }
 }
 
-/* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y is not. Where there is
-   s->side, y is the cotangent of that in s->y[2], and a sweep adds to this side the transpose of what one does there. */
+/* Make a fixed-point sweep from s->y[now] to the other array; coef = NULL keeps what is there. Returns the change of y
+   relative to the size of each field, not finite if y is not. If s->side is set, y is a cotangent, and the sweep is
+   side + the transposed sweep at s->y[2]. */
 #else
-/* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y is not. */
+/* Make a fixed-point sweep from s->y[now] to the other array; coef = NULL keeps what is there. Returns the change of y
+   relative to the size of each field, not finite if y is not. */
 #endif
 static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int now)
 {
@@ -77,7 +79,7 @@ static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int
     for (int k = 0; k < PHI_DIM; ++k) phi_raise(&largest, size[k]);
     for (int k = 0; k < PHI_DIM; ++k) {
         s->usual[k] = size[k] + PHI_LEAST_SIZE * largest + 1e-300;
-        change[k] /= s->usual[k]; /* no number where both are infinite */
+        change[k] /= s->usual[k]; /* NaN if both are infinite */
         moved = isnan(change[k]) || change[k] > moved ? change[k] : moved;
     }
     return moved;
@@ -88,7 +90,7 @@ static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int
 
 #include "lattice_newton.c"
 
-/* Keep the y of a stage, and x where its transpose reads that; returns where the next are kept. */
+/* Write the solution y of a stage, and x if its reverse pass reads it, to the tape; returns the end of the tape. */
 static double *phi_keep_stage(const phi_solver *s, int now, double *to)
 {
     const size_t block = phi_block(s->rows, s->width), units = phi_units(s);
@@ -104,7 +106,7 @@ static double *phi_keep_stage(const phi_solver *s, int now, double *to)
     return to + PHI_KEPT * PHI_DIM * block;
 }
 
-/* The stages of a step. */
+/* Make the stages of a step. */
 static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
 {
     const size_t units = phi_units(s);
@@ -157,7 +159,7 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
     return phi_all_hold(s, s->x) ? PHI_OK : PHI_NOT_FINITE;
 }
 
-/* One step; if it cannot be made, none. */
+/* Make one step, or leave the state unchanged. */
 static phi_status phi_try(phi_solver *s)
 {
     phi_copy(s->before, s->x, s);

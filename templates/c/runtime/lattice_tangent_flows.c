@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* A step that carries tangent vectors along, by functions for arguments of any size. */
+/* Make a step with tangent vectors, with full-range functions. */
 static phi_status phi_carry(phi_solver *s)
 {
     const size_t far = s->far;

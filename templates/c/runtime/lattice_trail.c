@@ -9,13 +9,12 @@
 #include "rows.c"
 #include "lattice_back.c"
 
-/* ---- What is kept to go back ---- */
+/* ---- Checkpoints and tape ---- */
 #if !PHI_SERIES
-/* The sweeps that steps consist of where they are joined: without the last flow, unless that is all. */
+/* Number of flows in a step whose last flow is merged with the first of the next step. */
 #define PHI_OWN_FLOWS (PHI_FLOWS > 1 ? PHI_FLOWS - 1 : 1)
 
-/* The number of such a flow among all flows: the first of a step that continues another is joined to the last of that one, unless
-   steps are one flow. */
+/* Number of a flow, with PHI_FLOWS for the merged last and first one. */
 static int phi_joined(int flow, int continues) { return PHI_FLOWS > 1 && flow == 0 && continues ? PHI_FLOWS : flow; }
 
 #endif
@@ -25,10 +24,10 @@ typedef struct phi_transpose {
 } phi_transpose;
 
 #if PHI_SERIES
-/* The numbers that a step keeps. */
+/* Doubles on the tape for one step. */
 static size_t phi_numbers_kept(const phi_solver *s) { return PHI_ALL_STAGES((size_t)PHI_KEPT) * PHI_DIM * phi_block(s->rows, s->width); }
 
-/* Stand after so many steps. */
+/* Set the number of steps and the time. */
 static void phi_stand(phi_solver *s, size_t steps)
 {
     s->steps = steps;
@@ -40,11 +39,11 @@ static void phi_stand(phi_solver *s, size_t steps)
 
 #endif
 #if PHI_BOND_PARAMETERS
-/* Room for values at the bonds of each site. */
+/* Doubles for values at all bonds. */
 static size_t phi_at_bonds(const phi_solver *s) { return ((size_t)s->bonds[s->sites] + 7) / 8 * 8; }
 
 #endif
-/* The numbers that any transpose has room for. */
+/* Doubles that every reverse pass needs. */
 static size_t phi_always(const phi_solver *s)
 {
     const size_t block = phi_block(s->rows, s->width), units = phi_units(s);
@@ -55,7 +54,7 @@ static size_t phi_always(const phi_solver *s)
     return numbers + units * PHI_SUMS;
 }
 
-/* The bytes of the state that a segment begins with. */
+/* Bytes of a checkpoint: the state at the start of a segment. */
 static size_t phi_state_size(const phi_solver *s)
 {
     return PHI_DIM * phi_block(s->rows, s->width) * sizeof(double) + 2 * sizeof(size_t);
@@ -65,21 +64,21 @@ static size_t phi_state_size(const phi_solver *s)
 #include "lattice_trail_kept.c"
 
 #if !PHI_SERIES
-enum { PHI_BESIDE_CORE = 1 << 19 }; /* bytes that the caches of a core hold beside the state */
+enum { PHI_BESIDE_CORE = 1 << 19 }; /* bytes of cache for the tape, beside the state */
 
 #endif
-/* Whether the states of all segments fit beside what the steps of one keep. */
+/* Whether the checkpoints of all segments fit beside the tape of one segment. */
 static int phi_fits(size_t room, size_t longest, size_t of_step, size_t of_state, size_t steps)
 {
     return (room - longest * of_step) / of_state > steps / longest;
 }
 
 #if PHI_SERIES
-/* Share memory out, all that is not taken in any case between what the steps of a segment keep and the states that segments
-   begin with: the longest segments that are made twice only, since the last is made but once; or half and half. */
+/* Divide the memory between the tape of one segment and checkpoints: the longest segments for which every step but
+   those of the last segment is made twice; or one half each. */
 #else
-/* Share memory out, all that is not taken in any case between what the steps of a segment keep and the states that segments
-   begin with: the shortest segments that are made twice only, if caches hold them, or half and half where all that is too little. */
+/* Divide the memory between the tape of one segment and checkpoints: the shortest segments for which every step is made
+   at most twice, but long enough to fill the cache; or one half each. */
 #endif
 static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t steps, void *memory, size_t size)
 {
@@ -89,7 +88,7 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
     memset(next, 0, phi_always(s) * sizeof *next);
     g->block = block;
 #if PHI_UNDONE
-    const size_t of_step = phi_leg_size(s); /* all is counted in legs */
+    const size_t of_step = phi_leg_size(s); /* sizes are counted in legs */
     steps = phi_legs(steps, g->leg);
 #else
     g->of_step = phi_numbers_kept(s);
@@ -126,9 +125,9 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
 #endif
 }
 
-enum { PHI_UNASKED = 1 << 22 }; /* updates of sites before it is asked whether to stop */
+enum { PHI_UNASKED = 1 << 22 }; /* site updates between calls of s->stop */
 
-/* Whether to stop, after so many more steps. */
+/* Whether to stop; called after some more steps. */
 static int phi_is_stopped(const phi_solver *s, phi_transpose *g, size_t steps)
 {
     g->unasked += steps * s->sites;
@@ -137,13 +136,13 @@ static int phi_is_stopped(const phi_solver *s, phi_transpose *g, size_t steps)
     return s->stop();
 }
 
-/* The fields of the state that a segment begins with. */
+/* Fields of a checkpoint. */
 static void phi_fields_of_state(const phi_transpose *g, size_t number, double *fields[PHI_DIM])
 {
     for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = PHI_FIRST_SITE(g->states + (number * PHI_DIM + f) * g->block);
 }
 
-/* Another segment begins here, after so many steps. */
+/* Store a checkpoint after a number of steps. */
 static void phi_mark(const phi_solver *s, phi_transpose *g, size_t done)
 {
     double *fields[PHI_DIM];
@@ -156,7 +155,7 @@ static void phi_mark(const phi_solver *s, phi_transpose *g, size_t done)
     ++g->count;
 }
 
-/* Go back to where the last segment begins; returns the number of its step. */
+/* Restore the last checkpoint; returns the number of its step. */
 static size_t phi_return(phi_solver *s, const phi_transpose *g)
 {
     double *fields[PHI_DIM];

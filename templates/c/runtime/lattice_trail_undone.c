@@ -3,16 +3,16 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Sweeps are undone on the way back, leg by leg: the state that a leg begins with is kept, so what rounding adds is left behind there.
-   Where it has added much, as where fields grow fast, all is done once more with legs of one step, and where that does not do, as
-   where they are damped away, from the beginning of a step for each of its flows. Legs are counted from
-   where the run began: segments change no bit. */
-#define PHI_UNLIKE (450.0 * DBL_EPSILON) /* of the largest value of all fields, 1e-13 in double precision */
+/* The reverse pass recomputes states by the inverse flows, leg by leg. The tape holds the state at the start of each
+   leg, so rounding errors do not pass from leg to leg. If a recomputed state differs too much, as where fields grow
+   fast, all is repeated with legs of one step; if that fails too, as with strong damping, each flow is recomputed from
+   the start of its step. Legs are counted from the start of the run, so results do not depend on segments. */
+#define PHI_UNLIKE (450.0 * DBL_EPSILON) /* relative to the largest value of all fields; 1e-13 in double precision */
 
-/* The legs that steps from the beginning of one take. */
+/* Number of legs in a number of steps. */
 static size_t phi_legs(size_t steps, size_t leg) { return steps / leg + (steps % leg > 0); }
 
-/* The bytes that a leg keeps. */
+/* Bytes on the tape for one leg. */
 static size_t phi_leg_size(const phi_solver *s) { return PHI_DIM * phi_block(s->rows, s->width) * sizeof(double); }
 
 size_t phi_trail_size(const phi_solver *s, size_t steps)

@@ -7,7 +7,7 @@
 #include "rows.c"
 #include "lattice_trail.c"
 
-/* ---- Flows that are undone ---- */
+/* ---- Reverse pass with states recomputed by the inverse flows ---- */
 #include "lattice_undoing_taken.c"
 #include "lattice_undoing_sites.c"
 static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first, size_t end)
@@ -31,7 +31,7 @@ static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first,
 #endif
 }
 
-/* Go back through some flows, the last first; all threads come here at once. */
+/* Reverse pass of some flows, the last first; called by all threads together. */
 static void phi_go_all_back(const phi_solver *s, const phi_flow *flows, size_t count)
 {
 #if PHI_WAVES
@@ -48,11 +48,11 @@ static void phi_go_all_back(const phi_solver *s, const phi_flow *flows, size_t c
 }
 
 #if !PHI_WAVES
-enum { PHI_DEEPEST = 1 }; /* flows at once */
+enum { PHI_DEEPEST = 1 }; /* flows in a wavefront block */
 #endif
 
-/* The way back through the sweeps of a flow, by its number, of the step after so many, for those cotangents: it joins the others that wait,
-   and all are made when they are as many as are made at once. */
+/* Queue the reverse pass of a flow, by its number in a step, for the cotangents bar; the queue is processed when it
+   holds depth flows. */
 static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t step, int number, double *const *bar,
     phi_flow *flows, size_t *count, size_t depth)
 {
@@ -86,7 +86,7 @@ static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t st
 #endif
 }
 
-/* Pull cotangents back through so many steps, joined, after so many, and undo them: s->x becomes the fields before. */
+/* Reverse pass of some steps after step `before`, with merged flows; s->x becomes the fields before them. */
 static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t before, size_t steps)
 {
 #if PHI_WAVES
@@ -110,13 +110,14 @@ static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t b
 #endif
 }
 
-/* The state that a leg of a segment begins with. */
+/* Fields at the start of a leg. */
 static void phi_fields_of_leg(const phi_transpose *g, size_t leg, double *fields[PHI_DIM])
 {
     for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = PHI_FIRST_SITE(g->kept + (leg * PHI_DIM + f) * g->block);
 }
 
-/* The same as phi_steps_back for one step, from which a leg begins: the state before each of its flows is not what was undone. */
+/* As phi_steps_back for the first step of a leg, with the state before each flow recomputed from the start of the
+   step. */
 static void phi_step_back_anew(phi_solver *s, const phi_transpose *g, size_t before, size_t leg)
 {
     double *began[PHI_DIM];
@@ -142,7 +143,7 @@ static void phi_step_back_anew(phi_solver *s, const phi_transpose *g, size_t bef
     }
 }
 
-/* The largest value of a field, in an order that lets loops vectorise. */
+/* Largest magnitude in a field, in an order that lets loops vectorise. */
 static double phi_largest_of(const phi_solver *s, const double *field)
 {
     double lanes[8] = { 0.0 };
@@ -157,7 +158,7 @@ static double phi_largest_of(const phi_solver *s, const double *field)
     return lanes[0];
 }
 
-/* Whether two fields differ by so little. */
+/* Whether two fields differ by at most `most`. */
 static int phi_differ_by(const phi_solver *s, const double *one, const double *other, double most)
 {
     int near = 1;
@@ -168,7 +169,8 @@ static int phi_differ_by(const phi_solver *s, const double *one, const double *o
     return near;
 }
 
-/* Stand where a leg began, of which all steps have been undone, unless that is another state. */
+/* Restore the state at the start of a leg, after all its steps have been recomputed; fails if the recomputed state
+   differs too much. */
 static phi_status phi_leave_leg(const phi_solver *s, phi_transpose *g, size_t leg)
 {
     double *began[PHI_DIM], largest = 0.0;

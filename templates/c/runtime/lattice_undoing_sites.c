@@ -3,5 +3,6 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Pull cotangents back through a flow, and undo it, or hand what that has found, at pieces of rows. */
+/* Reverse pass of a flow for row segments: go = 1 pulls cotangents back and inverts the flow; go = 2 passes
+   contributions to other rows on. */
 #endif

@@ -3,13 +3,13 @@
 #include "lattice.h"
 #include "model.h"
 
-/* The number among all flows of that flow of the step after so many: those that are joined are that of the step after them. */
+/* Number of a flow among all flows of a run; a merged flow counts for the later step. */
 static size_t phi_number_of(size_t step, int number) { return step * PHI_OWN_FLOWS + (size_t)(number % PHI_FLOWS); }
 
-/* What flows hand lies in the arrays of every second flow by turns, by their number among all. */
+/* Arrays for contributions of a flow to other sites: two sets, used alternately. */
 static double *const *phi_handed_by(const phi_transpose *g, size_t flow) { return g->handed + flow % 2 * (PHI_HANDED / 2); }
 
-/* Before some flows are gone back through: the flow after them, of that number, has handed nothing. */
+/* Before a reverse pass: the flow after the first one contributes nothing. */
 static void phi_hand_nothing(const phi_solver *s, const phi_transpose *g, size_t flow)
 {
     size_t first, end = phi_share(phi_units(s), &first);
@@ -24,7 +24,7 @@ static void phi_hand_nothing(const phi_solver *s, const phi_transpose *g, size_t
     phi_wait();
 }
 
-/* After them: what the last one, of that number, has handed. */
+/* After a reverse pass: add the contributions of the last flow. */
 static void phi_hand_last(const phi_solver *s, const phi_transpose *g, size_t flow, double *const *bar)
 {
 #if PHI_HANDS
@@ -36,5 +36,5 @@ static void phi_hand_last(const phi_solver *s, const phi_transpose *g, size_t fl
 #endif
 }
 
-/* Pull cotangents back through a flow, and undo it, at pieces of rows. */
+/* Reverse pass of a flow for row segments: pull cotangents back, and invert the flow. */
 #endif

@@ -5,22 +5,22 @@
 #include "rows.c"
 #include "sweeps.h"
 
-/* ---- Several flows at once ---- */
-/* Where the fields do not fit into caches, several flows go over the lattice together, slice by slice, each so far behind the one
-   before it as that reads: so a slice is fetched once for all. Each thread has slices of its own. Beside their ends flow
-   k leaves k PHI_SPAN of them out, to be made when all threads have come so far. What a flow reads is what it reads where flows
-   are made one by one: the bits are the same. */
-enum { PHI_DEEPEST = 16, PHI_CACHE = 1 << 21 }; /* flows at once; bytes that they may go over */
+/* ---- Wavefront (temporal) blocking ---- */
+/* If the fields exceed the caches, several flows pass over the lattice together, slice by slice, each PHI_SPAN slices
+   behind the one before, so that a slice is loaded once for all of them. Each thread has its own slices. At the ends of
+   these, flow k first leaves out k PHI_SPAN slices, which are made after all threads have come so far. Each flow reads
+   the same values as in separate passes: the bits are the same. */
+enum { PHI_DEEPEST = 16, PHI_CACHE = 1 << 21 }; /* most flows in a block; bytes that their slices may take */
 
 #if PHI_ONE_ROW
-/* The slices of the lattice, the pieces of its row. */
+/* Number of slices: the segments of the row. */
 static size_t phi_slices(const phi_solver *s) { return phi_units(s); }
 #else
-/* The slices of the lattice, each all rows of one place along the first axis. */
+/* Number of slices: all rows with one index of the first axis form a slice. */
 static size_t phi_slices(const phi_solver *s) { return s->sizes[0]; }
 #endif
 
-/* How many flows are made at once. */
+/* Number of flows in a block; 1 for no blocking. */
 static size_t phi_depth(const phi_solver *s)
 {
     const size_t slices = phi_slices(s), bytes = PHI_DOUBLES * PHI_ARRAYS * sizeof(double);
@@ -48,7 +48,7 @@ static void phi_make_slices(const phi_solver *s, const phi_flow *flow, size_t fr
 #endif
 }
 
-/* So many flows, one after the other. */
+/* Apply some flows as one block. */
 static void phi_make_wave(const phi_solver *s, const phi_flow *flows, size_t count)
 {
     size_t from;
@@ -64,7 +64,7 @@ static void phi_make_wave(const phi_solver *s, const phi_flow *flows, size_t cou
     phi_wait();
 }
 
-/* The flows of some steps, joined, without the last. */
+/* Apply the flows of some steps, merged, without the last one. */
 static void phi_make_waves(const phi_solver *s, size_t steps)
 {
     const size_t each = PHI_FLOWS - 1, depth = phi_depth(s);

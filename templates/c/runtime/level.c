@@ -4,7 +4,7 @@
 
 #include "model.h"
 
-/* ---- What a monitored trajectory holds fixed: e = -H(x0), so that K = monitor (H + e) is 0 along it ---- */
+/* ---- Energy level e = -H(x0): K = monitor (H + e) is 0 along a monitored trajectory ---- */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
 {
     gauge[0] = -phi_hamiltonian(params, x);
@@ -17,7 +17,7 @@ static int phi_time_passes(const phi_params *params, const double x[PHI_DIM])
     return isfinite(rate) && rate > 0.0;
 }
 
-/* Make a vector field per unit of the physical time one per unit of tau. */
+/* Convert a vector field from physical time to tau. */
 static void phi_make_per_tau(const phi_params *params, const double x[PHI_DIM], double field[PHI_DIM])
 {
     const double rate = phi_monitor(params, x);

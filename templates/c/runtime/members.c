@@ -9,15 +9,15 @@
 #include "solver.c"
 
 /* ---- Members of an ensemble ---- */
-/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m]; where it is 0,
-   all have the first. */
+/* Arguments of an ensemble. own = 1: member m has the parameters params[m] and the step h[m]; own = 0: all have those
+   of member 0. */
 typedef struct {
     double *x;
     size_t members, steps, own;
     const phi_params *params; /* NULL for the defaults */
     const double *h;
 #include "state_of_members.h"
-    size_t stride; /* 0 where there are no frames */
+    size_t stride; /* 0 without frames */
     double *frames; /* NULL for none */
     unsigned char *status; /* NULL for none */
 } phi_members;
@@ -36,7 +36,7 @@ static phi_members phi_asked(const phi_params *params, double *x, size_t members
     return all;
 }
 
-/* Start a member at a state, with what is its own, and with all that its step size asks for. */
+/* Initialise a member at a state, with its parameters and all coefficients for its step size. */
 static phi_status phi_begin_member(const phi_members *all, size_t m, const double x[PHI_DIM] PHI_AND_GAUGE(const double *gauge), phi_solver *s)
 {
     const phi_params *params = all->params != NULL ? all->params + m * all->own : NULL;
@@ -44,21 +44,21 @@ static phi_status phi_begin_member(const phi_members *all, size_t m, const doubl
     return status == PHI_OK ? phi_integrate(s, all->h[m * all->own], 0) : status;
 }
 
-/* The same at the state that the ensemble has for it, which is x then. */
+/* Initialise a member at its state in the ensemble, which is copied to x. */
 static phi_status phi_take_member(const phi_members *all, size_t m, double x[PHI_DIM], phi_solver *s)
 {
     for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + m];
     return phi_begin_member(all, m, x PHI_AND_GAUGE_OF(all, m), s);
 }
 
-/* How many steps there are to the next frame, or to the end. */
+/* Number of steps to the next frame, or to the end. */
 static size_t phi_to_frame(const phi_members *all, size_t done)
 {
     const size_t left = all->steps - done;
     return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride : left;
 }
 
-/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+/* Write the frame of a member, if one is due after this number of steps: x, or NaN if x is NULL. */
 static void phi_put_frame(const phi_members *all, size_t m, size_t done, const double *x)
 {
     for (size_t i = 0; i < PHI_DIM && all->frames != NULL && done % all->stride == 0; ++i)
@@ -67,7 +67,7 @@ static void phi_put_frame(const phi_members *all, size_t m, size_t done, const d
 
 #include "members_attitudes.c"
 
-/* The steps of a member after so many, by itself. */
+/* Make the remaining steps of a member, one by one. */
 static phi_status phi_end_member(const phi_members *all, size_t m, size_t done, phi_solver *s, phi_status status)
 {
     while (done < all->steps) {
@@ -80,7 +80,7 @@ static phi_status phi_end_member(const phi_members *all, size_t m, size_t done, 
     return status;
 }
 
-/* Where a member ends. */
+/* Write the final state of a member. */
 static void phi_put_member(const phi_members *all, size_t m, const double x[PHI_DIM], phi_status status)
 {
     for (size_t i = 0; i < PHI_DIM; ++i) all->x[i * all->members + m] = x[i];

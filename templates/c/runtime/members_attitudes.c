@@ -4,7 +4,7 @@
 #include <string.h>
 #include "members.c"
 
-/* The same for its attitude. */
+/* Write the attitude of a member to its frame, if one is due after this number of steps; NaN for NULL. */
 static void phi_put_attitude(const phi_members *all, size_t m, size_t done, const phi_solver *s)
 {
     double element[PHI_ELEMENT];

@@ -10,7 +10,7 @@
 #include "model.h"
 
 /* ---- The implicit step, by Newton's method ---- */
-/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
+/* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 #include "measure_policy.h"
 #include "newton_policy.h"
 
@@ -27,8 +27,8 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
     return size;
 }
 
-/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The last
-   correction changes the increment to first order, without an evaluation: it is accepted if the error that remains,
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The last
+   correction changes the increment to first order, without another evaluation: it is accepted if the remaining error,
    quadratic in it, is below PHI_TOLERANCE. */
 static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
@@ -54,10 +54,10 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
         previous = size;
         if (!(remaining <= PHI_TOLERANCE || stalled)) continue;
 #if PHI_ATTITUDE
-        double factor[PHI_ELEMENT]; /* made here, while what follows is computed beside it */
+        double factor[PHI_ELEMENT]; /* computed here, in parallel with the lines below */
         phi_factor(s PHI_AND_STAGE, y, factor);
 #endif
-        double small[PHI_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        double small[PHI_DIM] = { 0.0 }; /* correction of the increment, and compensation */
         for (int i = 0; i < PHI_DIM; ++i)
             for (int j = 0; j < PHI_DIM; ++j) small[i] -= slope[i * PHI_DIM + j] * delta[j];
         for (int i = 0; i < PHI_DIM; ++i) small[i] += s->carry[i];

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "newton_lanes.c"
 
-/* The product of a matrix and a vector. */
+/* Product of a matrix and a vector. */
 static void phi_apply(phi_lanes matrix[restrict PHI_DIM * PHI_DIM], phi_lanes vector[restrict PHI_DIM],
     phi_lanes product[restrict PHI_DIM])
 {
@@ -18,12 +18,12 @@ static void phi_apply(phi_lanes matrix[restrict PHI_DIM * PHI_DIM], phi_lanes ve
     }
 }
 
-/* What a residual takes from the increment. */
+/* Corrections of the increment by the residual. */
 static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes gained[restrict PHI_DIM])
 {
 #if PHI_CENTRED
     phi_apply(model->inverse, residual, gained);
-    for (int i = 0; i < PHI_DIM; ++i) { /* y is the mean of the ends, alpha and beta */
+    for (int i = 0; i < PHI_DIM; ++i) { /* y is the mean of alpha and beta */
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) gained[i][lane] = 2.0 * (gained[i][lane] - residual[i][lane]);
     }
@@ -32,7 +32,7 @@ static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi
 #endif
 }
 
-/* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
+/* Correct y by the residuals, with the inverse of the Newton matrix, and measure the corrections. */
 static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     phi_lanes delta[PHI_DIM];

@@ -4,8 +4,8 @@
 #include <string.h>
 #include "newton_lanes.c"
 
-/* Correct y by the residuals, with the factors of its matrix, and measure the corrections; also find what they take from
-   the increments. */
+/* Correct y by the residuals, with the factors of the Newton matrix, and measure the corrections; also compute the
+   corrections of the increments. */
 static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     phi_lanes delta[PHI_DIM];

@@ -4,8 +4,8 @@
 #include <string.h>
 #include "newton_lanes.c"
 
-/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
-   far from 1. */
+/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot
+   is far from 1. */
 static void phi_invert(phi_lanes matrix[restrict PHI_DIM * PHI_DIM])
 {
     for (int k = 0; k < PHI_DIM; ++k) {

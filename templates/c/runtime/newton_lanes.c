@@ -13,15 +13,15 @@
 /* ---- Newton's method in lanes ---- */
 #include "measure_policy.h"
 
-/* A stage in all lanes, linearised around y. */
+/* Linearisation of a stage around y, in all lanes. */
 typedef struct {
 #include "state_of_model.h"
 } phi_model;
 
 #include "newton_stages.c"
 
-/* Units of corrections of y, so that matrices are reused down to the same relative size as in phi_size, or larger: the least
-   that a component is in the stages. */
+/* Units in which corrections of y are measured, so that matrices are reused down to the same relative accuracy as in
+   phi_size: the smallest magnitude of each component in the stages. */
 static void phi_measure(const phi_model *model PHI_AND_INT_STAGES, phi_lanes unit[restrict PHI_DIM])
 {
     phi_lanes norm = { 0.0 };
@@ -41,7 +41,7 @@ static void phi_measure(const phi_model *model PHI_AND_INT_STAGES, phi_lanes uni
     }
 }
 
-/* Take a correction from y; its size, summed over the components. */
+/* Subtract a correction from y; returns its size, summed over the components. */
 static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     memset(size, 0, PHI_LANES * sizeof size[0]);
@@ -59,15 +59,15 @@ static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_la
 #include "newton_corrected_sparse.c"
 #include "newton_corrected.c"
 
-/* Corrections below the first go on with the matrices of the last pass. After the square of so small a correction as the
-   second, there is rounding only, if the next is below the third. */
+/* After corrections below PHI_FROZEN the matrices are reused. After a correction below PHI_SMALL, whose square is
+   rounding, one below PHI_BLOCK_ROUNDING is the last. */
 #define PHI_FROZEN 1e-4
 #define PHI_SMALL 1e-8
 #define PHI_BLOCK_ROUNDING 1e-10
-#define PHI_CAUTION 32.0 /* frozen matrices leave twice what new ones did, of the same correction; this is far more */
+#define PHI_CAUTION 32.0 /* reused matrices contract half as fast as new ones; the factor 32 is a wide safety margin */
 
-/* What corrections of this size leave, after those of the size before: the first leave their square, later ones the part of
-   themselves that they are of those before, or less. Nothing, where all that is left is rounding. */
+/* Expected next correction: the square of the first; later the latest times the ratio of the latest to the one before.
+   0 at rounding level. */
 static void phi_leave(const phi_lanes size, const phi_lanes before, phi_lanes left)
 {
     PHI_EACH_LANE

@@ -4,7 +4,7 @@
 
 #include "newton_lanes.c"
 
-/* Make a unit in each lane the least that a component is in any stage. */
+/* Set the unit of each component, in each lane, to its smallest magnitude in any stage. */
 static inline void phi_take_least(const phi_model *model, int stages, int i, double unit[restrict PHI_LANES])
 {
     for (int stage = 1; stage < stages; ++stage) {

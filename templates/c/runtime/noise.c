@@ -8,7 +8,7 @@
 #include "philox.c"
 
 /* ---- Noise ---- */
-/* Independent normal variates of variance 1. */
+/* Draw independent normal variates of variance 1. */
 static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double normals[PHI_DRAWS])
 {
     for (int k = 0; k < PHI_DRAWS; k += 2) {
@@ -22,14 +22,14 @@ static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double no
 
 #include "noise_of_flows.c"
 
-/* The increments of the next step: those given, or random ones. 0 if one is not finite. */
+/* Increments of the next step: the given ones, or random ones. Returns 0 if one is not finite. */
 static int phi_draw(phi_solver *s, const double *given)
 {
     if (given != NULL) {
         PHI_TAKE_INCREMENTS(s->dw, given);
     } else {
         phi_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
-        const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h); /* so that a step of -h undoes one of h */
+        const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h); /* so that a step of -h inverts one of h */
         for (int k = 0; k < PHI_DRAWS; ++k) s->dw[k] *= size;
         phi_order_draws(s);
     }

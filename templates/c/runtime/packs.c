@@ -8,33 +8,33 @@
 #include "solver.c"
 #include "lanes.c"
 
-/* ---- Packs of members ---- */
+/* ---- SIMD batches of members: explicit steps ---- */
 enum {
-    PHI_PACK_COUNT = 4, /* in a group: while one waits for a result, the others are worked at */
+    PHI_PACK_COUNT = 4, /* batches in a group: the latency of one is hidden by the others */
     PHI_GROUP = PHI_PACK_COUNT * PHI_LANES,
-    PHI_STRETCH = 32   /* steps before the members are looked at: what is not finite stays so */
+    PHI_STRETCH = 32   /* steps between checks for finite values; values that are not finite stay so */
 };
 
-/* Members of an ensemble, one in each lane. */
+/* One SIMD batch: a member in each lane. */
 typedef struct {
     phi_lanes x[PHI_DIM], carry[PHI_DIM];
 #if PHI_SPLITTING
-    phi_lanes start[PHI_DIM]; /* x where a step began; in it, carry is moved */
+    phi_lanes start[PHI_DIM]; /* x at the start of the step; within a step, carry holds the sum of increments */
 #endif
 } phi_pack;
 
-/* Members of an ensemble, in packs. */
+/* A group of SIMD batches. */
 typedef struct {
     phi_pack pack[PHI_PACK_COUNT];
     phi_lanes PHI_OF(coef[PHI_PACK_COUNT], PHI_STAGES)[PHI_COEFFICIENTS];
-    int packs;    /* in use */
-    int own;      /* whether each member has coefficients of its own */
-    int prepared; /* whether a member has brought coefficients that all have */
+    int packs;    /* batches in use */
+    int own;      /* whether members have different coefficients */
+    int prepared; /* whether the shared coefficients are set */
 #if PHI_FAR
-    int far; /* whether arguments of functions are too large for polynomials */
+    int far; /* whether full-range functions are needed */
 #endif
-    int active[PHI_GROUP];       /* whether there is such a member, and it has not left */
-    size_t steps_left[PHI_GROUP]; /* that it has still to make */
+    int active[PHI_GROUP];       /* whether the lane holds a member that has not failed */
+    size_t steps_left[PHI_GROUP]; /* steps left to make */
 } phi_group;
 
 /* phi_add for one coordinate in all lanes. */
@@ -66,18 +66,18 @@ static inline void phi_settle_lanes(double x[restrict PHI_LANES], double carry[r
 #include "packs_splitting.c"
 
 #if PHI_FAR
-/* The same where arguments of functions are too large for polynomials. */
+/* As phi_steps_lanes, with full-range functions. */
 PHI_APART static void phi_steps_far_lanes(phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step) {
         phi_begin_lanes(group);
-        phi_flows_far_lanes(0, 1, group); /* which is right for all */
+        phi_flows_far_lanes(0, 1, group); /* own = 1 is correct for every group */
         phi_end_lanes(group);
     }
 }
 
 #endif
-/* How many active members have values that are not finite, and which. */
+/* Number of active members with values that are not finite; marks them. */
 static int phi_group_lost(const phi_group *group, int lost[PHI_GROUP])
 {
     int count = 0;
@@ -99,14 +99,15 @@ static void phi_pack_copy(phi_pack *to, const phi_pack *from, int lane)
     }
 }
 
-/* Some steps of all members, by short ways. */
+/* Make some steps of all members, with small-argument functions. */
 static void phi_group_advance(phi_group *group, int steps)
 {
     if (group->own) phi_steps_lanes(1, group, steps);
     else phi_steps_lanes(0, group, steps);
 }
 
-/* Some steps of all members. One whose values are not finite then leaves, with its state before them. How many remain. */
+/* Make some steps of all members. A member whose values are not finite then leaves, with its state before these steps.
+   Returns the number of active members. */
 static int phi_group_steps(phi_group *group, int steps)
 {
     phi_pack before[PHI_PACK_COUNT];
@@ -133,7 +134,7 @@ static int phi_group_steps(phi_group *group, int steps)
     return active;
 }
 
-/* Put a member into its lane, and its coefficients there; if all have the same, the first brings them to all. */
+/* Assign a member to a lane, with its coefficients; if all members share coefficients, the first sets them. */
 static phi_status phi_group_join(phi_group *group, int m, const phi_members *all, size_t first)
 {
     phi_solver s;
@@ -159,7 +160,7 @@ static phi_status phi_group_join(phi_group *group, int m, const phi_members *all
     return PHI_OK;
 }
 
-/* The frames after so many steps, of the members that are active. */
+/* Write the frames of active members after a number of steps. */
 static void phi_group_frame(const phi_group *group, const phi_members *all, size_t first, size_t done)
 {
     double x[PHI_DIM];
@@ -169,7 +170,7 @@ static void phi_group_frame(const phi_group *group, const phi_members *all, size
     }
 }
 
-/* The end of a member; the steps that the group did not make with it, it makes by itself. */
+/* Write the results of a member. Steps that the group did not make for it are made by single steps. */
 static phi_status phi_group_end(const phi_group *group, int m, const phi_members *all, size_t first,
     phi_status status)
 {
@@ -190,7 +191,7 @@ static phi_status phi_group_end(const phi_group *group, int m, const phi_members
     return status;
 }
 
-/* The members from first on, as many as a group holds. The first status that is not OK. */
+/* Integrate one group, from member first on. Returns the first status that is not OK. */
 PHI_APART static phi_status phi_group_run(const phi_members *all, size_t first)
 {
     phi_group group;
@@ -200,7 +201,7 @@ PHI_APART static phi_status phi_group_run(const phi_members *all, size_t first)
     group.packs = (count + PHI_LANES - 1) / PHI_LANES;
     group.own = (int)all->own;
     for (int m = 0; m < count; ++m) begun[m] = phi_group_join(&group, m, all, first);
-    int active = count > 1; /* one alone is quicker without lanes */
+    int active = count > 1; /* measured: a single member is faster by itself */
     for (size_t done = 0; done < all->steps && active > 0;) {
         const size_t next = phi_to_frame(all, done);
         const int stretch = next < PHI_STRETCH ? (int)next : PHI_STRETCH;

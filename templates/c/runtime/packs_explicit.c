@@ -4,7 +4,7 @@
 #include <string.h>
 #include "packs.c"
 
-/* phi_stage for the members of a pack; the sums are those of phi_advance. */
+/* phi_stage for a batch of members; sums as in phi_advance. */
 PHI_IN_PLACE static inline void phi_stage_lanes(phi_lanes *coef, int own, phi_pack *pack)
 {
     phi_lanes increment[PHI_DIM];
@@ -21,7 +21,7 @@ PHI_IN_PLACE static inline void phi_stage_lanes(phi_lanes *coef, int own, phi_pa
     }
 }
 
-/* Steps of a group: each stage for all packs. Where own is 0, all members have the coefficients of the first lane. */
+/* Make steps of a group: each stage for all batches. own = 0: all members have the coefficients of the first lane. */
 PHI_IN_PLACE static inline void phi_steps_lanes(int own, phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step)

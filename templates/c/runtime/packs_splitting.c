@@ -4,13 +4,13 @@
 #include <string.h>
 #include "packs.c"
 
-/* Before the flows of a step. */
+/* Start a step, before its flows. */
 static void phi_begin_lanes(phi_group *group)
 {
     for (int k = 0; k < group->packs; ++k) memcpy(group->pack[k].start, group->pack[k].x, sizeof group->pack[k].x);
 }
 
-/* After them. */
+/* End a step, after its flows. */
 static void phi_end_lanes(phi_group *group)
 {
     for (int k = 0; k < group->packs; ++k) {
@@ -19,7 +19,7 @@ static void phi_end_lanes(phi_group *group)
     }
 }
 
-/* Steps of a group: as in phi_stages, each flow for all packs. Where own is 0, all members have the coefficients of the
+/* Make steps of a group: as in phi_stages, each flow for all batches. own = 0: all members have the coefficients of the
    first lane. */
 PHI_IN_PLACE static inline void phi_steps_lanes(int own, phi_group *group, int steps)
 {

@@ -14,8 +14,8 @@
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 #include "path_policy.h"
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
-   like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope. An expansion with gaps between
+   its terms, like t + t^9, or across the kink of an absolute value, may only seem to have converged. */
 static int phi_holds(const double *coef, const double p[PHI_DIM], const double m[PHI_DIM],
     const double slope[PHI_DIM])
 {
@@ -27,8 +27,8 @@ static int phi_holds(const double *coef, const double p[PHI_DIM], const double m
     return 1;
 }
 
-/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m - start. The number
-   of terms follows from their size; 0 if PHI_TERMS do not suffice. */
+/* Path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m - start. The size
+   of the terms decides their number. Returns 0 if PHI_TERMS terms do not suffice. */
 static int phi_piece(const double *coef, const double p[PHI_DIM], const double start[PHI_DIM], double change[PHI_DIM],
     double mean[PHI_DIM])
 {
@@ -58,8 +58,8 @@ static int phi_piece(const double *coef, const double p[PHI_DIM], const double s
     return 0;
 }
 
-/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
+/* Whole path from x, in 1, 2, 4, ... pieces until each expansion converges. For any p, the end of the path lies on the
+   symplectic leaf of x. Returns 0 if the path is too long or leaves the domain. *made counts all pieces. */
 static int phi_path(const double *coef, const double x[PHI_DIM], const double p[PHI_DIM], double change[PHI_DIM],
     double mean[PHI_DIM], int *made)
 {
@@ -84,8 +84,8 @@ static int phi_path(const double *coef, const double x[PHI_DIM], const double p[
     return 0;
 }
 
-/* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
-   x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
+/* Residual p - grad S_h(mean) of the equation for p, where mean is that of the path; also the change of x along the
+   path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
 static int phi_residual(phi_solver *s, const double *coef, const double p[PHI_DIM], double y[PHI_DIM],
     double residual[PHI_DIM], double change[PHI_DIM], double jacobian[PHI_DIM * PHI_DIM], int *made)
 {
@@ -98,7 +98,7 @@ static int phi_residual(phi_solver *s, const double *coef, const double p[PHI_DI
     return 1;
 }
 
-/* The Jacobian by differences, for steps so large that the approximate one does not contract. */
+/* Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
 static int phi_differences(phi_solver *s, const double *coef, const double p[PHI_DIM], const double residual[PHI_DIM],
     double jacobian[PHI_DIM * PHI_DIM], int *made)
 {
@@ -113,8 +113,8 @@ static int phi_differences(phi_solver *s, const double *coef, const double p[PHI
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
-   PHI_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing. */
+/* Solve p = grad S_h(mean of the path from x with covector p), and move to the end of that path. If that needs more
+   than PHI_MOST_PIECES pieces, the step is too large for a meaningful solution. */
 static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
     const double *coef = PHI_OF(s->coef, stage);

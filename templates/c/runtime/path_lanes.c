@@ -9,11 +9,11 @@
 #include "newton_lanes.c"
 
 /* ---- Blocks along paths ---- */
-#define PHI_SLOPE_ACCURACY 1e-7 /* of the derivatives of paths */
-#define PHI_MIDDLES_SETTLED 1e-9 /* accuracy of middles: what is left, the passes mend */
-#define PHI_GUESS_ACCURACY 1e-6 /* of expansions for guesses, which are no better */
+#define PHI_SLOPE_ACCURACY 1e-7 /* accuracy of the derivatives of paths */
+#define PHI_MIDDLES_SETTLED 1e-9 /* accuracy of middles; Newton iterations remove the remaining error */
+#define PHI_GUESS_ACCURACY 1e-6 /* accuracy of expansions in predictions, which are not more accurate */
 
-/* alpha - y and beta - alpha to leading order, from one short expansion. */
+/* alpha - y and beta - alpha to leading order, by one short expansion. */
 static void phi_evaluate_lanes(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM],
     phi_lanes displacement[restrict PHI_DIM], phi_lanes increment[restrict PHI_DIM])
 {
@@ -31,7 +31,8 @@ static void phi_evaluate_lanes(phi_lanes coef[restrict], phi_lanes y[restrict PH
     }
 }
 
-/* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
+/* alpha - y and beta - alpha, by an expansion whose mean differs from y a little, corrected to first order in that
+   difference. */
 static void phi_read_ends(phi_model *model, phi_expansion *e, const phi_lanes wrong)
 {
     phi_lanes miss[PHI_DIM];
@@ -54,8 +55,8 @@ static void phi_read_ends(phi_model *model, phi_expansion *e, const phi_lanes wr
         }
 }
 
-/* The matrices of a stage, from the derivatives of the paths and the Hessian of S_h. They are known to seven digits: what
-   that leaves of a correction is below rounding when it is accepted. */
+/* Matrices of a stage, from the derivatives of the paths and the Hessian of S_h. Seven digits suffice: the error of an
+   accepted correction is then below rounding. */
 static void phi_linearise_paths(phi_lanes coef[restrict], phi_model *model, phi_expansion *e,
     phi_lanes hessian[restrict PHI_DIM * PHI_DIM])
 {
@@ -71,7 +72,7 @@ static void phi_linearise_paths(phi_lanes coef[restrict], phi_model *model, phi_
     }
 }
 
-/* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
+/* Evaluate a stage at the points y, with new matrices or with those of the last iteration. */
 static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
 {
     phi_expansion e;

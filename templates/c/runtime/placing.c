@@ -32,7 +32,7 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
 #elif PHI_GAUSS
     memset(&s->history, 0, sizeof s->history);
 #elif PHI_GUESSED
-    /* what guesses begin from moves with the state */
+    /* shift the predictors with the state */
     PHI_EACH_STAGE
         for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif

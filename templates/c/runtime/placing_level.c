@@ -6,7 +6,7 @@
 #include "algebra.c"
 #include "level.c"
 
-/* The level of s->x, which was moved from elsewhere; 0, and back there, where it has none. */
+/* Set the energy level after the state was moved to s->x. Returns 0, with the former state, if that has none. */
 static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const double carry[PHI_DIM])
 {
     double level[PHI_GAUGES];
@@ -18,7 +18,7 @@ static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const doubl
         return 0;
     }
     memcpy(s->gauge, level, sizeof level);
-    PHI_EACH_STAGE /* where s->h is NaN the next step does it again */
+    PHI_EACH_STAGE /* if s->h is NaN, the next step computes them */
         phi_prepare(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(s->coef, stage));
     return 1;
 }

@@ -6,11 +6,11 @@
 #include "implicit.c"
 #include "model.h"
 
-#define PHI_NEAR_BY 0.125 /* how far the state may be moved, in its own size, for guesses to move with it */
+#define PHI_NEAR_BY 0.125 /* largest relative change of the state after which predictors are shifted rather than cleared */
 
-/* Guesses move with the state, by as many past values as extrapolation needs: to where a motion through x would have had
-   them, which differs from the motion as it was by what moved the state, and by the difference of their slopes. Recurrences
-   are of the motion as it was. From far away all begins anew, with the next step. */
+/* Shift the predictors with the state, for as many past values as the extrapolation needs: a motion through x would
+   have had past values that differ by the change of the state and by the difference of the slopes. Recurrences are
+   dropped, as they were fitted to the former motion. After a large change, the next step clears the predictors. */
 static void phi_move_guesses(phi_solver *s, const double from[PHI_DIM])
 {
     double distance = 0.0, size = 0.0, before[PHI_DIM], slope[PHI_DIM];
@@ -41,7 +41,7 @@ static void phi_move_guesses(phi_solver *s, const double from[PHI_DIM])
     for (int i = 0; i < PHI_DIM; ++i) slope[i] -= before[i];
 #endif
 #if PHI_COMPOSED
-    double since = s->h; /* how long ago the last step began, and then each of its stages */
+    double since = s->h; /* time since the start of the last step, then of each of its stages */
 #endif
     PHI_EACH_STAGE {
         phi_history *history = &PHI_OF(s->history, stage);

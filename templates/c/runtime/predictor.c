@@ -5,7 +5,7 @@
 #include "model.h"
 #include "recurrence.c"
 
-/* ---- Starting guesses ---- */
+/* ---- Predictors ---- */
 #include "predictor_policy.h"
 
 #include "predictor_recurrences.c"

@@ -6,8 +6,7 @@
 #include "recurrence.c"
 #include "predictor_policy.h"
 
-/* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have nothing to do
-   with the motion. */
+/* Whether a prediction is near the state. Far away the equation of a step has solutions unrelated to the motion. */
 static int phi_near(const double guess[PHI_DIM], const double last[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -19,12 +18,12 @@ static int phi_near(const double guess[PHI_DIM], const double last[PHI_DIM])
 }
 
 enum {
-    PHI_HISTORY = 8, /* values that extrapolation uses at most: more amplify rounding more than they gain */
-    PHI_REPAY = 150, /* steps that a fit costs, about */
-    PHI_LONG_WAIT = 20000 /* steps until a recurrence that often needs fitting is fitted again */
+    PHI_HISTORY = 8, /* most values that the extrapolation uses; more would amplify rounding errors */
+    PHI_REPAY = 150, /* cost of a fit, in steps; measured */
+    PHI_LONG_WAIT = 20000 /* steps until the next fit of a recurrence that has needed many */
 };
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
+/* Predict the next value (y) from earlier ones. Returns 0 if there is no prediction. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {
     const int last = history->count - 1;
@@ -46,7 +45,7 @@ static int phi_predict(const phi_history *history, double value[PHI_DIM])
     return last >= 0 && phi_near(value, history->past[last]);
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
+/* Select the predictor that would have been best for a solution that took several iterations. */
 static void phi_judge(phi_history *history, const double value[PHI_DIM])
 {
     double row[PHI_HISTORY + 1][PHI_DIM], guess[PHI_DIM], least = HUGE_VAL, fitted = HUGE_VAL;
@@ -72,7 +71,7 @@ static void phi_judge(phi_history *history, const double value[PHI_DIM])
     if (history->extrapolation_order == 0) history->extrapolation_order = 1;
 }
 
-/* Drop what is old, if so many values would not fit into the history. */
+/* Drop the oldest values if the history has no room for `count` more. */
 static void phi_make_room(phi_history *history, int values)
 {
     if (history->count + values <= PHI_KEPT) return;
@@ -80,7 +79,8 @@ static void phi_make_room(phi_history *history, int values)
     history->count = PHI_REMEMBERED;
 }
 
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. Whether it foresees. */
+/* Fit the recurrence to the last values; the wait until the next fit grows with every fit. Returns whether the
+   recurrence predicts well. */
 static int phi_fit(phi_history *history)
 {
     int found = 1;
@@ -99,7 +99,7 @@ static int phi_fit(phi_history *history)
     return found;
 }
 
-/* Take in the solved value: what took one iteration needs no better guess. */
+/* Update the predictor with a solution. A solve of one iteration needs no better prediction. */
 static void phi_remember(phi_history *history, const double value[PHI_DIM], int iterations)
 {
     if (iterations > 1) phi_judge(history, value);

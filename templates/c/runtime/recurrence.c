@@ -6,20 +6,21 @@
 #include "model.h"
 
 /* ---- Recurrences fitted to the last values ---- */
-/* A recurrence uses no more values than leave so little, in sizes of the largest. */
+/* A fit stops adding values once the residual is below this, relative to the largest value. */
 #define PHI_ENOUGH 3e-12
 
-/* The ridge of the least squares: the level of rounding. */
+/* Regularisation of the least squares: the level of rounding. */
 #define PHI_RIDGE 1e-15
 
-/* How far a recurrence may miss values that it was not fitted to, in sizes of the largest: beyond, the motion is chaotic
-   or the step long, and other guesses are as good. */
+/* Largest accepted error of a recurrence for values it was not fitted to, relative to the largest value. Beyond it, the
+   motion is chaotic or the step long, and other predictors are as good. */
 #define PHI_HOPELESS 1e-7
 
-enum { PHI_ROWS = (int)PHI_REMEMBERED - PHI_WINDOW - PHI_AHEAD - PHI_CHECKS + 1 }; /* equations of the least squares */
+enum { PHI_ROWS = (int)PHI_REMEMBERED - PHI_WINDOW - PHI_AHEAD - PHI_CHECKS + 1 }; /* equations of the least-squares problem */
 
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
+/* Subtract multiples of one column, stored in r, from eight columns, to make them orthogonal to it. If that column is
+   one of the eight, columns up to it are unchanged, and inverse becomes 1 over its squared norm. The number of rows is
+   even. */
 static void phi_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
 {
     double even[8] = { 0.0 }, odd[8] = { 0.0 };
@@ -40,7 +41,7 @@ static void phi_project(int rows, double (*one)[8], int column, double *inverse,
     }
 }
 
-/* By how much recurrences miss the last of these values. */
+/* Error of the recurrences for the last of these values. */
 static double phi_missed(const double *value, double (*weight)[8])
 {
     enum { AHEAD = PHI_AHEAD, WINDOW = PHI_WINDOW, CHECKS = PHI_CHECKS };
@@ -54,10 +55,10 @@ static double phi_missed(const double *value, double (*weight)[8])
     return most;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... PHI_AHEAD - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... PHI_AHEAD - 1, to the
+   history of a component, by least squares with Tikhonov regularisation (modified Gram-Schmidt). Columns are added
+   eight at a time, until the residuals are negligible. Returns the number of past values used, or 0 if the recurrences
+   do not predict the last values, which were left out of the fit. */
 static int phi_train(phi_history *history, int component)
 {
     enum { AHEAD = PHI_AHEAD, WINDOW = PHI_WINDOW, ROWS = PHI_ROWS };
@@ -74,7 +75,7 @@ static int phi_train(phi_history *history, int component)
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
     while (terms < WINDOW && left > PHI_ENOUGH * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+        const int part = terms / 8, rows = ROWS + terms + 8; /* later rows of the regularisation are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
         for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = PHI_RIDGE * largest;

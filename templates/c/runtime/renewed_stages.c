@@ -2,7 +2,7 @@
 #define PHI_FILE_RENEWED_STAGES
 #include "model.h"
 
-/* Compute the coefficients of the next step that are functions of the time or of the noise. */
+/* Compute the coefficients of the next step that depend on the time or on the noise. */
 static void phi_renew(phi_solver *s)
 {
     PHI_EACH_STAGE

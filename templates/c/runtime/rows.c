@@ -6,12 +6,12 @@
 #include "model.h"
 
 /* ---- Rows of sites ---- */
-/* A piece of a row, and what loops over its sites are told. */
+/* Segment of a row, with the pointers and numbers that loops over its sites read. */
 typedef struct {
 #include "state_of_row.h"
 } phi_row;
 
-/* Before a loop over sites: tells compilers that they are independent. */
+/* Before a loop over sites: tells the compiler that iterations are independent. */
 #if defined(__clang__)
 #define PHI_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -22,7 +22,7 @@ typedef struct {
 #endif
 
 #if PHI_COLOURS
-/* The first site of a colour in a row, from a given one on. */
+/* First site of a colour in a row, at or after a given site. */
 static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
 {
     for (ptrdiff_t i = from; i < from + PHI_COLOUR_COUNT; ++i)
@@ -35,8 +35,8 @@ static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
 }
 
 #endif
-/* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at open ends,
-   where terms that read them have weight 0. */
+/* Update the halo of a row for the sites from..to: copies of the other end, or mirrored values at open ends, where
+   terms that read them have weight 0. */
 static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
 #if PHI_OPEN_ROWS
@@ -59,10 +59,10 @@ static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdi
 #if PHI_BETWEEN
 
 #if PHI_ONE_ROW
-/* The sites from one on, before another. */
+/* Before a loop over the sites of a segment. */
 #else
-/* The sites from one on, before another: as far as to the end of the last vector of 8, which may lie in the copies beside a row,
-   where these are made anew. */
+/* Before a loop over the sites of a segment, rounded up to whole vectors of 8; the excess lies in the halo, which is
+   updated afterwards. */
 #endif
 static inline const phi_row *phi_between(phi_row *row, ptrdiff_t from, ptrdiff_t to)
 {

@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
+/* Number of rows for these sizes, and their width; 0 if sizes are not allowed. */
 static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / PHI_DOUBLES_OF_SITE;
@@ -16,12 +16,12 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
         rows *= sizes[a];
     }
     size_t wide = PHI_WIDE((sizes[PHI_LAST_AXIS] + 7) / 8 * 8);
-    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
+    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would compete for the same cache sets */
     *width = (ptrdiff_t)wide;
     return rows > most / wide ? 0 : rows;
 }
 
-/* The position of a row along all axes but the last. */
+/* Position of a row along all axes but the last. */
 static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[PHI_AXES])
 {
     place[PHI_AXES - 1] = 0;
@@ -31,7 +31,7 @@ static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[
     }
 }
 
-/* Where a row is, and those beside it. */
+/* Addresses of a row and its neighbours. */
 static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
 {
     ptrdiff_t place[PHI_AXES];
@@ -53,14 +53,14 @@ static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_L
     }
 }
 
-/* The same of all rows, into memory. */
+/* Store the addresses of all rows and their neighbours in memory. */
 static void phi_find_all_lines(phi_solver *s, double *memory)
 {
     s->lines = (ptrdiff_t *)(void *)memory;
     for (size_t r = 0; r < s->rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
 }
 
-/* The row of that number, which is worked at in one go. */
+/* Row with this number, a work item of threads. */
 static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
 {
     phi_row row;
@@ -97,5 +97,5 @@ static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
     return row;
 }
 
-static size_t phi_units(const phi_solver *s) { return s->rows; } /* what is worked at in one go */
+static size_t phi_units(const phi_solver *s) { return s->rows; } /* work items of threads: the rows */
 #endif

@@ -3,13 +3,13 @@
 #include "lattice.h"
 #include "model.h"
 
-/* The number of rows, which is 1, and its width; 0 if the size is not allowed. */
+/* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / PHI_DOUBLES_OF_SITE;
     if (sizes == NULL || sizes[0] < phi_least[0] PHI_OR_MISFIT(0) || sizes[0] > most / 2) return 0;
     size_t wide = PHI_WIDE((sizes[0] + 7) / 8 * 8);
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share lines of the cache */
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows a multiple of a page apart would compete for the same cache sets */
     return 1;
 }
 
@@ -22,18 +22,18 @@ static inline phi_row phi_row_of(const phi_solver *s)
 }
 
 #if PHI_GATHER
-enum { PHI_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
+enum { PHI_PIECE = 256 }; /* sites of a work item, for any number of threads */
 #else
-enum { PHI_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
+enum { PHI_PIECE = 1024 }; /* sites of a work item, for any number of threads */
 #endif
 
-/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+/* Number of segments of the row; the last one is the longest, so that halos copy from one segment only. */
 static size_t phi_units(const phi_solver *s)
 {
     return s->length < 2 * PHI_PIECE ? 1 : (size_t)s->length / PHI_PIECE;
 }
 
-/* The piece of that number. */
+/* Segment with this number, a work item of threads. */
 static inline phi_row phi_piece_of(const phi_solver *s, size_t unit)
 {
     phi_row row = phi_row_of(s);

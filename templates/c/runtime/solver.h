@@ -3,7 +3,7 @@
 #include "declarations.h"
 #include "phrases.h"
 #include "status.h"
-const char *phi_status_string(phi_status status); /* what a status means */
+const char *phi_status_string(phi_status status); /* the meaning of a status */
 
 #include "history_gauss.h"
 #include "history_differences.h"
@@ -19,8 +19,8 @@ size_t phi_solver_size(void); /* bytes; for languages that cannot read the struc
 size_t phi_solver_steps_done(const phi_solver *s);
 double phi_solver_time(const phi_solver *s);
 void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]); /* the attitude, then the position, if there is one */
-size_t phi_trail_size(void); /* PHI_TRAIL, in numbers */
-size_t phi_trail_size_each(void); /* PHI_TRAIL_EACH, in numbers */
+size_t phi_trail_size(void); /* PHI_TRAIL, the number of doubles */
+size_t phi_trail_size_each(void); /* PHI_TRAIL_EACH, the number of doubles */
 
 /* Initialise *s with the state x0. params may be NULL for the defaults. PHI_BAD_ARGUMENT, with *s unchanged, if a value
    or a coefficient is not finite, or if a parameter that must be positive is not. */

@@ -28,10 +28,11 @@ static void phi_prepare(const phi_params *params, double h, double *coef)
 }
 
 #if PHI_MONITOR
-/* What flows move: the state, the physical time, and a sum that is no number where a logarithm has none. */
+/* Quantities that flows update: the state, the physical time, and a sum that becomes NaN outside the domain of a
+   logarithm. */
 enum { PHI_TIME = PHI_DIM, PHI_DOMAIN, PHI_ALONG };
 
-/* One step: the exact flows of the parts of K, one after the other. If it fails, the state is as before. */
+/* Make one step: the exact flows of the parts of K, one after the other. If it fails, the state is unchanged. */
 #if PHI_ADJOINT
 static phi_status phi_stages(phi_solver *s, double (*kept)[PHI_DIM])
 #else
@@ -65,7 +66,7 @@ static phi_status phi_stages(phi_solver *s)
 }
 
 #else
-/* One step: the exact flows of the parts of H, one after the other. If it fails, the state is as before. */
+/* Make one step: the exact flows of the parts of H, one after the other. If it fails, the state is unchanged. */
 #if PHI_ADJOINT
 static phi_status phi_stages(phi_solver *s, double (*kept)[PHI_DIM])
 #else
@@ -98,7 +99,7 @@ static phi_status phi_stages(phi_solver *s)
 }
 
 #if PHI_CORRECTED
-/* Bring the state to where the steps of a run move it, or after them back. If it fails, the state is as before. */
+/* Apply the corrector before the steps of a run, or its inverse after them. If it fails, the state is unchanged. */
 static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_KEPT)
 {
     double x[PHI_DIM], moved[PHI_DIM];
@@ -110,8 +111,8 @@ static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_KEPT)
     return PHI_OK;
 }
 
-/* End a run that began at before: the status of its last step, or that of the corrector. Without a good step, or where
-   the corrector fails, the state is as before the run. */
+/* End a run that started at `before`; returns the status of its last step, or that of the corrector. Without a
+   successful step, or if the corrector fails, the state is that before the run. */
 static phi_status phi_end_run(phi_solver *s, const phi_solver *before, phi_status status PHI_AND_STATES_KEPT)
 {
     const phi_status corrected = s->steps == before->steps ? PHI_OK : phi_correct(s, 1 PHI_AND_KEPT_AT(-PHI_BEGUN));

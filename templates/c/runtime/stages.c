@@ -7,7 +7,7 @@
 #include "stage_predicted.c"
 #include "stage_alone.c"
 
-/* The stages of one step. If one fails, the state is as before the step. */
+/* Make the stages of one step. If one fails, the state is that before the step. */
 static phi_status phi_stages(phi_solver *s)
 {
     phi_status status = PHI_OK;

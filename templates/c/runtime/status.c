@@ -4,7 +4,7 @@
 
 const char *phi_status_string(phi_status status)
 {
-    switch (status) { /* no table, which would be data to relocate */
+    switch (status) { /* a table would be data that the loader has to relocate */
     case PHI_OK: return "ok";
     case PHI_NO_CONVERGENCE: return "no convergence: the step is too large";
     case PHI_SINGULAR: return "singular Newton matrix: the step is too large";

@@ -3,7 +3,7 @@
 #include "model.h"
 #include "solver.h"
 
-/* The derivative of one explicit stage, 1 + increment', and its step from x + carry. The remembered value is unused. */
+/* Derivative of one explicit stage, 1 + increment'; also advances from x + carry. The argument value is unused. */
 static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {

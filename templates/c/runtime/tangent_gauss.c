@@ -8,11 +8,11 @@
 #include "model.h"
 #include "solver.c"
 
-enum { PHI_SLOPES = PHI_UNKNOWNS * (PHI_DIM + PHI_UNKNOWNS) }; /* of a stage, along x and along the unknowns */
+enum { PHI_SLOPES = PHI_UNKNOWNS * (PHI_DIM + PHI_UNKNOWNS) }; /* of a stage, by x and by the unknowns */
 #include "gauss_tangent_policy.h"
 
-/* How moves of the stages vary along coordinate j, by sweeps of the linear equations that they satisfy; 0 if these do not
-   come to an end. */
+/* Derivatives of the stage increments by coordinate j: fixed-point sweeps of linear equations. Returns 0 if they do not
+   converge. */
 static int phi_vary(const phi_solver *s, double slopes[PHI_NODES][PHI_SLOPES], int j, phi_lanes *varied)
 {
     phi_lanes z[PHI_UNKNOWNS];
@@ -42,7 +42,7 @@ static int phi_vary(const phi_solver *s, double slopes[PHI_NODES][PHI_SLOPES], i
     return 0;
 }
 
-/* The derivative of the step that s has made from at, and its change. */
+/* Derivative and change of the step that s has made from *at. */
 static phi_status phi_tangent_stage(const phi_solver *s, const phi_solver *at, double change[PHI_DIM],
     double derivative[PHI_DIM * PHI_DIM])
 {

@@ -9,8 +9,8 @@
 #include "tangent_implicit.c"
 #include "tangent_product.c"
 
-/* The derivative of one implicit stage: alpha = x gives Dy = jacobian^-1, and the stage is 1 + increment_jacobian Dy.
-   All is evaluated at the y of the stage itself, found from its remembered value by corrections that shrink no more. */
+/* Derivative of one implicit stage: alpha = x gives Dy = jacobian^-1, and the stage has the derivative 1 +
+   increment_jacobian Dy. y is solved to rounding level, starting from the stored value. */
 static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {

@@ -23,8 +23,8 @@ static int phi_tangent_holds(const double *coef, const double p[2 * PHI_DIM], co
     return 1;
 }
 
-/* The path dm/dt = pi(m) p with its variation, 0 <= t <= 1, by their Taylor series: change is the end minus the start,
-   mean the mean minus the start. 0 if PHI_TERMS terms do not suffice. */
+/* Path dm/dt = pi(m) p with its variation, 0 <= t <= 1, by Taylor series: change is the end minus the start, mean the
+   mean minus the start. Returns 0 if PHI_TERMS terms do not suffice. */
 static int phi_tangent_piece(const double *coef, const double p[2 * PHI_DIM], const double start[2 * PHI_DIM],
     double change[2 * PHI_DIM], double mean[2 * PHI_DIM])
 {
@@ -53,8 +53,9 @@ static int phi_tangent_piece(const double *coef, const double p[2 * PHI_DIM], co
     return 0;
 }
 
-/* End and mean of the whole path from x under p, minus x, with their variations under a variation of x (the first
-   PHI_DIM seeds) or of p (the others): change and mean hold the state, then its variation. 0 if it cannot be followed. */
+/* End and mean of the whole path from x with covector p, minus x, with their variations under a variation of x (the
+   first PHI_DIM seeds) or of p (the others). change and mean hold the state, then its variation. Returns 0 if the path
+   cannot be followed. */
 static int phi_tangent_seed(const double *coef, const double x[PHI_DIM], const double p[PHI_DIM], int seed,
     double change[2 * PHI_DIM], double mean[2 * PHI_DIM])
 {
@@ -81,8 +82,8 @@ static int phi_tangent_seed(const double *coef, const double x[PHI_DIM], const d
     return 0;
 }
 
-/* The derivative of one stage: p = grad S_h(mean) gives (1 - H mean_p) Dp = H mean_x with H the Hessian of S_h, and the
-   stage is end_x + end_p Dp, with p found from the remembered mean, value, by corrections that shrink no more. */
+/* Derivative of one stage: p = grad S_h(mean) gives (1 - H mean_p) Dp = H mean_x with H the Hessian of S_h, and the
+   stage has the derivative end_x + end_p Dp. p is solved to rounding level, starting from the stored mean in value. */
 static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {

@@ -10,7 +10,7 @@ static double phi_taylor_product(const double *a, const double *b, int k)
     return sum;
 }
 
-/* Coefficient k >= 1 of the Taylor series of f(a), where d is that of f'(a): f(a)' = f'(a) a'. */
+/* Coefficient k >= 1 of the Taylor series of f(a); d is the series of f'(a): f(a)' = f'(a) a'. */
 static double phi_taylor_chain(const double *a, const double *d, int k)
 {
     double sum = 0.0;
