@@ -7,9 +7,8 @@
  *   step: explicit; one step of one site: 24 multiplications, 12 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Energy, Casimirs,
- *   right-hand side
- * body-sha256: ffe7e13d9a8298b745a73fee3fe4b9092ccde2810347369267e42cde7c08d4f3
+ * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
+ * body-sha256: 307ad34d460dddc6940d6b949dd0857e96a571af3a731fc418041e831906ba50
  */
 #include "food_web.h"
 #include <limits.h>
@@ -98,8 +97,7 @@ static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width
     const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
     if (sizes == NULL || sizes[0] < food_web_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
-    /* rows a multiple of a page apart would compete for the same cache sets */
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide);
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
     return 1;
 }
 
@@ -446,8 +444,7 @@ static void food_web_copy(double *const *to, double *const *from, const food_web
 }
 
 /* ---- The flows ---- */
-/* steps between checks for finite values; values that are not finite stay so */
-enum { food_web_STRETCH = 32 };
+enum { food_web_STRETCH = 32 }; /* steps between checks for finite values */
 
 /* Apply the flow kind: 0 first, 1 all inner ones, 2 last, 3 inner ones in reverse order. */
 static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef)
@@ -458,7 +455,7 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
         food_web_sweep_colour(s, kind == 1 ? flow : last - flow, coef);
 }
 
-/* Apply the flow with this number in a step; number food_web_FLOWS is the last and the first flow merged. */
+/* Apply flow `number` of a step; number food_web_FLOWS is the last merged with the first. */
 static void food_web_make_flow(const food_web_solver *s, size_t steps, int number)
 {
     (void)steps;
@@ -489,7 +486,7 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
     food_web_status status = food_web_set_step(s, h);
     if (status != food_web_OK || steps == 0) return status;
-    if (s->open) food_web_copy(s->x, s->before, s); /* drop the last flow: it is merged with the next one */
+    if (s->open) food_web_copy(s->x, s->before, s); /* merged with the next flow */
     else food_web_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = food_web_STRETCH; s->steps < end && status == food_web_OK;) {
@@ -537,7 +534,7 @@ food_web_status food_web_resume(food_web_solver *s, double h, const double *x, s
     return food_web_OK;
 }
 
-/* ---- Energy, Casimirs, right-hand side ---- */
+/* ---- Observables ---- */
 double food_web_hamiltonian(const food_web_solver *s)
 {
     double density[food_web_BUFFER], sum = 0.0, rest = 0.0;

@@ -8,8 +8,8 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
- *   blocking; Energy, Casimirs, right-hand side; Caller-driven stepping
- * body-sha256: 96c88c6b952b132ed338ddf7e7454c1370eb3b8fe2d6d91526810015e58e41b6
+ *   blocking; Observables; Caller-driven stepping
+ * body-sha256: 57a5ade1c66d3d9246b4ccdacb8fd2b800dfe627f8ce7e659a05386c2063895a
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -109,8 +109,7 @@ static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *w
         rows *= sizes[a];
     }
     size_t wide = heisenberg_LEAD + ((sizes[heisenberg_AXES - 1] + 7) / 8 * 8 + heisenberg_HALO + 7) / 8 * 8;
-    /* rows a multiple of a page apart would compete for the same cache sets */
-    if (wide % 512 == 0) wide += 8;
+    if (wide % 512 == 0) wide += 8; /* rows pages apart share cache sets */
     *width = (ptrdiff_t)wide;
     return rows > most / wide ? 0 : rows;
 }
@@ -691,8 +690,7 @@ static void heisenberg_copy(double *const *to, double *const *from, const heisen
 }
 
 /* ---- The flows ---- */
-/* steps between checks for finite values; values that are not finite stay so */
-enum { heisenberg_STRETCH = 32 };
+enum { heisenberg_STRETCH = 32 };   /* steps between checks for finite values */
 enum { heisenberg_FAR_STEPS = 64 }; /* steps with full-range functions, after one that needed them */
 
 /* Apply the flow of one part of H. */
@@ -709,8 +707,7 @@ typedef struct {
     const double *coef; /* its coefficients */
 } heisenberg_flow;
 
-/* Set *flow to the flow with this number in a step; number heisenberg_FLOWS is the last and the first flow
-   merged. */
+/* Set *flow to flow `number` of a step; number heisenberg_FLOWS is the last merged with the first. */
 static void heisenberg_find_flow(const heisenberg_solver *s, size_t steps, int number, heisenberg_flow *flow)
 {
     flow->part = heisenberg_flow_parts[number];
@@ -832,7 +829,7 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
 {
     heisenberg_status status = heisenberg_set_step(s, h);
     if (status != heisenberg_OK || steps == 0) return status;
-    if (s->open) heisenberg_copy(s->x, s->before, s); /* drop the last flow: it is merged with the next one */
+    if (s->open) heisenberg_copy(s->x, s->before, s); /* merged with the next flow */
     else heisenberg_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_STRETCH; s->steps < end && status == heisenberg_OK;) {
@@ -914,7 +911,7 @@ heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double
     return heisenberg_OK;
 }
 
-/* ---- Energy, Casimirs, right-hand side ---- */
+/* ---- Observables ---- */
 double heisenberg_hamiltonian(const heisenberg_solver *s)
 {
     double density[heisenberg_BUFFER], sum = 0.0, rest = 0.0;

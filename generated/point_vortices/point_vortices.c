@@ -10,8 +10,8 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
- *   method, for stages that fixed-point sweeps do not solve; Energy, Casimirs, right-hand side
- * body-sha256: ac80c3d6733a81bc4b3d9cf627ef926e751da35326af4766d187bc191e9bb90a
+ *   method, for stages that fixed-point sweeps do not solve; Observables
+ * body-sha256: 19f54c4d8efb202ddc1514c41fb9c987438832ef9dccbab26c6f0eac17153393
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -80,8 +80,7 @@ static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrd
     const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
     if (sizes == NULL || sizes[0] < point_vortices_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
-    /* rows a multiple of a page apart would compete for the same cache sets */
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide);
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
     return 1;
 }
 
@@ -787,7 +786,7 @@ point_vortices_status point_vortices_kick(point_vortices_solver *s, const double
     return point_vortices_move(s, change, 1.0);
 }
 
-/* ---- Energy, Casimirs, right-hand side ---- */
+/* ---- Observables ---- */
 double point_vortices_hamiltonian(const point_vortices_solver *s)
 {
     double density[point_vortices_BUFFER], sum = 0.0, rest = 0.0;

@@ -7,9 +7,8 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Rows of sites; The lattice; The solver; The flows; Energy, Casimirs, right-hand
- *   side
- * body-sha256: bafd8278b2a92d3eb2b9c7e5d219ace022610d74f4e46e4dd227e7734557eda2
+ * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
+ * body-sha256: fdfd1f303a33d7343ceb6b1b78e0c5e7ff2e8a5d2bc1306deac6067330511433
  */
 #include "toda.h"
 #include <math.h>
@@ -92,8 +91,7 @@ static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
     const size_t most = SIZE_MAX / 64 / toda_RESERVED;
     if (sizes == NULL || sizes[0] < toda_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = toda_LEAD + ((sizes[0] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
-    /* rows a multiple of a page apart would compete for the same cache sets */
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide);
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
     return 1;
 }
 
@@ -342,9 +340,9 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 }
 
 /* ---- The flows ---- */
-enum { toda_STRETCH = 32 }; /* steps between checks for finite values; values that are not finite stay so */
+enum { toda_STRETCH = 32 }; /* steps between checks for finite values */
 
-/* Apply the flow with this number in a step; number toda_FLOWS is the last and the first flow merged. */
+/* Apply flow `number` of a step; number toda_FLOWS is the last merged with the first. */
 static void toda_make_flow(const toda_solver *s, size_t steps, int number)
 {
     (void)steps;
@@ -375,7 +373,7 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 {
     toda_status status = toda_set_step(s, h);
     if (status != toda_OK || steps == 0) return status;
-    if (s->open) toda_copy(s->x, s->before, s); /* drop the last flow: it is merged with the next one */
+    if (s->open) toda_copy(s->x, s->before, s); /* merged with the next flow */
     else toda_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = toda_STRETCH; s->steps < end && status == toda_OK;) {
@@ -422,7 +420,7 @@ toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields
     return toda_OK;
 }
 
-/* ---- Energy, Casimirs, right-hand side ---- */
+/* ---- Observables ---- */
 double toda_hamiltonian(const toda_solver *s)
 {
     double density[toda_BUFFER], sum = 0.0, rest = 0.0;

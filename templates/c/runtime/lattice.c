@@ -180,7 +180,7 @@ void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
 #include "lattice_saved_compensated.c"
 #include "lattice_saved_noise.c"
 
-/* ---- Energy, Casimirs, right-hand side ---- */
+/* ---- Observables ---- */
 double phi_hamiltonian(const phi_solver *s)
 {
     double density[PHI_BUFFER], sum = 0.0, rest = 0.0;

@@ -6,7 +6,7 @@
 #include "sweeps.h"
 
 /* ---- The flows ---- */
-enum { PHI_STRETCH = 32 }; /* steps between checks for finite values; values that are not finite stay so */
+enum { PHI_STRETCH = 32 }; /* steps between checks for finite values */
 #if PHI_NEAR
 enum { PHI_FAR_STEPS = 64 }; /* steps with full-range functions, after one that needed them */
 #endif
@@ -158,7 +158,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
-    if (s->open) phi_copy(s->x, s->before, s); /* drop the last flow: it is merged with the next one */
+    if (s->open) phi_copy(s->x, s->before, s); /* merged with the next flow */
     else phi_copy(s->before, s->x, s);
 #endif
 #endif
@@ -202,7 +202,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
-    if (s->open) phi_copy(s->x, s->before, s); /* drop the last flow: it is merged with the next one */
+    if (s->open) phi_copy(s->x, s->before, s); /* merged with the next flow */
     else phi_copy(s->before, s->x, s);
 #endif
     status = phi_march(s, steps);

@@ -8,7 +8,7 @@ typedef struct {
 #include "state_of_flow.h"
 } phi_flow;
 
-/* Set *flow to the flow with this number in a step; number PHI_FLOWS is the last and the first flow merged. */
+/* Set *flow to flow `number` of a step; number PHI_FLOWS is the last merged with the first. */
 static void phi_find_flow(const phi_solver *s, size_t steps, int number, phi_flow *flow)
 {
     flow->part = phi_flow_parts[number];

@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Apply the flow with this number in a step; number PHI_FLOWS is the last and the first flow merged. */
+/* Apply flow `number` of a step; number PHI_FLOWS is the last merged with the first. */
 static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 {
 #if PHI_RENEWED

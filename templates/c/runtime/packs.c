@@ -12,7 +12,7 @@
 enum {
     PHI_PACK_COUNT = 4, /* batches in a group: the latency of one is hidden by the others */
     PHI_GROUP = PHI_PACK_COUNT * PHI_LANES,
-    PHI_STRETCH = 32   /* steps between checks for finite values; values that are not finite stay so */
+    PHI_STRETCH = 32   /* steps between checks for finite values */
 };
 
 /* One SIMD batch: a member in each lane. */

@@ -16,7 +16,7 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
         rows *= sizes[a];
     }
     size_t wide = PHI_WIDE((sizes[PHI_LAST_AXIS] + 7) / 8 * 8);
-    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would compete for the same cache sets */
+    if (wide % 512 == 0) wide += 8; /* rows pages apart share cache sets */
     *width = (ptrdiff_t)wide;
     return rows > most / wide ? 0 : rows;
 }
