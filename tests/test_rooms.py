@@ -74,6 +74,7 @@ REGULAR_EXPRESSIONS = {
     "phigen/targets/reserved.py": "names of the spec, for identifiers",
     "phigen/targets/spelling.py": "patterns of functions and names of the loop IR",
     "phigen/targets/header.py": "descriptions in specs; files of users, for their checksum",
+    "phigen/targets/c/language.py": "names of the spec, for identifiers",
     "phigen/targets/c/tokens.py": "the text of the runtime and of printed parts: the lexer of C",
     "phigen/targets/c/macros.py": "lines of the runtime that name phrases",
     "phigen/targets/c/amalgamation.py": "lines of the runtime that call hooks, and its prefix",

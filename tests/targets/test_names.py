@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from support import COMMAND, TARGETS, compile_text, compiled, files, run, solver, tool, write
 
+from phigen import resources
 from phigen.compiler import emit
 from phigen.scheme.steps import Explicit
 from phigen.spec.names import ARGUMENTS, SPEC_FUNCTIONS
 from phigen.symbolic.symbols import TEMPORARY, Symbol
+from phigen.targets.c import phrases
 from phigen.targets.header import is_edited, plain
 from phigen.targets.names import Scope, identifiers
 from phigen.targets.reserved import C_RESERVED, JAVASCRIPT_RESERVED, PYTHON_RESERVED
@@ -170,6 +172,44 @@ def test_every_awkward_name_can_be_a_parameter(tmp_path):
     changed = {names[7]: 100.0}
     _, moved = agree(compilation, np.array([0.3, 0.2]), changed)
     np.testing.assert_allclose(field[1] - moved[1], (100 - 8e-3) / 10, rtol=1e-12)
+
+
+def macros_of_solvers(name):
+    """The phrases and macros of the runtime in C, and what macros of a solver with that name, or its guards, may be."""
+    runtime = (resources.templates() / "c/runtime").glob("*.[ch]")
+    defined = {m for file in runtime for m in re.findall(r"#define (PHI_\w+)", file.read_text("utf-8"))}
+    every = {m for m in defined | phrases.names() if not m.startswith("PHI_FILE_")}
+    own = {m.replace("PHI_", f"{name}_") for m in every}
+    return sorted(every | own | {f"{name}_DIM", f"{name}_TOLERANCE", f"{name.upper()}_H", f"{name.upper()}_DEVICE_H"})
+
+
+@pytest.mark.slow
+def test_parameters_may_have_the_names_of_all_macros_of_the_runtime(tmp_path):
+    names = [*macros_of_solvers("t"), "phi_init", "t_init", "t_cos_lane", "t_matrix_exponential"]
+    assert {"PHI_COPY", "t_COPY", "t_RIDGE"} < set(names)
+    terms = [f"{n}*u1/{k + 3}" for k, n in enumerate(names)]
+    parts = chunks(" + ".join(terms))
+    definitions = "definitions:\n" + "".join(f"  part{i}: {e}\n" for i, e in enumerate(parts))
+    declared = "".join(f"  {n}: {{value: {k + 1}e-5, description: '{n}, PHI_COPY'}}\n" for k, n in enumerate(names))
+    compilation = compile_text(
+        f"coordinates: [u1, u2]\nparameters:\n{declared}poisson: {{matrix: [[0, 1], [-1, 0]]}}\n{definitions}"
+        f"hamiltonian: u2**2*u1 + {' + '.join(f'part{i}' for i in range(len(parts)))}\norder: 2\n"
+    )
+    check_c(compilation, tmp_path)
+    _, field = agree(compilation, np.array([0.3, 0.2]))
+    expected = sum((k + 1) * 1e-5 / (k + 3) for k in range(len(names)))
+    np.testing.assert_allclose(-field[1] - 0.04, expected, rtol=1e-12)
+
+
+def test_coordinates_may_have_the_names_of_macros_and_functions_of_the_solver(tmp_path):
+    """Coordinates are variables of functions that call others of the solver."""
+    compilation = compile_text(
+        "coordinates: [PHI_COPY, t_versin, T_H, t_DIM]\nparameters: {PHI_UNROLL: 2, phi_x: 3, t_TOLERANCE: 1}\n"
+        "poisson: {canonical: {q: [PHI_COPY, T_H], p: [t_versin, t_DIM]}}\norder: 2\nprofile: fast\n"
+        "hamiltonian: t_versin**2/phi_x + t_DIM**2*t_TOLERANCE - PHI_UNROLL*cos(PHI_COPY) + T_H**2*t_versin\n"
+    )
+    check_c(compilation, tmp_path)
+    agree(compilation, np.array([0.1, 0.2, 0.3, 0.4]))
 
 
 def test_the_header_says_which_parameter_a_changed_member_is():

@@ -17,8 +17,12 @@ from phigen.targets.c import phrases, states
 from phigen.targets.c.files import calls_left_out, left_out
 from phigen.targets.c.macros import Macros
 from phigen.targets.c.real import DOUBLE, Real
+from phigen.targets.c.tokens import TokenKind, tokens
 from phigen.targets.c.unused import without_unused
 from phigen.targets.features import holds
+
+#: Names of phrases; those of the model are others (`phigen.targets.c.language`).
+_PHRASES = phrases.names()
 
 
 @dataclass
@@ -119,11 +123,14 @@ class Amalgam:
 
     def _printed(self, lines: Sequence[str]) -> list[str]:
         """Return lines that were printed for the solver with macros expanded; names of the model stay as they are."""
-        spelt = [line for line in lines if "PHI_" in line]
-        replaced = dict(zip(spelt, map(self._macros.expanded, ([line] for line in spelt)), strict=True))
-        spelt_lines = [
-            self._prefixed(text) if text != line else text for line in lines for text in replaced.get(line, [line])
-        ]
+        named, number = set[int](), 0
+        for token in tokens("\n".join(lines)):
+            if token.kind is TokenKind.NAME and token.text in _PHRASES:
+                named.add(number)
+            number += token.text.count("\n")
+        spelt_lines: list[str] = []
+        for k, line in enumerate(lines):
+            spelt_lines += map(self._prefixed, self._macros.expanded([line])) if k in named else [line]
         return self._typed(spelt_lines)
 
     def _typed(self, lines: Sequence[str]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -10,10 +11,11 @@ from phigen.ir.passes.forms import LANE, NEAR, OWN
 from phigen.lanes.lane_functions import LANE_FORMULAS, LANE_FUNCTIONS
 from phigen.scheme.program import Program
 from phigen.symbolic import functions as elementary
+from phigen.targets.c import phrases
 from phigen.targets.language import Language
 from phigen.targets.names import Scope, identifiers
 from phigen.targets.printer import Printer
-from phigen.targets.reserved import C_RESERVED
+from phigen.targets.reserved import C_RESERVED, Reserved
 
 FUNCTIONS = elementary.written_in("c")
 LANGUAGE = Language(
@@ -21,6 +23,24 @@ LANGUAGE = Language(
     functions=FUNCTIONS,
     constants={"pi": "3.141592653589793", "E": "2.718281828459045"},  # digits, since -std=c99 hides M_PI
 )
+
+
+@cache
+def reserved_members(name: str) -> Reserved:
+    """Return what no member may be called: also phrases of the runtime, and macros of the solver."""
+    return _extended(name, "[A-Z0-9_]*[A-Z0-9]")
+
+
+@cache
+def reserved_variables(name: str) -> Reserved:
+    """Return what no variable may be called: also what begins as functions and types of the solver do."""
+    return _extended(name, r"\w*[^\W_]")
+
+
+def _extended(name: str, pattern: str) -> Reserved:
+    guards = {f"{name.upper()}_{end}" for end in ("H", "HPP", "DEVICE_H")}
+    words = C_RESERVED.words | phrases.names() | guards
+    return Reserved(words, re.compile(f"{C_RESERVED.pattern.pattern}|{re.escape(name)}_{pattern}"))
 
 
 @cache
@@ -46,4 +66,4 @@ def printer(scope: Scope, functions: Mapping[str, str] = FUNCTIONS) -> Printer:
 
 def members(program: Program) -> dict[str, str]:
     """The members of the parameter struct, by the names of the parameters."""
-    return identifiers((p.name for p in program.parameters), C_RESERVED)
+    return identifiers((p.name for p in program.parameters), reserved_members(program.name))

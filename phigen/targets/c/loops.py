@@ -8,7 +8,7 @@ from itertools import groupby
 
 from phigen.ir import nodes as ir
 from phigen.symbolic.expression import Expression
-from phigen.targets.c.language import LANGUAGE, elementary_functions
+from phigen.targets.c.language import LANGUAGE, elementary_functions, reserved_variables
 from phigen.targets.c.layout import WIDTH
 from phigen.targets.spelling import Dialect, Spelling
 
@@ -45,7 +45,7 @@ def statements(printed: ir.Function, name: str, *, shared_line: int = 0) -> list
     Declarations of computed values share lines that are not longer than ``shared_line``.
     """
     dialect = Dialect(
-        replace(LANGUAGE, functions=elementary_functions(name)),
+        replace(LANGUAGE, reserved=reserved_variables(name), functions=elementary_functions(name)),
         operators={"and": "&&", "or": "||", "not": "!", "index": "ptrdiff_t", "size": "size_t"},
         functions={function: f"{name}_{function}" for function in _RUNTIME},
         pointers=frozenset({"row", "s", *(p for p in printed.parameters if p == "params")}),

@@ -657,6 +657,11 @@ def definitions(switches: Mapping[str, bool]) -> Iterator[str]:
         yield from choice.definitions(known)
 
 
+def names() -> frozenset[str]:
+    """Return the names of all phrases, without their parameters."""
+    return frozenset(f"PHI_{phrase.partition('(')[0]}" for choice in ALL for phrase in choice.phrases)
+
+
 def header() -> str:
     """All phrases as a header of C that has conditions."""
     return "\n".join(line for choice in ALL for line in choice.header())

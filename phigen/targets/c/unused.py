@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from phigen.targets.c.tokens import CToken, TokenKind, names, tokens
 
 #: First words of what declares no function, or one of the library.
-_NO_FUNCTIONS = ("typedef", "extern", "enum", "struct", "union")
+_TYPES = ("typedef", "enum", "struct", "union")
+_NO_FUNCTIONS = ("extern", *_TYPES)
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ def without_unused(lines: Sequence[str], prefix: str) -> list[str]:
     declarations of functions that are not among the lines, if their names have the prefix of the solver."""
     functions = [f for f in functions_of(lines) if f.name.startswith(prefix)]
     static = [f for f in functions if f.static]
-    inside = {k for f in static for k in range(f.begin, f.end)} | _declared(functions)
-    reached = _reached(names("\n".join(line for k, line in enumerate(lines) if k not in inside)), static, lines)
+    inside = {k for f in static for k in range(f.begin, f.end)} | _declared(functions) | _types(lines)
+    reached = _reached(_used("\n".join(line for k, line in enumerate(lines) if k not in inside)), static, lines)
     defined = {f.name for f in functions if f.defined}
     unused = [f for f in functions if (f.name not in reached if f.static else f.name not in defined)]
     return _without(lines, unused)
@@ -39,11 +40,27 @@ def _declared(functions: Iterable[Function]) -> set[int]:
     return {k for f in functions if not f.defined for k in range(f.begin, f.end)}
 
 
+def _types(lines: Sequence[str]) -> set[int]:
+    """The lines that declare types, whose members may be called as functions are."""
+    types = (d for d in declarations_of(lines) if lines[d.begin].startswith(_TYPES))
+    return {k for d in types for k in range(d.begin, d.end)}
+
+
+def _used(text: str) -> set[str]:
+    """The names in a text that are not those of members: these follow a point or an arrow."""
+    used, before = set[str](), "  "
+    for _, token in _code(text):
+        if token.kind is TokenKind.NAME and before[-1] != "." and before[-2:] != "->":
+            used.add(token.text)
+        before = before[-1] + token.text
+    return used | {name for line in text.splitlines() if line.startswith("#") for name in names(line)}
+
+
 def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str]) -> set[str]:
     """The static functions that are called, also by one another."""
     words: dict[str, set[str]] = {}
     for f in static:
-        words.setdefault(f.name, set()).update(names("\n".join(lines[f.begin : f.end])) if f.defined else ())
+        words.setdefault(f.name, set()).update(_used("\n".join(lines[f.begin : f.end])) if f.defined else ())
     reached, open_ = set[str](), [name for name in words if name in called]
     while open_:
         name = open_.pop()
