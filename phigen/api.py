@@ -219,9 +219,9 @@ def interface_of(program: Program) -> Interface:
     step = program.step.swept
     if step is None:
         return about
-    from phigen.ir.lattice_loops import LatticeLoops, bounds
+    from phigen.targets.device.launches import launches
 
-    sites, loops = step.sites, LatticeLoops(program, step)
+    sites = step.sites
     every_other = bool(step.partners and not step.partners.graph)
     return LatticeInterface(
         **vars(about),
@@ -239,11 +239,9 @@ def interface_of(program: Program) -> Interface:
         pairs=every_other,
         compensated=program.compensated,
         at_bonds=sites.at_bonds,
-        neighbours=tuple(loops.neighbours),
-        bounds=tuple(tuple(bounds(w.key)) for w in loops.weights),
         colours=sites.colours,
         colour_weights=sites.weights,
-        sweeps=tuple(tuple((sweep.kernel.name, sweep.colour) for sweep in part) for part in step.parts),
+        launches=launches(program, step),
         dear=every_other or step.equation is not None,
     )
 

@@ -208,6 +208,12 @@ class LatticeLoops:
         return (*self.program.coordinates, *sites.parameters, *sites.increments)
 
     @cached_property
+    def numbers(self) -> tuple[str, ...]:
+        """The parameters that are one number each."""
+        arrays = {*self.step.sites.parameters, *self.step.sites.at_bonds}
+        return tuple(p.name for p in self.program.parameters if p.name not in arrays)
+
+    @cached_property
     def neighbours(self) -> list[tuple[int, ...]]:
         """The offsets of all neighbours."""
         return sorted({offset for _, offset in self.step.sites.places.values() if any(offset)})

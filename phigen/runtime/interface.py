@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from phigen.ir.launches import LatticeLaunches
 
 Floats = NDArray[np.float64]
 
@@ -93,11 +95,9 @@ class LatticeInterface(Interface):
     compensated: bool = False  # whether the C stores a compensation term for each field
     at_bonds: tuple[str, ...] = ()
     observed_fields: tuple[str, ...] = ()  # observables with a value at each site
-    neighbours: tuple[tuple[int, ...], ...] = ()  # offsets of the sites whose fields flows read
-    bounds: tuple[tuple[tuple[int, int], ...], ...] = ()  # of each weight of a term at open ends, along each axis
     colours: int = 1
     colour_weights: tuple[int, ...] = ()  # the colour of a site is the sum of weights times places, modulo the colours
-    sweeps: tuple[tuple[tuple[str, int | None], ...], ...] = ()  # name and colour of the sweeps of each part of H
+    launches: LatticeLaunches = field(default_factory=LatticeLaunches)  # of the kernels of devices
     dear: bool = False  # whether recomputing a step takes longer than writing and reading its tape
 
     def is_shared(self, sites: int) -> bool:

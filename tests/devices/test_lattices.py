@@ -3,41 +3,42 @@
 import numpy as np
 import nvrtc
 import pytest
+from lattice.test_seams import text as seamed
 from support import COMMAND
 from systems import LATTICES, spec_of
 
 import phigen
 from phigen.api import compilation_of
 from phigen.compiler import emit
-from phigen.errors import DeviceError, SpecError
+from phigen.errors import DeviceError
+from phigen.lattice.states import start_of
 from phigen.runtime.devices.lattices import DeviceLattice
+from phigen.runtime.lattice import LatticeSolver
+from phigen.runtime.lattice_series import recordable
+from phigen.spec import loads
 
 pytest.importorskip("pyopencl")
 
 QUICK, LONGER = ("fput",), ("heisenberg", "thermal_heisenberg", "xxz_disorder")
-REFUSED = {
-    "chiral_magnet": "interact in pairs",
-    "food_web": "interact in pairs",
-    "kdv": "implicit",
-    "outer_planets": "interact in pairs",
-    "point_vortices": "implicit",
-}
 
 
 def cases():
-    for name in (n for n in LATTICES if n not in REFUSED):
+    for name in LATTICES:
         mark = () if name in QUICK else pytest.mark.slow if name in LONGER else pytest.mark.exhaustive
         yield pytest.param(name, marks=mark)
 
 
-def both(name):
-    compilation = compilation_of(name, profile="small")
+def both(source):
+    compilation = compilation_of(source, profile="small")
     return [phigen.compile(compilation, target, profile="small") for target in ("opencl", "c")]
 
 
 def beginning(name, interface):
     """A random state, a step, parameters at sites, and random numbers."""
     rng, run = np.random.default_rng(0), next(iter(spec_of(name).runs.values()))
+    if interface.graph or interface.pairs:
+        start = start_of(spec_of(name), run)
+        return start.state, float(run.step), start.arguments
     sizes = tuple(max(8, 2 * period * least) for period, least in zip(interface.periods, interface.least, strict=True))
     x = 1 + 0.1 * rng.standard_normal((len(interface.coordinates), *sizes))
     more = {"seed": 3} if interface.noise else {}
@@ -53,23 +54,98 @@ def test_fields_are_those_of_c(name):
     np.testing.assert_allclose(ours.energy, theirs.energy, rtol=1e-13)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", REFUSED)
-def test_lattices_without_kernels_are_refused(name):
-    program = compilation_of(name, profile="small").program
-    with pytest.raises(SpecError, match=REFUSED[name]):
-        emit(program, "device", COMMAND)
-
-
-@pytest.mark.slow
-def test_bits_do_not_depend_on_the_size_of_work_groups():
-    device, _ = both("fput")
-    x, h, _ = beginning("fput", device.interface)
+def of_group_size(device, size):
+    """The same solver with another number of work items in a group."""
     files, interface = device.backend._files, device.interface
-    other = DeviceLattice(files, interface, "opencl", {"fput_GROUP": 3})
-    session = other.start(x, dict(interface.parameters))
-    session.advance(h, 20)
-    np.testing.assert_array_equal(session.state(), device.integrate(x, h, 20).x[-1])
+    other = DeviceLattice(files, interface, "opencl", {f"{interface.name}_GROUP": size})
+    return LatticeSolver(other, interface, device.spec)
+
+
+GRAPH = """
+phigen: 1
+name: net
+lattice: {graph: bonds}
+coordinates: [x, y, z]
+parameters: {J: {value: 1, at: bonds}, B: {value: 0.3, at: sites}}
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: {sites: -B*z, bonds: "-J*(x[a]*x[b] + y[a]*y[b] + z[a]*z[b]) - (x[a]*y[b] - y[a]*x[b])/5"}
+casimirs: {C: x**2 + y**2 + z**2}
+observables:
+  total: {sum: z, over: sites}
+  mean: {mean: x*y, over: sites}
+  largest: {max: x, over: sites}
+  bond: {mean: "x[a]*x[b]", over: bonds}
+  least: {min: "z[a]*z[b]", over: bonds}
+  height: z**2
+"""
+
+
+@pytest.mark.slow
+def test_recorded_numbers_are_those_of_c_and_do_not_depend_on_the_size_of_work_groups():
+    device, c = both(loads(GRAPH))
+    rng = np.random.default_rng(1)
+    bonds = np.array([(a, b) for a, b in rng.integers(0, 90, (150, 2)) if a != b])
+    more = {"bonds": bonds, "J": rng.random(len(bonds)), "B": rng.random(90)}
+    x, of = rng.standard_normal((3, 90)), recordable(c.interface)
+    ours, theirs, others = (
+        solver.series(x, 0.05, 6, of=of, stride=2, **more) for solver in (device, c, of_group_size(device, 5))
+    )
+    assert list(ours.columns) == list(theirs.columns) == ["energy", "total", "mean", "largest", "bond", "least"]
+    for name in of:
+        np.testing.assert_allclose(ours.columns[name], theirs.columns[name], rtol=1e-13, atol=1e-13)
+        np.testing.assert_array_equal(ours.columns[name], others.columns[name])
+    np.testing.assert_array_equal(ours.last, others.last)
+    seen, expected = (solver.observables(ours.last, **more) for solver in (device, c))
+    np.testing.assert_allclose(seen["height"], expected["height"], rtol=1e-14)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "sizes"), [("twisted", (7,)), ("layer", (3, 5))])
+def test_sites_on_seams_are_those_of_c(name, sizes):
+    device, c = both(loads(seamed(name, sizes, "small")))
+    x = 1 + 0.3 * np.random.default_rng(0).standard_normal((3, *sizes))
+    ours, theirs = (solver.integrate(x, 0.1, 5) for solver in (device, c))
+    np.testing.assert_allclose(ours.x, theirs.x, rtol=0, atol=1e-14)
+
+
+@pytest.mark.slow
+def test_stages_that_sweeps_do_not_solve_are_solved_by_newton_s_method(monkeypatch):
+    device, c = both("kdv")
+    solve, solved = device.backend.stepping._newton, []
+    monkeypatch.setattr(device.backend.stepping, "_newton", lambda *a: solved.append(1) or solve(*a))
+    x = 1 + 0.3 * np.random.default_rng(0).standard_normal((1, 8))
+    ours, theirs = (solver.integrate(x, 0.3, 1) for solver in (device, c))
+    np.testing.assert_allclose(ours.x, theirs.x, rtol=0, atol=1e-13)
+    assert solved
+
+
+CHAIN = """
+phigen: 1
+name: chain
+lattice: {axes: [i], boundary: periodic}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + (q[i+1]-q)**2/2 + (q[i+1]-q)**3/12
+"""
+
+
+@pytest.mark.slow
+def test_compensated_sums_of_floats_are_those_of_c(tmp_path):
+    """Their energy drifts no further, and a resumed run has the bits of one that was not interrupted."""
+    device, c = both(loads(CHAIN + "real: float\nsolver: {compensated: true}\n"))
+    x = 0.3 * np.random.default_rng(0).standard_normal((2, 32))
+    ours, theirs = (solver.integrate(x, 0.05, 600, stride=60) for solver in (device, c))
+    np.testing.assert_allclose(ours.x, theirs.x, rtol=0, atol=1e-5)
+    assert np.ptp(ours.energy) < 1.5 * np.ptp(theirs.energy)
+    session, resumed = (device.backend.start(x, {}) for _ in range(2))
+    session.advance(0.05, 70)
+    stored, state = session.saved(), session.state()
+    assert np.abs(stored["compensation"]).max() > 0
+    resumed.place(state)
+    resumed.resume(0.05, 70, stored)
+    for each in (session, resumed):
+        each.advance(0.05, 70)
+    np.testing.assert_array_equal(session.state(), resumed.state())
 
 
 @pytest.mark.slow

@@ -58,7 +58,7 @@ def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, com
             head.append(
                 ir.Declare(ir.Pointer(constant=False), ((compensation.symbol, layout.row(compensation_array)),))
             )
-            body += _compensated(k, field, ir.Entry(compensation, SITE), s.value)
+            body += compensated_sum(k, field, ir.Entry(compensation, SITE), s.value)
         elif s.array.name in rows.loaded:
             body.append(ir.Assign(field, ir.Accumulated(ir.Name(s.array.name), s.value)))
         else:
@@ -88,8 +88,8 @@ def row_function(function: ir.Function, *parameters: str, body: Iterable[ir.Stat
     return discard_unread(replace(function, parameters=parameters, body=tuple(body)))
 
 
-def _compensated(k: int, field: ir.Value, compensation: ir.Value, increment: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statements of a compensated sum; the rounding error goes into the compensation term."""
+def compensated_sum(k: int, field: ir.Value, compensation: ir.Value, increment: ir.Value) -> Iterator[ir.Statement]:
+    """Yield the statements of compensated sum number k; the rounding error goes into the compensation term."""
     add, total = ir.fixed(f"add{k}"), ir.fixed(f"sum{k}")
     items = ((add.symbol, ir.Accumulated(compensation, increment)), (total.symbol, ir.Binary("+", field, add)))
     yield ir.Declare(ir.Type.REAL, items)

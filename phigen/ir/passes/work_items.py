@@ -1,4 +1,4 @@
-"""Lowering of sweeps to work items of a device: each updates one site of a lattice whose fields are in one array."""
+"""Lowering to work items of a device: each computes the values of one site, of fields that are in one array."""
 
 from __future__ import annotations
 
@@ -7,32 +7,55 @@ from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
+from phigen.ir.passes.extremes import keep, limit
+from phigen.ir.passes.row_loops import compensated_sum
 from phigen.symbolic.symbols import Symbol
 
-#: Number of the site of a work item, and the number of all sites.
-SITE, COUNT = ir.fixed("i"), ir.fixed("count")
+#: Number of the site of a work item, of the other site of a bond or pair, of the bond among those of a site, and the
+#: number of all sites.
+SITE, OTHER, BOND, COUNT = map(ir.fixed, ("i", "j", "b", "count"))
 
-#: Arrays of a kernel: fields, coefficients of a flow, numbers of neighbours, weights of terms at open ends, parameters
-#: at sites, and increments of the noise.
-FIELDS, COEFFICIENTS, NEIGHBOURS, WEIGHTS, PARAMETERS, INCREMENTS = map(
-    ir.fixed, ("x", "coef", "neighbours", "weights", "at_sites", "dw")
-)
+#: The first arguments of all kernels, before the arrays.
+ARGUMENTS = ("items", "count", "sites", "coefficients", "first")
+
+#: Arrays of a kernel by their names, in the order of its arguments: see the comment above the kernels in
+#: ``templates/c/device_lattice.h.jinja``.
+_ARRAYS = ("neighbours", "weights", "on_seams", "at_sites", "dw", "x", "start", "varied", "out")
+_OF_GRAPHS = ("starts", "others", "at_bonds", "colours", "colour")
+_OF_SUMS = ("sums", "adds")
 
 #: Names in a kernel that fields and parameters make way for.
-KERNEL_NAMES = (
-    *("items", "count", "sites", "coefficients", "first", "coef", "neighbours", "weights", "at_sites", "dw", "x"),
-    *("i", "k"),
-)
+KERNEL_NAMES = (*ARGUMENTS, *_ARRAYS, *_OF_GRAPHS, *_OF_SUMS, "coef", "i", "j", "b", "k")
+
+#: The arrays of outputs, and others, by their kinds.
+_STORED = {ir.Storage.OUTPUT: "out", ir.Storage.OBSERVABLE: "out", ir.Storage.SUM: "sums"}
+_STORED |= {ir.Storage.START: "start", ir.Storage.VARIATION: "varied", ir.Storage.STATE: "x"}
+
+
+def kernel_arrays(lattice: LatticeLoops) -> tuple[str, ...]:
+    """Return the arrays that are arguments of all kernels of a lattice, in order."""
+    step = lattice.step
+    absent = {
+        "on_seams": not lattice.seams,
+        "at_sites": not step.sites.parameters,
+        "dw": not step.sites.increments,
+        "weights": not lattice.weights,
+        "start": not step.equation,
+        "varied": not step.equation,
+    }
+    arrays = [name for name in _ARRAYS if not absent.get(name)]
+    arrays += _OF_GRAPHS if step.others.graph else ()
+    return (*arrays, *(_OF_SUMS if step.partners else ()))
 
 
 def work_items(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
-    """Return a sweep as the statements of one work item. Raises `TypeError` for what only some lattices have."""
+    """Return a function over sites, bonds or pairs as the statements of one work item."""
     items = _WorkItems(lattice)
-    loops = (s for s in function.body if isinstance(s, ir.Loop))
-    before = (s for s in function.body if not isinstance(s, ir.Loop))
-    statements = [*before, *(inner for loop in loops for inner in loop.body)]
-    lowered = tuple(new for s in statements for new in items.lowered(s))
-    return replace(function, parameters=KERNEL_NAMES, body=lowered)
+    loops = [s for s in function.body if isinstance(s, ir.Loop)]
+    head = [s for s in function.body if isinstance(s, ir.Declare)]
+    lowered = [new for s in head for new in items.lowered(s)]
+    lowered += [new for loop in loops for new in items.loop(loop)]
+    return replace(function, parameters=KERNEL_NAMES, body=tuple(lowered))
 
 
 @dataclass
@@ -42,36 +65,95 @@ class _WorkItems:
     lattice: LatticeLoops
     declared: set[int] = field(default_factory=set)
 
+    def loop(self, loop: ir.Loop) -> Iterator[ir.Statement]:
+        """Yield the statements of the site of the work item for a loop; one over bonds or pairs stays a loop."""
+        if loop.kind == "sites":
+            yield from (new for s in loop.body for new in self.lowered(s))
+            return
+        stores = [s for s in loop.body if isinstance(s, ir.Store)]
+        totals = [ir.fixed(f"total{s.array.number}") for s in stores]
+        for s, total in zip(stores, totals, strict=True):
+            before = ir.Select(ir.fixed("adds"), self._element(s.array, SITE), ir.Constant(0.0))
+            start = limit(s.extreme, "HUGE_VAL") if s.extreme else before
+            yield ir.Declare(ir.Type.REAL, ((total.symbol, start),), mutable=True)
+        body: list[ir.Statement] = [new for s in loop.body if isinstance(s, ir.Declare) for new in self.lowered(s)]
+        for s, total in zip(stores, totals, strict=True):
+            added = [ir.Assign(total, s.value, adds=True)]
+            body += keep(s.extreme, total, s.value, s.array.number) if s.extreme else added
+        yield _over_bonds(body) if self.lattice.step.others.graph else _over_pairs(body)
+        yield from (ir.Assign(self._element(s.array, SITE), total) for s, total in zip(stores, totals, strict=True))
+
     def lowered(self, s: ir.Statement) -> Iterator[ir.Statement]:
         """Yield the statements on memory for one on the level of sites."""
         match s:
             case ir.Store(array, value, adds):
-                yield ir.Assign(self._element(array, SITE), value, adds)
+                yield from self._stored(array, value, adds=adds)
             case ir.Declare(items=((name, ir.Load() as load),)):
-                site: ir.Value = SITE
+                site: ir.Value = OTHER if load.end == "b" else SITE
                 if any(load.offset):
                     number = self.lattice.neighbours.index(load.offset)
                     site = ir.Name(Symbol("beside", number))
                     if number not in self.declared:
                         self.declared.add(number)
-                        yield ir.index(site, ir.Entry(NEIGHBOURS, _of_array(SITE, number)))
+                        yield ir.index(site, ir.Entry(ir.fixed("neighbours"), _of_array(SITE, number)))
                 yield ir.real(name, self._element(load.array, site))
-            case ir.Declare(items=((name, ir.Coefficient(k)),)):
-                yield ir.real(name, ir.Entry(COEFFICIENTS, ir.Constant(k)))
-            case ir.Declare(items=((name, ir.Inside(k)),)):
-                yield ir.real(name, ir.Entry(WEIGHTS, _of_array(SITE, k)))
-            case ir.Declare():
-                yield s
+            case ir.Declare(items=((name, value),)):
+                yield replace(s, items=((name, self._value(value)),))
             case _:
                 raise TypeError(s)
 
+    def _stored(self, array: ir.Array, value: ir.Value, *, adds: bool) -> Iterator[ir.Statement]:
+        place = self._element(array, SITE)
+        if array.storage is ir.Storage.STATE and self.lattice.program.compensated:
+            fields = self.lattice.program.dimension
+            yield from compensated_sum(array.number, place, _entry("x", SITE, fields + array.number), value)
+        else:
+            yield ir.Assign(place, value, adds)
+
+    def _value(self, value: ir.Value) -> ir.Value:
+        match value:
+            case ir.Coefficient(k):
+                return _entry("coef", ir.Constant(k))
+            case ir.SystemParameter(name):
+                return _entry("coef", ir.Constant(self.lattice.numbers.index(name)))
+            case ir.Time():
+                return _entry("coef", ir.Constant(len(self.lattice.numbers)))
+            case ir.BondParameter(number):
+                ends = ir.Binary("*", ir.Constant(number), _entry("starts", COUNT))
+                return _entry("at_bonds", ir.Binary("+", BOND, ends) if number else BOND)
+            case ir.Inside(k):
+                return _entry("weights", SITE, k)
+            case ir.OnSeam(k):
+                return _entry("on_seams", SITE, k)
+            case ir.HasColour():
+                matches = ir.Binary("==", _entry("colours", SITE), ir.fixed("colour"))
+                return ir.Select(matches, ir.Constant(1.0), ir.Constant(0.0))
+        return value
+
     def _element(self, array: ir.Array, site: ir.Value) -> ir.Value:
         sites, fields = self.lattice.step.sites, self.lattice.program.coordinates
+        if array.storage is not ir.Storage.STATE or array.name in fields:
+            return _entry(_STORED[array.storage], site, array.number)
         if array.name in sites.increments:
-            return ir.Entry(INCREMENTS, _of_array(site, sites.increments.index(array.name)))
-        if array.name in sites.parameters:
-            return ir.Entry(PARAMETERS, _of_array(site, sites.parameters.index(array.name)))
-        return ir.Entry(FIELDS, _of_array(site, fields.index(array.name)))
+            return _entry("dw", site, sites.increments.index(array.name))
+        return _entry("at_sites", site, sites.parameters.index(array.name))
+
+
+def _over_bonds(body: list[ir.Statement]) -> ir.Statement:
+    """Return the loop over the bonds of a site."""
+    high = ir.Entry(ir.fixed("starts"), ir.Binary("+", SITE, ir.Constant(1)))
+    other = ir.index(OTHER, _entry("others", BOND))
+    return ir.Loop("plain", (other, *body), "b", _entry("starts", SITE), high)
+
+
+def _over_pairs(body: list[ir.Statement]) -> ir.Statement:
+    """Return the loop over all other sites."""
+    other = ir.If(ir.Binary("==", OTHER, SITE), (ir.Continue(),))
+    return ir.Loop("plain", (other, *body), "j", ir.Constant(0), COUNT)
+
+
+def _entry(array: str, site: ir.Value, number: int = 0) -> ir.Value:
+    return ir.Entry(ir.fixed(array), _of_array(site, number))
 
 
 def _of_array(site: ir.Value, number: int) -> ir.Value:

@@ -1,19 +1,21 @@
-"""Lattices that split on devices: fields stay there from step to step; what is observed is computed on the host."""
+"""Lattices on devices: fields stay there from step to step, and energies and observables come back as numbers."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from itertools import chain
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phigen.errors import DeviceError
 from phigen.runtime.devices.device import Device, OutOfMemoryError
+from phigen.runtime.devices.launching import Kernels, Launcher
 from phigen.runtime.devices.opening import device_of
+from phigen.runtime.devices.site_tables import SiteTables
 from phigen.runtime.interface import FIRST_DRAWS, BackendError, Draws, Floats, LatticeInterface
 from phigen.runtime.numpy_lattice import NumpyLattice, NumpyLatticeSession
 
@@ -25,58 +27,85 @@ class DeviceLatticeSession(NumpyLatticeSession):
     """A session whose state is on a device, and comes back where it is read. The module is that of the host."""
 
     def __init__(self, backend: DeviceLattice, *arguments: Any, timed: bool) -> None:
-        self._device, self._kernels = backend.device, backend.kernels
+        self._interface, self._device = backend.interface, backend.device
         self._host: Floats | None = None
         self._shape: tuple[int, ...] = arguments[1].shape
+        self._size = int(np.prod(self._shape))
         self._on_device = False
         super().__init__(*arguments, timed=timed)
-        self._tables = backend.tables(self._sites, self._shape[1:])
-        self._fields, self._before = (self._device.empty(8 * int(np.prod(self._shape))) for _ in range(2))
+        self._launcher = backend.launcher(self._sites, self._shape[1:])
+        stored = self._size * (2 if self._interface.compensated else 1)  # the fields, and their compensation terms
+        self._fields, self._before = (self._launcher.empty(stored) for _ in range(2))
+        self._stored = stored
         self._flag = self._device.empty(4)
+        self._increments = self._launcher.empty(self._launcher.tables.count * max(1, len(self._interface.noise)))
+        self._numbers = self._launcher.empty(len(self._interface.launches.numbers) + 1)
+        self._coefficients: Any = None
+        self._row = 0
 
     @property
     def _x(self) -> Floats:
         """The state on the host."""
         if self._host is None:
-            self._host = np.empty(self._shape)
-            self._device.read(self._fields, self._host)
+            self._host = self._launcher.read(self._fields, self._shape)
         return self._host
 
     @_x.setter
     def _x(self, value: Floats) -> None:
         self._host, self._on_device = np.ascontiguousarray(value), False
 
+    def _upload(self, compensation: Floats | None = None) -> None:
+        """Write a state to the device that was set on the host, with its compensation terms, 0 by default."""
+        if self._on_device:
+            return
+        state = self._x.ravel()
+        if self._interface.compensated:
+            state = np.append(state, np.zeros(self._size) if compensation is None else compensation.ravel())
+        self._launcher.write(self._fields, state)
+        self._on_device = True
+
+    def saved(self) -> dict[str, Any]:
+        """See `phigen.runtime.lattice.LatticeSession`."""
+        if not self._interface.compensated:
+            return {}
+        self._upload()
+        return {"compensation": self._launcher.read(self._fields, (2, *self._shape))[1]}
+
+    def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
+        """See `phigen.runtime.lattice.LatticeSession`."""
+        super().resume(h, steps, arrays)
+        self._upload(arrays.get("compensation"))
+
     def advance(self, h: float, steps: int) -> None:
         """See `phigen.runtime.lattice.LatticeSession`. Raises `DeviceError` if the device fails; the state stays."""
         self.prepare(h)
-        if not self._on_device:
-            self._device.write(self._fields, self._x)
-            self._on_device = True
         left = steps
         while left:
             count = min(left, _STEPS_PER_LOOK)
             begun = self.steps
-            try:
-                self._copy(self._fields, self._before)
+            with resumable(begun):
+                self._upload()
+                self._launcher.copy(self._fields, self._before, self._stored)
                 self._make(count)
                 if self._failed():
                     self.steps = begun
-                    self._copy(self._before, self._fields)
+                    self._restore()
                     self._make_until_failure()
-            except (DeviceError, OutOfMemoryError) as error:
-                hint = "with checkpoints=, integrate stores the state at each frame, and resumes from there"
-                raise DeviceError(f"after step {begun}: {error}\n  hint: {hint}") from error
             left -= count
+
+    def _restore(self) -> None:
+        self._launcher.copy(self._before, self._fields, self._stored)
+        self._host = None
 
     def _make_until_failure(self) -> None:
         """Make steps one by one until one fails. Raises `BackendError` with the state before it."""
         while True:
-            self._copy(self._fields, self._before)
+            self._launcher.copy(self._fields, self._before, self._stored)
             self._make(1)
             if self._failed():
                 self.steps -= 1
                 self._tell_time()
-                self._copy(self._before, self._fields)
+                self._restore()
                 raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
 
     def _make(self, steps: int) -> None:
@@ -84,110 +113,119 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._host = None
         module, rows = self._module, self._rows
         constant = not (hasattr(module, "_renewed") or hasattr(module, "_draw"))
+        flows = self._flows()
         if constant:
-            self._tables.write_coefficients(rows)
+            self._write_coefficients(rows)
         for _ in range(steps):
             self._tell_time()
             if hasattr(module, "_renewed"):
                 rows = module._renewed(self._sites, self._rows)
             if not constant:
-                self._tables.write_coefficients(rows)
-            for number, (part, row) in enumerate(module.SCHEDULE):
+                self._write_coefficients(rows)
+            for number, (part, colour, row) in enumerate(flows):
                 if hasattr(module, "_draw") and number in (0, len(module.SCHEDULE) - len(module.SOURCES)):
-                    self._tables.write_increments(module._draw(self._sites, int(number > 0)))
-                for kernel, sites, items in self._kernels.of_part(part, self._tables):
-                    self._device.launch(kernel, items, self._tables.arguments(items, sites, row, self._fields))
+                    self._launcher.write(self._increments, module._draw(self._sites, int(number > 0)))
+                arrays = {"x": self._fields, "dw": self._increments}
+                for sweep in self._interface.launches.parts[part]:
+                    self._launcher.run(sweep, self._coefficients, row * self._row, colour, **arrays)
             self.steps += 1
         self._tell_time()
 
-    def _copy(self, source: Any, target: Any) -> None:
-        size = int(np.prod(self._shape))
-        self._device.launch(self._kernels.copy, size, [np.int32(size), source, target])
-        if target is self._fields:
-            self._host = None
+    def _flows(self) -> list[tuple[int, int, int]]:
+        """Return the flows of a step: part of H, colour of the sites of a graph, row of coefficients."""
+        if hasattr(self._module, "BY_COLOUR"):
+            return [(part, colour, row) for (part, colour), row in self._sites.schedule]
+        return [(part, 0, row) for part, row in self._module.SCHEDULE]
+
+    def _write_coefficients(self, rows: Sequence[Sequence[Any]]) -> None:
+        """Copy the coefficients of all flows of a step to the device."""
+        values = np.asarray(rows, dtype=np.float64).reshape(len(rows), -1)
+        self._row = values.shape[1]
+        if self._coefficients is None:
+            self._coefficients = self._launcher.empty(values.size)
+        self._launcher.write(self._coefficients, values)
 
     def _failed(self) -> bool:
-        size, flag = int(np.prod(self._shape)), np.zeros(1, dtype=np.int32)
+        flag = np.zeros(1, dtype=np.int32)
         self._device.write(self._flag, flag)
-        self._device.launch(self._kernels.failed, size, [np.int32(size), self._fields, self._flag])
+        kernel = self._launcher.kernels["failed"]
+        self._device.launch(kernel, self._size, [np.int32(self._size), self._fields, self._flag])
         self._device.read(self._flag, flag)
         return bool(flag[0])
 
+    # --- functions of the state
 
-class Kernels:
-    """The kernels of the sweeps of each part of H, with the colours of their sites; None for all sites."""
+    def _evaluated(self, name: str) -> tuple[Any, int]:
+        """Return a buffer of the outputs of a kernel at all sites, and the number of outputs."""
+        launch = self._interface.launches.others.get(name)
+        if launch is None:
+            return None, 0
+        self._upload()
+        parameters = self._sites.parameters
+        numbers = [float(parameters[n]) for n in self._interface.launches.numbers]
+        self._launcher.write(self._numbers, [*numbers, self._sites.t if self._timed else 0.0])
+        out = self._launcher.empty(launch.outputs * self._launcher.tables.count)
+        self._launcher.run(launch, self._numbers, x=self._fields, out=out)
+        return out, launch.outputs
 
-    def __init__(
-        self,
-        device: Device,
-        text: str,
-        name: str,
-        parts: Sequence[Sequence[tuple[str, int | None]]],
-        defined: Mapping[str, int],
-    ) -> None:
-        program = device.compiled(text, defined)
-        self.copy, self.failed = (device.kernel(program, f"{name}_{kind}_kernel") for kind in ("copy", "failed"))
-        self._parts = [[(device.kernel(program, f"{name}_{k}_kernel"), c) for k, c in part] for part in parts]
+    def _fields_of(self, name: str) -> Floats:
+        """Return the outputs of a kernel (outputs, *sizes)."""
+        with resumable(self.steps):
+            out, outputs = self._evaluated(name)
+            sizes = self._shape[1:]
+            return self._launcher.read(out, (outputs, *sizes)) if outputs else np.empty((0, *sizes))
 
-    def of_part(self, part: int, tables: Tables) -> list[tuple[Any, Any, int]]:
-        """Return the kernels of a part, each with the numbers of its sites and their number."""
-        return [(kernel, *tables.sites_of(colour)) for kernel, colour in self._parts[part]]
+    def _numbers_of(self, name: str, kinds: Sequence[str]) -> Floats:
+        """Return the outputs of a kernel, reduced over the sites by the kind of each."""
+        with resumable(self.steps):
+            out, _ = self._evaluated(name)
+            return self._launcher.reduced(out, kinds, self._launcher.tables.count)
+
+    def hamiltonian(self) -> float:
+        """Return H of the state."""
+        return float(self._numbers_of("energy", ["sum"])[0])
+
+    def density(self) -> Floats:
+        """Return the density of H at the sites (*sizes)."""
+        return self._fields_of("energy").reshape(self._shape[1:])
+
+    def casimirs(self) -> Any:
+        """Return the densities of the Casimirs of sites, and numbers for sums and products."""
+        kinds = self._interface.casimir_kinds
+        if "sites" in kinds:
+            fields = self._fields_of("casimirs")
+        numbers = self._numbers_of("casimirs", ["max" if kind == "sites" else kind for kind in kinds])
+        return [fields[k] if kind == "sites" else numbers[k] for k, kind in enumerate(kinds)]
+
+    def vector_field(self) -> Floats:
+        """Return π∇H (coordinates, *sizes)."""
+        return self._fields_of("vector_field")
+
+    def observables(self) -> Floats:
+        """Return the observables that are one number each (observables,)."""
+        reductions, count = self._interface.launches.reductions, self._launcher.tables.count
+        if not reductions:
+            return np.empty(0)
+        values = self._numbers_of("observables", [kind for kind, _ in reductions])
+        counts = {"sites": count, "bonds": len(getattr(self._sites, "ends", ())), "pairs": count * (count - 1) / 2}
+        divisors = [counts[over] if kind == "mean" else 1.0 for kind, over in reductions]
+        with np.errstate(all="ignore"):
+            quotients: Floats = values / np.array(divisors)
+        return quotients
+
+    def observed_fields(self) -> Floats:
+        """Return the observables with a value at each site (fields, *sizes)."""
+        return self._fields_of("observed_fields")
 
 
-class Tables:
-    """The arrays of a lattice on a device, beside its fields."""
-
-    def __init__(self, device: Device, sites: Any, sizes: tuple[int, ...], interface: LatticeInterface) -> None:
-        self._device, self._count = device, int(np.prod(sizes))
-        numbers = np.arange(self._count, dtype=np.int32).reshape(sizes)
-        neighbours = [sites.shifted(numbers, *offset).ravel() for offset in interface.neighbours]
-        weights = [np.broadcast_to(sites.present(*chain.from_iterable(b)), sizes).ravel() for b in interface.bounds]
-        at_sites = [np.broadcast_to(sites.parameters[name], sizes).ravel() for name in interface.at_sites]
-        self._neighbours, self._weights = self._written(neighbours, np.int32), self._written(weights, np.float64)
-        self._at_sites = self._written(at_sites, np.float64)
-        self._increments = device.empty(8 * self._count * max(1, len(interface.noise)))
-        self._coefficients: Any = None
-        self._row = 0
-        total = sum(w * p for w, p in zip(interface.colour_weights, np.indices(sizes), strict=True))
-        self._colours: dict[int | None, tuple[Any, int]] = {None: (None, self._count)}
-        for colour in range(interface.colours if interface.colours > 1 else 0):
-            chosen = numbers.ravel()[(np.asarray(total) % interface.colours).ravel() == colour]
-            self._colours[colour] = self._written([chosen], np.int32), len(chosen)
-
-    def sites_of(self, colour: int | None) -> tuple[Any, int]:
-        """Return the numbers of the sites of a colour, None for all sites, and their number."""
-        return self._colours[colour if len(self._colours) > 1 else None]
-
-    def write_coefficients(self, rows: Sequence[Sequence[Any]]) -> None:
-        """Copy the coefficients of all flows of a step to the device."""
-        values = np.ascontiguousarray(rows, dtype=np.float64).reshape(len(rows), -1)
-        self._row = values.shape[1]
-        if self._coefficients is None:
-            self._coefficients = self._device.empty(values.nbytes)
-        self._device.write(self._coefficients, values)
-
-    def write_increments(self, increments: Any) -> None:
-        """Copy the increments of the noise (sources, *sizes) to the device."""
-        self._device.write(self._increments, np.ascontiguousarray(increments, dtype=np.float64))
-
-    def arguments(self, items: int, sites: Any, row: int, fields: Any) -> list[Any]:
-        """Return the arguments of the kernel of a sweep."""
-        tables = [self._neighbours, self._weights, self._at_sites, self._increments]
-        return [
-            np.int32(items),
-            np.int32(self._count),
-            sites,
-            self._coefficients,
-            np.int32(row * self._row),
-            *tables,
-            fields,
-        ]
-
-    def _written(self, arrays: Sequence[NDArray[Any]], kind: Any) -> Any:
-        values = np.ascontiguousarray(np.concatenate([*arrays, np.zeros(1)]), dtype=kind)
-        buffer = self._device.empty(values.nbytes)
-        self._device.write(buffer, values)
-        return buffer
+@contextmanager
+def resumable(steps: int) -> Iterator[None]:
+    """Raise `DeviceError` with a hint, where a device fails after a number of steps."""
+    try:
+        yield
+    except (DeviceError, OutOfMemoryError) as error:
+        hint = "with checkpoints=, integrate stores the state at each frame, and resumes from there"
+        raise DeviceError(f"after step {steps}: {error}\n  hint: {hint}") from error
 
 
 class DeviceLattice(NumpyLattice):
@@ -206,7 +244,8 @@ class DeviceLattice(NumpyLattice):
         super().__init__(files, interface)
         self.target, self._defined = target, defined
         self._header = files[f"{interface.name}_device.h"]
-        self.kernels = Kernels(self.device, self._header, interface.name, interface.sweeps, defined)
+        self.kernels = Kernels(self.device, self._header, interface.name, defined)
+        self._of_sizes: tuple[tuple[int, ...], dict[Any, Any]] = (), {}
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         return DeviceLattice, (self._files, self.interface, self.target, dict(self._defined))
@@ -221,21 +260,36 @@ class DeviceLattice(NumpyLattice):
         """See `phigen.runtime.lattice.LatticeBackend`."""
         return hashlib.sha256(f"{self._header}\n{self.device.name}\n{super().identity}".encode()).hexdigest()[:40]
 
-    def tables(self, sites: Any, sizes: tuple[int, ...]) -> Tables:
-        """Return the arrays of a lattice of some size on the device."""
-        largest = np.iinfo(np.int32).max // max(self.interface.dimension, len(self.interface.neighbours))
+    @cached_property
+    def stepping(self) -> Any:
+        """The module that makes implicit steps."""
+        from phigen.runtime.devices.implicit import stepping_module
+
+        return stepping_module(self._text, self.interface.name, single=self.interface.single)
+
+    def launcher(self, sites: Any, sizes: tuple[int, ...]) -> Launcher:
+        """Return the launches for a lattice of some size. Raises `DeviceError` if it is too large."""
+        launches, about = self.interface.launches, self.interface
+        rows = [len(launches.neighbours), about.dimension * (2 if about.compensated else 1)]
+        rows += [one.outputs for one in launches.others.values()]
+        largest = np.iinfo(np.int32).max // max(rows)
         if np.prod(sizes, dtype=float) > largest:
-            name = self.interface.name
-            raise DeviceError(f"{name}: {sizes} are more than {largest} sites, the most that 32 bits can number")
-        try:
-            return Tables(self.device, sites, sizes, self.interface)
-        except OutOfMemoryError as error:
-            name = self.interface.name
-            raise DeviceError(f"{name}: too little memory for {sizes} sites: {error}\n  hint: take fewer") from error
+            raise DeviceError(f"{about.name}: {sizes} are more than {largest} sites, the most that 32 bits can number")
+        if self._of_sizes[0] != sizes:
+            self._of_sizes = sizes, {}
+        real = np.float32 if about.single else np.float64
+        return Launcher(self.kernels, SiteTables(self.device, sites, sizes, about, real, self._of_sizes[1]))
 
     def start(
         self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
     ) -> NumpyLatticeSession:
-        """Return a session at x0 (coordinates, *sizes), at the time t0."""
+        """Return a session at x0 (coordinates, *sizes), at the time t0. Raises `DeviceError`."""
+        from phigen.runtime.devices.implicit import ImplicitSession
+
+        session = ImplicitSession if hasattr(self._module, "_relax") else DeviceLatticeSession
         timed = bool(self.interface.time)
-        return DeviceLatticeSession(self, self._module, x0, parameters, t0, draws, timed=timed)
+        try:
+            return session(self, self._module, x0, parameters, t0, draws, timed=timed)
+        except OutOfMemoryError as error:
+            sites = f"{self.interface.name}: too little memory for {x0.shape[1:]} sites"
+            raise DeviceError(f"{sites}: {error}\n  hint: take fewer") from error

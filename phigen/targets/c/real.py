@@ -18,7 +18,7 @@ from phigen.targets.c.tokens import CToken, TokenKind, tokens
 DIGITS = 24 / 53
 
 #: Below this a number that is named by a ``#define`` is a threshold.
-_THRESHOLD = 1e-5
+THRESHOLD = 1e-5
 
 #: The functions of C's library that have one for each type.
 _FUNCTIONS = frozenset(
@@ -96,7 +96,7 @@ class Real:
             naming = (naming or token.text == "define") and "\n" not in token.text
             if token.kind is TokenKind.REAL and not token.text.endswith("f"):
                 value = float.fromhex(token.text) if token.text.startswith("0x") else float(token.text)
-                yield literal(threshold(value) if naming and 0.0 < value < _THRESHOLD else value)
+                yield literal(threshold(value) if naming and 0.0 < value < THRESHOLD else value)
             elif token.kind is TokenKind.NAME and token.text in _FUNCTIONS and after.text == "(":
                 yield f"{token.text}{self.function_suffix}"
             else:

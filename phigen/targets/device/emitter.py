@@ -29,16 +29,9 @@ SUFFIX = "_device.h"
 
 def emit(program: Program, command: str) -> dict[str, str]:
     """File names and their contents."""
-    expect_offered(program)
     name = program.name
     lines = [*header_lines(program, command), *_READING]
     return {f"{name}{SUFFIX}": sealed(lines, text_of_device(for_devices(program)))}
-
-
-def expect_offered(program: Program) -> None:
-    """Raise `SpecError` for lattices whose steps have no kernels."""
-    if program.step.swept:
-        lattice.expect_offered(program, program.step.swept)
 
 
 _READING = (

@@ -1,57 +1,102 @@
-"""Lattices that split, for devices: one kernel for each flow and colour, and one that looks for failures."""
+"""Lattices for devices: a kernel for each flow and colour, each sum over bonds or pairs, each function of states."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from phigen.errors import Diagnostic, SpecError
+from phigen.ir import nodes as ir
+from phigen.ir import walk
 from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries
-from phigen.ir.passes.work_items import work_items
+from phigen.ir.passes.work_items import kernel_arrays, work_items
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Sweeps
+from phigen.scheme.steps import Gather, Sweeps
 from phigen.targets.c import functions
 from phigen.targets.c.loops import statements
+from phigen.targets.c.real import DOUBLE, OVERLOADED_FLOAT
 from phigen.targets.header import plain, sentence
 from phigen.targets.rendering import render
 
-
-def expect_offered(program: Program, step: Sweeps) -> None:
-    """Raise `SpecError` for lattices whose steps have no kernels."""
-    sites = step.sites
-    reasons = {
-        "its steps are implicit": step.equation,
-        "its sites are those of a graph, or interact in pairs": step.partners,
-        "its colours have a seam": sites.seams,
-        "its sums over steps are compensated": program.compensated,
-        "its numbers are single": program.single,
-    }
-    for reason, holds in reasons.items():
-        if holds:
-            message = f"target device: {program.name} has no kernels, since {reason}"
-            raise SpecError([Diagnostic(message, hint="take target c")])
+#: The arrays of kernels: their types, and what their elements are.
+_ARRAYS = {
+    "neighbours": ("const int", "neighbours[n * count + i]: the number of neighbour n of site i"),
+    "weights": ("const double", "weights[n * count + i]: 0 for terms beyond open ends, else 1"),
+    "on_seams": ("const double", "on_seams[n * count + i]: 1 where term n of the sweep begins on a seam, else 0"),
+    "at_sites": ("const double", "at_sites[n * count + i]: parameter n at site i"),
+    "dw": ("const double", "dw[n * count + i]: the increment of the noise of source n"),
+    "x": ("double", "x[n * count + i]: field n at site i"),
+    "start": (
+        "const double",
+        "start[n * count + i]: the fields at the start of a stage, where x has those in its middle",
+    ),
+    "varied": ("const double", "varied[n * count + i]: a variation of the fields"),
+    "out": ("double", "out[n * count + i]: result n at site i, where a kernel does not update x"),
+    "starts": ("const int", "starts[i] to starts[i + 1]: the places of the bonds of site i in the next arrays"),
+    "others": ("const int", "others[b]: the other site of bond b"),
+    "at_bonds": ("const double", "at_bonds[n * starts[count] + b]: parameter n at bond b"),
+    "colours": ("const int", "colours[i]: the colour of site i"),
+    "colour": ("int", "colour: that of the sites that a sweep updates"),
+    "sums": ("double", "sums[n * count + i]: sum n over the bonds or pairs of site i"),
+    "adds": ("int", "adds: 1 if a kernel adds to sums, 0 if it overwrites them"),
+}
 
 
 def body(program: Program, step: Sweeps, language: str) -> str:
     """Return the text of a file; ``language`` is its prelude."""
-    sites = step.sites
+    loops = LatticeLoops(program, step)
+    arrays = kernel_arrays(loops)
+    numbers = [*loops.numbers, *([program.time] if program.time else [])]
+    compensated = f"; x[({program.dimension} + n) * count + i]: its compensation term" if program.compensated else ""
+    comments = {name: _ARRAYS[name][1] for name in arrays}
+    comments["x"] += compensated
+    if step.sites.parameters:
+        comments["at_sites"] += f" ({', '.join(step.sites.parameters)})"
+    if step.sites.at_bonds:
+        comments["at_bonds"] += f" ({', '.join(step.sites.at_bonds)})"
     values = {
         "NAME": program.name,
         "language": language,
         "n": program.dimension,
         "coordinates": ", ".join(program.coordinates),
-        "neighbours": len(LatticeLoops(program, step).neighbours),
-        "at_sites": f" ({', '.join(sites.parameters)})" if sites.parameters else "",
+        "neighbours": len(loops.neighbours),
+        "numbers": f" ({', '.join(numbers)})" if numbers else "",
+        "arrays": list(comments.values()),
+        "arguments": ", ".join(_argument(name, program.name) for name in arrays),
+        "implicit": step.equation is not None,
         "functions": functions.called(program),
-        "kernels": [*_kernels(program, step)],
+        "kernels": [*_kernels(loops)],
     }
-    return render("c", "device_lattice.h", values)
+    return (OVERLOADED_FLOAT if program.single else DOUBLE).spelt(render("c", "device_lattice.h", values))
 
 
-def _kernels(program: Program, step: Sweeps) -> Iterator[tuple[str, str, list[str]]]:
-    """Yield the comment, the name, and the statements of each sweep."""
-    loops = LatticeLoops(program, step)
+def _argument(name: str, prefix: str) -> str:
+    kind = _ARRAYS[name][0]
+    return f"int {name}" if kind == "int" else f"{prefix}_GLOBAL {kind} *{name}"
+
+
+def _kernels(loops: LatticeLoops) -> Iterator[tuple[str, str, list[str]]]:
+    """Yield the comment, the name, and the statements of each kernel."""
+    for built in _functions(loops):
+        if not any(isinstance(s, ir.Store) for s in walk.statements(built.body)):
+            continue
+        lowered = work_items(simultaneous(temporaries(built)), loops)
+        yield plain(sentence(built.doc)), built.name, statements(lowered, loops.program.name)
+
+
+def _functions(loops: LatticeLoops) -> Iterator[ir.Function]:
+    step = loops.step
+
+    def summed(gather: Gather | None) -> Iterator[ir.Function]:
+        return map(loops.sums, gather.ends if gather else ())
+
     for sweep in (sweep for part in step.parts for sweep in part):
-        lowered = work_items(simultaneous(temporaries(loops.sweep(sweep))), loops)
-        yield plain(sentence(sweep.kernel.purpose)), sweep.kernel.name, statements(lowered, program.name)
+        yield from summed(sweep.gather)
+        yield loops.sweep(sweep)
+    gathers = [step.others.energy, step.others.field, step.others.observed]
+    if step.equation:
+        yield from map(loops.stage, (step.equation.relax, step.equation.advance, step.equation.slope))
+        gathers.append(step.others.varied)
+    for gather in gathers:
+        yield from summed(gather)
+    yield from map(loops.observable, loops.program.observables.kernels)

@@ -1,0 +1,109 @@
+"""Kernels of a lattice on a device, their launches, and reductions in a fixed order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from phigen.ir.launches import SiteLaunch, SumLaunch
+from phigen.runtime.devices.device import Device
+from phigen.runtime.devices.site_tables import SiteTables
+from phigen.runtime.interface import Floats
+
+#: Numbers that a work item reduces in one pass. The order of sums depends on it, and on nothing else.
+_REDUCED = 64
+
+#: Numbers of the kinds of reductions in kernels; a mean is a sum first.
+_KINDS = {"sum": 0, "mean": 0, "product": 1, "max": 2, "min": 3}
+
+
+class Kernels:
+    """The kernels of a compiled file by their names."""
+
+    def __init__(self, device: Device, text: str, name: str, defined: Mapping[str, int]) -> None:
+        self._device, self._name = device, name
+        self._program = device.compiled(text, defined)
+        self._kernels: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._kernels:
+            self._kernels[name] = self._device.kernel(self._program, f"{self._name}_{name}_kernel")
+        return self._kernels[name]
+
+
+class Launcher:
+    """Launches for one lattice, whose numbers are of the type of its tables."""
+
+    def __init__(self, kernels: Kernels, tables: SiteTables) -> None:
+        self.device, self.kernels, self.tables, self.real = tables.device, kernels, tables, tables.real
+        self._names = tables.interface.launches.arrays
+        self._sums: Any = None
+
+    def empty(self, numbers: int) -> Any:
+        """Return a new buffer of a number of reals."""
+        return self.device.empty(max(1, numbers) * np.dtype(self.real).itemsize)
+
+    def write(self, buffer: Any, values: Any) -> None:
+        """Copy numbers into a buffer."""
+        self.device.write(buffer, np.ascontiguousarray(values, dtype=self.real))
+
+    def read(self, buffer: Any, shape: tuple[int, ...]) -> Floats:
+        """Return the numbers of a buffer."""
+        values = np.empty(shape, self.real)
+        self.device.read(buffer, values)
+        return values.astype(np.float64, copy=False)
+
+    def run(self, launch: SiteLaunch, coefficients: Any, first: int = 0, colour: int = 0, **buffers: Any) -> None:
+        """Compute the sums that a kernel reads, and launch it; ``buffers`` are its arrays beside the tables."""
+        for k, sums in enumerate(launch.sums):
+            self._launch(sums, (None, self.tables.count), coefficients, first, colour, adds=np.int32(k > 0), **buffers)
+        self._launch(launch, self.tables.selected(launch), coefficients, first, colour, adds=np.int32(0), **buffers)
+
+    def _launch(
+        self,
+        launch: SiteLaunch | SumLaunch,
+        selection: tuple[Any, int],
+        coefficients: Any,
+        first: int,
+        colour: int,
+        **buffers: Any,
+    ) -> None:
+        sites, items = selection
+        if not items:
+            return
+        arrays = {**self.tables.arrays(launch, colour), **buffers, "sums": self._summed(launch)}
+        passed = [arrays.get(name) for name in self._names]
+        numbers = [np.int32(items), np.int32(self.tables.count), sites, coefficients, np.int32(first)]
+        self.device.launch(self.kernels[launch.kernel], items, [*numbers, *passed])
+
+    def _summed(self, launch: SiteLaunch | SumLaunch) -> Any:
+        """Return the buffer of sums over bonds or pairs; one for all kernels."""
+        if self._sums is None and "sums" in self._names:
+            launches = self.tables.interface.launches
+            listed = [*launches.others.values(), *(sweep for part in launches.parts for sweep in part)]
+            most = max((s.values for one in listed for s in one.sums), default=1)
+            self._sums = self.empty(most * self.tables.count)
+        return self._sums
+
+    def copy(self, source: Any, target: Any, numbers: int) -> None:
+        """Copy the numbers of a buffer into another."""
+        self.device.launch(self.kernels["copy"], numbers, [np.int32(numbers), source, target])
+
+    def reduced(self, buffer: Any, kinds: Sequence[str], length: int) -> Floats:
+        """Return one number for each row of ``length`` numbers, by the kind of each row; what is no number stays.
+
+        The order of the operations depends on the length only.
+        """
+        rows = len(kinds)
+        if not rows or not length:
+            return np.zeros(rows)
+        kind_numbers = self.tables.kinds(tuple(_KINDS[kind] for kind in kinds))
+        while length > 1:
+            parts = -(-length // _REDUCED)
+            target, items = self.empty(rows * parts), rows * parts
+            sizes = np.int32(items), np.int32(length), np.int32(parts)
+            self.device.launch(self.kernels["reduce"], items, [*sizes, kind_numbers, buffer, target])
+            buffer, length = target, parts
+        return self.read(buffer, (rows,))
