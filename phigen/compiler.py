@@ -318,12 +318,12 @@ def _split(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
 
 
 def _parts(spec: Spec, system: System) -> SplitHamiltonian:
-    """The parts of H. A monitor takes T and V, and a composition that is named composes two parts."""
+    """The parts of H. A monitor takes T and V, a named composition composes two parts, attitudes follow rotations."""
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)
     if spec.monitor:
         return replace(split(system, motions=False), small=None)
-    parts = split(system)
+    parts = split(system, rigid=not spec.reconstruct)
     alone = len(parts.flows) == 1 and parts.flows[0].has_motion
     return split(system, motions=False) if alone and spec.composition != "auto" else parts
 

@@ -14,6 +14,7 @@ from phigen import progress
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.splitting import exponential, matrices, scalar, spheres
 from phigen.splitting.closure import motion_of
+from phigen.splitting.euler import EulerMotion
 from phigen.splitting.exponential import NoClosedFormError
 from phigen.splitting.integrals import reduced
 from phigen.splitting.kepler import KeplerMotion
@@ -24,17 +25,20 @@ from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, s
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.tower import Poly, Tower
 
+#: Motions with flows of their own, which are proved by identities.
+Motion = KeplerMotion | RelativeMotions | EulerMotion
+
 #: The manner of a linear motion with a matrix exponential.
 BY_MATRIX = "moved by exp(tA), computed before the steps"
 
 
 @dataclass(frozen=True)
 class Term:
-    """A term of H, as the user wrote it and in the ring; ``motion`` is set for Kepler motions."""
+    """A term of H, as the user wrote it and in the ring; ``motion`` is set for Kepler motions and rigid bodies."""
 
     expression: Expression
     element: Poly
-    motion: KeplerMotion | None = None
+    motion: KeplerMotion | EulerMotion | None = None
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class Flow:
     increment: tuple[Expression, ...]
     manner: str
     force: tuple[Expression, ...] = field(default=(), kw_only=True)
-    motion: KeplerMotion | RelativeMotions | None = field(default=None, kw_only=True)
+    motion: Motion | None = field(default=None, kw_only=True)
     pieces: tuple[Flow, ...] = field(default=(), kw_only=True)
     exponentials: tuple[MatrixExponential, ...] = field(default=(), kw_only=True)
 
@@ -61,7 +65,7 @@ class Flow:
 
     @property
     def has_motion(self) -> bool:
-        """Whether the flow is one of Kepler motions, or some of its pieces are."""
+        """Whether the flow is that of a motion, or some of its pieces are."""
         return any(flow.motion for flow in (self, *self.pieces))
 
     def vector_field(self, system: System) -> tuple[Expression, ...]:
@@ -121,8 +125,8 @@ def _flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool) -> Flow:
     return composed(ring.coordinates, [flow for _, flow in steps])
 
 
-def _flow_of_motion(ring: Ring, term: Term, motion: KeplerMotion) -> Flow:
-    """Return the flow of a Kepler motion."""
+def _flow_of_motion(ring: Ring, term: Term, motion: KeplerMotion | EulerMotion) -> Flow:
+    """Return the flow of a motion."""
     return Flow(term.expression, tuple(motion.increments(ring.coordinates)), motion.manner, motion=motion)
 
 

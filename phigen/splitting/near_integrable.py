@@ -1,4 +1,4 @@
-"""Kepler motions among the terms of H: sums of p²/2m and −k/|q| of one body, which do not commute.
+"""Motions among the terms of H: sums of p²/2m and −k/|q| of one body, which do not commute, and free rigid bodies.
 
 A body is two or three coordinates q with 1/|q| in H, and their conjugate momenta. The remaining terms are
 perturbations; where these are small compared with the motions, H = A + εB is near-integrable.
@@ -10,9 +10,11 @@ from collections.abc import Iterator, Sequence
 from math import inf
 
 from phigen.geometry.system import System
+from phigen.splitting.euler import EulerMotion
 from phigen.splitting.flow import Term
 from phigen.splitting.kepler import KeplerMotion
 from phigen.splitting.ring import Ring
+from phigen.splitting.rotors import rotors
 from phigen.splitting.terms import joined, monomial_terms
 from phigen.symbolic.expression import symbol
 from phigen.symbolic.numeric import DomainError, evaluate
@@ -26,13 +28,17 @@ _DIMENSIONS = (2, 3)
 SMALL = 0.02
 
 
-def with_motions(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms with Kepler motions as single terms, these first; None if there are no such motions.
+def with_motions(ring: Ring, terms: Sequence[Term], *, rigid: bool) -> list[Term] | None:
+    """Return the terms with motions as single terms, these first; None if there are no motions.
+
+    They are Kepler motions and, if ``rigid``, free rigid bodies.
 
     Only terms of a single body belong to its motion: (p_1 + p_2)² is not divided, and commutes with functions of q_1
     − q_2.
     """
-    motions = list(_motions(ring, terms))
+    motions: list[tuple[KeplerMotion | EulerMotion, Poly]] = [*_motions(ring, terms)]
+    if rigid:
+        motions += rotors(ring, terms)
     if not motions:
         return None
     motion_terms = [Term(motion.hamiltonian, element, motion) for motion, element in motions]

@@ -38,11 +38,11 @@ class SplitHamiltonian:
     small: int | None = None
 
 
-def split(system: System, *, motions: bool = True) -> SplitHamiltonian:
+def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitHamiltonian:
     """Return H as a sum of parts with elementary flows: as few as possible, among these with the most invariants.
 
-    Kepler motions are single terms if ``motions``. A near-integrable H is split in its two parts. Raises `SpecError`,
-    located at the Hamiltonian, with the term that has no flow.
+    Kepler motions are single terms if ``motions``, and so are free rigid bodies if ``rigid`` too. A near-integrable
+    H is split in its two parts. Raises `SpecError`, located at the Hamiltonian, with the term that has no flow.
     """
     listed = hamiltonian_terms(system)
     ring = ring_of(system, listed)
@@ -53,7 +53,7 @@ def split(system: System, *, motions: bool = True) -> SplitHamiltonian:
     best: SplitHamiltonian | None = None
     least: tuple[float, ...] = (inf, inf, inf)
     conflicts = Conflicts(ring)
-    for candidate in _candidates(system, conflicts, terms, motions=motions):
+    for candidate in _candidates(system, conflicts, terms, motions=motions, rigid=rigid):
         parts = conflicts.grouped(candidate)
         small = small_part(system, ring, parts)
         if (small is None, len(parts)) > least[:2]:
@@ -92,18 +92,20 @@ def _lost(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly
     return sum(not all(ring.commute(invariant, g) for g in sums) for invariant in invariants)
 
 
-def _candidates(system: System, conflicts: Conflicts, terms: list[Term], *, motions: bool) -> Iterator[list[Term]]:
-    """Yield the terms as written, squares whole, with Kepler motions, by blocks, without companions, and in groups."""
+def _candidates(
+    system: System, conflicts: Conflicts, terms: list[Term], *, motions: bool, rigid: bool
+) -> Iterator[list[Term]]:
+    """Yield the terms as written, squares whole, with motions, by blocks, without companions, and in groups."""
     yield terms
     ring = conflicts.ring
     whole = _with_whole_summands(ring, hamiltonian_terms(system))
     if whole:
         yield whole
-    keplerian = with_motions(ring, terms) if motions else None
-    if keplerian:
-        yield keplerian
-        moving = [t for t in keplerian if t.motion]
-        for grouped in groupings(ring, [t for t in keplerian if not t.motion]):
+    with_moving = with_motions(ring, terms, rigid=rigid) if motions else None
+    if with_moving:
+        yield with_moving
+        moving = [t for t in with_moving if t.motion]
+        for grouped in groupings(ring, [t for t in with_moving if not t.motion]):
             yield [*moving, *grouped]
     blocked = by_blocks(system, ring, terms)
     if blocked:

@@ -10,10 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from phigen.geometry.system import System, hamiltonian_vector_field
-from phigen.splitting.flow import Flow, composed
-from phigen.splitting.kepler import KeplerMotion
+from phigen.splitting.flow import Flow, Motion, composed
 from phigen.splitting.parts import SplitHamiltonian
-from phigen.splitting.relative import RelativeMotions
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.expression import (
     ONE,
@@ -166,12 +164,10 @@ def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Ex
         yield f"composition for {c}", a - b
 
 
-def _motion_residuals(
-    system: System, flow: Flow, motion: KeplerMotion | RelativeMotions
-) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of Kepler motions.
+def _motion_residuals(system: System, flow: Flow, motion: Motion) -> Iterator[tuple[str, Expression]]:
+    """Yield the residuals of Kepler motions or of a rigid body.
 
-    π∇H is their field, and the increments are those proved by `phigen.splitting.kepler.identities`.
+    π∇H is their field, and the increments are those proved by identities of the motion.
     """
     names = system.coordinates
     field = flow.vector_field(system)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from phigen.symbolic import entire, special, universal
+from phigen.symbolic import elliptic, entire, special, universal
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.special import SPECIAL
 
@@ -287,10 +287,11 @@ _LISTED = (
         inline=True,
         letters="sgn",
     ),
-    Function(  # b where a > 0, else c: for observables, which are not differentiated
+    Function(  # b where a > 0, else c
         "choose",
         arity=3,
         own=True,
+        slopes=lambda call, f, a, b, c: (0, call("choose", a, one := 1 + 0 * b, 0 * b), call("choose", a, 0 * b, one)),
         value=lambda library, a, b, c: b if a > 0 else c,
         at_zero=None,
         rational=True,
@@ -353,6 +354,19 @@ FUNCTIONS[universal.ANOMALY] = Function(  # of Kepler motions, by an iteration: 
     cost=120,
     near=True,
 )
+#: Of free rigid bodies, by elliptic functions: see `phigen.symbolic.elliptic`.
+FUNCTIONS |= {
+    name: Function(
+        name,
+        arity=3,
+        own=True,
+        slopes=elliptic.slopes if name == elliptic.AMPLITUDE else None,
+        value=value,
+        cost=120,
+        near=True,
+    )
+    for name, value in zip(elliptic.ELLIPTIC, (elliptic.value, elliptic.squares, elliptic.ratios), strict=True)
+}
 
 #: Powers with exponents ½ and ⅓: expressions have no such functions, languages do.
 ROOTS = {"sqrt": _library("sqrt"), "cbrt": _library("cbrt")}

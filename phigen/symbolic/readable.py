@@ -34,6 +34,7 @@ UNFAMILIAR = {
     "sinroot": "sinroot(s) = sin(√s)/√s",
     "arcroot": "arcroot(s) = (√s − sin √s)/√s³",
     "anomaly": "anomaly(t, r, η, β, μ, …) = s with r G1 + η G2 + μ G3 = t, Stumpff functions of β and s",
+    "amplitude": "amplitude(t, P, Q) = tan(φ/4)/√P, φ = am(√P t) with the modulus √(Q/P)",
     "exprel": "exprel(s) = (e^s − 1)/s",
     "inv": "inv(s) = 1/s for s > 0",
     "inv0": "inv0(s) = 1/s for s > 0, else 0",

@@ -10,6 +10,8 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.program import Program
 from phigen.splitting.matrices import MAX_PADE_NORM, PADE
+from phigen.symbolic import elliptic
+from phigen.symbolic.elliptic import ELLIPTIC
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression, call, symbol, symbols_of, topological
 from phigen.symbolic.special import MIDDLE, NEAR, POLE, SPECIAL, near_coefficients, order_of, rest_coefficients
@@ -17,6 +19,9 @@ from phigen.symbolic.universal import ANOMALY, MOST_ITERATIONS, RADIAL
 from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
+
+#: Means after which the arithmetic–geometric mean has converged for any two numbers.
+MOST_MEANS = 16
 
 _MEANING = (
     "(1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation.",
@@ -96,6 +101,57 @@ def entire_used(program: Program) -> list[str]:
 def calls_anomaly(program: Program) -> bool:
     """Whether kernels call the universal anomaly of Kepler motions."""
     return any(e.op == ANOMALY for e in topological([e for kernel in program.kernels for e in kernel.roots]))
+
+
+def elliptic_used(program: Program) -> list[str]:
+    """The functions of `ELLIPTIC` that kernels call, and the first of them where others are called."""
+    ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
+    called = [name for name in ELLIPTIC if name in ops]
+    return called if not called or called[0] == ELLIPTIC[0] else [ELLIPTIC[0], *called]
+
+
+#: The integrals of `ELLIPTIC`: their meaning, and the arguments of Carlson's R_D for them and for half a turn, from the
+#: squares cc of cn and dd of dn, and the square m of the modulus.
+_INTEGRALS = {
+    elliptic.SQUARES: ("The integral over t of S**2 with S = sn/sqrt(P)", "cc, dd, 1.0", "0.0, 1.0 - m, 1.0"),
+    elliptic.RATIOS: ("The integral over t of S**2/dn**2 with S = sn/sqrt(P)", "cc, 1.0, dd", "0.0, 1.0, 1.0 - m"),
+}
+
+
+def elliptic_texts(names: Sequence[str], render: Callable[[str, Mapping[str, object]], str]) -> list[str]:
+    """The definitions of functions of `ELLIPTIC` by three templates: amplitude, Carlson's R_D, and integrals."""
+    values: dict[str, object] = {
+        "part": repr(2.0**-elliptic.DOUBLINGS),
+        "doublings": elliptic.DOUBLINGS,
+        "series": _nested_series(),
+        "ratio": repr(elliptic.MEAN_RATIO),
+        "most": MOST_MEANS,
+        "circle": repr(2 * math.pi),
+        # the error of the last polynomial is below rounding where the spread is this part of the mean
+        "spread": repr((2.2e-16 / 4) ** (-1 / 6)),
+        "duplications": elliptic.LANE_DUPLICATIONS,
+    }
+    texts = [render("amplitude", values)] if ELLIPTIC[0] in names else []
+    integrals = [name for name in names if name in _INTEGRALS]
+    texts += [render("carlson", values)] if integrals else []
+    for name in integrals:
+        meaning, arguments, whole = _INTEGRALS[name]
+        forms = {"function": name, "meaning": meaning, "arguments": arguments, "whole": whole}
+        texts.append(render("amplitude_integral", {**values, **forms}))
+    return texts
+
+
+def _nested_series() -> str:
+    """The series of S/t by Horner's rule, in x and y."""
+    return _nested([_nested([repr(float(c)) for c in row], "x") for row in elliptic.series()], "y")
+
+
+def _nested(coefficients: Sequence[str], variable: str) -> str:
+    *others, last = coefficients
+    text = last
+    for c in reversed(others):
+        text = f"{c} + {variable} * ({text})"
+    return text
 
 
 def stumpff() -> tuple[list[Fraction], list[Fraction]]:

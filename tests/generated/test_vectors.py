@@ -20,7 +20,8 @@ CASES = {
     "explicit": ("pendulum_euler", {"adjoint": True}, "explicit_lanes explicit_adjoint_lanes stage_lanes gain_lanes"),
     "flows": ("toda3", {"scheme": "splitting"}, "add_lanes change1_lanes change2_lanes change1_far_lanes settle_lanes"),
     "flows back": (
-        "rigid_body", {"scheme": "splitting", "adjoint": True}, "flow1_adjoint_lanes flow2_adjoint_far_lanes gain_lanes"
+        "rigid_body", {"scheme": "splitting", "composition": "blanes-moan", "adjoint": True},
+        "flow1_adjoint_lanes flow2_adjoint_far_lanes gain_lanes",
     ),
     "sites": ("heisenberg", {}, "sweep1_near sweep1_far sweep2_near sweep3_far vector_field_row energy_row"),
     "sites back": ("klein_gordon", {"adjoint": True}, "sweep1 sweep2 sweep1_back sweep2_back"),

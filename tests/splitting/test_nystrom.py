@@ -203,7 +203,7 @@ def test_a_wrong_multiple_of_the_gradient_is_refuted():
 
 
 def test_a_condition_that_does_not_hold_is_refuted():
-    found = compiled("rigid_body", 6, "splitting")
+    found = compiled("spin_chain5", 6, "splitting")
     refuted = [s.name for s in check(found.system, replace(found.splitting, kick=0)) if s.verdict == REFUTED]
     assert refuted == ["{H_1, {H_1, {H_1, H_2}}} = 0"]
 

@@ -143,7 +143,7 @@ def test_refuted_flows_are_not_compiled(monkeypatch):
     from phigen.proofs import statements
 
     genuine = statements.check_splitting
-    found = compiled("rigid_body", 4, "splitting")
+    found = compiled("kowalevski_top", 4, "splitting")
 
     def planted(system, splitting, noise):
         flow = splitting.flows[1]

@@ -13,6 +13,7 @@ from phigen.lanes.lane_functions import SMALL_ARGUMENT_FUNCTIONS
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.symbolic.economised import economised
+from phigen.symbolic.elliptic import ELLIPTIC
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import (
@@ -34,7 +35,7 @@ from phigen.targets.rendering import render
 from phigen.targets.special import entire_used
 
 #: The functions of the library that have a version here, under whose name flows call them.
-FLOW_FUNCTIONS = tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f not in ENTIRE and f != ANOMALY)
+FLOW_FUNCTIONS = tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f not in (*ENTIRE, ANOMALY, *ELLIPTIC))
 
 
 #: Terms beyond this, relative to the first, are left out of series in single precision: a quarter of a rounding.
@@ -86,7 +87,8 @@ def called(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
     polynomial = [render("c", "polynomial.c", {"NAME": program.name})] if phis else []
     anomaly = [_anomaly(program)] if special.calls_anomaly(program) else []
     functions = [render("c", "small.c", _values(program, f)) for f in small]
-    return [*polynomial, *phis, *functions, *anomaly, *_exponentials(program)]
+    elliptic = _elliptic(program, special.elliptic_used(program), near=False)
+    return [*polynomial, *phis, *functions, *anomaly, *elliptic, *_exponentials(program)]
 
 
 def _exponentials(program: Program) -> list[str]:
@@ -100,10 +102,20 @@ def _exponentials(program: Program) -> list[str]:
 
 def near(program: Program, names: Iterable[str]) -> list[str]:
     """Versions for the loops over lanes, of small arguments only, of these functions."""
-    return [
+    listed = list(names)
+    others = [f for f in listed if f not in ELLIPTIC]
+    texts = [
         _anomaly(program, near=True) if f == ANOMALY else render("c", "small.c", _values(program, f) | {"near": True})
-        for f in names
+        for f in others
     ]
+    return texts + _elliptic(program, [f for f in ELLIPTIC if f in listed], near=True)
+
+
+def _elliptic(program: Program, names: Sequence[str], *, near: bool) -> list[str]:
+    """Return the elliptic functions of free rigid bodies."""
+    return special.elliptic_texts(
+        names, lambda template, values: render("c", f"{template}.c", {"NAME": program.name, "near": near, **values})
+    )
 
 
 def _anomaly(program: Program, *, near: bool = False) -> str:

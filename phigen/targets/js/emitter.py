@@ -17,7 +17,7 @@ from phigen.targets import special
 from phigen.targets.features import switches
 from phigen.targets.header import facts, header_lines, sealed
 from phigen.targets.js.files import LATTICE_MODULES, MODULES, chosen
-from phigen.targets.js.functions import definitions
+from phigen.targets.js.functions import definitions, elliptic_definitions
 from phigen.targets.js.loops import statements
 from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties
 from phigen.targets.js.runtime import assembled
@@ -63,6 +63,7 @@ def _functions(program: Program) -> list[str]:
     """Return definitions of the elementary functions that JavaScript lacks."""
     anomaly = special.calls_anomaly(program)
     functions = definitions(special.used(program), special.entire_used(program), LANGUAGE.printer, anomaly=anomaly)
+    functions += elliptic_definitions(special.elliptic_used(program))
     if special.largest_exponential(program):
         functions.append(render("js", "matrix_exponential.mjs", special.exponential_constants()).strip("\n"))
     return functions

@@ -25,6 +25,11 @@ def definitions(
     return [text.strip("\n") for text in (*polynomial, *texts)]
 
 
+def elliptic_definitions(names: Sequence[str]) -> list[str]:
+    """Return the definitions of functions of `ELLIPTIC`."""
+    return [t.strip("\n") for t in special.elliptic_texts(names, lambda t, values: render("js", f"{t}.mjs", values))]
+
+
 def _anomaly() -> str:
     c2, c3 = (_listed([float(c) for c in series]) for series in special.stumpff())
     return render("js", "anomaly.mjs", {"c2": c2, "c3": c3, **special.anomaly_values()})

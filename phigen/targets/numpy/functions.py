@@ -16,7 +16,10 @@ def called(program: Program) -> list[str]:
     phis = [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     entire = [render("numpy", "entire.py", _entire(f)) for f in special.entire_used(program)]
     anomaly = [_anomaly()] if special.calls_anomaly(program) else []
-    return [*phis, *entire, *anomaly, *_exponentials(program)]
+    elliptic = special.elliptic_texts(
+        special.elliptic_used(program), lambda template, values: render("numpy", f"{template}.py", values)
+    )
+    return [*phis, *entire, *anomaly, *elliptic, *_exponentials(program)]
 
 
 def _exponentials(program: Program) -> list[str]:

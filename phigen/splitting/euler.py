@@ -1,0 +1,148 @@
+"""The flow of a free rigid body: ẋ_i = α_i x_j x_k for three coordinates, α of both signs, by elliptic functions.
+
+E_i = α_j α_k x_i² differ by constants. With the largest and the smallest of them, P = max − min, and Q = max less the
+third, S, C and κ of `phigen.symbolic.elliptic` give, by the addition theorem of Jacobi's functions,
+
+    x_i' = (x_i σ_j σ_k + α_i x_j x_k S σ_i)/D,    σ_i² = D + E_i S²,    D = 1 − max S² = C² − min S²,
+
+where σ_i > 0, but σ_i = C for the smallest E_i. An error of κ gives the motion of another time, and does not change the
+energy and |x|. No step has a phase, and nothing is divided by the difference of two moments: the separatrix, rotations
+about an axis and symmetric bodies are no special cases.
+
+C. G. J. Jacobi, Sur la rotation d'un corps, Crelle's Journal 39 (1850); R. van Zon, J. Schofield, Numerical
+implementation of the exact dynamics of free rigid bodies, Journal of Computational Physics 225 (2007).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from phigen.splitting.ring import TIME
+from phigen.symbolic.elliptic import AMPLITUDE, functions_of
+from phigen.symbolic.expression import ONE, ZERO, Expression, call, derivatives, number, power, sqrt, symbol, total
+from phigen.symbolic.symbols import Symbol
+
+Vector = Sequence[Expression]
+
+#: The other two indices of each one, in cyclic order.
+CYCLIC = ((1, 2), (2, 0), (0, 1))
+
+_HALF = number(Fraction(1, 2))
+
+
+@dataclass(frozen=True)
+class EulerMotion:
+    """ẋ_i = α_i x_j x_k for the ``coordinates`` x_i, with the ``factors`` α_i, which depend on parameters only."""
+
+    coordinates: tuple[str, ...]
+    factors: tuple[Expression, ...]
+    hamiltonian: Expression
+
+    @property
+    def manner(self) -> str:
+        """The motion in words."""
+        return f"{', '.join(self.coordinates)} moved as a free rigid body, by elliptic functions"
+
+    def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
+        """Return expressions as they are compared in proofs."""
+        return [*roots]
+
+    def field(self, names: Sequence[str]) -> list[Expression]:
+        """Return the rates of all coordinates."""
+        x = [symbol(name) for name in self.coordinates]
+        rates = [a * x[j] * x[k] for a, (j, k) in zip(self.factors, CYCLIC, strict=True)]
+        return self._placed(names, rates)
+
+    def increments(self, names: Sequence[str]) -> list[Expression]:
+        """Return the increments of all coordinates in the time of the flow."""
+        return self._placed(names, _changes([symbol(name) for name in self.coordinates], self.factors))
+
+    def residuals(self) -> Iterator[tuple[str, Expression]]:
+        """Yield the residuals that vanish if the changes are the motion."""
+        yield from identities()
+
+    def _placed(self, names: Sequence[str], values: Vector) -> list[Expression]:
+        placed = dict(zip(self.coordinates, values, strict=True))
+        return [placed.get(name, ZERO) for name in names]
+
+
+def _changes(x: Vector, factors: Vector) -> list[Expression]:
+    """Return the changes in the time of the flow."""
+    levels = _levels(x, factors)
+    low = _smaller(_smaller(*levels[:2]), levels[2])
+    high = -_smaller(_smaller(-levels[0], -levels[1]), -levels[2])
+    above, below = [e - low for e in levels], [high - e for e in levels]
+    p = high - low
+    q = 2 * p - total(above)
+    kappa = call(AMPLITUDE, symbol(TIME), p, q)
+    s, c, _ = functions_of(kappa, p, q)
+    square, z = s**2, p * kappa**2
+    roots = [sqrt(c**2 + e * square) for e in above]
+    sigma = [call("choose", e, root, c) for e, root in zip(above, roots, strict=True)]
+    versine = 8 * z * power(1 + z, -2)  # 1 − C
+    losses = [
+        call("choose", e, d * square / (1 + root), versine) for e, d, root in zip(above, below, roots, strict=True)
+    ]
+    divisor = c**2 - low * square
+    # Where D is small, 1 − σ_j and 1 − σ_k are not.
+    gaps = [
+        call("choose", divisor - _HALF, high * square - (u + v - u * v), sigma[j] * sigma[k] - divisor)
+        for j, k, u, v in ((j, k, losses[j], losses[k]) for j, k in CYCLIC)
+    ]
+    return _ends(x, factors, sigma, s, divisor, gaps)
+
+
+def _levels(x: Vector, factors: Vector) -> list[Expression]:
+    """Return the E_i."""
+    return [factors[j] * factors[k] * e**2 for e, (j, k) in zip(x, CYCLIC, strict=True)]
+
+
+def _smaller(a: Expression, b: Expression) -> Expression:
+    return call("choose", b - a, a, b)
+
+
+def _ends(
+    x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Expression, gaps: Vector
+) -> list[Expression]:
+    """Return the changes of the x_i, where ``gaps`` are σ_j σ_k − D."""
+    inverse = power(divisor, -1)
+    return [
+        (x[i] * gap + factors[i] * x[j] * x[k] * (s * sigma[i])) * inverse
+        for i, ((j, k), gap) in enumerate(zip(CYCLIC, gaps, strict=True))
+    ]
+
+
+def identities() -> Iterator[tuple[str, Expression]]:
+    """Yield the residuals that vanish if the increments are the flow, in independent symbols x_i, α_i and S.
+
+    Let E_m be the largest. Then σ_m = 1 and Ṡ = σ_j σ_k, which is CD of the elliptic functions, and σ_j, σ_k are roots
+    of 1 − (E_m − E_j)S². The factors σ_j σ_k − D are compared with their form for small S.
+    """
+    names = [Symbol("body", kind, i) for kind in ("x", "a") for i in range(3)]
+    x, factors = ([symbol(name) for name in of] for of in (names[:3], names[3:]))
+    name = Symbol("body", "S")
+    s, levels = symbol(name), _levels(x, factors)
+    for m, (j, k) in enumerate(CYCLIC):
+        sigma = [ONE if i == m else sqrt(1 - (levels[m] - levels[i]) * s**2) for i in range(3)]
+        divisor = 1 - levels[m] * s**2
+        gaps = [sigma[a] * sigma[b] - divisor for a, b in CYCLIC]
+        for (a, b), gap in zip(CYCLIC, gaps, strict=True):
+            u, v = 1 - sigma[a], 1 - sigma[b]
+            yield f"σ_{a + 1} σ_{b + 1} - D", levels[m] * s**2 - (u + v - u * v) - gap
+        changes = _ends(x, factors, sigma, s, divisor, gaps)
+        ends = [e + change for e, change in zip(x, changes, strict=True)]
+        for i, (slope, (a, b)) in enumerate(zip(derivatives(changes, name), CYCLIC, strict=True)):
+            yield f"dx_{i + 1}'/dt", slope * (sigma[j] * sigma[k]) - factors[i] * ends[a] * ends[b]
+    yield from _function_identities()
+
+
+def _function_identities() -> Iterator[tuple[str, Expression]]:
+    """Yield the residuals that vanish if S(κ) moves with CD, where κ moves with (1 + z)D/4."""
+    name, p, q = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "Q"))
+    kappa = symbol(name)
+    s, c, _ = functions_of(kappa, p, q)
+    yield "C² + PS²", c**2 + p * s**2 - 1
+    yield "dS/dt = CD", derivatives([s], name)[0] * (1 + p * kappa**2) / 4 - c
+    yield "1 - C", 8 * (p * kappa**2) * power(1 + p * kappa**2, -2) - (1 - c)

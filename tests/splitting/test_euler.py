@@ -1,0 +1,177 @@
+"""The flow of a free rigid body, as one part of H: elliptic functions, steps of any size, derivatives."""
+
+import math
+from functools import cache
+from itertools import product
+
+import mpmath
+import numpy as np
+import pytest
+from scipy import special
+from support import compile_text, javascript, solver
+
+from phigen.splitting import euler
+from phigen.splitting.statements import check
+from phigen.symbolic import elliptic
+from phigen.symbolic.verdict import PROVED, REFUTED, decide_zero
+
+SO3 = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}}}\n"
+BODY = (
+    f"{SO3}parameters: {{A: 1, B: 2, C: 3}}\nhamiltonian: (x**2/A + y**2/B + z**2/C)/2\nscheme: splitting\n"
+    "casimirs: {S: x**2 + y**2 + z**2}\nruns: {one: {initial: [0.3, -0.5, 0.8], step: 0.1, steps: 10}}\n"
+)
+#: Moments: three different ones, symmetric bodies, and nearly symmetric ones.
+MOMENTS = [(1, 2, 3), (1, 1, 3), (3, 2, 2), (1, 1 + 1e-9, 2)]
+#: Near the separatrix, on it, on the axes, elsewhere, and at rest.
+STARTS = [
+    (1e-2, 1, 1e-2), (1e-8, 1, 0), (np.sqrt(3) / 2, 0, 0.5), (1, 0, 0), (0, 1, 0), (0, 0, -1), (0.3, -0.5, 0.8),
+    (0, 0, 0),
+]  # fmt: skip
+STEPS = (1e-3, 0.7, -4.0, 30.0)
+
+
+@cache
+def body(extras=""):
+    return compile_text(BODY + extras, 4)
+
+
+def expected(x, moments, h):
+    """The end of a step by a Taylor method in 30 digits, which knows nothing of elliptic functions."""
+    with mpmath.workdps(30):
+        a = [1 / mpmath.mpf(m) for m in moments]
+        factors = [a[2] - a[1], a[0] - a[2], a[1] - a[0]]
+        x, count = [mpmath.mpf(float(e)) for e in x], 1 + int(abs(h) * 2)
+        for _ in range(count):
+            x = _taylor(x, factors, mpmath.mpf(h) / count)
+        return np.array([float(e) for e in x])
+
+
+def _taylor(x, factors, h, order=28):
+    terms = [[e] for e in x]
+    for n in range(order):
+        sums = [
+            factors[i] * mpmath.fdot(terms[(i + 1) % 3], list(reversed(terms[(i + 2) % 3]))) / (n + 1) for i in range(3)
+        ]
+        for listed, e in zip(terms, sums, strict=True):
+            listed.append(e)
+    return [mpmath.polyval(list(reversed(listed)), h) for listed in terms]
+
+
+@pytest.mark.thin(4)
+@pytest.mark.parametrize("moments", MOMENTS)
+def test_a_step_of_any_size_ends_on_the_orbit_to_rounding(moments):
+    """The derivative of the flow multiplies the rounding of the start: by at most 1e3 in these steps."""
+    values = dict(zip("ABC", moments, strict=True))
+    for start, h in product(STARTS, STEPS):
+        x = np.array(start)
+        exact = expected(x, moments, h)
+        for target in ("c", "numpy"):
+            end = solver(body(), target).integrate(x, h, 1, **values).x[-1]
+            allowed = 3e-16 + 2e-15 * abs(h) * (1 if abs(h) < 10 else 1e4)
+            np.testing.assert_allclose(end, exact, rtol=0, atol=allowed, err_msg=f"{start}, h = {h}, {target}")
+            for weights in (np.ones(3), 1 / np.array(moments)):
+                assert abs(weights @ end**2 - weights @ x**2) <= 3e-15 * (weights @ x**2)
+
+
+def test_small_increments_have_all_digits():
+    """Compensated sums add them to the state: a relative error of the increment, not of the state, counts."""
+    x, h = np.array([0.3, -0.5, 0.8]), 1e-6
+    made = solver(compile_text(BODY.replace("scheme", "profile: small\nscheme"), 4), "c")
+    session = made.session(np.array(x))
+    session.step(h, 1000)
+    np.testing.assert_allclose(session.x - x, expected(x, (1, 2, 3), 1000 * h) - x, rtol=1e-12)
+
+
+def test_targets_agree_and_javascript_has_the_flow():
+    x = np.array([0.3, -0.5, 0.8])
+    for h in (0.4, 11.0):
+        c = solver(body(), "c").integrate(x, h, 5).x[-1]
+        js = javascript(body(), f"x0: {x.tolist()}", f"s.integrate({h}, 5)", "[...s.x]")
+        np.testing.assert_allclose(js, c, rtol=0, atol=3e-15)
+
+
+def test_members_in_lanes_are_those_one_by_one():
+    """Steps beyond the range of the lanes among them, and states where nothing moves."""
+    made = solver(body("adjoint: true\n"), "c")
+    states = np.concatenate([np.array(STARTS), np.random.default_rng(2).normal(size=(29, 3))])
+    for h in (0.05, 0.7, 6.0):
+        together = made.ensemble(states, h, 4)
+        alone = [made.integrate(x, h, 4).x[-1] for x in states]
+        np.testing.assert_allclose(np.asarray(together).reshape(len(states), 3), alone, rtol=0, atol=1e-14)
+    weights = np.tile([1.0, -2.0, 0.5], (len(states), 1))
+    found = made.pullback(states, 0.3, 3, weights).x0_bar
+    alone = [made.pullback(x, 0.3, 3, w).x0_bar for x, w in zip(states, weights, strict=True)]
+    np.testing.assert_allclose(found, alone, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_the_derivative_of_the_flow_is_exact_and_poisson(target):
+    made, d = solver(body("tangent: true\n"), target), 1e-5
+    for start, h in product(STARTS[:-1], (0.1, 2.0, 9.0)):
+        x = np.array(start)
+        end, tangent = made.step_tangent(x, h)
+        moved = tangent @ _bracket(x) @ tangent.T
+        assert np.abs(moved - _bracket(end)).max() < 1e-15 * (1 + np.abs(tangent).max() ** 2)
+        ends = [[made.integrate(x + s * d * row, h, 1).x[-1] for s in (2, 1, -1, -2)] for row in np.eye(3)]
+        slopes = np.array([(8 * (b - c) - (a - e)) / (12 * d) for a, b, c, e in ends]).T
+        np.testing.assert_allclose(tangent, slopes, atol=1e-9 * max(1, np.abs(slopes).max() ** 3))
+
+
+def _bracket(x):
+    return np.array([[0, -x[2], x[1]], [x[2], 0, -x[0]], [-x[1], x[0], 0]])
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_gradients_along_state_and_moments_are_differences(target):
+    made = solver(body("adjoint: true\n"), target)
+    x, weights, d = np.array([0.3, -0.5, 0.8]), np.array([1, -2, 0.5]), 1e-5
+    for h in (0.7, 5.0):
+        found = made.pullback(x, h, 3, weights)
+        for name, value in (("A", 1.0), ("B", 2.0), ("C", 3.0)):
+            above, below = (weights @ made.integrate(x, h, 3, **{name: value + s}).x[-1] for s in (d, -d))
+            assert found.parameters_bar[name] == pytest.approx((above - below) / (2 * d), rel=1e-7)
+
+
+def test_the_flow_is_proved_and_a_wrong_sign_is_refuted(monkeypatch):
+    assert {s.verdict for s in check(body().system, body().splitting)} == {PROVED}
+    genuine = euler._ends
+    monkeypatch.setattr(euler, "_ends", lambda x, f, sigma, s, *rest: genuine(x, f, sigma, -s, *rest))
+    assert decide_zero("", list(euler.identities()), ()).verdict == REFUTED
+
+
+def test_where_the_body_is_split_in_rotations():
+    named = compile_text(BODY + "composition: blanes-moan\n", 4)
+    attitude = compile_text(BODY + "reconstruct: quaternion\n", 4)
+    linear = compile_text(BODY.replace("/2\nscheme", "/2 + 0.1*x\nscheme"), 4)
+    hyperbolic = BODY.replace("y: {z: -x}", "y: {z: x}").replace("casimirs: {S: x**2 + y**2 + z**2}\n", "")
+    other_brackets = compile_text(hyperbolic, 4)
+    assert [len(c.splitting.flows) for c in (named, attitude)] == [2, 2]
+    assert not any(f.has_motion for c in (named, attitude, other_brackets) for f in c.splitting.flows)
+    assert [f.has_motion for f in linear.splitting.flows].count(True) == 1
+
+
+#: t√P and Q/P, with small arguments, many turns, and both ends of the modulus.
+ARGUMENTS = [(u, m) for u in (1e-3, 0.3, 0.999, 1.001, 2.5, -7.0, 300.0) for m in (0, 1e-12, 0.3, 0.9, 1 - 1e-4)]
+
+
+@pytest.mark.parametrize("p", [1.0, 0.0625])
+def test_the_amplitude_is_that_of_jacobi(p):
+    for u, m in ARGUMENTS:
+        t = u / np.sqrt(p)
+        kappa = elliptic.value(math, t, p, m * p)
+        s, c, square = elliptic.functions_of(kappa, p, m * p)
+        sn, cn, dn, _ = special.ellipj(u, m)
+        found = [np.sqrt(p) * s, c, np.sqrt(square)]
+        np.testing.assert_allclose(found, [sn, cn, dn], rtol=0, atol=1e-14 * (1 + abs(u)))
+
+
+def test_the_integrals_are_those_of_the_second_kind():
+    """∫sn² dt = (u − E(am))/m, and Carlson's R_D is mpmath's."""
+    for u, m in ARGUMENTS:
+        if m > 1e-3:
+            _, _, _, phi = special.ellipj(u, m)
+            exact = (u - special.ellipeinc(phi, m)) / m
+            if abs(u) > 0.1:
+                assert elliptic.squares(math, u, 1.0, m) == pytest.approx(exact, rel=1e-12)
+    for x, y, z in ((0.5, 0.7, 1), (0, 1, 1e-3), (0.2, 1, 0.3), (0, 1e-9, 1)):
+        assert elliptic.carlson(math, x, y, z) == pytest.approx(float(mpmath.elliprd(x, y, z)), rel=3e-15)
