@@ -2,6 +2,7 @@
 
 import platform
 import re
+from dataclasses import replace
 
 import pytest
 from support import run, spec_of, tool, write
@@ -20,7 +21,7 @@ CASES = {
     "explicit": ("pendulum_euler", {"adjoint": True}, "explicit_lanes explicit_adjoint_lanes stage_lanes gain_lanes"),
     "flows": ("toda3", {"scheme": "splitting"}, "add_lanes change1_lanes change2_lanes change1_far_lanes settle_lanes"),
     "flows back": (
-        "rigid_body", {"scheme": "splitting", "composition": "blanes-moan", "adjoint": True},
+        "rigid_body", {"scheme": "splitting", "adjoint": True},
         "flow1_adjoint_lanes flow2_adjoint_far_lanes gain_lanes",
     ),
     "sites": ("heisenberg", {}, "sweep1_near sweep1_far sweep2_near sweep3_far vector_field_row energy_row"),
@@ -28,6 +29,8 @@ CASES = {
     "pairs": ("outer_planets", {}, "pair_forces sweep1 sweep2"),
     "equations of sites": ("kdv", {}, "slope relax increment"),
 }  # fmt: skip
+#: Of the cases whose parts are composed by a method that is named: by rotations, in place of one exact flow.
+COMPOSITIONS = {"flows back": "blanes-moan"}
 
 
 #: Equations clang writes out lane by lane first, and finds the vectors in what stands there then.
@@ -38,7 +41,9 @@ CLANG = [("clang", case) for case in ("explicit", "flows", "flows back", "sites 
 @pytest.mark.parametrize(("compiler", "case"), [*(("gcc", case) for case in CASES), *CLANG])
 def test_loops_over_lanes_become_vectors(compiler, case, tmp_path):
     name, asked, functions = CASES[case]
-    compilation = compile_spec(spec_of(name), profile="fast", **asked)
+    compilation = compile_spec(
+        replace(spec_of(name), composition=COMPOSITIONS.get(case, "auto")), profile="fast", **asked
+    )
     write(tmp_path, emit(compilation.program, "c", "phigen"))
     marked = marked_loops((tmp_path / f"{name}.c").read_text(encoding="utf-8"))
     assert {f"{name}_{function}" for function in functions.split()} - {*marked.values()} == set()
