@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 57a5ade1c66d3d9246b4ccdacb8fd2b800dfe627f8ce7e659a05386c2063895a
+ * body-sha256: 9b69f0ac362ba5bffe18ed73514cd1419ba9f44cdbd9ae3e0ddcfc1bfb80c1e3
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -436,18 +436,9 @@ static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const do
     size_t first, size_t end)
 {
     switch (part) {
-    case 1:
-        if (far) heisenberg_rows1_far(s, coef, first, end);
-        else heisenberg_rows1_near(s, coef, first, end);
-        break;
-    case 2:
-        if (far) heisenberg_rows2_far(s, coef, first, end);
-        else heisenberg_rows2_near(s, coef, first, end);
-        break;
-    default:
-        if (far) heisenberg_rows3_far(s, coef, first, end);
-        else heisenberg_rows3_near(s, coef, first, end);
-        break;
+    case 1: (far ? heisenberg_rows1_far : heisenberg_rows1_near)(s, coef, first, end); break;
+    case 2: (far ? heisenberg_rows2_far : heisenberg_rows2_near)(s, coef, first, end); break;
+    default: (far ? heisenberg_rows3_far : heisenberg_rows3_near)(s, coef, first, end); break;
     }
 }
 

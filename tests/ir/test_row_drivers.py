@@ -1,5 +1,6 @@
 """Row drivers, by their text."""
 
+from dataclasses import replace
 from textwrap import dedent
 
 from ir.ir_text import text
@@ -19,6 +20,7 @@ from phigen.ir.row_drivers import (
     in_forms,
     member,
 )
+from phigen.targets.c.loops import statements
 
 KICK, DRIFT = ir.Call("kick", (COEF, SEGMENT)), ir.Call("drift", (COEF, SEGMENT))
 PARAMETERS = ("part", "coef", "far")
@@ -95,3 +97,9 @@ def test_the_flag_far_selects_the_full_range_form() -> None:
         else:
           kick(coef, &row)
         """)  # fmt: skip
+
+
+def test_c_selects_the_function_of_one_call_by_a_flag() -> None:
+    (choice,) = in_forms({"_far": (DRIFT,), "_near": (replace(DRIFT, name="drift_near"),)})
+    printed = ir.Function("sweep", "", ir.Role.OTHER, PARAMETERS, (choice,))
+    assert statements(printed, "toda") == ["    (far ? toda_drift : toda_drift_near)(coef, &row);"]
