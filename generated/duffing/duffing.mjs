@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 76bd3e1ce9bba931c0addb426ff07c2dca00680c3000b348e6036161ef9c23b6
+ * body-sha256: 2f281a1dad0a8107fe0528c1d2763b12d89e1a3ab32715d8adefb7de571054da
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -355,7 +355,7 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state. Its predictors start anew.
+   * Return an independent solver with the same state. Predictors may start anew.
    *
    * @returns {Solver}
    */

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
  *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: cc0c51b96879c1fa03c90c7a3cbbd67cb9c993b724f2a807efb48bf2e5b063bf
+ * body-sha256: 3c388a9cf6f1e1a71c405ef7bd71558436b8089abb4c9143a94b5fcfaed85be5
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -143,8 +143,11 @@ typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES];
 #define kowalevski_gauss_EACH_LANE
 #endif
 
-/* Gauss collocation: the weights b_j, and the matrix mu = A diag(1/b) that mixes the stages; row j has the
-   factors of stage j. mu_ij + mu_ji is 1, without rounding: so the method is symplectic. */
+/* Gauss collocation: the nodes c_j, the weights b_j, and the matrix mu = A diag(1/b) that mixes the stages;
+   row j has the factors of stage j. mu_ij + mu_ji is 1, without rounding: so the method is symplectic. */
+static const double kowalevski_gauss_nodes[kowalevski_gauss_NODES] = { 0.019855071751231884,
+    0.10166676129318664, 0.2372337950418355, 0.4082826787521751, 0.591717321247825, 0.7627662049581645,
+    0.8983332387068134, 0.9801449282487681 };
 static const double kowalevski_gauss_weights[kowalevski_gauss_WIDTH] = { 0.05061426814518813,
     0.11119051722668724, 0.15685332293894363, 0.181341891689181, 0.181341891689181, 0.15685332293894363,
     0.11119051722668724, 0.05061426814518813 };
@@ -419,6 +422,46 @@ static inline double kowalevski_gauss_change_of(double scale, kowalevski_gauss_l
     return (even + odd) / (double)kowalevski_gauss_NODES;
 }
 
+/* Collocation polynomial: factors of the stage increments in the offsets of the unknowns from the end of a
+   step, at a fraction of the step. They are integrals of Lagrange polynomials from 1 on, as sums of Legendre
+   polynomials. */
+static void kowalevski_gauss_factors_at(double fraction, double factor[kowalevski_gauss_NODES])
+{
+    const double x = 2.0 * fraction - 1.0;
+    double below = 1.0, here = x, node_below[kowalevski_gauss_NODES], node[kowalevski_gauss_NODES];
+    for (int j = 0; j < kowalevski_gauss_NODES; ++j) {
+        factor[j] = fraction - 1.0;
+        node_below[j] = 1.0;
+        node[j] = 2.0 * kowalevski_gauss_nodes[j] - 1.0;
+    }
+    for (int k = 1; k < kowalevski_gauss_NODES; ++k) {
+        const double b = (double)k / (double)(k + 1), a = 1.0 + b, above = a * x * here - b * below;
+        for (int j = 0; j < kowalevski_gauss_NODES; ++j) {
+            const double node_above = a * (2.0 * kowalevski_gauss_nodes[j] - 1.0) * node[j]
+                - b * node_below[j];
+            factor[j] += 0.5 * node[j] * (above - below);
+            node_below[j] = node[j];
+            node[j] = node_above;
+        }
+        below = here;
+        here = above;
+    }
+}
+
+/* Values of the unknowns in a step of another size, the last one times a ratio, by the collocation
+   polynomial. */
+static void kowalevski_gauss_predict_at(kowalevski_gauss_history *past, double ratio,
+    kowalevski_gauss_lanes *z)
+{
+    double factor[kowalevski_gauss_NODES];
+    for (int i = 0; i < kowalevski_gauss_NODES; ++i) {
+        kowalevski_gauss_factors_at(1.0 + ratio * kowalevski_gauss_nodes[i], factor);
+        for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k)
+            for (int j = 0; j < kowalevski_gauss_NODES; ++j)
+                z[k][i] += factor[j] * past->moves[past->latest][k][j];
+    }
+}
+
 /* Values of the unknowns that a predictor derives from the increments of the last steps. */
 static void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predictor, kowalevski_gauss_lanes *z)
 {
@@ -464,6 +507,9 @@ static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, const double e
 {
     kowalevski_gauss_history *past = &s->history;
     const int older = past->latest, latest = kowalevski_gauss_EARLIER - 1 - older;
+    if (memcmp(&s->h, &past->h, sizeof s->h) != 0) past->count = 0; /* predictors read steps of one size */
+    past->h = s->h;
+    past->kicked = 0;
     kowalevski_gauss_lanes last[kowalevski_gauss_UNKNOWNS];
     memcpy(last, past->moves[older], sizeof last);
     kowalevski_gauss_see(s, end, last, past->moves[older]);
@@ -524,11 +570,14 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
         { { 0.0 } };
     kowalevski_gauss_progress progress = { HUGE_VAL, 0, 0 };
     for (int i = 0; i < kowalevski_gauss_NODES; ++i) weights[0][i] = s->h * kowalevski_gauss_weights[i];
-    if (past->count > 0) {
+    if (past->count > 0 && !memcmp(&s->h, &past->h, sizeof s->h) != 0) {
         kowalevski_gauss_predict(past, past->count < kowalevski_gauss_EARLIER
             ? kowalevski_gauss_PREDICTORS - 1 : past->predictor, z);
     } else {
         memset(z, 0, sizeof z);
+        if (past->count > 0 && fabs(s->h) <= fabs(past->h))
+            kowalevski_gauss_predict_at(past, s->h / past->h, z);
+        if (past->count > 1) past->count = 1;
         past->rate = 0.5;
         past->sweeps = 2;
     }
@@ -611,7 +660,6 @@ kowalevski_gauss_status kowalevski_gauss_integrate(kowalevski_gauss_solver *s, d
         s->h = h;
         s->t_before_h = s->t;
         s->steps_before_h = s->steps;
-        memset(&s->history, 0, sizeof s->history);
     }
     for (; steps > 0; --steps) {
         const kowalevski_gauss_status status = kowalevski_gauss_stage(s);
@@ -643,6 +691,29 @@ kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
 {
     if (s == NULL || change == NULL) return kowalevski_gauss_BAD_ARGUMENT;
     if (!kowalevski_gauss_advance(s, change, s->carry)) return kowalevski_gauss_BAD_ARGUMENT;
+    s->history.kicked = 1; /* the moves of the last step still predict those of the next one */
+    return kowalevski_gauss_OK;
+}
+
+kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solver *s, const double *fraction,
+    size_t count, double *x)
+{
+    if (s == NULL || fraction == NULL || x == NULL) return kowalevski_gauss_BAD_ARGUMENT;
+    if (s->history.count == 0 || s->history.kicked) return kowalevski_gauss_BAD_ARGUMENT;
+    double factor[kowalevski_gauss_NODES], z[kowalevski_gauss_UNKNOWNS], point[kowalevski_gauss_POINT],
+        change[kowalevski_gauss_DIM];
+    kowalevski_gauss_start(s, point);
+    for (size_t row = 0; row < count; ++row) {
+        kowalevski_gauss_factors_at(fraction[row], factor);
+        for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
+            z[k] = 0.0;
+            for (int j = 0; j < kowalevski_gauss_NODES; ++j)
+                z[k] += factor[j] * s->history.moves[s->history.latest][k][j];
+        }
+        kowalevski_gauss_stage_change(s->coef, point, z, change);
+        for (int i = 0; i < kowalevski_gauss_DIM; ++i)
+            x[row * kowalevski_gauss_DIM + (size_t)i] = s->x[i] + change[i];
+    }
     return kowalevski_gauss_OK;
 }
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bbfea0e067e1bd28fd36618a238d2630527baeff10d39cd3d9ce8e011f8ec694
+ * body-sha256: 5d6ea4b871ea0df78957cad53d25463787ca441c6187cfb32bca61a0bee52e58
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -43,6 +43,8 @@ typedef struct {
     int predictor; /* number of the predictor */
     int age;       /* steps since all predictors were compared for the first time */
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
+    int kicked;    /* whether the state was changed since the last step */
+    double h;      /* size of the last step */
     /* stage increments of the last steps, in the frame of the end of the last one */
     double moves[kowalevski_gauss_EARLIER][kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
 } kowalevski_gauss_history;
@@ -79,6 +81,14 @@ kowalevski_gauss_status kowalevski_gauss_set_state(kowalevski_gauss_solver *s,
     const double x[kowalevski_gauss_DIM]);
 kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
     const double change[kowalevski_gauss_DIM]);
+
+/* The states at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial:
+   x[r * kowalevski_gauss_DIM + i] is x_i at fraction[r]. They are far less accurate than steps, and off the
+   leaf by their error: they serve to find events. The state at an event, as accurate as those of whole steps,
+   is reached by a copy of *s in a step of size (fraction - 1) h. kowalevski_gauss_BAD_ARGUMENT before the
+   first step, and after a change of the state. */
+kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solver *s, const double *fraction,
+    size_t count, double *x);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

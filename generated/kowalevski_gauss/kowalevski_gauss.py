@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 72 additions, 95 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 2939b154f01c041e0149f2a974a7f34a2515e856f8adff2048aec560917544f8
+# body-sha256: 86879e4b767a208c0c588fc93a75353bea4a18d0ecdbb8997ef8be20a1bb3577
 import numpy as np
 
 VERSION = "0.1.0"
@@ -216,7 +216,8 @@ ROUNDING = 4e-16  # ... if it changes no more than this: a part of 0.4 let Casim
 NEARLY_ROUNDING = 2e-14  # so is the second up to this that changes no less than the one before
 TRIALS = 32  # steps from one comparison of predictors to the next: it takes as long as two sweeps
 
-# Gauss collocation: the weights, and the matrix mu that mixes the stages; mu + mu.T is 1 everywhere, without rounding.
+# Gauss collocation: nodes, weights, and the matrix mu that mixes the stages; mu + mu.T is 1 everywhere, without rounding.
+NODES = np.array((0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751, 0.591717321247825, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681,))
 WEIGHTS = np.array((0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.181341891689181, 0.181341891689181, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813,))
 MIXING = np.array([
     [0.5, -0.08189496310558142, 0.040042703777944944, -0.02472134580320029, 0.016976173236371128, -0.012225914113298098, 0.00874856676919733, -0.005482808253215898],
@@ -294,11 +295,39 @@ def _solved(stage, x, z):
     return found, status
 
 
+def _factors_at(fractions):
+    """Factors of the moves in the offsets from the end of a step, (fractions, stages): the collocation polynomial.
+
+    They are integrals of Lagrange polynomials from 1 on, as sums of Legendre polynomials.
+    """
+    x, nodes = 2 * np.reshape(fractions, (-1, 1)) - 1, 2 * NODES - 1
+    legendre = np.polynomial.legendre.legvander
+    at, at_nodes = legendre(x[:, 0], len(NODES)), legendre(nodes, len(NODES))
+    return (x - 1) / 2 + 0.5 * (at[:, 2:] - at[:, :-2]) @ at_nodes[:, 1:-1].T
+
+
+def _interpolated(stage, x, moves, fractions):
+    """States at fractions of a step that ends at x, (fractions, DIM), from its moves as seen from its end."""
+    offsets = np.moveaxis(moves @ _factors_at(fractions).T, -1, 1)[:, :, 0]
+    return x + _stage_change(stage[0], _point(stage, np.repeat(x, len(fractions), axis=0))[:, 0], offsets)
+
+
+def _with_new_step(memory, ratio):
+    """The memory for a step of another size, that of the last one times a ratio: it holds the unknowns themselves."""
+    if memory[1].ndim != 3 or not abs(ratio) <= 1:
+        return (np.zeros((1, 1)),) * 2
+    return (np.matmul(memory[1], _factors_at(1 + ratio * NODES).T)[np.newaxis],) * 2
+
+
 def _advance(stage, x, carry, memory):
-    """One step of all members; `memory` holds the moves of the last step, and these as seen from its end, once there was one."""
-    predicted = memory[1].ndim == 3
+    """One step of all members.
+
+    `memory` holds the moves of the last step, and these as seen from its end, once there was one, or the start of the sweeps.
+    """
+    predicted = memory[1].ndim > 2
     anew = np.zeros((8, len(x), len(WEIGHTS)))
-    moves, status = _solved(stage, x, memory[1] @ PREDICTION.T if predicted else anew)
+    start = memory[1] @ PREDICTION.T if memory[1].ndim == 3 else memory[1][0] if predicted else anew
+    moves, status = _solved(stage, x, start)
     failed = np.flatnonzero(status != "")
     if predicted and len(failed):
         # A prediction may mislead: once more without.

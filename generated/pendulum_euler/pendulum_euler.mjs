@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8dad40c92e4ae16b983b6e38fd03e10f7b8ac05933474622e54f00e601f68928
+ * body-sha256: 3488f48fea992fb5c61009e4a1eb36243d016a4a2ae674c9a114b3c7c99f83eb
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -238,7 +238,7 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state. Its predictors start anew.
+   * Return an independent solver with the same state. Predictors may start anew.
    *
    * @returns {Solver}
    */

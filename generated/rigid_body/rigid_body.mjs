@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 91e5f1e8b2113b1e70b7e033175151caf803b48b13f808b17788acc32463b9ac
+ * body-sha256: bbc6539cdadfd72890d81f78222f17ac0d4df993394d2a3b3a26f5d7248cb7fb
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -658,7 +658,7 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state. Its predictors start anew.
+   * Return an independent solver with the same state. Predictors may start anew.
    *
    * @returns {Solver}
    */

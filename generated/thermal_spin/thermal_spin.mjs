@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f7924a7f61919898cad80bb2dfefcaebf005c304c15957dd1cbc286757aa0706
+ * body-sha256: b0cee9600809f737b74ceb0c1835ad90fc4e7100620050159387be1355eaf70b
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -460,7 +460,7 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state. Its predictors start anew.
+   * Return an independent solver with the same state. Predictors may start anew.
    *
    * @returns {Solver}
    */

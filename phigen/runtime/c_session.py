@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,6 +96,18 @@ class CSession:
         if status:
             raise BackendError(status_name(status), segment.first, self._x.reshape(1, -1).astype(np.float64))
         return rows
+
+    def interpolated(self, fractions: Sequence[float]) -> Floats | None:
+        """See `Session`."""
+        if not hasattr(self._c, "interpolate"):
+            return None
+        at = np.asarray(fractions, dtype=self._real)
+        buffer = bytearray(len(at) * self._x.nbytes)
+        place = (ctypes.c_char * len(buffer)).from_buffer(buffer)
+        if self._c.interpolate(self.address, at.tobytes(), len(at), place):
+            return None
+        states: Floats = np.frombuffer(buffer, dtype=self._real).reshape(len(at), -1).astype(np.float64, copy=False)
+        return states
 
     def branch(self) -> CSession:
         """See `Session`."""

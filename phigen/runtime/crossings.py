@@ -2,6 +2,9 @@
 
 Between two steps of size h, the solution is a single step of size θh, 0 < θ < 1, from the state before. The crossing is
 at the θ for which g vanishes to round-off. So the points lie on the leaf, without interpolation.
+
+A method with a collocation polynomial is searched for zeros of g on that. From there Newton's method takes steps of
+size (θ − 1)h from the state after; these start from the polynomial too.
 """
 
 from __future__ import annotations
@@ -9,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -27,6 +29,14 @@ Function = Callable[..., Floats]
 
 #: Steps between two evaluations of g on arrays, by default; a copy of the session is held for each.
 BLOCK = 64
+#: Values of g in each step where a collocation polynomial gives them: enough for the extrema of a motion that makes
+#: half a turn in a step.
+SAMPLES = 4
+#: Half the distance of the two points on a collocation polynomial by which g is differentiated, in steps: about the
+#: cube root of rounding.
+_DIFFERENCE = 1e-5
+#: Largest number of steps by Newton's method to a zero, which takes two to four.
+_MOST_NEWTON = 8
 #: Numbers of equal steps that reach a point between two steps, tried in this order: a single step without a predictor
 #: may not converge.
 SUBSTEPS = (1, 2, 4, 8)
@@ -67,12 +77,13 @@ def section_columns(coordinates: tuple[str, ...]) -> list[Column]:
 class CrossingFinder(Generic[C]):
     """Locates the zeros of g along a session with steps of size h, in a ``direction`` as time increases.
 
-    At most one crossing is found between two steps. If g has the same sign at three steps and an extremum between
-    them, the extremum is located, in case g changes its sign twice there. A start with g = 0 counts as a crossing if g
-    leaves zero in the direction.
+    At most one crossing is found between two points: steps or, with a collocation polynomial, parts of steps. If g has
+    the same sign at three points and an extremum between them, the extremum is located, in case g changes its sign
+    twice there. A start with g = 0 counts as a crossing if g leaves zero in the direction.
 
-    ``past`` are copies of the session at the last steps except the latest. ``values`` are those of g at these steps and
-    the latest, ``first`` is the number of the first of them. ``t0`` is the time of step 0; g receives times if it is
+    ``past`` are copies of the session at the last steps except the latest, which is ``latest``. ``values`` are those of
+    g at these steps and the latest, and at the points between them, of which each step has ``points``; ``first`` is the
+    number of the first of these steps. ``t0`` is the time of step 0; g receives times if it is
     ``timed``. ``places`` are sessions at the crossings of the latest block, with their numbers of steps from the start.
     A ``block`` is the number of steps between two evaluations of g on arrays.
     """
@@ -87,6 +98,8 @@ class CrossingFinder(Generic[C]):
     direction: str = "rising"
     places: list[tuple[float, C]] = field(default_factory=list)
     block: int = BLOCK
+    points: int = 1
+    latest: C | None = None
     _sign: float = 1.0  # crossings of sign·g that rise are searched; falling ones are the rising ones of −g
 
     def follow(
@@ -100,7 +113,8 @@ class CrossingFinder(Generic[C]):
             self.first = session.steps
             self.values = [self._value(session, 0, 0.0)]
         while steps > 0:
-            states, clocks, failure, known = [], list[float](), None, len(self.values) - 1
+            states, inner, clocks, failure = [], list[Floats](), list[float](), None
+            known = (len(self.values) - 1) // self.points
             for _ in range(min(steps, self.block)):
                 before = session.branch()
                 try:
@@ -110,18 +124,28 @@ class CrossingFinder(Generic[C]):
                     break
                 self.past.append(before)
                 states.append(session.state())
+                inner.append(self._inside(session))
                 clocks.append(self._clock(session, math.nan))
             steps -= len(states)
             if states:
-                rows = np.array(states)
+                rows, self.latest, self.points = np.array(states), session, 1 + len(inner[0])
                 self.first = session.steps - len(rows) - known
-                counted = self._time(known + 1 + np.arange(len(rows)))
-                times = counted if math.isnan(clocks[0]) else np.array(clocks)
-                self.values += self._values(rows, times).tolist()
-                yield rows, list(self._crossings(known))
-                self.past, self.values = self.past[-1:], self.values[-2:]
+                counted = self._time(self.points * known + np.arange(1, self.points * len(rows) + 1))
+                times = counted if self.points > 1 or math.isnan(clocks[0]) else np.array(clocks)
+                points = np.concatenate([np.array(inner), rows[:, np.newaxis]], axis=1) if self.points > 1 else rows
+                self.values += self._values(points.reshape(-1, rows.shape[1]), times).tolist()
+                yield rows, list(self._crossings(self.points * known))
+                self.past, self.values = self.past[-1:], self.values[-self.points - 1 :]
             if failure:
                 raise failure
+
+    def _inside(self, session: C) -> Floats:
+        """Return states (points, DIM) between the last two steps, if the session interpolates and g reads no clock."""
+        interpolated = getattr(session, "interpolated", None)
+        if interpolated is None or (self.timed and not math.isnan(self._clock(session, math.nan))):
+            return np.empty((0, 0))
+        states: Floats | None = interpolated([k / SAMPLES for k in range(1, SAMPLES)])
+        return np.empty((0, 0)) if states is None else states
 
     def within(self, session: C, part: float) -> list[tuple[float, Floats]]:
         """Return the crossings (t, x) in the first ``part`` of the next step of a session, which is not advanced.
@@ -134,11 +158,11 @@ class CrossingFinder(Generic[C]):
                 inside = [place for place in self.places if place[0] <= end]
         except BackendError:
             return []
-        return [(self._clock(there, self._time(at - self.first)), there.state()) for at, there in inside]
+        return [(self._clock(there, self.t0 + at * self.h), there.state()) for at, there in inside]
 
     def _time(self, j: Any, fraction: float = 0.0) -> Any:
         """Return the time at a fraction of interval j, where interval 0 begins at the first of the values."""
-        return self.t0 + (self.first + j + fraction) * self.h
+        return self.t0 + (self.first + (j + fraction) / self.points) * self.h
 
     def _values(self, states: Floats, t: Floats) -> Floats:
         # The direction refers to increasing time, so the sign of g is reversed for negative steps.
@@ -158,20 +182,20 @@ class CrossingFinder(Generic[C]):
             self.places += self._rising(known)
         self.places.sort(key=lambda place: place[0])
         for at, there in self.places:
-            yield self._clock(there, self._time(at - self.first)), there.state()
+            yield self._clock(there, self.t0 + at * self.h), there.state()
 
     def _rising(self, known: int) -> Iterator[tuple[float, C]]:
         v = [self._sign * value for value in self.values]
         if known == 0 and v[0] == 0 < v[1]:
             yield self.first, self.past[0]
         for i in range(len(v) - 1):
-            if i >= 1 and (bracket := self._hidden(v, i)):
+            if i >= max(1, known) and (bracket := self._hidden(v, i)):
                 yield self._located(*bracket)
             if i >= known and v[i] < 0 <= v[i + 1]:
                 yield self._located(i, 0.0, v[i], 1.0, v[i + 1])
 
     def _hidden(self, v: list[float], i: int) -> tuple[int, float, float, float, float] | None:
-        """Return an interval beside step i and a bracket in it, if an extremum near step i changes the sign of g."""
+        """Return an interval beside point i and a bracket in it, if an extremum near that changes the sign of g."""
         a, b, c = v[i - 1 : i + 2]
         peak = a < b >= c and b < 0
         if not (peak or (a > b <= c and b >= 0 and a >= 0)):
@@ -211,13 +235,27 @@ class CrossingFinder(Generic[C]):
                 at_right = self._at(j, right)
         return left if sign * at_left < sign * at_right else right
 
-    def _at(self, j: int, fraction: float, substeps: Sequence[int] = SUBSTEPS) -> float:
-        return self._sign * self._value(self._moved(j, fraction, substeps), j, fraction)
+    def _at(self, j: int, fraction: float) -> float:
+        """Return g at a fraction of interval j, on the collocation polynomial if there is one."""
+        step, part = divmod(j, self.points)
+        if self.points > 1:
+            return self._on_polynomial(step, [(part + fraction) / self.points])[0]
+        return self._sign * self._value(self._moved(step, fraction, SUBSTEPS), j, fraction)
 
-    def _moved(self, j: int, fraction: float, substeps: Sequence[int]) -> C:
-        """Return a session after a fraction of step j, made in the first number of equal steps that does not fail."""
+    def _on_polynomial(self, step: int, fractions: Sequence[float]) -> list[float]:
+        """Return g at fractions of a step, on its collocation polynomial."""
+        states = self._after(step).interpolated(fractions)
+        times = self._time(self.points * (step + np.array(fractions)))
+        return [self._sign * float(value) for value in self._values(states, times)]
+
+    def _after(self, step: int) -> Any:
+        """Return the session after a step; it must not be advanced."""
+        return self.past[step + 1] if step + 1 < len(self.past) else self.latest
+
+    def _moved(self, step: int, fraction: float, substeps: Sequence[int]) -> C:
+        """Return a session after a fraction of a step, made in the first number of equal steps that does not fail."""
         for count in substeps:
-            session = self.past[j].branch()
+            session = self.past[step].branch()
             try:
                 session.advance(fraction * self.h / count, count)
             except BackendError:
@@ -229,17 +267,53 @@ class CrossingFinder(Generic[C]):
 
     def _located(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C]:
         """Return the crossing in interval j between two fractions: its number of steps, and a session there."""
+        step, part = divmod(j, self.points)
+        low, high = (part + low) / self.points, (part + high) / self.points
+        if self.points > 1 and (polished := self._polished(step, low, at_low, high, at_high)):
+            fraction, there = polished
+            return self.first + step + fraction, there
+
+        def value(fraction: float) -> float:
+            there = self._moved(step, fraction, (count,))
+            return self._sign * self._value(there, self.points * step, self.points * fraction)
+
         for count in SUBSTEPS:
             # All fractions take the same number of substeps, so that g is a smooth function of the fraction.
             try:
-                fraction = root(partial(self._at, j, substeps=(count,)), low, at_low, high, at_high)
-                there = self._moved(j, fraction, (count,))
+                fraction = root(value, low, at_low, high, at_high)
+                there = self._moved(step, fraction, (count,))
             except BackendError:
                 if count == SUBSTEPS[-1]:
                     raise
             else:
                 break
-        return self.first + j + fraction, there
+        return self.first + step + fraction, there
+
+    def _polished(self, step: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C] | None:
+        """Return the fraction of a step and the session of the zero that is nearest to one on its polynomial.
+
+        None if steps by Newton's method do not converge to it, as where g has a double zero.
+        """
+        fraction = root(lambda at: self._on_polynomial(step, [at])[0], low, at_low, high, at_high)
+        before, after = self._on_polynomial(step, [fraction - _DIFFERENCE, fraction + _DIFFERENCE])
+        slope, best = (after - before) / (2 * _DIFFERENCE), math.inf
+        place: tuple[float, C] | None = None
+        for _ in range(_MOST_NEWTON):
+            there: C = self._after(step).branch()
+            try:
+                if fraction < 1:
+                    there.advance((fraction - 1) * self.h, 1)
+            except BackendError:
+                return None
+            value = self._sign * self._value(there, self.points * step, self.points * fraction)
+            if not abs(value) < best:  # rounding, unless the step that led here was not small
+                return place if best <= abs(slope) * math.sqrt(self._after(step).rounding) else None
+            best, place = abs(value), (fraction, there)
+            following = min(1.0, max(0.0, fraction - value / slope)) if slope else math.nan
+            if abs(following - fraction) <= np.finfo(float).eps:
+                return place
+            fraction = following
+        return None
 
     def _clock(self, session: C, counted: float) -> float:
         """Return the physical time of a session if its steps are equal in τ, else the ``counted`` time."""

@@ -145,7 +145,11 @@ class MemberBatch:
         self.failed_at = self._done if self.failed_at < 0 else self.failed_at
         self.who, self.x, self._carry = self.who[remaining], self.x[remaining], self._carry[remaining]
         self._before = self._before[remaining]
-        self._memory = [(a[remaining], b[remaining]) for a, b in self._memory]
+        # Members are the last axis but one: arrays of Gauss methods are (unknowns, members, stages).
+        self._memory = [
+            (np.take(a, remaining, max(a.ndim - 2, 0)), np.take(b, remaining, max(b.ndim - 2, 0)))
+            for a, b in self._memory
+        ]
         self._stages = [self._module._stage_at(stage, remaining) for stage in self._stages]
         if self._first is not None:
             self._first, self._turned = self._first[remaining], (self._turned[0][remaining], self._turned[1][remaining])

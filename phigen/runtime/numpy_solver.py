@@ -9,7 +9,7 @@ Sessions call the functions that the module's ``integrate`` consists of: ``_valu
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -115,12 +115,17 @@ class NumpySession:
         self._stand(*self._module._sum(self._x, self._carry, change[np.newaxis]))
 
     def _stand(self, x: Floats, carry: Floats) -> None:
-        """Replace the state and its compensation term. Predictors are offsets from the state, and stay as they are."""
+        """Replace the state and its compensation term. Predictors are offsets from the state, and stay as they are.
+
+        Those of Gauss methods begin anew, as the last step does not lead to the state.
+        """
         monitored = hasattr(self._module, "_refused")
         if not np.isfinite(x).all() or (monitored and len(self._module._refused(self._values(), x))):
             raise BackendError("BAD_ARGUMENT", self.steps, self._x.copy())
         element = None if self._turned is None else self.element()
         self._x, self._carry = x, carry
+        if hasattr(self._module, "_interpolated"):
+            self._memory = [(np.zeros_like(x),) * 2] * len(self._stages)
         if monitored:  # e = -H
             self._gauge = self._module.gauge(x[0], **self._parameters)
             if np.isfinite(self._h):
@@ -214,6 +219,16 @@ class NumpySession:
             self._commit(x, carry, memory, stages)
         return tangent
 
+    def interpolated(self, fractions: Sequence[float]) -> Floats | None:
+        """See `Session`."""
+        if not hasattr(self._module, "_interpolated") or not self._memory or self._memory[0][1].ndim != 3:
+            return None
+        with np.errstate(all="ignore"):
+            states: Floats = self._module._interpolated(
+                self._stages[0], self._x, self._memory[0][1], np.asarray(fractions)
+            )
+        return states
+
     def branch(self) -> NumpySession:
         """See `Session`."""
         state = self._x, self._carry, self._gauge, self._t, self._draws
@@ -259,9 +274,12 @@ class NumpySession:
     def _prepare(self, h: float) -> None:
         if h != self._h:
             self._t, self._counted = self._now(), self.steps
-            self._h = h
+            ratio, self._h = h / self._h, h
             self._stages = self._new_stages()
-            self._memory = [(np.zeros_like(self._x),) * 2] * len(self._stages)
+            if self._memory and hasattr(self._module, "_with_new_step"):
+                self._memory = [self._module._with_new_step(pair, ratio) for pair in self._memory]
+            else:
+                self._memory = [(np.zeros_like(self._x),) * 2] * len(self._stages)
 
     def _new_stages(self) -> list[Stage]:
         with np.errstate(all="ignore"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol, Self
 
 import numpy as np
@@ -68,6 +68,14 @@ class Session(Followed, Protocol):
         """Make one step, and return its derivative (DIM, DIM).
 
         Raises `MissingExtraError` without the extra ``tangent``.
+        """
+        ...
+
+    def interpolated(self, fractions: Sequence[float]) -> Floats | None:
+        """Return states (fractions, DIM) at fractions of the last step, 0 at its start, by its collocation polynomial.
+
+        They are far less accurate than steps, and serve to locate events. None if the method has no polynomial, and
+        where the last step does not lead to the state.
         """
         ...
 

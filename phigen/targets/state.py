@@ -180,8 +180,9 @@ STATE = (
         "history",
         "GUESSED",
         ("phi_history PHI_OF(history, PHI_STAGES); /* predictor of the starting value of the iteration */",),
-        reset=("PHI_FORGET(s->history);",),
     ),
+    StateBlock("steps", "GAUSS", copied=("twin.history = this.history.map((history) => history.copy());",)),
+    StateBlock("forgotten", "GUESSED && !GAUSS", reset=("PHI_FORGET(s->history);",)),
     StateBlock(
         "recurrence",
         "RECURRENCES",

@@ -110,6 +110,7 @@ CONDITIONS = {
     "history_gauss.h": "GAUSS",
     "history_recurrences.h": "RECURRENCES",
     "implicit.c": "IMPLICIT",
+    "interpolate.c": "GAUSS && !DEVICE",
     "lane_functions_double.c": "!SINGLE",
     "lane_functions_single.c": "SINGLE",
     "lattice_adjoint.c": "ADJOINT",

@@ -67,6 +67,7 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
     older = [f"matrix[{table.stages + j}][lane] * before[{j}]" for j in range(table.stages)]
     values = {
         "NAME": program.name,
+        "nodes": _row(table.nodes, table.stages),
         "weights": _row(table.weights, width),
         "mixing": _columns(table.mixing, width),
         "predictors": len(predictions),

@@ -78,6 +78,7 @@ def _collocation(program: Program, step: Gauss) -> list[str]:
         "plain": step.plain,
         "point": program.dimension + bool(program.time),
         "most_sweeps": step.most_sweeps,
+        "nodes": json.dumps(table.nodes),
         "weights": json.dumps(table.weights),
         "mixing": [json.dumps(row) for row in table.mixing],
         "prediction": [json.dumps(row) for row in table.prediction],

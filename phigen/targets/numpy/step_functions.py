@@ -125,6 +125,7 @@ def _gauss_adjoint(program: Program, step: Gauss) -> StepPart:
 
 def _gauss_values(step: Gauss) -> dict[str, object]:
     return {
+        "nodes": listed(step.tableau.nodes),
         "weights": listed(step.tableau.weights),
         "mixing": [", ".join(map(repr, row)) for row in step.tableau.mixing],
         "prediction": [", ".join(map(repr, row)) for row in step.tableau.prediction],

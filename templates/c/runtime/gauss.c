@@ -82,6 +82,41 @@ static inline double phi_change_of(double scale, phi_lanes *before, phi_lanes *a
     return (even + odd) / (double)PHI_NODES;
 }
 
+/* Collocation polynomial: factors of the stage increments in the offsets of the unknowns from the end of a step, at a
+   fraction of the step. They are integrals of Lagrange polynomials from 1 on, as sums of Legendre polynomials. */
+static void phi_factors_at(double fraction, double factor[PHI_NODES])
+{
+    const double x = 2.0 * fraction - 1.0;
+    double below = 1.0, here = x, node_below[PHI_NODES], node[PHI_NODES];
+    for (int j = 0; j < PHI_NODES; ++j) {
+        factor[j] = fraction - 1.0;
+        node_below[j] = 1.0;
+        node[j] = 2.0 * phi_nodes[j] - 1.0;
+    }
+    for (int k = 1; k < PHI_NODES; ++k) {
+        const double b = (double)k / (double)(k + 1), a = 1.0 + b, above = a * x * here - b * below;
+        for (int j = 0; j < PHI_NODES; ++j) {
+            const double node_above = a * (2.0 * phi_nodes[j] - 1.0) * node[j] - b * node_below[j];
+            factor[j] += 0.5 * node[j] * (above - below);
+            node_below[j] = node[j];
+            node[j] = node_above;
+        }
+        below = here;
+        here = above;
+    }
+}
+
+/* Values of the unknowns in a step of another size, the last one times a ratio, by the collocation polynomial. */
+static void phi_predict_at(phi_history *past, double ratio, phi_lanes *z)
+{
+    double factor[PHI_NODES];
+    for (int i = 0; i < PHI_NODES; ++i) {
+        phi_factors_at(1.0 + ratio * phi_nodes[i], factor);
+        for (int k = 0; k < PHI_UNKNOWNS; ++k)
+            for (int j = 0; j < PHI_NODES; ++j) z[k][i] += factor[j] * past->moves[past->latest][k][j];
+    }
+}
+
 /* Values of the unknowns that a predictor derives from the increments of the last steps. */
 static void phi_predict(phi_history *past, int predictor, phi_lanes *z)
 {
@@ -137,6 +172,9 @@ static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lane
 {
     phi_history *past = &s->history;
     const int older = past->latest, latest = PHI_EARLIER - 1 - older;
+    if (PHI_DIFFERS(s->h, past->h)) past->count = 0; /* predictors read steps of one size */
+    past->h = s->h;
+    past->kicked = 0;
 #if PHI_FRAMED
 #if PHI_STAGED
     phi_lanes last[PHI_UNKNOWNS];
@@ -188,10 +226,12 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
     phi_lanes z[PHI_UNKNOWNS], next[PHI_UNKNOWNS], weights[1] = { { 0.0 } };
     phi_progress progress = { HUGE_VAL, 0, 0 };
     for (int i = 0; i < PHI_NODES; ++i) weights[0][i] = s->h * phi_weights[i];
-    if (past->count > 0) {
+    if (past->count > 0 && !PHI_DIFFERS(s->h, past->h)) {
         phi_predict(past, past->count < PHI_EARLIER ? PHI_PREDICTORS - 1 : past->predictor, z);
     } else {
         PHI_CLEAR_STAGES(z);
+        if (past->count > 0 && fabs(s->h) <= fabs(past->h)) phi_predict_at(past, s->h / past->h, z);
+        if (past->count > 1) past->count = 1;
         past->rate = 0.5;
         past->sweeps = 2;
     }

@@ -11,6 +11,8 @@ typedef struct {
     int age;       /* steps since all predictors were compared for the first time */
 #endif
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
+    int kicked;    /* whether the state was changed since the last step */
+    double h;      /* size of the last step */
     double moves[PHI_EARLIER][PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last steps, in the frame of the end of the last one */
 #if PHI_FRAMED && PHI_ADJOINT
     double solved[PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last step in the frame of its start, for the tape */

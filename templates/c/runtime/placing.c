@@ -59,7 +59,9 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
     PHI_TAKE_LEVEL(s, from)
 #if PHI_RECURRENCES
     phi_move_guesses(s, from);
-#elif PHI_GUESSED && !PHI_GAUSS
+#elif PHI_GAUSS
+    s->history.kicked = 1; /* the moves of the last step still predict those of the next one */
+#elif PHI_GUESSED
     PHI_EACH_STAGE
         for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif

@@ -77,6 +77,12 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM]);
    random ones. */
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw);
 
+/* The states at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial: x[r * PHI_DIM
+   + i] is x_i at fraction[r]. They are far less accurate than steps, and off the leaf by their error: they serve to find
+   events. The state at an event, as accurate as those of whole steps, is reached by a copy of *s in a step of size
+   (fraction - 1) h. PHI_BAD_ARGUMENT before the first step, and after a change of the state. */
+phi_status phi_interpolate(const phi_solver *s, const double *fraction, size_t count, double *x);
+
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 #if PHI_GROUPS || PHI_PACKS

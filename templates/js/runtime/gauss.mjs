@@ -1,6 +1,6 @@
 import { advance } from "./algebra.mjs";
 import { MOST_RISING, NEARLY_ROUNDING, ROUNDING, SOLVED, STALLED } from "./gauss_policy.mjs";
-import { DIM, MAX_SWEEPS, MIXING, PLAIN, POINT, PREDICTION, UNKNOWNS, WEIGHTS } from "./model.mjs";
+import { DIM, MAX_SWEEPS, MIXING, PLACES, PLAIN, POINT, PREDICTION, UNKNOWNS, WEIGHTS } from "./model.mjs";
 import { stageChange, stageField } from "./model.mjs";
 import { turnStage } from "./attitude_stages.mjs";
 import { keepMove } from "./gauss_framed.mjs";
@@ -23,8 +23,9 @@ export class History {
   /** Sweeps that the last step took, and the rate at which their changes shrink. */
   sweeps = 2;
   rate = 0.5;
-  /** The moves of the stages of the last step, as seen from its end. */
+  /** The moves of the stages of the last step, as seen from its end, and its size. */
   moves = stages();
+  h = NaN;
 
   /** Forget everything. */
   clear() {
@@ -35,6 +36,40 @@ export class History {
   move() {
     this.clear();
   }
+
+  /** An independent copy. */
+  copy() {
+    const twin = Object.assign(new History(), this);
+    twin.moves = this.moves.map((move) => Float64Array.from(move));
+    return twin;
+  }
+}
+
+/** Forget the last step, which does not lead to the state. */
+export function forgetSteps(solver) {
+  for (const history of solver.history) history.clear();
+}
+
+/**
+ * The factors of the moves in the offsets of the unknowns from the end of a step, at a fraction of it: the
+ * collocation polynomial, as integrals of Lagrange polynomials from 1 on, by sums of Legendre polynomials.
+ */
+export function factorsAt(fraction) {
+  const x = 2 * fraction - 1;
+  const factors = new Float64Array(NODES).fill(fraction - 1);
+  let [below, here] = [1, x];
+  let [nodesBelow, nodes] = [PLACES.map(() => 1), PLACES.map((place) => 2 * place - 1)];
+  for (let k = 1; k < NODES; k++) {
+    const b = k / (k + 1);
+    const a = 1 + b;
+    const above = a * x * here - b * below;
+    const nodesAbove = PLACES.map((place, j) => a * (2 * place - 1) * nodes[j] - b * nodesBelow[j]);
+    nodes.forEach((node, j) => {
+      factors[j] += 0.5 * node * (above - below);
+    });
+    [below, here, nodesBelow, nodes] = [here, above, nodes, nodesAbove];
+  }
+  return factors;
 }
 
 const point = new Float64Array(POINT);
@@ -95,10 +130,15 @@ export function collocate(solver, stage, start, history, moves) {
   let last = Infinity;
   let rising = 0;
   let rises = 0;
-  if (history.count > 0) {
+  if (history.count > 0 && solver.h === history.h) {
     mixed(PREDICTION, history.moves, predicted);
   } else {
-    for (const row of predicted) row.fill(0);
+    const ratio = solver.h / history.h;
+    if (history.count > 0 && Math.abs(ratio) <= 1) {
+      mixed(PLACES.map((place) => factorsAt(1 + ratio * place)), history.moves, predicted);
+    } else {
+      for (const row of predicted) row.fill(0);
+    }
     history.rate = 0.5;
     history.sweeps = 2;
   }
@@ -154,6 +194,7 @@ function attempt(solver, stage) {
   pass(solver, time);
   work.now.forEach((move, i) => keepMove(solver.coef[stage], end, move, history.moves[i]));
   history.count = 1;
+  history.h = solver.h;
   turnStage(solver, stage, end);
   return "OK";
 }

@@ -1,6 +1,7 @@
 import { StepError } from "./errors.mjs";
 import { restoreState, savedState } from "./saving.mjs";
 import { tangentOf } from "./tangent.mjs";
+import { forgetSteps } from "./gauss.mjs";
 
 /** Members of Solver: the derivative of a step. */
 export class Tangent {
@@ -19,6 +20,7 @@ export class Tangent {
     const { status, tangent } = tangentOf(this, at);
     if (status === "OK") return tangent;
     restoreState(this, before);
+    forgetSteps(this);
     Object.assign(this, { steps, h: NaN }); // coefficients belong to the time after the step
     throw new StepError(status, steps);
   }

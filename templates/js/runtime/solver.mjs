@@ -163,7 +163,7 @@ export class Solver {
 
   // #endif
   /**
-   * Return an independent solver with the same state. Its predictors start anew.
+   * Return an independent solver with the same state. Predictors may start anew.
    *
    * @returns {Solver}
    */
@@ -177,6 +177,7 @@ export class Solver {
 
   // #members kicks
   // #members tangent
+  // #members interpolate
   // #members ensemble
   /** The Hamiltonian, at x and its time or elsewhere. */
   hamiltonian(x = this.x, t = this.t) {

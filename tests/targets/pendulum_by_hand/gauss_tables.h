@@ -3,6 +3,7 @@
 #define GAUSS_TABLES_H
 #include <string.h>
 
+static const double phi_nodes[PHI_NODES] = { 0.5 };
 static const double phi_weights[PHI_WIDTH] = { 1.0 };
 static const double phi_mixing[PHI_NODES][PHI_WIDTH] = { { 0.5 } };
 enum { PHI_PREDICTORS = 1 };

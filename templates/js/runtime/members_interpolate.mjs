@@ -1,0 +1,29 @@
+import { StepError } from "./errors.mjs";
+import { endOf, factorsAt, startOf } from "./gauss.mjs";
+import { DIM } from "./model.mjs";
+import { stageChange } from "./model.mjs";
+
+/** Members of Solver: states inside of the last step. */
+export class Interpolation {
+  /**
+   * The states at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial.
+   * They are far less accurate than steps, and off the leaf by their error: they serve to find events. The
+   * state at an event, as accurate as those of whole steps, is reached by a copy of the solver in a step of
+   * size (fraction - 1) h. Throws StepError before the first step, and after a change of the state.
+   *
+   * @param {number[]} fractions
+   * @returns {Float64Array[]}
+   */
+  interpolate(fractions) {
+    const [history] = this.history;
+    if (!history.count) throw new StepError("BAD_ARGUMENT", this.steps, "no step leads to this state");
+    const start = startOf(this);
+    const change = new Float64Array(DIM);
+    return fractions.map((fraction) => {
+      const factors = factorsAt(fraction);
+      const parts = history.moves.map((move, j) => move.map((value) => factors[j] * value));
+      stageChange(this.coef[0], start, endOf(parts), change);
+      return this.x.map((value, i) => value + change[i]);
+    });
+  }
+}
