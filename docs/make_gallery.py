@@ -187,7 +187,8 @@ def lattice_facts(name: str) -> dict[str, Any]:
     made = solver.integrate(start.state, float(run.step), run.steps, run.stride, parameters=start.arguments, **about)
     errors = errors_of(compilation.cell, made)
     thin = max(1, len(made) // FRAMES)
-    few = replace(made, t=made.t[::thin], x=made.x[::thin], energy=made.energy[::thin])
+    rows = {name: getattr(made, name)[::thin] for name in ("t", "x", "energy", "observed")}
+    few = replace(made, **rows)
     names = run.lattice.names if run.lattice else ()
     thin_errors = {quantity: e[::thin] for quantity, e in errors.items()}
     drawn = lattice_figure(few, thin_errors, "", dots=SMALL, site_names=names)

@@ -208,7 +208,7 @@ def interface_of(program: Program) -> Interface:
         casimirs=program.casimirs,
         time=program.time,
         moving=frozenset(["energy", *program.pushed] if program.time or program.forced else ()),
-        monitored=program.monitor is not None,
+        monitored=program.is_monitored,
         attitude=program.attitude.shape if program.attitude else (),
         position=bool(program.attitude and program.attitude.group.translation),
         noise=program.noise.sources if program.noise else (),

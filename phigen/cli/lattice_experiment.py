@@ -17,7 +17,7 @@ from phigen.runtime.arguments import Beginning
 from phigen.runtime.interface import Draws, Floats, LatticeInterface
 from phigen.runtime.lattice_course import ObservedCourse
 from phigen.runtime.lattice_frames import state_columns
-from phigen.runtime.lattice_rows import IntegrationPlan, Past, strided, timed
+from phigen.runtime.lattice_rows import IntegrationPlan, Past, strided, timed, timed_in_tau
 from phigen.runtime.lattice_series import key_of
 
 if TYPE_CHECKING:
@@ -48,7 +48,10 @@ class LatticeExperiment(Experiment):
         state = solver.state(self.start.state if self.past is None else self.past.last, "x0")
         values = solver.values(self.parameters, {}, state.shape[1:])
         draws = Draws(self.run.seed, step=self.made) if solver.interface.noise else Draws()
-        return Beginning(state, self.h, values, self.begin if solver.interface.time else 0.0, draws)
+        level = None
+        if self.past is not None and solver.interface.monitored:
+            level = -solver.hamiltonian(self.start.state, parameters=values)
+        return Beginning(state, self.h, values, self.begin if solver.interface.time else 0.0, draws, level=level)
 
     def begun(self, solver: LatticeSolver) -> ObservedCourse:
         """A course where the steps begin. Raises `StepError`."""
@@ -63,6 +66,9 @@ class LatticeExperiment(Experiment):
         at, run = self.beginning(solver), self.run
         if self.times is None:
             rows = strided(at.h, run.steps, run.stride, self.end)
+        elif solver.interface.monitored:
+            assert self.end is not None
+            rows = timed_in_tau(self.spans, self.end)
         else:
             rows = timed(at.h, run.steps, self.spans, self.end)
         section, transforms = solver.section_of(run, at.values), solver.transforms_of(run)
@@ -112,6 +118,7 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
         what = f"its first row, at t = {float(past.t[0])!r}, is not the start of the run {run.name}"
         raise click.BadParameter(f"{path} is of another run: {what}", param_hint="--extend")
     steps = past.steps or round((float(past.t[-1]) - experiment.t0) / experiment.h)
+    steps = past.steps if solver.interface.monitored else steps  # a .csv has the times, not the steps
     return replace(experiment, past=replace(past, steps=steps))
 
 

@@ -259,9 +259,12 @@ def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str
 
 def told_steps(trajectory: LatticeTrajectory) -> str:
     """``60 steps of 0.1 and a part of one``."""
-    whole = trajectory.steps * trajectory.h
-    part = abs(trajectory.t[-1] - trajectory.t[0] - whole) > 1e-9 * max(abs(whole), abs(trajectory.h))
-    return f"{trajectory.steps} steps of {trajectory.h:.9g}" + (" and a part of one" if part else "")
+    whole, monitored = trajectory.steps * trajectory.h, trajectory.solver.interface.monitored
+    passed = trajectory.t[-1] - trajectory.t[0]
+    if monitored:
+        passed = whole if trajectory.tau is None else trajectory.tau[-1]
+    part = abs(passed - whole) > 1e-9 * max(abs(whole), abs(trajectory.h))
+    return f"{trajectory.steps} steps of {trajectory.h:.9g}" + " in τ" * monitored + " and a part of one" * bool(part)
 
 
 def _shown(error: float) -> str:

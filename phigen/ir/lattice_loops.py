@@ -13,7 +13,7 @@ from functools import cached_property
 
 from phigen.ir import nodes as ir
 from phigen.ir.passes.loop_invariant import loop_invariant
-from phigen.scheme.kernel import Kernel, Role
+from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.reversal import UNDONE
 from phigen.scheme.steps import Ends, Gather, Sweep, Sweeps
@@ -57,11 +57,12 @@ class LatticeLoops:
         others = self.step.others
         gather = others.sums_of(kernel)
         body: list[ir.Statement] = [*self._outputs(ir.Storage.OBSERVABLE, kernel.roots)]
-        if kernel.role is Role.ENERGY and gather.names:
+        if kernel.role.is_energy and gather.names:
             shared, out = Symbol(symbols.GATHERED, "energy"), ir.Array(ir.Storage.OBSERVABLE, 0)
             body.insert(0, ir.real(shared, ir.Load(ir.Array(ir.Storage.SUM, 0))))
             body.append(ir.Store(out, _HALF * symbol(shared)))
-        return self._over_sites(kernel, ("params", "state", "sites", "out"), body, gather if gather.names else None)
+        parameters = ("params", "state", *["varied"] * kernel.reads_variations, "sites", "out")
+        return self._over_sites(kernel, parameters, body, gather if gather.names else None)
 
     def sums(self, ends: Ends) -> ir.Function:
         """Return the function that sums over the bonds of one kind, or over the pairs, of each site."""

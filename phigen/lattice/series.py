@@ -55,6 +55,7 @@ class SeriesPlan:
     scheme = "series"
     is_implicit, weak_order = True, 1
     flows: ClassVar[tuple[CellFlow, ...]] = ()
+    negative: ClassVar[int | None] = None
 
     @property
     def label(self) -> str:

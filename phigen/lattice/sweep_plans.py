@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from phigen.errors import Diagnostic, SpecError
+from phigen.lattice import cell_monitor
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
 from phigen.lattice.cell_building import (
     Misfit,
@@ -24,7 +25,7 @@ from phigen.lattice.cell_building import (
 from phigen.lattice.cell_kicks import cell_kicks
 from phigen.lattice.damping import TogetherError
 from phigen.lattice.forcing import force_flows, noise_flows, pushed_casimirs
-from phigen.lattice.graphs import GraphSearch, energies, site_sums
+from phigen.lattice.graphs import GraphSearch, energies, merged_ends, site_sums
 from phigen.lattice.observable_kernels import observables, observed_sums
 from phigen.lattice.series import SeriesPlan, plan_series
 from phigen.lattice.site_kernels import site_kernel
@@ -46,6 +47,7 @@ from phigen.scheme.choosing import ScheduledMethod, is_dated, planned, with_carr
 from phigen.scheme.forces import forced_lines
 from phigen.scheme.gathering import staged
 from phigen.scheme.kernel import Kernel, Output, Role
+from phigen.scheme.logarithmic import composition_of
 from phigen.scheme.lowering import operation_counts
 from phigen.scheme.noise import noise_lines, with_noise
 from phigen.scheme.nystrom import Nystrom
@@ -71,6 +73,7 @@ class SplittingPlan:
     choice: ScheduledMethod
     noise: tuple[CellFlow, ...] = ()
     since: str = ""  # reason for more colours than the fewest
+    negative: int | None = None  # with a monitor, the part B of K = log(A + e) − log(−B)
 
     #: The scheme, as in specs, and the name of the method for the user; a step is one stage of explicit flows.
     scheme = kind = "splitting"
@@ -116,7 +119,9 @@ class SplittingPlan:
         flows = (
             f"{len(choice.schedule().flows)} flows" if not marked else f"{', '.join(marked)} for each colour of sites"
         )
+        monitor = [] if self.negative is None else [cell_monitor.fact(self.flows, self.negative)]
         return [
+            *monitor,
             f"scheme: splitting, H = {parts}, with the exact flow of each",
             f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows}{why}",
             "step: explicit",
@@ -158,12 +163,13 @@ def plan_sweeps(cell: Cell, spec: Spec) -> LatticePlan:
     Raises `SpecError` where neither is possible, and for features that lattices do not have.
     """
     _expect_supported(cell, spec)
+    cell_monitor.expect_applicable(cell, spec)
     if spec.scheme == "series" or (spec.scheme == "auto" and spec.birealisation.kind != "auto"):
         return plan_series(cell, spec)
     try:
         return _plan_splitting(cell, spec)
     except SpecError as unsplit:
-        if spec.scheme == "splitting":
+        if spec.scheme == "splitting" or spec.monitor is not None:
             raise
         try:
             series_plan = plan_series(cell, spec)
@@ -177,15 +183,19 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
     parts, forces, since = _coloured(cell, search, spec)
     noise = tuple(noise_flows(cell, parts.colouring, search, spec))
     flows = (*parts.flows, *forces)
-    requested = spec.wanted_order, spec.composition
-    choice = planned(spec, SplitHamiltonian(flows), *requested, lambda: () if cell.forces else _kicks(cell, parts))
+    monitored = spec.monitor is not None
+    order = spec.wanted_order
+    requested = order, composition_of(spec.composition, order) if monitored else spec.composition
+    plain = bool(cell.forces) or monitored
+    choice = planned(spec, SplitHamiltonian(flows), *requested, lambda: () if plain else _kicks(cell, parts))
     coloured = any(flow.by_colour for flow in flows)
     if coloured and noise:
         message = "scheme splitting: noise is not offered where parts are those of one colour of a graph"
         raise SpecError([Diagnostic(message, spec.locations.get(("noise",)), "scheme: series takes it")])
     if cell.time:  # the flows of colours follow each other in the order of the parts
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
-    return SplittingPlan(parts, _with_seams(choice, parts.colouring), noise, since)
+    plan = SplittingPlan(parts, _with_seams(choice, parts.colouring), noise, since)
+    return replace(plan, negative=cell_monitor.negative_part(cell, plan.flows, spec)) if monitored else plan
 
 
 def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMethod:
@@ -274,28 +284,42 @@ def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
 def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
     """Return the solver of a lattice as a program."""
     extras = spec.extras
-    coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK], cell.times)
+    monitored = spec.monitor is not None
+    late = (cell_monitor.LATE,) if monitored and extras.tangent else ()
+    coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK, *late], cell.times)
     schedule = plan.schedule()
     solved = plan.equation(cell, coefficients, tangent=extras.tangent)
     swept = tuple(
-        tuple(_sweep(cell, flow, motion, k, coefficients, what, tangent=extras.tangent) for motion in flow.every_motion)
+        tuple(
+            _sweep(cell, flow, motion, k, coefficients, what, tangent=extras.tangent, late=bool(late))
+            for motion in flow.every_motion
+        )
         for k, (flow, what) in enumerate(plan.flows_named(cell), 1)
     )
     if extras.adjoint and cell.noise:
         raise SpecError([Diagnostic("adjoint is not offered for lattices with noise")])
     plain_names = tuple(p.name for p in cell.parameters if p.at == "all")
     refresh = coefficients.refresh(t=cell.times)
+    further = {"kick": (KICK,) if schedule.multiples else (), "late": late}
     prepare = Kernel(
         "prepare",
         f"everything that depends on parameters and the time of a {'stage' if solved else 'flow'} only",
-        {"params": plain_names, "h": (TIME,), **({"kick": (KICK,)} if schedule.multiples else {})},
+        {"params": plain_names, "h": (TIME,), **{n: s for n, s in further.items() if s}},
         (Output("coef", tuple(coefficients.values)),),
     )
     observed = observables(cell, single=extras.real == "float")
     kernels = [*(sweep.kernel for part in swept for sweep in part), *((solved.relax, solved.advance) if solved else ())]
     noise = Noise(tuple(cell.noise), 1 if solved else 2) if cell.noise else None
+    rates, sums_of_parts = None, list[tuple[str, BondSum]]()
+    if plan.negative is not None:
+        rates, sums_of_parts = cell_monitor.rates_of(cell, plan.flows, plan.negative, tangent=extras.tangent)
+        kernels += rates.kernels
     sites = _sites(cell, plan.colouring, [*kernels, *observed.kernels])
     kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell, varied=solved is not None)
+    if partners:
+        purpose = "what a pair adds to the energy of a part of H, or to its variation"
+        of_parts = ((n, _gather(cell, merged_ends([s]), f"{n}_of_pairs", purpose)) for n, s in sums_of_parts)
+        partners = replace(partners, of_parts=tuple((n, g or Gather((), ())) for n, g in of_parts))
     if partners:
         gathers_of_partners = partners.gathers
         all_sweeps = [s for part in swept for sweep in part for s in (sweep, sweep.tangent) if s]
@@ -313,6 +337,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
         partners,
         plan.by_colour,
         solved,
+        rates=rates,
         refresh=refresh,
         adjoint=adjoint,
     )
@@ -374,6 +399,7 @@ def _sweep(
     hamiltonian: str,
     *,
     tangent: bool,
+    late: bool,
 ) -> Sweep:
     increments = staged(list(motion.increments.values()), coefficients)
     updated = tuple(cell.fields.index(f) for f in motion.increments)
@@ -384,15 +410,17 @@ def _sweep(
     kernel = site_kernel(cell, f"sweep{k}{suffix}", purpose, increments, "change", coefficients, Role.SWEEP)
     purpose = f"what all other sites b add to the forces of H_{k} at a site a"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
-    tangent_sweep = _tangent(cell, motion, f"{k}{suffix}", coefficients) if tangent else None
+    tangent_sweep = _tangent(cell, motion, f"{k}{suffix}", coefficients, late=late) if tangent else None
     inside, window = flow.beside is not None and not near_seam, flow.window if near_seam else None
     tangent_sweep = replace(tangent_sweep, inside=inside, window=window) if tangent_sweep else None
     return Sweep(kernel, updated, motion.colour, gather, tangent_sweep, inside, window)
 
 
-def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coefficients) -> Sweep:
-    """Return the derivative of a sweep."""
-    slopes = staged(along(cell, list(motion.increments.values())), coefficients)
+def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coefficients, *, late: bool) -> Sweep:
+    """Return the derivative of a sweep, whose time varies too if flows may be ``late``."""
+    increments = list(motion.increments.values())
+    slopes = along(cell, increments)
+    slopes = staged(cell_monitor.delayed(increments, slopes) if late else slopes, coefficients)
     updated = tuple(cell.fields.index(f) for f in motion.increments)
     purpose = f"the derivative of sweep {suffix.replace('_', '.')}"
     kernel = site_kernel(cell, f"tangent{suffix}", purpose, slopes, "change", coefficients, Role.SWEEP_TANGENT)

@@ -35,7 +35,8 @@ NONE_DRAWN: Mapping[str, int | None] = MappingProxyType({})
 class Beginning:
     """Checked arguments of a trajectory: initial state ``x`` at the time ``t0``, step size, parameters, random numbers.
 
-    ``first`` are the values of the initial attitude and position, None for the default.
+    ``first`` are the values of the initial attitude and position, None for the default. ``level`` is the e of a lattice
+    whose steps are equal in τ, None for −H(x).
     """
 
     x: Floats
@@ -44,6 +45,20 @@ class Beginning:
     t0: float = 0.0
     draws: Draws = FIRST_DRAWS
     first: Floats | None = None
+    level: float | None = None
+
+
+def level(about: Interface, more: dict[str, Any]) -> float | None:
+    """Return the energy level e of a lattice whose steps are equal in τ, taken from ``gauge`` among other arguments.
+
+    None for −H of the start. Raises `ValueError` for anything but a finite number.
+    """
+    if not about.monitored or "gauge" not in more:
+        return None
+    value = np.ravel(np.asarray(more.pop("gauge"), dtype=np.float64))
+    if value.shape != (1,) or not np.isfinite(value).all():
+        raise ValueError("gauge must be one finite number, the energy level e")
+    return float(value[0])
 
 
 def step_size(h: float) -> float:

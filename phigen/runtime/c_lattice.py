@@ -71,6 +71,9 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "observed_fields": (None, (_POINTER, _POINTER)),
     "set_state": (_INT, (_POINTER, _POINTER)),
     "kick": (_INT, (_POINTER, _POINTER)),
+    "time": (_DOUBLE, (_POINTER,)),
+    "saved_clock": (None, (_POINTER, _POINTER)),
+    "resume_clock": (_INT, (_POINTER, _POINTER)),
 }
 
 #: A tape has room for at least this number of values: 2 MiB in double precision, which the cache of a core holds.
@@ -240,10 +243,27 @@ class CLatticeSession:
         """Return the arrays that `resume` needs beside the state to continue with the same bits."""
         if not hasattr(self._c, "saved"):
             return {}
+        clock = self._clock()
         x = np.empty((self._saved_states * self._shape[0], *self._shape[1:]), self._real)
         far = np.zeros(1, dtype=np.uintp)
         fields = self._c.saved(self._address, x.ctypes.data, far.ctypes.data)
-        return {"before": x[:fields].copy(), "far": far} if fields else {"far": far}
+        return clock | ({"before": x[:fields].copy(), "far": far} if fields else {"far": far})
+
+    def _clock(self) -> dict[str, Any]:
+        """Return the energy level and the physical time of steps equal in τ, else nothing."""
+        return {"passed": self._filled(self._c.saved_clock, (5,))} if hasattr(self._c, "saved_clock") else {}
+
+    def time(self) -> float:
+        """Return the physical time since the start, for steps equal in τ."""
+        return float(self._c.time(self._address))
+
+    def hold(self, level: float) -> None:
+        """Hold another energy level e, for steps equal in τ."""
+        self._set_clock(np.array([level, *self._clock()["passed"][1:]]))
+
+    def _set_clock(self, clock: Floats) -> None:
+        values = np.ascontiguousarray(clock, dtype=self._real)
+        self._expect_done(self._c.resume_clock(self._address, values.ctypes.data))
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
         """Continue after ``steps`` steps of size h, from the result of `saved`."""
@@ -255,6 +275,8 @@ class CLatticeSession:
             x = np.ascontiguousarray(arrays["before"], dtype=self._real) if "before" in arrays else None
             before, fields = (None, 0) if x is None else (x.ctypes.data, len(x))
             self._expect_done(self._c.resume(self._address, h, before, fields, int(arrays["far"][0])))
+        if "passed" in arrays:
+            self._set_clock(arrays["passed"])
 
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes). Raises `BackendError` if it is not finite."""

@@ -39,7 +39,7 @@ from phigen.runtime.interface import (
     Progress,
     row_steps,
 )
-from phigen.runtime.lattice_course import ObservedCourse
+from phigen.runtime.lattice_course import LatticeCourse, ObservedCourse
 from phigen.runtime.lattice_frames import (
     FrameRows,
     Frames,
@@ -49,14 +49,14 @@ from phigen.runtime.lattice_frames import (
     stream_path,
     write_whole,
 )
-from phigen.runtime.lattice_rows import Crossed, IntegrationPlan, strided, timed
+from phigen.runtime.lattice_rows import Crossed, IntegrationPlan, strided, timed, timed_in_tau
 from phigen.runtime.lattice_run import LatticeRun
 from phigen.runtime.lattice_series import LatticeSeries, NumberRows, expect_table, recordable
 from phigen.runtime.live import LiveLattice
 from phigen.runtime.named import Named
 from phigen.runtime.sections import function_of
 from phigen.runtime.spectra import Correlation, DynamicSpectrum, Transforms
-from phigen.runtime.timed import advance_by
+from phigen.runtime.timed import moved_on
 from phigen.writing import replacing
 
 if TYPE_CHECKING:
@@ -77,6 +77,14 @@ class LatticeSession(Protocol):
 
     def state(self) -> Floats:
         """Return a copy of the state (coordinates, *sizes)."""
+        ...
+
+    def time(self) -> float:
+        """Return the physical time since the start, for steps equal in τ."""
+        ...
+
+    def hold(self, level: float) -> None:
+        """Hold another energy level e than −H of the state, for steps equal in τ."""
         ...
 
     def advance(self, h: float, steps: int) -> None:
@@ -177,8 +185,10 @@ class LatticeTrajectory:
     written to one, ``energy`` (frames,) the values of H. There is a frame for every stride-th of the ``steps`` steps of
     size ``h``, or at given times, and for the end, which may be a part of a step later. ``observed`` (frames,
     observables) are the observables that are one number each. ``crossings`` are the frames where the section of a run
-    is crossed, ``retried`` the steps that were made in parts. ``joined`` tells whether the run continues another.
-    ``structure_factor`` and ``correlated`` are the results of ``spectrum`` and ``correlation`` of a run.
+    is crossed, ``retried`` the steps that were made in parts. With a monitor, ``h`` is a step in τ, and ``tau``
+    (frames,) has the values of τ; it is None without one, and where the run continues another. ``joined`` tells whether
+    the run continues another. ``structure_factor`` and ``correlated`` are the results of ``spectrum`` and
+    ``correlation`` of a run.
     """
 
     t: Floats
@@ -193,6 +203,7 @@ class LatticeTrajectory:
     observed: Floats = field(default_factory=lambda: np.empty((0, 0)), repr=False)
     crossings: LatticeTrajectory | None = field(default=None, repr=False)
     retried: tuple[int, ...] = ()
+    tau: Floats | None = None
     joined: bool = False
     structure_factor: DynamicSpectrum | None = field(default=None, repr=False)
     correlated: Correlation | None = field(default=None, repr=False)
@@ -334,6 +345,7 @@ class LatticeTrajectory:
 
     def _further(self) -> dict[str, Any]:
         about = {"t": self.t, "energy": self.energy, "steps": self.steps, "h": self.h}
+        about |= {} if self.tau is None else {"tau": self.tau}
         about |= {f"observable_{name}": values for name, values in self.observables.items()}
         about |= {name: values for name, (_, values) in self.transforms().items()}
         named = {"coordinates": np.array(self.coordinates), "axes": np.array(self.axes)}
@@ -389,7 +401,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
         Frames are the states after every ``stride``-th step and the last. With ``until`` in place of ``steps``, the
         last step is the part of one that ends at that time. A step that fails is made in 2, 4, …, 2**retry equal parts,
-        which is another map than a whole step, but also Poisson.
+        which is another map than a whole step, but also Poisson. With a monitor, ``h`` is a step in τ, and ``gauge=e``
+        is held in place of −H of the start.
         ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With noise, the random
         numbers of a site are a function of ``seed``, ``member``, the number of the step, which begins with ``step0``,
         and the site. With ``output``, a path that ends in .npy or .npz, frames are written to that file one by one; to
@@ -453,9 +466,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         def made(t: Floats, x: Floats, steps: int) -> LatticeTrajectory:
             crossed = np.array(run.crossed)
             crossings = self._trajectory(crossed, grown.whole(shape), met, steps, plan) if plan.section else None
-            retried = tuple(run.course.retried)
+            retried, joined = tuple(run.course.retried), plan.past is not None
             trajectory = self._trajectory(t, x, rows, steps, plan)
-            return replace(trajectory, crossings=crossings, retried=retried, joined=plan.past is not None)
+            return replace(trajectory, crossings=crossings, retried=retried, tau=run.tau, joined=joined)
 
         try:
             run.make(progress)
@@ -466,7 +479,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             rows.record(last)
             states = np.array([*frames.first(len(rows) - 1), last.state()])
             done = run.course.steps
-            t = np.append(run.times, plan.begin + plan.at.h * done)
+            clock = run.course.time()
+            t = np.append(run.times, plan.begin + (plan.at.h * done if math.isnan(clock) else clock))
+            run.numbers.append(float(done))
             failed = made(t, states, done + (plan.past.steps if plan.past else 0))
             raise self.failure(error, plan.at.h, failed, plan.at.values) from error
         trajectory = made(run.times, frames.array, plan.steps)
@@ -541,12 +556,14 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """The plan of a run of the spec, from a start that has been checked."""
         if retry or run.is_timed:
             arguments.expect_no_noise("retry" if retry else "every", self.interface)
-        end = None
-        if run.stop is not None or run.until is not None:
+        end, in_tau = None, self.interface.monitored and run.is_timed
+        if run.stop is not None or run.until is not None or in_tau:
             stop = self.function(run.stop, at.values) if run.stop is not None else None
             end = runs.end_of(ObservedCourse.begun(self, at, retry), run, stop, timed=bool(self.interface.time))
         rows = strided(at.h, run.steps, run.stride, end)
-        if run.is_timed:
+        if in_tau and end is not None:
+            rows = timed_in_tau(runs.spans_of_run(run, end.span), end)
+        elif run.is_timed:
             span = at.h * run.steps if end is None else end.span
             rows = timed(at.h, run.steps, runs.spans_of_run(run, span), end)
         return IntegrationPlan(at, rows, at.t0, retry, self.section_of(run, at.values), self.transforms_of(run))
@@ -825,12 +842,12 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         for k, time in enumerate(times.tolist()):
             row = int(np.argmin(np.abs(t - time)))
             begin = float(t[row]) if self.interface.time else 0.0
-            session = self.started(Beginning(np.array(x[row]), trajectory.h, trajectory.parameters, begin))
+            level = -float(trajectory.energy[0]) if self.interface.monitored else None
+            at = Beginning(np.array(x[row]), trajectory.h, trajectory.parameters, begin, level=level)
             try:
-                advance_by(time - float(t[row]), trajectory.h, session.advance)
+                states[k] = moved_on(LatticeCourse(self, at), trajectory.h, time - float(t[row])).state()
             except BackendError as error:
                 raise self.failure(error, trajectory.h, None, trajectory.parameters) from error
-            states[k] = session.state()
         return states
 
     def hamiltonian(
@@ -953,14 +970,18 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """Return the checked arguments of a trajectory; the step size is NaN if it is not known yet."""
         begin = arguments.start_time(t0, self.interface, more)
         draws = arguments.draws(self.interface, more, drawn)
+        level = arguments.level(self.interface, more)
         start = self.state(x, what)
         size = math.nan if h is None else arguments.step_size(h)
-        return Beginning(start, size, self.values(parameters, more, start.shape[1:]), begin, draws)
+        return Beginning(start, size, self.values(parameters, more, start.shape[1:]), begin, draws, level=level)
 
     def started(self, at: Beginning) -> LatticeSession:
         """Return a session for checked arguments. Raises `StepError`."""
         try:
-            return self.backend.start(at.x, at.values, at.t0, at.draws)
+            session = self.backend.start(at.x, at.values, at.t0, at.draws)
+            if at.level is not None:
+                session.hold(at.level)
+            return session
         except BackendError as error:
             raise self.failure(error, at.h, None, at.values, at.x) from error
 
@@ -976,6 +997,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
                 return ParameterError(f"{name}: {wrong}", **{**facts, "step": 0})
             numbers = ", ".join(f"{n} = {v!r}" for n, v in values.items() if np.ndim(v) == 0)
             reason = "a coefficient computed from parameters alone is not finite"
+            reason += ", or the part B of H is not negative where it starts" * self.interface.monitored
             return ParameterError(f"{name}: no step can be made with {numbers}: {reason}", **{**facts, "step": 0})
         where = f"step {error.step} of size {h!r} failed" if error.step >= 0 else "a step failed"
         if error.members:

@@ -50,6 +50,8 @@ class LatticeCourse:
             self._sites = self.solver.started(begin)
             if clock.h:
                 self._sites.resume(clock.h, int(arrays["counts"][1]) - counted, arrays)
+            elif "passed" in arrays:
+                self._sites.hold(float(arrays["passed"][0]))
             if self._ahead:
                 self._sites.advance(clock.h, self._ahead)
             self._arrays, self._ahead = {}, 0
@@ -72,8 +74,8 @@ class LatticeCourse:
         return self.sites.state()
 
     def time(self) -> float:
-        """NaN: steps are equal in time."""
-        return math.nan
+        """The physical time since the start for steps equal in τ, else NaN."""
+        return self.sites.time() if self.solver.interface.monitored else math.nan
 
     def element(self) -> Floats:
         """Return an empty array, since lattices have no attitude."""

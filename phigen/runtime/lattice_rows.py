@@ -23,12 +23,14 @@ if TYPE_CHECKING:
 class RowSteps:
     """Rows after ``whole`` steps (rows,) and a further step of size ``part`` (rows,), 0 for none.
 
-    The first is the start. With an ``end``, that makes the last row.
+    The first is the start. With an ``end``, that makes the last row. Where steps are equal in τ and rows are at given
+    times, these are the ``spans`` after the start, (rows,), and what precedes them is found on the way.
     """
 
     whole: NDArray[np.int64]
     part: Floats
     end: End | None = None
+    spans: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.whole)
@@ -45,7 +47,8 @@ class RowSteps:
     def described(self) -> list[int | float]:
         """Plain data that identifies these rows."""
         rows = [len(self), self.steps, int(self.whole[min(1, len(self) - 1)])]
-        return [*rows, *([] if not self.part.any() else [float(self.part.sum()), float(self.part[-1])])]
+        spans = [] if self.spans is None else [float(self.spans.sum())]
+        return [*rows, *spans, *([] if not self.part.any() else [float(self.part.sum()), float(self.part[-1])])]
 
 
 def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSteps:
@@ -69,6 +72,14 @@ def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) 
     tail = strided(h, steps, max(1, steps if end is None else end.steps), end)
     whole = [0, *whole, int(tail.whole[-1])]
     return RowSteps(np.array(whole, dtype=np.int64), np.array([0.0, *part, tail.part[-1]]), end)
+
+
+def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
+    """Return rows at times ``spans`` after the start, and at the end, for steps that are equal in τ."""
+    inner = [span for span in spans if abs(end.span - span) > EQUAL * abs(end.span)]
+    whole = np.zeros(len(inner) + 2, dtype=np.int64)
+    whole[-1] = end.steps
+    return RowSteps(whole, np.zeros(len(whole)), end, np.array([0.0, *inner, end.span]))
 
 
 @dataclass(frozen=True)

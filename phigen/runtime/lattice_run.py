@@ -17,6 +17,7 @@ from phigen.runtime.interface import Floats, Progress
 from phigen.runtime.lattice_course import ObservedCourse
 from phigen.runtime.lattice_frames import identity_of
 from phigen.runtime.lattice_rows import IntegrationPlan, Past
+from phigen.runtime.timed import EQUAL, reached, steps_until
 
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
@@ -59,6 +60,8 @@ class LatticeRun:
     identity: Mapping[str, Any] = field(default_factory=dict)
     count: int = 0
     crossed: list[float] = field(default_factory=list)  # the times of the crossings
+    clocks: list[float] = field(default_factory=list)  # times and numbers of steps of rows, where steps are equal in τ
+    numbers: list[float] = field(default_factory=list)
     course: Any = None
     last: Any = None  # the session at the latest row
 
@@ -67,20 +70,45 @@ class LatticeRun:
         self._begin()
         rows, saved = self.plan.rows, time.monotonic()
         for k in range(self.count, len(rows)):
-            self._advance(int(rows.whole[k]) - self.course.steps)
-            self.last = self._reached(k).sites
+            self._advance(self._steps_before(k) - self.course.steps)
+            there, number = self._reached(k)
+            self._mark(there, number)
+            self.last = there.sites
             self.rows.see(self.last)
             self.count += 1
             if self.checkpoints and time.monotonic() - saved >= self.rows.seconds:
                 self._save()
                 saved = time.monotonic()
             if progress:
-                progress(int(rows.whole[k]))
+                progress(self.course.steps)
 
     @property
     def times(self) -> Floats:
         """The times of the complete rows."""
+        if self.solver.interface.monitored:
+            past = [] if self.plan.past is None else self.plan.past.t[:-1].tolist()
+            return np.array([*past, *(self.plan.begin + t for t in self.clocks)])
         return self.plan.times[: self.count + (len(self.plan.past.t) - 1 if self.plan.past else 0)]
+
+    @property
+    def tau(self) -> Floats | None:
+        """τ of the complete rows, where steps are equal in τ and the run continues no other."""
+        if not self.solver.interface.monitored or self.plan.past is not None:
+            return None
+        return self.plan.at.h * np.array(self.numbers)
+
+    def _mark(self, there: ObservedCourse, number: float) -> None:
+        """Store the time and the number of steps of a row."""
+        self.clocks.append(there.time())
+        self.numbers.append(number)
+
+    def _steps_before(self, k: int) -> int:
+        """The number of whole steps before row k."""
+        rows, course = self.plan.rows, self.course
+        if rows.spans is None or k == len(rows) - 1:
+            return int(rows.whole[k])
+        ahead, _ = steps_until(course, self.plan.at.h, float(rows.spans[k]) - course.time())
+        return int(course.steps + ahead)
 
     def _begin(self) -> None:
         """Store the first row, or restore the checkpoint."""
@@ -95,7 +123,9 @@ class LatticeRun:
             self.rows.restore(arrays)
             self.crossings.restore({name.removeprefix("section."): array for name, array in arrays.items()})
             self.crossed = arrays["crossed"].tolist()
+            self.clocks, self.numbers = (arrays[name].tolist() for name in ("clocks", "numbers"))
             return
+        self._mark(self.course, 0.0)
         if plan.past:
             self.rows.begin(plan.past)
         else:
@@ -131,21 +161,28 @@ class LatticeRun:
             self.crossed.append(t)
             self.crossings.see(there.sites)
 
-    def _reached(self, k: int) -> ObservedCourse:
-        """The course at row k, from the whole steps before it."""
-        rows, part = self.plan.rows, float(self.plan.rows.part[k])
+    def _reached(self, k: int) -> tuple[ObservedCourse, float]:
+        """The course at row k, from the whole steps before it, and its number of steps."""
+        rows, part, h = self.plan.rows, float(self.plan.rows.part[k]), self.plan.at.h
         course: ObservedCourse = self.course
+        between: ObservedCourse
         if k == len(rows) - 1 and rows.end:
             there: ObservedCourse
             there, number = rows.end.finish(course)
             if self.finder and number > course.steps:
                 self._cross(self.finder.within(course, number - course.steps))
-            return there
+            return there, number
+        if rows.spans is not None:
+            left = float(rows.spans[k]) - course.time()
+            if abs(left) <= EQUAL * abs(rows.spans[k]):
+                return course, float(course.steps)
+            between, part = reached(course, h, left)
+            return between, course.steps + part / h
         if not part:
-            return course
-        between: ObservedCourse = course.branch()
+            return course, float(course.steps)
+        between = course.branch()
         between.advance(part, 1)
-        return between
+        return between, course.steps + part / h
 
     # --- checkpoints
 
@@ -158,7 +195,8 @@ class LatticeRun:
         assert self.checkpoints
         arrays: dict[str, Any] = {"count": np.array(self.count), **self.course.saved(), **self.rows.saved()}
         arrays |= {f"section.{name}": array for name, array in self.crossings.saved().items()}
-        arrays["crossed"] = np.array(self.crossed)
+        marks = {"crossed": self.crossed, "clocks": self.clocks, "numbers": self.numbers}
+        arrays |= {name: np.array(values) for name, values in marks.items()}
         if self.finder:
             arrays["section.values"] = np.array(self.finder.values)
             for before in self.finder.past:

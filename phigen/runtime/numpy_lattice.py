@@ -43,6 +43,8 @@ class NumpyLatticeSession:
         try:
             _, self._sites = module._started(x0, parameters, *([t0] if timed else []))
             module._coefficients(self._sites, StartPolicy().probe_step)
+            if hasattr(module, "_begin"):
+                module._begin(self._sites, self._x)
         except ValueError:
             raise BackendError("BAD_ARGUMENT", 0, self._x[None]) from None
         self._sites.seed, self._sites.member = draws.seed, draws.member
@@ -112,19 +114,35 @@ class NumpyLatticeSession:
             self._sites.t = self._clock.after(self.steps)
 
     def saved(self) -> dict[str, Any]:
-        """Return {}: the next step depends on the state alone."""
-        return {}
+        """Return the energy level and the physical time of steps equal in τ, else {}."""
+        return {"passed": np.array([self._sites.level, *self._sites.clock])} if hasattr(self._sites, "level") else {}
+
+    def time(self) -> float:
+        """Return the physical time since the start, for steps equal in τ."""
+        return float(sum(self._sites.clock))
+
+    def hold(self, level: float) -> None:
+        """Hold another energy level e, for steps equal in τ."""
+        self._sites.level = level
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
         """Continue after ``steps`` steps of size h, from the result of `saved`."""
         self.prepare(h)
         self.steps = steps
+        if "passed" in arrays:
+            self._sites.level, *clock = arrays["passed"].tolist()
+            self._sites.clock = tuple(clock)
         self._tell_time()
 
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes). Raises `BackendError` if it is not finite."""
         if not np.isfinite(x).all():
             raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy())
+        if hasattr(self._sites, "level"):
+            try:
+                self._sites.level = self._module._level(self._sites, x)
+            except ValueError:
+                raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy()) from None
         self._x = np.array(x)
 
     def kick(self, change: Floats) -> None:

@@ -154,7 +154,7 @@ def states_at(place: Callable[[int], Session], t: Floats, x: Floats, h: float, t
         span = time - float(t[row])
         states[k] = x[row]
         if span:
-            states[k] = _from(place(row), h, span).state()
+            states[k] = moved_on(place(row), h, span).state()
     return states
 
 
@@ -168,8 +168,8 @@ def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -
         advance(left, 1)
 
 
-def _from(session: Session, h: float, span: float) -> Session:
-    """Return the session after the time ``span``, in whole steps and a part of one."""
+def moved_on(session: C, h: float, span: float) -> C:
+    """Return the session after the time ``span``, in whole steps and a part of one. Raises `BackendError`."""
     step = np.copysign(h, span)
     if not np.isfinite(session.time()):
         advance_by(span, h, session.advance)

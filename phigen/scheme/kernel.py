@@ -31,7 +31,8 @@ class Role(Enum):
     SIDE = auto()  # the derivative of RELAX along a variation of x
     FOLLOW = auto()  # the derivative of ADVANCE along a variation of y
     GATHER = auto()  # terms of sums over bonds or pairs
-    ENERGY = auto()  # the Hamiltonian, or its density
+    ENERGY = auto()  # the Hamiltonian or a part of it, or its density
+    ENERGY_SLOPE = auto()  # the derivative of the density of a part along a variation
     CASIMIRS = auto()
     VECTOR_FIELD = auto()
     OBSERVABLES = auto()  # observables that are numbers, or their densities
@@ -49,12 +50,19 @@ class Role(Enum):
     @property
     def is_stage(self) -> bool:
         """Whether a kernel belongs to the equation of a stage."""
-        return self in (Role.RELAX, Role.ADVANCE, Role.OWN_SLOPE, *_OF_STARTS, *_OF_VARIATIONS) and not self.is_sweep
+        others = self.is_sweep or self.is_observable
+        return self in (Role.RELAX, Role.ADVANCE, Role.OWN_SLOPE, *_OF_STARTS, *_OF_VARIATIONS) and not others
 
     @property
     def is_observable(self) -> bool:
         """Whether a kernel computes observables, which are no part of a step."""
-        return self in (Role.ENERGY, Role.CASIMIRS, Role.VECTOR_FIELD, Role.OBSERVABLES, Role.SITE_OBSERVABLES)
+        fields = (Role.CASIMIRS, Role.VECTOR_FIELD, Role.OBSERVABLES, Role.SITE_OBSERVABLES)
+        return self.is_energy or self in fields
+
+    @property
+    def is_energy(self) -> bool:
+        """Whether a kernel has the density of an energy, of which bonds and pairs add shares, or its derivative."""
+        return self in (Role.ENERGY, Role.ENERGY_SLOPE)
 
     @property
     def is_transposed_stage(self) -> bool:
@@ -69,7 +77,7 @@ class Role(Enum):
 
 #: Kernels that read the start of a stage, and those that read variations.
 _OF_STARTS = frozenset({Role.RELAX, Role.SLOPE, Role.SIDE})
-_OF_VARIATIONS = frozenset({Role.SWEEP_TANGENT, Role.SLOPE, Role.SIDE, Role.FOLLOW})
+_OF_VARIATIONS = frozenset({Role.SWEEP_TANGENT, Role.SLOPE, Role.SIDE, Role.FOLLOW, Role.ENERGY_SLOPE})
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,12 @@ class Logarithmic:
     @property
     def fact(self) -> str:
         """The line of the header."""
-        return f"monitor: log, steps are equal in tau; K = log(A + e) - log(-B) with B = {self.negative}"
+        return fact_of(str(self.negative))
+
+
+def fact_of(negative: str) -> str:
+    """Return the line of the header on a monitor with this B."""
+    return f"monitor: log, steps are equal in tau; K = log(A + e) - log(-B) with B = {negative}"
 
 
 def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarithmic | None:

@@ -228,6 +228,11 @@ class Program:
         return tuple(float((a + b) / 2) for a, b in pairwise(ends))
 
     @property
+    def is_monitored(self) -> bool:
+        """Whether steps are equal in τ, not in the time."""
+        return self.monitor is not None or bool(self.step.swept and self.step.swept.rates)
+
+    @property
     def held(self) -> tuple[str, ...]:
         """The quantities with a fixed value for each trajectory: Casimirs, for their multiples, or e."""
         return (LEVEL.kind,) if self.monitor else self.gauge.casimirs if self.gauge else ()

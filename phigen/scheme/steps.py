@@ -504,7 +504,8 @@ class Partners:
     """Sums over bonds or pairs at a site: half the energies, and the forces or rates, as functions of the parameters.
 
     ``varied`` has the forces with their derivatives along variations of the fields, where a step solves an
-    `Equation`. ``observed`` are the densities of observables of bonds and pairs.
+    `Equation`. ``observed`` are the densities of observables of bonds and pairs, ``of_parts`` the energies of parts of
+    H and their derivatives, by the names of the kernels that read them (`PartRates`).
     """
 
     energy: Gather
@@ -512,16 +513,37 @@ class Partners:
     graph: bool = False
     varied: Gather = Gather((), ())
     observed: Gather = Gather((), ())
+    of_parts: tuple[tuple[str, Gather], ...] = ()
 
     def sums_of(self, kernel: Kernel) -> Gather:
         """The sums that an observable reads; empty where it reads none."""
         sums = {Role.ENERGY: self.energy, Role.VECTOR_FIELD: self.field, Role.OBSERVABLES: self.observed}
-        return sums.get(kernel.role, Gather((), ()))
+        return dict(self.of_parts).get(kernel.name) or sums.get(kernel.role, Gather((), ()))
 
     @property
     def gathers(self) -> tuple[Gather, ...]:
         """All sums, including empty ones."""
-        return (self.energy, self.field, self.varied, self.observed)
+        return (self.energy, self.field, self.varied, self.observed, *(gather for _, gather in self.of_parts))
+
+
+@dataclass(frozen=True)
+class PartRates:
+    """Steps of a lattice that are equal in τ: K = log(A + e) − log(−B), where H = A + B has two parts.
+
+    The flow of a part of K is that of the part of H over the time τ/(A + e), or τ/(−B). ``energies`` are the densities
+    of both parts, in the order of the parts of the step; that with the number ``negative`` is B. ``slopes`` are their
+    derivatives along a variation, if derivatives of a step were requested: then ``prepare`` reads the variation of the
+    time of the flow, as the input ``late``.
+    """
+
+    energies: tuple[Kernel, Kernel]
+    negative: int
+    slopes: tuple[Kernel, ...] = ()
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All kernels, each once."""
+        return (*self.energies, *self.slopes)
 
 
 @dataclass(frozen=True)
@@ -596,6 +618,7 @@ class Sweeps(_Scheduled):
     partners: Partners | None = None
     by_colour: tuple[bool, ...] = ()  # graphs: whether a part belongs to one colour
     equation: Equation | None = None
+    rates: PartRates | None = None
 
     kind = SWEEPS
 
@@ -651,12 +674,18 @@ class Sweeps(_Scheduled):
         return max(len(g.names) for g in (*swept, *self.others.gathers))
 
     @property
+    def rate_kernels(self) -> tuple[Kernel, ...]:
+        """The kernels of the energies of parts; empty without a monitor."""
+        return self.rates.kernels if self.rates else ()
+
+    @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         swept = [sweep for part in self.parts for sweep in part]
         swept += [sweep.tangent for sweep in swept if sweep.tangent]
         swept_kernels = [sweep.kernel for sweep in swept]
         swept_kernels += self.equation.kernels if self.equation else ()
+        swept_kernels += self.rate_kernels
         gathers = [sweep.gather for sweep in swept if sweep.gather]
         gathers += self.others.gathers
         kernels = (*swept_kernels, *(k for g in gathers for k in g.kernels))

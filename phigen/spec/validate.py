@@ -148,7 +148,6 @@ WITHOUT_SERIES = {
 
 #: Keys that lattices do not take: the values that do no harm, and what to do.
 NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
-    "monitor": ((), "phigen show --expand 3 prints an ordinary spec of three sites, which takes it"),
     "reconstruct": ((), "phigen show --expand prints an ordinary spec of a few sites, which takes it"),
     "terms": ((), "order: sets the method of a lattice"),
     "gauge": (("auto", "none"), "gauges are those of ordinary systems"),

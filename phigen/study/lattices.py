@@ -65,12 +65,13 @@ class _Subject:
         """The time of a frame, None where there is none."""
         return None if self.t0 is None else float(trajectory.t[frame])
 
-    def stepped(self, x: Floats, h: float, steps: int = 1, t0: float | None = None) -> Floats:
-        """The state after some steps, from the time t0 on, or that of the run."""
+    def stepped(
+        self, x: Floats, h: float, steps: int = 1, t0: float | None = None, held: Mapping[str, float] | None = None
+    ) -> Floats:
+        """The state after some steps, from the time t0 on, or that of the run, where ``held`` is a level e, if any."""
         t0 = self.t0 if t0 is None else t0
-        trajectory = self.solver.integrate(
-            x, h, steps, max(1, steps), t0=t0, seed=self.seed, parameters=self.start.arguments
-        )
+        options: dict[str, Any] = {"t0": t0, "seed": self.seed, "parameters": self.start.arguments, **(held or {})}
+        trajectory = self.solver.integrate(x, h, steps, max(1, steps), **options)
         end: Floats = trajectory.x[-1]
         return end
 
@@ -118,7 +119,8 @@ def verify_lattice(
     checks += _single(cell, subject, single, trajectory) if single else []
     label = compilation.named(compilation.method)
     said = f"{stated(units_of(cell, trajectory))} {WORST_SITE}"
-    return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, said)
+    clock = "τ" if subject.solver.interface.monitored else "t"
+    return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, said, clock=clock)
 
 
 def _without_noise(subject: _Subject) -> _Subject:
@@ -200,9 +202,16 @@ def _reversal(subject: _Subject, trajectory: LatticeTrajectory) -> Check:
     for k in (0, -1):
         x, t0 = trajectory.x[k], subject.time(trajectory, k)
         after = None if t0 is None else t0 + subject.h
-        back = subject.stepped(subject.stepped(x, subject.h, 1, t0), -subject.h, 1, after)
+        held = _held(subject.solver, x, subject.start.arguments)
+        there = subject.stepped(x, subject.h, 1, t0, held)
+        back = subject.stepped(there, -subject.h, 1, after, held)
         worst = max(worst, float(np.abs(back - x).max()) / _size(x))
     return Check("reversibility", worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
+
+
+def _held(solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any]) -> dict[str, float]:
+    """The argument by which steps that are equal in τ hold the level e of a state; {} for others."""
+    return {"gauge": -solver.hamiltonian(x, parameters=parameters)} if solver.interface.monitored else {}
 
 
 def _agreement(subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
@@ -337,7 +346,8 @@ class _Few:
     @property
     def given(self) -> dict[str, Any]:
         """Keyword arguments of the steps."""
-        return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters}
+        held = _held(self.subject.solver, self.x, self.parameters)
+        return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters, **held}
 
     def tangent(self, solver: LatticeSolver, h: float) -> tuple[Floats, Floats]:
         """The state after a step, and its derivative (numbers, numbers)."""

@@ -37,6 +37,8 @@ def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], 
         "tangent": program.extras.tangent,
         "most_sweeps": step.equation.most_sweeps if step.equation else 0,
         "graph": step.others.graph,
+        "monitored": step.rates is not None,
+        "negative": step.rates.negative if step.rates else 0,
     }
 
 
@@ -48,4 +50,6 @@ def switches(step: Sweeps) -> dict[str, bool]:
         "GATHER": step.partners is not None,
         "GRAPH": step.others.graph,
         "BY_COLOUR": bool(step.by_colour),
+        "MONITOR": step.rates is not None,
+        "LATE": step.rates is not None and bool(step.rates.slopes),
     }

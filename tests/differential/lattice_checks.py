@@ -88,6 +88,13 @@ class Trial:
         return ({"t0": START} if self.system.timed else {}) | ({"seed": 2**40 + 3} if self.system.noise else {})
 
     @property
+    def held(self) -> dict[str, Any]:
+        """Argument of calls that hold the level of the start, where steps are equal in τ."""
+        if not self.system.monitored:
+            return {}
+        return {"gauge": -self.system.densities(self.values, self.t0, self.x0.reshape(len(self.x0), -1))}
+
+    @property
     def t0(self) -> float:
         """The time of the start."""
         return START if self.system.timed else 0.0
@@ -108,9 +115,14 @@ class Trial:
 
     @cached_property
     def field(self) -> Callable[[float, Floats], Floats]:
-        """The right-hand side without noise, of flat states."""
+        """The right-hand side without noise, of flat states; per unit of τ where steps are equal in τ."""
         rate, shape = self.system.rates(self.values), (len(self.system.fields), self.system.count)
-        return lambda t, y: rate(t, y.reshape(shape)).ravel()
+
+        def field(t: float, y: Floats) -> Floats:
+            x = y.reshape(shape)
+            return np.asarray(rate(t, x).ravel() * self.system.pace(self.values, x))
+
+        return field
 
 
 def prepare(system: Lattice) -> Trial:
@@ -182,7 +194,7 @@ def _number(said: Any) -> float:
 def functions(trial: Trial) -> None:
     """H, its density, the vector field and Casimirs have the values of the formulas."""
     system, x, when = trial.system, trial.x0, {"t": START} if trial.system.timed else {}
-    field = trial.field(trial.t0, x.ravel()).reshape(x.shape)
+    field = trial.field(trial.t0, x.ravel()).reshape(x.shape) / system.pace(trial.values, x.reshape(len(x), -1))
     energy = system.densities(trial.values, trial.t0, x.reshape(len(x), -1))
     for target, solver in trial.solvers.items():
         part = trial.part(target, 1e-12, 1e-4)
@@ -380,11 +392,10 @@ def tangent(trial: Trial) -> None:
     steps, along = 3, trial.random.normal(size=(2, *trial.x0.shape))
     run, carried = trial.solvers["numpy" if trial.single else "c"], {}
     for target, solver in trial.solvers.items():
-        for _, vectors in solver.tangents(trial.x0, trial.h, steps, along, **trial.since, **trial.given):
+        more = {**trial.since, **trial.held, **trial.given}
+        for _, vectors in solver.tangents(trial.x0, trial.h, steps, along, **more):
             carried[target] = vectors
-    slope, doubt = derivative(
-        lambda e: run.integrate(trial.x0 + e * along[0], trial.h, steps, steps, **trial.since, **trial.given).x[-1]
-    )
+    slope, doubt = derivative(lambda e: run.integrate(trial.x0 + e * along[0], trial.h, steps, steps, **more).x[-1])
     scale = float(np.abs(carried["numpy"]).max()) + float(np.abs(along).sum())
     for target, vectors in carried.items():
         part = max(trial.part(target, 1e-9, 2e-3), 30 * float(doubt.max()) / scale)
@@ -430,7 +441,7 @@ def reversal(trial: Trial) -> None:
     for target, solver in trial.solvers.items():
         there = solver.integrate(trial.x0, trial.h, 3, 3, **trial.since, **trial.given).x[-1]
         since = {"t0": START + 3 * trial.h} if trial.system.timed else {}
-        back = solver.integrate(there, -trial.h, 3, 3, **since, **trial.given).x[-1]
+        back = solver.integrate(there, -trial.h, 3, 3, **since, **trial.held, **trial.given).x[-1]
         scale = float(max(np.abs(there).max(), np.abs(trial.x0).max()))
         expect_close(back, trial.x0, trial.part(target, 1e-12, 1e-4), f"{target}: there and back", scale)
 

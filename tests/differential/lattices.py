@@ -40,7 +40,7 @@ def draw_lattice(seed: int, attempt: int = 0) -> Lattice:
     )  # fmt: skip
     drawn = _with_energy(source, drawn, cell)
     drawn = _acted_upon(source, drawn, cell)
-    return _with_options(source, drawn)
+    return _monitored(source, _with_options(source, drawn), cell)
 
 
 def _relation(source: random.Random, relation: str) -> dict[str, Any]:
@@ -320,3 +320,20 @@ def _with_options(source: random.Random, drawn: Lattice) -> Lattice:
         if chosen:
             (options if source.random() < 0.6 else asked)[name] = True
     return replace(drawn, options=options, asked=asked)
+
+
+def _monitored(source: random.Random, drawn: Lattice, cell: Cell) -> Lattice:
+    """The lattice, or for canonical pairs another energy with a negative part, and a monitor."""
+    acted_upon = drawn.timed or drawn.forced or bool(drawn.noise)
+    if not (drawn.pairs and cell.pairs and drawn.count > 1) or acted_upon or source.random() < 0.4:
+        return drawn
+    q, p = (tuple(Symbol(c) for c in side) for side in zip(*cell.pairs, strict=True))
+    apart = sum((Symbol(f"{c}[a]") - Symbol(f"{c}[b]")) ** 2 for c in q)
+    well = source.choice([1 / sympy.sqrt(1 + apart), sympy.exp(-apart / 4), sympy.Integer(2) - sympy.cos(apart)])
+    masses = source.choice([sympy.Integer(1), Symbol("B") ** 2 + 1])
+    options = {k: v for k, v in drawn.options.items() if k not in ("adjoint", "scheme")}
+    options |= {"scheme": "splitting"} if source.random() < 0.5 else {}
+    asked = {k: v for k, v in drawn.asked.items() if k != "adjoint"}
+    return replace(
+        drawn, sites=(sum(c**2 for c in p) / (2 * masses),), ends=(-well,), options=options, asked=asked, monitored=True
+    )

@@ -36,7 +36,7 @@ class Lattice:
     ``boundary`` is that of each of the ``axes``; without axes it is a graph, or ``pairs``. ``pi`` has the brackets of
     a site, ``across`` the brackets (f, g, place of g, value) with others, or along bonds. H is the sum of ``sites``
     over all sites, and of ``ends`` over bonds or pairs. ``vector``, ``covector``, ``damping`` and ``noise`` act as
-    docs/lattices.md has it.
+    docs/lattices.md has it. Where it is ``monitored``, steps are equal in τ, and ``ends`` are the negative part of H.
     """
 
     seed: int
@@ -60,6 +60,7 @@ class Lattice:
     casimir: Expr | None = None
     positive: bool = False
     initial: Any = None
+    monitored: bool = False
     options: Mapping[str, Any] = field(default_factory=dict)
     asked: Mapping[str, Any] = field(default_factory=dict)
 
@@ -104,6 +105,8 @@ class Lattice:
             yield "forces", {kind: {n: text(f) for n, f in by.items()} for kind, by in forces.items() if by}
         if self.damping is not None:
             yield "damping", text(self.damping)
+        if self.monitored:
+            yield "monitor", "log"
         if self.noise:
             yield "noise", {n: {"hamiltonian": text(g), "amplitude": text(s)} for n, (g, s) in self.noise.items()}
         yield from self.options.items()
@@ -197,6 +200,14 @@ class Lattice:
     def _term(self, expression: Expr, target: int = -1, edges: bool = False) -> _Term:
         return _Term(self, [sympy.sympify(expression)], edges, target)
 
+    def pace(self, values: Mapping[str, Any], x: Floats) -> float:
+        """dt/dτ at a state."""
+        if not self.monitored:
+            return 1.0
+        well = sum(np.sum(self._term(e, edges=True).at(0.0, x, values)) for e in self.ends)
+        with np.errstate(divide="ignore"):
+            return float(-1 / np.float64(well))
+
     def densities(self, values: Mapping[str, Any], t: float, x: Floats) -> float:
         """The value of H."""
         terms = [self._term(e) for e in self.sites] + [self._term(e, edges=True) for e in self.ends]
@@ -235,6 +246,8 @@ class Lattice:
                 yield replace(self, **{name: {k: v for k, v in parts.items() if k != key}})
         if self.damping is not None:
             yield replace(self, damping=None)
+        if self.monitored:
+            yield replace(self, monitored=False)
         if self.casimir is not None:
             yield replace(self, casimir=None)
         if self.bonds:

@@ -74,7 +74,8 @@ class WholeArrays:
         body = [*sums, *self._reads(function), ir.real(OUT.symbol, empty)]
         body += [ir.Assign(ir.Entry(OUT, ir.Constant(s.array.number)), s.value) for s in values]
         body += [ir.Assign(OUT, s.value, adds=True) for s in added]
-        return replace(function, parameters=("parameters", "x", "sites"), body=(*body, ir.Return(OUT)))
+        varied = ("v",) if "varied" in function.parameters else ()
+        return replace(function, parameters=("parameters", "x", *varied, "sites"), body=(*body, ir.Return(OUT)))
 
     def sums(self, functions: Sequence[ir.Function]) -> ir.Function:
         """Return one function for the sums over bonds or pairs of several functions, such as those for both ends."""
@@ -235,7 +236,7 @@ class WholeArrays:
             case ir.OnSeam(_, colour, offset):
                 return ir.Called("begins", (ir.fixed("window"), *map(ir.Constant, (colour, *offset))), SITES)
             case ir.Load(array, offset, end):
-                if function.role is Role.ENERGY and array.storage is Storage.SUM:
+                if function.role.is_energy and array.storage is Storage.SUM:
                     return next(self._sums_value(function, s) for s in function.body if isinstance(s, ir.GatherSums))
                 return self._load(array, offset, end)
         return value

@@ -117,11 +117,22 @@ TIME = Choice(
         "INIT": ("phi_init_at", "phi_init"),
         "TAKE_T0": ("s->t = s->now = t0;", ""),
         "SET_TIME(s)": ("s->t = s->now =", "s->t ="),
-        "TIME_AFTER(s, steps)": (LATTICE_TIME, LATTICE_TIME),
         "TIMES_OF_SLOPES": ("static const double after[4] = { 0.0, 0.5, 0.5, 1.0 };", ""),
         "BEGIN_OF_STAGES(s)": ("double begin = s->t;", ""),
         "NEXT_BEGIN(h)": ("begin += h;", ""),
     },
+)
+
+PASSING = Choice(
+    "Steps of a lattice are equal in tau, and it sums up the physical time of its flows.",
+    ("MONITOR",),
+    {"TIME_AFTER(s, steps)": ("s->clock[0] + s->clock[1]", LATTICE_TIME)},
+)
+
+LATE = Choice(
+    "Coefficients of a lattice read how late a flow is along a tangent vector, where its time depends on the state.",
+    ("LATE",),
+    {"AND_ON_TIME": (", phi_on_time", "")},
 )
 
 GAUGE = Choice(
@@ -619,6 +630,8 @@ ALL = (
     STAGES,
     VALUES,
     TIME,
+    PASSING,
+    LATE,
     GAUGE,
     LEVEL,
     OWN,

@@ -73,6 +73,16 @@ LATTICE = (
         reset=("for (size_t k = 0; k < 2 * PHI_DIM; ++k, memory += block) s->carry[k] = memory;",),
     ),
     StateBlock(
+        "clock",
+        "MONITOR",
+        (
+            "double level;             /* energy level e = -H(x0); K = log(A + e) - log(-B) is 0 along the run */",
+            "double *densities;        /* densities of a part of H at the sites */",
+            "double *clock;            /* physical times of x and of before, each with its compensation term */",
+        ),
+        reset=("s->densities = memory, memory += block;", "s->clock = memory, memory += block;"),
+    ),
+    StateBlock(
         "open",
         "!SERIES",
         (
@@ -192,7 +202,10 @@ LATTICE = (
             "double now;               /* the time of the present stage, at which H is evaluated */",
         ),
     ),
-    StateBlock("t", "!TIMED", ("double t;                 /* time since phi_init */",)),
+    StateBlock("t", "!TIMED && !MONITOR", ("double t;                 /* time since phi_init */",)),
+    StateBlock(
+        "t", "MONITOR", ("double t;                 /* physical time since phi_init; steps are equal in tau */",)
+    ),
     StateBlock("h", members=("double h;                 /* size of the last step */",)),
     StateBlock(
         "noise",
@@ -243,7 +256,8 @@ LATTICE = (
     ),
     StateBlock(
         "before_h",
-        members=(
+        "!MONITOR",
+        (
             "size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */",
             "double t_before_h;",
         ),

@@ -10,6 +10,7 @@ from dataclasses import fields, replace
 from functools import partial
 from typing import Any
 
+from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import Program
 from phigen.targets.c import emitter as c
@@ -40,7 +41,13 @@ _READING = (
 
 
 def for_devices(program: Program) -> Program:
-    """Return a program without the parts that no kernel calls: derivatives of steps, the modified H, attitudes."""
+    """Return a program without the parts that no kernel calls: derivatives of steps, the modified H, attitudes.
+
+    Raises `SpecError` for lattices whose steps are equal in τ, which need sums over all sites in each flow.
+    """
+    if program.step.swept and program.step.swept.rates:
+        message = f"{program.name} has a monitor, which lattices on devices do not take"
+        raise SpecError([Diagnostic(message, hint="target c; on devices ensembles of ordinary systems have monitors")])
     left_out: dict[str, Any] = {"adjoint": None, "tangent": None, "tangents": ()}
     parts = {f.name for f in fields(program.step)}
     step = replace(program.step, **{part: none for part, none in left_out.items() if part in parts})

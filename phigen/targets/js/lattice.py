@@ -83,7 +83,7 @@ def _functions(lattice: LatticeLoops) -> Iterator[ir.Function]:
     for gather in step.others.gathers:
         yield from map(lattice.sums, gather.ends)
     yield from map(lattice.stage, step.equation.kernels if step.equation else ())
-    yield from map(lattice.observable, lattice.program.observables.kernels)
+    yield from map(lattice.observable, (*lattice.program.observables.kernels, *step.rate_kernels))
 
 
 def _contents(program: Program, step: Sweeps) -> list[str]:

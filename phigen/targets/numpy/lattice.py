@@ -53,6 +53,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     graphs = ["lattice_graph", *(["lattice_colours"] if step.by_colour else [])] if graph else []
     drawing = ["lattice_noise", "philox"] if program.noise else []
     parts = ["lattice", "lattice_sites", *graphs, *drawing, *(_SERIES if step.equation else ("lattice_splitting",))]
+    parts += ["lattice_monitor"] * (step.rates is not None)
     parts += ["lattice_steps", *(["lattice_tangent"] if program.extras.tangent else [])]
     pieces = [render("numpy", f"{part}.py", values) for part in parts]
     if step.adjoint:
@@ -101,7 +102,7 @@ def _functions(loops: LatticeLoops) -> Iterator[str]:
         if loops.program.extras.tangent:
             yield _table("TANGENTS", "Their derivatives.", step.tangents)
     yield from _transposes(loops, lowering, {k.name: k for k in step.adjoint.steps}) if step.adjoint else ()
-    for kernel in loops.program.observables.kernels:
+    for kernel in (*loops.program.observables.kernels, *step.rate_kernels):
         yield function(lowering.observable(temporaries(loops.observable(kernel))))
 
 

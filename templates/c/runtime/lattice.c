@@ -79,7 +79,7 @@ static void phi_prepare_step(const phi_params *params, double h, double *coef)
         phi_prepare(params, phi_times[k] * h, kick, coef + k * PHI_ROW);
     }
 #else
-    for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) phi_prepare(params, phi_times[k] * h, coef + k * PHI_ROW);
+    for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) phi_prepare(params, phi_times[k] * h PHI_AND_ON_TIME, coef + k * PHI_ROW);
 #endif
 }
 
@@ -91,6 +91,7 @@ static int phi_finite(const double *values, size_t count)
 }
 
 #include "lattice_carry.c"
+#include "lattice_monitor.c"
 
 phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const double *x0 PHI_AND_T0, void *work)
 {
@@ -123,6 +124,10 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
     phi_put_kinds(s);
     phi_put_parameters(s, &own);
     phi_put_at_bonds(s, &own);
+#if PHI_MONITOR
+    memset(s->clock, 0, 4 * sizeof *s->clock);
+    if (!phi_take_level(s)) return PHI_BAD_ARGUMENT;
+#endif
     return PHI_OK;
 }
 
@@ -136,8 +141,10 @@ static phi_status phi_set_step(phi_solver *s, double h)
     PHI_NOT_OPEN(s)
     phi_prepare_step(&s->params, h, s->coef);
     s->h = h;
+#if !PHI_MONITOR
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
+#endif
     s->prepared = 1;
     return PHI_OK;
 }
@@ -159,6 +166,7 @@ static void phi_copy(double *const *to, double *const *from, const phi_solver *s
 {
     for (size_t k = 0; k < PHI_DIM; ++k) memcpy(PHI_MEMORY_OF(to[k]), PHI_MEMORY_OF(from[k]), PHI_DOUBLES * sizeof **from);
     phi_copy_carry(s, to);
+    phi_copy_clock(s, to);
 }
 
 #include "lattice_vectors.c"
@@ -171,6 +179,7 @@ phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
 
 #include "lattice_kicks.c"
+#include "lattice_clock.c"
 
 #include "lattice_tangent.c"
 

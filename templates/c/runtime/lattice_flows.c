@@ -21,7 +21,7 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI
 #endif
 {
     size_t first, end = phi_share(phi_units(s), &first);
-#if PHI_TANGENT
+#if PHI_TANGENT && !PHI_MONITOR
     for (size_t k = 0; k < s->vectors; ++k) { /* a flow reads its own fields at the same site only: threads need not wait */
         double *v[PHI_DIM];
         phi_vector(s, k, v);
@@ -50,6 +50,7 @@ static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI
 #endif
 #include "lattice_found_flows.c"
 #include "lattice_made_flows.c"
+#include "lattice_monitored_flows.c"
 
 #if PHI_UNDONE
 static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first, size_t end);

@@ -4,10 +4,16 @@
 #include "model.h"
 #include "rows.c"
 
+#include "lattice_moved_level.c"
+
 /* Set the state to x + kept * state. */
 static phi_status phi_move(phi_solver *s, const double *x, double kept)
 {
     if (s == NULL || x == NULL) return PHI_BAD_ARGUMENT;
+#if PHI_MONITOR
+    phi_copy(s->before, s->x, s);
+    s->open = 0;
+#endif
     for (int moving = 0; moving < 2; ++moving) /* first check all values, then change them */
         for (size_t r = 0; r < PHI_DIM * s->rows; ++r) {
             double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
@@ -20,7 +26,11 @@ static phi_status phi_move(phi_solver *s, const double *x, double kept)
         }
     PHI_NOT_OPEN(s)
     phi_clear_carry(s);
+#if PHI_MONITOR
+    return phi_begin_level(s);
+#else
     return PHI_OK;
+#endif
 }
 
 phi_status phi_set_state(phi_solver *s, const double *x) { return phi_move(s, x, 0.0); }

@@ -10,6 +10,7 @@ import { expectFewSteps } from "./site_noise.mjs";
 import { renewRows } from "./rows_renewed.mjs";
 import { takeTime } from "./sites_timed.mjs";
 import { Sites } from "./sites.mjs";
+import { beginLevel } from "./site_level.mjs";
 import { makeStep } from "./flows.mjs";
 
 // ---- The solver ----
@@ -117,6 +118,7 @@ export class Solver {
     if (!rows.every((row) => row.every(Number.isFinite))) {
       throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
     }
+    beginLevel(this);
   }
 
   /** All parameters; those at sites and at bonds are arrays. */
@@ -164,7 +166,9 @@ export class Solver {
       throw new StepError(status, this.steps);
     }
     this.steps++;
+    // #if !MONITOR
     this.t = this.#timeBefore + (this.steps - this.#stepsBefore) * h;
+    // #endif
     return this;
   }
 

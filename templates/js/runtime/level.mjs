@@ -29,12 +29,3 @@ export function makePerTau(params, x, field) {
   const rate = rateAt(params, x);
   for (let i = 0; i < field.length; i++) field[i] *= rate;
 }
-
-/** The time of a solver gains that of a stage. */
-export function pass(solver, time) {
-  const sum = solver.t + time;
-  const added = sum - solver.t;
-  const small = solver.tCarry + ((solver.t - (sum - added)) + (time - added));
-  solver.t = sum + small;
-  solver.tCarry = small - (solver.t - sum);
-}

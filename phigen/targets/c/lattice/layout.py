@@ -127,7 +127,8 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "COMPENSATED": program.compensated,
         "SLOPES": layout.slopes,
         "SHARED": bool(step.adjoint)
-        or (step.equation is None and (program.profile == "fast" or program.extras.tangent)),
+        or (step.equation is None and (program.profile == "fast" or program.extras.tangent))
+        or step.rates is not None,
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }

@@ -129,7 +129,8 @@ class RowLoops:
         Those that a sweep reads (``swept``) may have further arguments, see `told_of_bonds`.
         """
         partners = self.layout.partners
-        observed = not swept and gather in (partners.energy, partners.field, partners.observed)
+        of_parts = [sums for _, sums in partners.of_parts]
+        observed = not swept and gather in (partners.energy, partners.field, partners.observed, *of_parts)
         for number, (ends, oriented) in enumerate(over_ends(gather) if gather else ()):
             arguments = self.told_of_bonds(ends, oriented) if swept else ()
             one = self._bond_loop(ends, oriented, {} if observed else self.versions, arguments)
@@ -188,5 +189,6 @@ class RowLoops:
 
 def observables(program: Program, loops: RowLoops) -> Sequence[str]:
     """Return the text of the functions of observables."""
-    kernels = (kernel for kernel in program.observables.kernels if kernel.roots)
+    observed = (*program.observables.kernels, *loops.layout.step.rate_kernels)
+    kernels = (kernel for kernel in observed if kernel.roots)
     return [printed(program, loops.observable(kernel), inline=False) for kernel in kernels]

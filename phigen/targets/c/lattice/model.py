@@ -98,6 +98,7 @@ def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> int:
         stage = stage * dimension + has["KRYLOV"]  # one for sums over pieces
     fields = dimension + 2 * dimension * has["COMPENSATED"]  # before a step, and what rounding leaves out
     fields += bool(layout.step.sites.seams)  # and the kinds of sites
+    fields += 2 * has["MONITOR"]  # densities, and the clock
     return len(layout.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage
 
 
@@ -149,6 +150,7 @@ def model(program: Program, step: Sweeps) -> str:
         "bound": repr(MAX_NORMAL_VARIATE) if program.noise else "",
         "reductions": ", ".join(_braced(_reduction(r)) for r in program.observables.reductions),
         "joined": not program.noise,
+        "late": has["LATE"],
         "allowed": statements(_allowed(program, graph=layout.graph), program.name),
     }
     timed = step.refresh or (program.time and step.equation)
@@ -190,6 +192,8 @@ def _constants(
             yield "BAND", band(step), "diagonals beside that of the matrix of Newton's method"
     else:
         yield "FLOWS", len(step.schedule.flows), "in a step"
+    if step.rates:
+        yield "NEGATIVE", 1 + step.rates.negative, "the part B of H, which is negative"
     if has["WAVES"]:
         far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = max(1, *far) if several else 1

@@ -57,7 +57,9 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
         texts += _PartLoops(loops, rows, step.parts).texts()
         texts += _PartLoops(loops, None, step.tangents).texts() if program.extras.tangent else []
     partners = layout.partners
-    for gather in () if layout.sums_up else (partners.field, partners.energy, partners.varied, partners.observed):
+    of_parts = (sums for _, sums in partners.of_parts)
+    others = (partners.field, partners.energy, partners.varied, partners.observed, *of_parts)
+    for gather in () if layout.sums_up else others:
         texts += [printed(program, loop) for loop in loops.sums(gather)]
     if equation:
         texts += _of_equation(loops, equation.relax, rows, end=equation.advance)

@@ -1,0 +1,125 @@
+"""The explicit monitor of all pairs of sites, H = A + B: K = log(A + e) − log(−B).
+
+A and B are sums over all sites and pairs, and each is constant along its own flow, so that the flow of a part of K is
+that of the part of H over another time; see `phigen.scheme.logarithmic`. All sites have the same steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from phigen.errors import SpecError
+from phigen.geometry.positivity import POSITIVE, sign_of
+from phigen.lattice.cell import PAIRS, Cell
+from phigen.lattice.site_kernels import site_kernel
+from phigen.lattice.site_parts import BondSum, CellFlow
+from phigen.lattice.states import start_of
+from phigen.lattice.variations import along, varied_sum
+from phigen.scheme.kernel import Kernel, Role
+from phigen.scheme.logarithmic import fact_of
+from phigen.scheme.steps import PartRates
+from phigen.spec.model import Spec
+from phigen.spec.names import LOGARITHMIC
+from phigen.splitting.ring import TIME
+from phigen.symbolic.arrays import evaluate
+from phigen.symbolic.expression import Expression, gradient, symbol, total
+from phigen.symbolic.neighbours import ENDS
+from phigen.symbolic.readable import shortened
+from phigen.symbolic.symbols import GATHERED, Symbol
+
+#: The variation of the time of a flow, as a symbol.
+LATE = Symbol("late")
+
+
+def expect_applicable(cell: Cell, spec: Spec) -> None:
+    """Raise `SpecError` for monitors of lattices that are not those of this module."""
+    if spec.monitor is None:
+        return
+    message, hint = "", "remove monitor; steps are equal in the time then"
+    if cell.relation != PAIRS:
+        message = "monitor: lattices take it for pairs only; here all sites would have the steps of the fastest of them"
+    elif spec.monitor != LOGARITHMIC:
+        message, hint = "monitor: an expression makes K = g(H + e), which does not split", "monitor: log"
+    elif spec.scheme == "series":
+        message, hint = "monitor: log needs H = A + B split in two", "scheme: splitting"
+    elif cell.time or cell.forces or cell.noise:
+        what = "time" if cell.time else "forces" if cell.forces else "noise"
+        message = f"monitor: log takes no {what}, with which e = -H(x0) would not be constant"
+    elif spec.extras.adjoint:
+        message = "monitor: gradients (adjoint) are not offered with it for lattices"
+        hint = "phigen show --expand 3 prints an ordinary spec of three sites, which has them"
+    if message:
+        raise SpecError([spec.diagnostic(("monitor",), message, hint)])
+
+
+def negative_part(cell: Cell, flows: Sequence[CellFlow], spec: Spec) -> int:
+    """Return the number of the part B. Raises `SpecError` where there are not two parts, of which one is negative."""
+    if len(flows) != 2:
+        message = f"monitor: log needs H = A + B of two parts with elementary flows; here there are {len(flows)}"
+        raise SpecError([spec.diagnostic(("monitor",), message, "remove monitor; steps are equal in the time then")])
+    for k, flow in enumerate(flows):
+        if all(sign_of(-s.expression, _positive(cell, s.expression)) == POSITIVE for s, _ in flow.summands):
+            return k
+    for k, flow in enumerate(flows):
+        energies = [_at_start(cell, flow, spec, name) for name in spec.runs]
+        if energies and all(e < 0 for e in energies):
+            return k
+    parts = ", ".join(f"the sum of {shortened(flow.hamiltonian)}" for flow in flows)
+    message = f"monitor: log needs a part that is negative, at least where runs start; the parts are {parts}"
+    hint = "positive: true of a parameter shows a sign; a constant can be taken from a part, in hamiltonian"
+    raise SpecError([spec.diagnostic(("monitor",), message, hint)])
+
+
+def _positive(cell: Cell, e: Expression) -> set[str]:
+    """Return the symbols of an expression that are positive by declaration."""
+    names = {p.name for p in cell.parameters if p.positive}
+    return names | {n for n, (base, _) in cell.places(e).items() if base in names}
+
+
+def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
+    """Return the energy of a part at the start of a run."""
+    start = start_of(spec, spec.runs[run])
+    arrays = {**start.parameters, **dict(zip(cell.fields, start.state, strict=True))}
+    first, second = np.triu_indices(start.sizes[0], 1)
+    energy = 0.0
+    for summand, _ in flow.summands:
+        values = dict(arrays)
+        for name, (base, offset) in cell.places(summand.expression).items():
+            array = np.broadcast_to(arrays[base], start.sizes)
+            values[name] = array[(first, second)[ENDS.index(str(offset[0]))]] if summand.bond else array
+        count = len(first) if summand.bond else start.sizes[0]
+        energy += float(np.broadcast_to(evaluate([summand.expression], values)[0], count).sum())
+    return energy
+
+
+def rates_of(
+    cell: Cell, flows: Sequence[CellFlow], negative: int, *, tangent: bool
+) -> tuple[PartRates, list[tuple[str, BondSum]]]:
+    """Return the kernels of the energies of both parts, and the sums over pairs that they read, by their names."""
+    energies, slopes, sums = list[Kernel](), list[Kernel](), list[tuple[str, BondSum]]()
+    shared = Symbol(GATHERED, "energy")
+    for k, flow in enumerate(flows, 1):
+        at_site, of_pair = (total(s.expression for s, _ in flow.summands if s.bond == bond) for bond in (False, True))
+        name, purpose = f"part{k}", f"the density of H_{k}"
+        energies.append(site_kernel(cell, name, purpose, [at_site], "out", role=Role.ENERGY))
+        sums.append((name, BondSum({shared: of_pair})))
+        if tangent:
+            name, purpose = f"part{k}_slope", f"{purpose}, along a variation"
+            slopes.append(site_kernel(cell, name, purpose, along(cell, [at_site]), "out", role=Role.ENERGY_SLOPE))
+            (slope,) = along(cell, [of_pair])
+            sums.append((name, BondSum({varied_sum(shared): slope})))
+    first, second = energies
+    return PartRates((first, second), negative, tuple(slopes)), sums
+
+
+def fact(flows: Sequence[CellFlow], negative: int) -> str:
+    """Return the line of the header."""
+    return fact_of(f"the sum of {shortened(flows[negative].hamiltonian)}")
+
+
+def delayed(increments: Sequence[Expression], slopes: Sequence[Expression]) -> list[Expression]:
+    """Return the variations of the increments of a flow whose time varies too, by `LATE`."""
+    rates = (gradient(e, [TIME])[0] for e in increments)
+    return [slope + rate * symbol(LATE) for slope, rate in zip(slopes, rates, strict=True)]

@@ -1,0 +1,19 @@
+#ifndef PHI_FILE_LATTICE_LATE_FLOWS
+#define PHI_FILE_LATTICE_LATE_FLOWS
+#include "lattice.h"
+#include "model.h"
+#include "lattice_monitor.c"
+
+/* Carry the tangent vectors along by a flow over a time that depends on the state: time = tau / rate. */
+static void phi_carry_vectors(const phi_solver *s, int part, double time, double rate)
+{
+    size_t first, end = phi_share(phi_units(s), &first);
+    for (size_t k = 0; k < s->vectors; ++k) {
+        double *v[PHI_DIM], coef[PHI_ROW];
+        phi_vector(s, k, v);
+        const double slope = phi_part_slope(s, part, v), late[1] = { (part == PHI_NEGATIVE ? slope : -slope) * time / rate };
+        phi_prepare(&s->params, time, late, coef);
+        phi_tangent_rows(s, part, coef, v, first, end);
+    }
+}
+#endif

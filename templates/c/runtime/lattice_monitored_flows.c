@@ -1,0 +1,21 @@
+#ifndef PHI_FILE_LATTICE_MONITORED_FLOWS
+#define PHI_FILE_LATTICE_MONITORED_FLOWS
+#include "lattice.h"
+#include "model.h"
+#include "lattice_monitor.c"
+#include "lattice_late_flows.c"
+
+/* The flow of that number in a step, of a part of K; after those of a step the last and the first together. Where its time
+   would not be positive, the state is no number afterwards. */
+static void phi_make_flow(const phi_solver *s, size_t steps, int number)
+{
+    double coef[PHI_ROW];
+    const int part = phi_flow_parts[number];
+    const double rate = phi_rate(s, part), time = phi_times[number] * s->h / (rate > 0.0 ? rate : 0.0);
+    (void)steps;
+    phi_carry_vectors(s, part, time, rate);
+    phi_prepare(&s->params, time PHI_AND_ON_TIME, coef);
+    phi_sweep_part(s, part, coef PHI_AND_FAR(s->far > 0));
+    if (part != PHI_NEGATIVE && PHI_THREAD == 0) phi_pass(s, time);
+}
+#endif

@@ -1,0 +1,40 @@
+import { StepError } from "./errors.mjs";
+import { NEGATIVE, part1, part2 } from "./model.mjs";
+
+// ---- Steps equal in tau: those of K = log(A + e) - log(-B), where H = A + B ----
+
+/** The sum of the densities that a function computes at sites, compensated after A. Neumaier. */
+export function totalOf(density, params, sites, ...at) {
+  const values = new Float64Array(sites.count);
+  density(params, ...at, sites, values);
+  let sum = 0, rest = 0;
+  for (const value of values) {
+    const total = sum + value;
+    rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
+    sum = total;
+  }
+  return sum + rest;
+}
+
+/** A part of H. */
+function partEnergy(part, { params, sites, x }) {
+  return totalOf([part1, part2][part], params, sites, x);
+}
+
+/**
+ * Set the level e = -H(x0), which a trajectory holds fixed, and the compensation term of t, which is physical time.
+ * Throws StepError where the physical time does not increase.
+ */
+export function beginLevel(solver) {
+  solver.tCarry = 0;
+  const energies = [partEnergy(0, solver), partEnergy(1, solver)];
+  solver.level = -(energies[0] + energies[1]);
+  if (Number.isFinite(solver.level) && energies[NEGATIVE] < 0) return;
+  throw new StepError("BAD_ARGUMENT", 0, `the part of H that has to be negative is ${energies[NEGATIVE]} at x0`);
+}
+
+/** A + e or -B: the flow of a part of K is that of the part of H over a time that is smaller by this factor. */
+export function rateOf(part, solver) {
+  const energy = partEnergy(part, solver);
+  return part === NEGATIVE ? -energy : energy + solver.level;
+}
