@@ -65,6 +65,7 @@ def compile(
     scheme: str | None = None,
     tangent: bool = False,
     profile: str | None = None,
+    device: int | None = None,
 ) -> Solver: ...
 
 
@@ -77,6 +78,7 @@ def compile(
     scheme: str | None = None,
     tangent: bool = False,
     profile: str | None = None,
+    device: int | None = None,
 ) -> Any: ...
 
 
@@ -89,23 +91,27 @@ def compile(
     tangent: bool = False,
     adjoint: bool = False,
     profile: str | None = None,
+    device: int | None = None,
 ) -> Any:
     """A solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled one.
 
     ``target`` is ``c``, ``numpy``, ``opencl``, ``cuda``, or ``auto``: C if there is a compiler, else NumPy with a
-    `PhigenWarning`. On ``opencl`` and ``cuda``, ensembles run on a device, see `Solver.device`. ``order``
-    overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``gauss``, ``auto``) its scheme; ``tangent``
-    asks for `Solver.step_tangent`, ``adjoint`` for `Solver.pullback` and `Solver.jacobian`, beside what the spec asks
-    for. The code is that of the profile ``fast``, or of ``profile``: the one of a spec is about what ``phigen build``
-    writes. Compiled C is cached by its content. Gives a `Solver`, of a lattice a `LatticeSolver`.
+    `PhigenWarning`. On ``opencl`` and ``cuda``, ensembles and lattices run on a device, see `Solver.device`; where
+    there are several, ``device`` is the number of one. ``order`` overrides the order of the spec, ``scheme``
+    (``series``, ``splitting``, ``gauss``, ``auto``) its scheme; ``tangent`` asks for `Solver.step_tangent`, ``adjoint``
+    for `Solver.pullback` and `Solver.jacobian`, beside what the spec asks for. The code is that of the profile
+    ``fast``, or of ``profile``: the one of a spec is about what ``phigen build`` writes. Compiled C is cached by its
+    content. Gives a `Solver`, of a lattice a `LatticeSolver`.
     Raises `SpecError`, `LimitError`, `CheckError` if the mathematics is refuted, e.g. since π is not Poisson, and
     `ToolchainError` if C was asked for in vain, or by naming a compiler in CC that does not work.
     """
     if target != "auto" and not registry.find(target).loader:
         runnable = ", ".join(registry.RUNNABLE)
         raise ValueError(f"Python cannot run the target {target!r}; it can run {runnable}")
+    if device is not None and target not in registry.DEVICES:
+        raise ValueError(f"device={device!r} is for the targets {' and '.join(registry.DEVICES)}, not {target!r}")
     compilation = compilation_of(source, order=order, scheme=scheme, tangent=tangent, adjoint=adjoint, profile=profile)
-    return (lattice_solver_of if compilation.spec.lattice else solver_of)(compilation, target)
+    return (lattice_solver_of if compilation.spec.lattice else solver_of)(compilation, target, device)
 
 
 def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:
@@ -152,28 +158,28 @@ def _expect_valid(**options: Unpack[Overrides]) -> None:
         raise ValueError(f"unknown profile {profile!r}; there are {', '.join(PROFILES)}")
 
 
-def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
+def solver_of(compilation: Compilation, target: str = "auto", device: int | None = None) -> Solver:
     """The loaded solver of a compilation. Raises `ToolchainError` if C was asked for and cannot be compiled."""
     from phigen.runtime.solver import Solver
 
     if compilation.spec.lattice:
         raise system_of_lattice(compilation.spec)
-    return Solver(*_loaded(compilation.program, target), compilation.spec)
+    return Solver(*_loaded(compilation.program, target, device), compilation.spec)
 
 
-def lattice_solver_of(compilation: Compilation, target: str = "auto") -> LatticeSolver:
+def lattice_solver_of(compilation: Compilation, target: str = "auto", device: int | None = None) -> LatticeSolver:
     """The same for a lattice."""
     from phigen.runtime.lattice import LatticeSolver
 
-    return LatticeSolver(*_loaded(compilation.program, target), compilation.spec)
+    return LatticeSolver(*_loaded(compilation.program, target, device), compilation.spec)
 
 
-def _loaded(program: Program, target: str) -> tuple[Any, Any]:
+def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any]:
     """The back end of a program, and its interface."""
     interface = interface_of(program)
     chosen = chosen_target(target, _warn)
     files = files_of(program, chosen, f"phigen build {program.name}.yaml")
-    return backend_of(files, interface, chosen), interface
+    return backend_of(files, interface, chosen, device), interface
 
 
 def files_of(program: Program, target: str, command: str) -> dict[str, str]:
@@ -188,10 +194,13 @@ def _warn(message: str) -> None:
     warnings.warn(message, PhigenWarning, stacklevel=2)
 
 
-def backend_of(files: Mapping[str, str], interface: Interface, target: str = "") -> Backend:
-    """The back end of the files (name → text) of a target, by default of the one they tell. Raises `ToolchainError`."""
+def backend_of(files: Mapping[str, str], interface: Interface, target: str = "", device: int | None = None) -> Backend:
+    """The back end of the files (name → text) of a target, by default of the one they tell. Raises `ToolchainError`.
+
+    ``device`` is the number of a device, for targets that have some.
+    """
     language = registry.find(target) if target else registry.target_of(files, interface.name)
-    return language.load(files, interface)
+    return language.load(files, interface, device)
 
 
 def interface_of(program: Program) -> Interface:

@@ -49,9 +49,10 @@ class Target:
         if refuse is not None:
             refuse(program)
 
-    def load(self, files: Mapping[str, str], interface: Interface) -> Backend:
-        """The back end of generated files. Raises `ToolchainError`."""
-        return cast("Backend", import_module(self.loader).load(files, interface))
+    def load(self, files: Mapping[str, str], interface: Interface, device: int | None = None) -> Backend:
+        """The back end of generated files, on the device of a number. Raises `ToolchainError`."""
+        options = {} if device is None else {"device": device}
+        return cast("Backend", import_module(self.loader).load(files, interface, **options))
 
 
 _LISTED = (

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from phigen.cli.completion import runs, specs
-from phigen.registry import LOADABLE
+from phigen.registry import RUNNABLE
 from phigen.spec import limits
 from phigen.spec.names import PROFILES, SCHEMES
 
@@ -31,7 +31,7 @@ SEED = click.IntRange(0, limits.SEED)
 
 #: What runs are made with.
 target_option = click.option(
-    "-t", "--target", type=click.Choice(["auto", *LOADABLE]), default="auto", show_default=True
+    "-t", "--target", type=click.Choice(["auto", *RUNNABLE]), default="auto", show_default=True
 )
 
 settings_option = click.option(

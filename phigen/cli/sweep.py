@@ -35,7 +35,10 @@ if TYPE_CHECKING:
     help="Address of a Dask cluster, tcp://…, to use instead of this machine.",
 )
 @click.option(
-    "--workers", metavar="N", type=click.IntRange(min=1), help="Number of processes.  [default: one for each core]"
+    "--workers",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Number of processes.  [default: one for each core, or each device]",
 )
 @target_option
 @order_option

@@ -57,10 +57,10 @@ def sweep(
     count they are drawn, with ``random: n`` and ``seed: k`` beside them. The result lies in the Zarr store ``output``,
     from which it is read as it is needed; an existing one of the same sweep is gone on with. Without ``output`` it is
     in memory. ``scheduler`` is the address of a Dask cluster; the default are ``workers`` processes of this machine,
-    one for each core. ``target``, ``order``, ``scheme`` and ``profile`` are those of `phigen.compile`. ``progress`` is
-    told the members made and those of them that failed, chunk by chunk. Scripts that call this need the guard
-    ``if __name__ == "__main__":``, as all that start processes do. Raises `SpecError`, `MissingPackageError` without
-    dask, distributed, xarray or zarr, ``phigen.errors.FileError`` and `PhigenError`.
+    one for each core, or for each device of the target. ``target``, ``order``, ``scheme`` and ``profile`` are those of
+    `phigen.compile`. ``progress`` is told the members made and those of them that failed, chunk by chunk. Scripts that
+    call this need the guard ``if __name__ == "__main__":``, as all that start processes do. Raises `SpecError`,
+    `MissingPackageError` without dask, distributed, xarray or zarr, ``phigen.errors.FileError`` and `PhigenError`.
     """
     from phigen.sweeping.store import imported
     from phigen.sweeping.sweep import SweepSetting, made

@@ -21,6 +21,7 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.members import Members
 from phigen.runtime.solver import Solver
 from phigen.sweeping import lattices
+from phigen.sweeping.devices import own_device
 from phigen.sweeping.statistics import MOST_BYTES, statistics_of
 from phigen.sweeping.store import Job, open_job
 
@@ -50,10 +51,11 @@ def make(store: str, digest: str, number: int) -> tuple[int, int]:
 def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
     """The job and its solver, once for each process; one process of a machine compiles, and the others wait for it."""
     job = open_job(store)
+    device = own_device(job.plan.about["target"])
     with _alone(job.interface.name):
         if isinstance(job.interface, LatticeInterface):
-            return job, LatticeSolver(job.backend(), job.interface)
-        return job, Solver(job.backend(), job.interface)
+            return job, LatticeSolver(job.backend(device), job.interface)
+        return job, Solver(job.backend(device), job.interface)
 
 
 @contextlib.contextmanager

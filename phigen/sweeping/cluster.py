@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from phigen.errors import PhigenError
-from phigen.runtime.members import cores
 from phigen.sweeping.chunk import make
 from phigen.sweeping.store import imported
 
@@ -32,7 +31,7 @@ class SweepError(PhigenError):
 
 
 @contextlib.contextmanager
-def connected(scheduler: str | None, workers: int | None) -> Iterator[tuple[Any, int]]:
+def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
     """A client of the cluster at an address, or of processes of this machine; and how many chunks fit at a time."""
     distributed, dask = imported("distributed"), imported("dask")
     if scheduler is not None:
@@ -43,16 +42,15 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[tuple[Any,
         with contextlib.closing(client):
             yield client, max(1, sum(client.nthreads().values()))
         return
-    count = workers or cores()
     with (
         # A worker may be killed with any chunk; which one is to blame, TRIES decides.
         dask.config.set({"distributed.scheduler.allowed-failures": TRIES, "distributed.worker.profile.enabled": False}),
         distributed.LocalCluster(
-            n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=logging.ERROR
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=logging.ERROR
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
-        yield client, count
+        yield client, workers
 
 
 def make_all(client: Any, slots: int, store: str, digest: str, chunks: Sequence[int], tell: Tell) -> None:

@@ -50,11 +50,11 @@ class Job:
     functions: str
     spec: str
 
-    def backend(self) -> Any:
-        """The loaded solver. Raises `ToolchainError`."""
+    def backend(self, device: int | None = None) -> Any:
+        """The loaded solver, on the device of a number. Raises `ToolchainError`."""
         from phigen import registry
 
-        return registry.find(self.plan.about["target"]).load(self.files, self.interface)
+        return registry.find(self.plan.about["target"]).load(self.files, self.interface, device)
 
     @cached_property
     def module(self) -> Any:

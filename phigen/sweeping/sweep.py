@@ -26,6 +26,7 @@ from phigen.spec.model import Run, Spec, SweepSettings
 from phigen.spec.names import KEPT
 from phigen.spec.problems import did_you_mean
 from phigen.sweeping import cluster, lattices, store
+from phigen.sweeping.devices import workers_of
 from phigen.sweeping.plan import Plan, chunk_of
 from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_errors
 
@@ -99,7 +100,7 @@ def made(
 
     job = _gone_on_with(setting.output, plan, beside) if setting.output.exists() else None
     if job is None or store.waiting(job):
-        with cluster.connected(setting.scheduler, setting.workers) as (client, slots):
+        with cluster.connected(setting.scheduler, setting.workers or workers_of(target)) as (client, slots):
             job = job or _created(setting.output, plan, beside, listed, slots)
             chunks = store.waiting(job)
             if setting.scheduler is None:  # another machine has memory of its own, of which its workers ask

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from support import COMMAND
+from support import COMMAND, compile_text
 from systems import LATTICES, as_given, slow_but, small
 
 from phigen.compiler import emit
@@ -48,3 +48,22 @@ def test_tables_whose_sizes_have_casts_are_no_functions():
         "n_CONSTANT double n_a[2 * (int)n_B][3] = { { 0.0 } };",
         "n_FUNCTION int n_f(void);",
     ]
+
+
+SPINS = """
+lattice: {axes: [i], boundary: periodic}
+coordinates: [x, y, z]
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: y**2/3 + x*x[i+1]
+scheme: series
+order: 2
+"""
+
+
+@pytest.mark.parametrize("real", ["", "real: float\n"])
+def test_no_phrase_of_the_runtime_is_left_in_functions_of_lattices(real):
+    """Those of implicit steps of spins have local tables, and loops that are unrolled."""
+    (text,) = emit(compile_text(SPINS + real).program, "device", COMMAND).values()
+    assert "t_phi0" in text
+    assert "PHI_" not in text
+    assert ("double" in text.split("*/", 1)[1]) == (not real)

@@ -2,6 +2,7 @@
 
 import importlib.util
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from phigen.api import compilation_of
 from phigen.errors import DeviceError, MissingPackageError
 from phigen.runtime.devices import opencl
 from phigen.runtime.devices.device import OutOfMemoryError
+from phigen.sweeping.devices import own_device, workers_of
 from phigen.symbolic.expression import topological
 
 pytest.importorskip("pyopencl")
@@ -172,6 +174,27 @@ def test_an_unknown_device_is_refused_with_those_there_are(monkeypatch):
     monkeypatch.setenv("PHIGEN_DEVICE", "voodoo")
     with pytest.raises(DeviceError, match="PHIGEN_DEVICE is 'voodoo', but OpenCL has the devices 0: "):
         phigen.compile("pendulum_euler", "opencl")
+
+
+def test_devices_have_numbers_and_workers_take_them_in_turn(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    one = opencl._listed(opencl._library())[0]
+    monkeypatch.setattr(opencl, "_OPENED", {})
+    monkeypatch.setattr(opencl, "_listed", lambda cl: [one, one])
+    second = phigen.compile("pendulum_euler", "opencl", device=1)
+    assert second.device is opencl.device(1) is not opencl.device(0)
+    assert pickle.loads(pickle.dumps(second)).device is second.device
+    with pytest.raises(DeviceError, match=r"device is 2, but OpenCL has the devices 0: .*; 1: "):
+        phigen.compile("pendulum_euler", "opencl", device=2)
+    with pytest.raises(ValueError, match="device=1 is for the targets opencl and cuda, not 'c'"):
+        phigen.compile("pendulum_euler", "c", device=1)
+    assert workers_of("opencl") == 2
+    assert own_device("opencl") is None
+    for name, number in ((0, 0), (1, 1), (2, 0), ("tcp://127.0.0.1:8786", None)):
+        monkeypatch.setattr(distributed, "get_worker", lambda name=name: SimpleNamespace(name=name))
+        assert own_device("opencl") == number
+    monkeypatch.setenv("PHIGEN_DEVICE", "1")
+    assert (workers_of("opencl"), own_device("opencl")) == (1, None)
 
 
 def test_cuda_without_its_package_is_told_what_to_install():

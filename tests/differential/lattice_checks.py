@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from differential import device_checks
 from differential.inputs import as_cpp, malformed, tables
 from differential.lattices import draw_lattice
 from differential.reference import (
@@ -518,6 +519,7 @@ CHECKS = (
     Check("wrong values are refused", lambda t: malformed(t.system), _always),
     Check("tables of bonds", lambda t: tables(t.system), lambda t: bool(t.system.bonds) and "k" in t.system.parameters),
     Check("C++", lambda t: as_cpp(t.compilation, lattice=True), lambda t: t.system.seed % 20 == 0),
+    Check("devices", device_checks.lattice, lambda t: device_checks.applies(t.system.seed), _RUN),
 )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from differential import device_checks
 from differential.formulas import numeric
 from differential.inputs import as_cpp
 from differential.ordinary import Ordinary, draw_ordinary
@@ -484,6 +485,10 @@ def _has_ensembles(trial: Trial) -> bool:
     return "ensemble" not in options.get("without", ()) and options.get("profile") != "certified"
 
 
+def _runs_on_devices(trial: Trial) -> bool:
+    return device_checks.applies(trial.system.seed) and _has_ensembles(trial)
+
+
 def _asked_twice(trial: Trial) -> bool:
     """Whether the spec and the call of `compile` ask for something each."""
     return bool(trial.system.asked) and not {"adjoint", "tangent", "real", "without"}.isdisjoint(trial.system.options)
@@ -516,6 +521,7 @@ CHECKS = (
     Check("steps that are too large", hopeless, _always, "s.step(x, 300 * h)"),
     Check("extras", extras, _asked_twice),
     Check("C++", lambda t: as_cpp(t.compilation, lattice=False), lambda t: t.system.seed % 20 == 0),
+    Check("devices", lambda t: device_checks.members(t, _many(t, 5)), _runs_on_devices, _RUN),
 )  # fmt: skip
 
 

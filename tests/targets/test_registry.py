@@ -38,6 +38,6 @@ def test_an_unknown_target_is_an_error_with_a_hint(program, target, hint):
 def test_the_command_line_and_the_schema_offer_what_is_registered():
     listed = "|".join(registry.TARGETS)
     assert f"[{listed}]" in CliRunner().invoke(group, ["build", "--help"]).output.replace("\n", "").replace(" ", "")
-    assert f"[auto|{'|'.join(registry.LOADABLE)}]" in CliRunner().invoke(group, ["run", "--help"]).output
+    assert f"[auto|{'|'.join(registry.RUNNABLE)}]" in CliRunner().invoke(group, ["run", "--help"]).output
     schema = json.dumps(json.loads(CliRunner().invoke(group, ["schema"]).output))
     assert json.dumps(list(registry.TARGETS)) in schema

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from phigen.errors import DeviceError, MissingPackageError
-from phigen.runtime.devices.device import OutOfMemoryError, choose
+from phigen.runtime.devices.device import Opened, OutOfMemoryError, choose
 from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
@@ -82,31 +82,48 @@ class CUDADevice:
             raise DeviceError(f"{self.name}: the device was lost, or its driver failed: {error}") from error
 
 
-#: The device of each process: contexts do not survive a fork.
-_OPENED: dict[int, CUDADevice] = {}
+_OPENED: Opened = {}
 
 
-def device() -> CUDADevice:
-    """Return the device of this process. Raises `MissingPackageError` without CuPy, `DeviceError` without a driver."""
-    if os.getpid() not in _OPENED:
-        try:
-            import cupy
-        except ImportError as error:
-            raise MissingPackageError("target cuda needs CuPy: pip install 'phigen[cuda]'") from error
-        try:
-            runtime = cupy.cuda.runtime
-            names = [runtime.getDeviceProperties(k)["name"].decode() for k in range(runtime.getDeviceCount())]
-        except cupy.cuda.runtime.CUDARuntimeError as error:
-            raise DeviceError(f"CUDA has no driver, or its driver finds no card ({error}); {_HINT}") from error
-        _OPENED[os.getpid()] = CUDADevice(cupy, choose(names, "CUDA"))
-    return _OPENED[os.getpid()]
+def device(index: int | None = None) -> CUDADevice:
+    """Return a card in this process, the default one without an index.
+
+    Raises `MissingPackageError` without CuPy, `DeviceError` without a driver.
+    """
+    key = os.getpid(), index
+    if key not in _OPENED:
+        cupy, names = _cards()
+        _OPENED[key] = CUDADevice(cupy, choose(names, "CUDA", index))
+    opened: CUDADevice = _OPENED[key]
+    return opened
+
+
+def count() -> int:
+    """Return the number of cards. Raises as `device`."""
+    return len(_cards()[1])
+
+
+def _cards() -> tuple[Any, list[str]]:
+    """Return the package CuPy, and the names of all cards."""
+    try:
+        import cupy
+    except ImportError as error:
+        raise MissingPackageError("target cuda needs CuPy: pip install 'phigen[cuda]'") from error
+    try:
+        runtime = cupy.cuda.runtime
+        names = [runtime.getDeviceProperties(k)["name"].decode() for k in range(runtime.getDeviceCount())]
+    except cupy.cuda.runtime.CUDARuntimeError as error:
+        raise DeviceError(f"CUDA has no driver, or its driver finds no card ({error}); {_HINT}") from error
+    if not names:
+        raise DeviceError(f"CUDA has no card; {_HINT}")
+    return cupy, names
 
 
 _HINT = "install NVIDIA's driver, or take target opencl, which runs on processors too"
 
 
-def load(files: Mapping[str, str], interface: Interface) -> Any:
-    """Return the back end of generated files; see `phigen.registry`."""
+def load(files: Mapping[str, str], interface: Interface, device: int | None = None) -> Any:
+    """Return the back end of generated files on a card; see `phigen.registry`."""
     from phigen.runtime.devices.loading import backend
 
-    return backend(files, interface, "cuda")
+    return backend(files, interface, "cuda", device)

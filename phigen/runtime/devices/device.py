@@ -58,15 +58,24 @@ class Device(Protocol):
         ...
 
 
-def choose(names: Sequence[str], target: str) -> int:
-    """Return the index of the device that `CHOICE` names, by default of the first. Raises `DeviceError`."""
+#: Devices by the number of the process, since contexts do not survive a fork, and their own, None for the default.
+Opened = dict[tuple[int, int | None], Any]
+
+
+def choose(names: Sequence[str], target: str, index: int | None) -> int:
+    """Return the index of a device: as passed, or that which `CHOICE` names, or 0. Raises `DeviceError`."""
+    if index is not None and not 0 <= index < len(names):
+        raise DeviceError(f"device is {index}, but {target} has the devices {_listed(names)}")
     requested_device = os.environ.get(CHOICE, "")
-    if not requested_device:
-        return 0
+    if index is not None or not requested_device:
+        return index or 0
     if requested_device.isdecimal() and int(requested_device) < len(names):
         return int(requested_device)
     for index, name in enumerate(names):
         if requested_device.lower() in name.lower():
             return index
-    listed = "; ".join(f"{index}: {name}" for index, name in enumerate(names))
-    raise DeviceError(f"{CHOICE} is {requested_device!r}, but {target} has the devices {listed}")
+    raise DeviceError(f"{CHOICE} is {requested_device!r}, but {target} has the devices {_listed(names)}")
+
+
+def _listed(names: Sequence[str]) -> str:
+    return "; ".join(f"{index}: {name}" for index, name in enumerate(names))

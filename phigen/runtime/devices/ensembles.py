@@ -44,19 +44,20 @@ class DeviceSolver:
         target: str,
         host: Backend,
         gauge: Floats | None = None,
+        index: int | None = None,
     ) -> None:
-        self.interface, self.target = interface, target
+        self.interface, self.target, self._index = interface, target, index
         self._files, self._host, self._gauge = dict(files), host, gauge
         self.defined: dict[str, int] = {}
         self._real: Any = np.float32 if interface.single else np.float64
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
-        return _loaded_again, (self._files, self.interface, self.target, self._gauge)
+        return _loaded_again, (self._files, self.interface, self.target, self._gauge, self._index)
 
     @property
     def device(self) -> Device:
-        """The device of this process."""
-        return device_of(self.target)
+        """The device in this process."""
+        return device_of(self.target, self._index)
 
     @property
     def identity(self) -> str:
@@ -67,7 +68,7 @@ class DeviceSolver:
     def with_gauge(self, gauge: Floats) -> DeviceSolver:
         """See `phigen.runtime.backend.Backend`."""
         host = self._host.with_gauge(gauge)
-        return DeviceSolver(self._files, self.interface, self.target, host, np.ascontiguousarray(gauge))
+        return DeviceSolver(self._files, self.interface, self.target, host, np.ascontiguousarray(gauge), self._index)
 
     def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`; ``threads`` is without effect.
@@ -219,7 +220,9 @@ class DeviceSolver:
         return self._host.rate(x, parameters)
 
 
-def _loaded_again(files: Mapping[str, str], interface: Interface, target: str, gauge: Floats | None) -> DeviceSolver:
+def _loaded_again(
+    files: Mapping[str, str], interface: Interface, target: str, gauge: Floats | None, index: int | None
+) -> DeviceSolver:
     """Return a solver that was pickled, on the device of this process."""
-    solver = cast(DeviceSolver, registry.find(target).load(files, interface))
+    solver = cast(DeviceSolver, registry.find(target).load(files, interface, device=index))
     return solver if gauge is None else solver.with_gauge(gauge)

@@ -240,20 +240,21 @@ class DeviceLattice(NumpyLattice):
         interface: LatticeInterface,
         target: str,
         defined: Mapping[str, int] = MappingProxyType({}),
+        index: int | None = None,
     ) -> None:
         super().__init__(files, interface)
-        self.target, self._defined = target, defined
+        self.target, self._defined, self._index = target, defined, index
         self._header = files[f"{interface.name}_device.h"]
         self.kernels = Kernels(self.device, self._header, interface.name, defined)
         self._of_sizes: tuple[tuple[int, ...], dict[Any, Any]] = (), {}
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
-        return DeviceLattice, (self._files, self.interface, self.target, dict(self._defined))
+        return DeviceLattice, (self._files, self.interface, self.target, dict(self._defined), self._index)
 
     @property
     def device(self) -> Device:
-        """The device of this process."""
-        return device_of(self.target)
+        """The device in this process."""
+        return device_of(self.target, self._index)
 
     @property
     def identity(self) -> str:

@@ -11,16 +11,16 @@ from phigen.runtime.devices.opening import device_of
 from phigen.runtime.interface import Interface, LatticeInterface
 
 
-def backend(files: Mapping[str, str], interface: Interface, target: str) -> Any:
+def backend(files: Mapping[str, str], interface: Interface, target: str, index: int | None = None) -> Any:
     """Return the back end of generated files: what runs on the host is of another target among the files."""
     from phigen.runtime.devices.ensembles import DeviceSolver
     from phigen.runtime.devices.lattices import DeviceLattice
 
     host = registry.target_of([file for file in files if not file.endswith("_device.h")], interface.name)
-    device = device_of(target)
+    device = device_of(target, index)
     if not (device.double or interface.single):
         hint = "say real: float in the spec, or take another device, which PHIGEN_DEVICE names"
         raise DeviceError(f"{device.name} has no numbers in double precision; {hint}")
     if isinstance(interface, LatticeInterface):
-        return DeviceLattice(files, interface, target)
-    return DeviceSolver(files, interface, target, host.load(files, interface))
+        return DeviceLattice(files, interface, target, index=index)
+    return DeviceSolver(files, interface, target, host.load(files, interface), index=index)

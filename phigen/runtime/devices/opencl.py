@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from phigen.errors import DeviceError, MissingPackageError
-from phigen.runtime.devices.device import OutOfMemoryError, choose
+from phigen.runtime.devices.device import Opened, OutOfMemoryError, choose
 from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
@@ -84,23 +84,36 @@ class OpenCLDevice:
             raise DeviceError(f"{self.name}: {_LOST}: {error}") from error
 
 
-#: The device of each process: contexts do not survive a fork.
-_OPENED: dict[int, OpenCLDevice] = {}
+_OPENED: Opened = {}
 
 
-def device() -> OpenCLDevice:
-    """Return the device of this process.
+def device(index: int | None = None) -> OpenCLDevice:
+    """Return a device in this process, the default one without an index.
 
     Raises `MissingPackageError` without pyopencl, `DeviceError` without a driver.
     """
-    if os.getpid() not in _OPENED:
-        try:
-            import pyopencl as cl
-        except ImportError as error:
-            raise MissingPackageError("target opencl needs pyopencl: pip install 'phigen[opencl]'") from error
+    key = os.getpid(), index
+    if key not in _OPENED:
+        cl = _library()
         devices = _listed(cl)
-        _OPENED[os.getpid()] = OpenCLDevice(cl, devices[choose([d.name for d in devices], "OpenCL")])
-    return _OPENED[os.getpid()]
+        _OPENED[key] = OpenCLDevice(cl, devices[choose([d.name for d in devices], "OpenCL", index)])
+    opened: OpenCLDevice = _OPENED[key]
+    return opened
+
+
+def count() -> int:
+    """Return the number of devices of the kind of the first: workers share these. Raises as `device`."""
+    kinds = [d.type for d in _listed(_library())]
+    return kinds.count(kinds[0])
+
+
+def _library() -> Any:
+    """Return the package pyopencl. Raises `MissingPackageError`."""
+    try:
+        import pyopencl as cl
+    except ImportError as error:
+        raise MissingPackageError("target opencl needs pyopencl: pip install 'phigen[opencl]'") from error
+    return cl
 
 
 def _listed(cl: Any) -> list[Any]:
@@ -116,8 +129,8 @@ def _listed(cl: Any) -> list[Any]:
     return sorted(devices, key=lambda d: next((k for k, kind in enumerate(order) if d.type & kind), len(order)))
 
 
-def load(files: Mapping[str, str], interface: Interface) -> Any:
-    """Return the back end of generated files; see `phigen.registry`."""
+def load(files: Mapping[str, str], interface: Interface, device: int | None = None) -> Any:
+    """Return the back end of generated files on a device; see `phigen.registry`."""
     from phigen.runtime.devices.loading import backend
 
-    return backend(files, interface, "opencl")
+    return backend(files, interface, "opencl", device)

@@ -10,7 +10,13 @@ from phigen.runtime.devices.device import Device
 DEVICES = {"opencl": "phigen.runtime.devices.opencl", "cuda": "phigen.runtime.devices.cuda"}
 
 
-def device_of(target: str) -> Device:
-    """Return the device of a target in this process. Raises `DeviceError` or `MissingPackageError`."""
-    opened: Device = import_module(DEVICES[target]).device()
+def device_of(target: str, index: int | None = None) -> Device:
+    """Return a device of a target in this process. Raises `DeviceError` or `MissingPackageError`."""
+    opened: Device = import_module(DEVICES[target]).device(index)
     return opened
+
+
+def devices_of(target: str) -> int:
+    """Return the number of devices of a target that workers share. Raises as `device_of`."""
+    number: int = import_module(DEVICES[target]).count()
+    return number

@@ -76,16 +76,18 @@ def text_of_device(program: Program) -> str:
     language = render(
         "c", "device_language.h", {"NAME": program.name, "double": not program.single, "group": group_size(program)}
     )
-    if program.step.swept:
-        lines = lattice.body(program, program.step.swept, language).splitlines()
-        return fitted(_guarded(program.name, "\n".join([*qualified(lines, program.name), ""])))
     has = switches(program, None) | {"DEVICE": True, "KICKED": False}
+    real = OVERLOADED_FLOAT if program.single else DOUBLE
+    spelt = partial(qualified, name=program.name)
+    if program.step.swept:
+        kernels = {"device_lattice.h": lattice.body(program, program.step.swept, language)}
+        amalgam = Amalgam(program.name, has, kernels, real)
+        return fitted(_guarded(program.name, amalgam.text("device_lattice.h", spelt)))
     texts = {"device_language.h": language} | text_of(program).texts(program, program.step, None, has)
     declarations = render("c", "device_declarations.h", c.declared_values(program, None, has))
     texts |= {"device_declarations.h": declarations, "model.h": c.model(program, None, has, texts.values())}
-    real = OVERLOADED_FLOAT if program.single else DOUBLE
     amalgam = Amalgam(program.name, has, c.policies(program) | texts, real)
-    body = c.unrestricted(program, amalgam.text("device.c", partial(qualified, name=program.name)))
+    body = c.unrestricted(program, amalgam.text("device.c", spelt))
     body = _guarded(program.name, body)
     return fitted(body)
 

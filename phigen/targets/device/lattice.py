@@ -14,7 +14,6 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Gather, Sweeps
 from phigen.targets.c import functions
 from phigen.targets.c.loops import statements
-from phigen.targets.c.real import DOUBLE, OVERLOADED_FLOAT
 from phigen.targets.header import plain, sentence
 from phigen.targets.rendering import render
 
@@ -67,7 +66,7 @@ def body(program: Program, step: Sweeps, language: str) -> str:
         "functions": functions.called(program),
         "kernels": [*_kernels(loops)],
     }
-    return (OVERLOADED_FLOAT if program.single else DOUBLE).spelt(render("c", "device_lattice.h", values))
+    return render("c", "device_lattice.h", values)
 
 
 def _argument(name: str, prefix: str) -> str:
