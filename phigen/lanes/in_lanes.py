@@ -150,7 +150,8 @@ def in_lanes(program: Program) -> Lanes | None:
 
     None where the spec excludes lanes, the program has no such parts, or they would need too much of the stack.
     """
-    return LOWERINGS[program.step.kind.name](program, program.step)
+    lowering = LOWERINGS.get(program.step.kind.name)
+    return lowering(program, program.step) if lowering else None
 
 
 def _is_lowered(program: Program) -> bool:
@@ -380,7 +381,7 @@ def _without_matrices(kernel: Kernel) -> Kernel:
     return replace(kernel, name="evaluate", outputs=outputs, named=named)
 
 
-#: The lowering of each kind of step.
+#: The lowerings of kinds of steps; those of other kinds are not computed in lanes.
 LOWERINGS: Mapping[str, Callable[[Program, Any], Lanes | None]] = {
     "newton": _of_newton,
     "explicit": _of_explicit,

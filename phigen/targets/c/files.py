@@ -9,10 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from phigen.scheme.step_kinds import STEP_KINDS
 from phigen.targets.features import holds
+
+_KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
 #: Conditions on switches (`phigen.targets.c.features`) by files.
 CONDITIONS = {
+    **{f"{kind}.c": kind.upper() for kind in _KINDS},
+    **{f"tangent_{kind}.c": f"TANGENT && {kind.upper()}" for kind in _KINDS},
     "adjoint.c": "ADJOINT",
     "adjoint_back.c": "!TRACED",
     "adjoint_back_lanes.c": "TRACED",
@@ -103,7 +108,6 @@ CONDITIONS = {
     "finite.c": "!DEVICE",
     "gauge.c": "GAUGE_SEARCH && !MONITOR",
     "gauge_formula.c": "GAUGE && !MONITOR && !GAUGE_SEARCH",
-    "gauss.c": "GAUSS",
     "graph.c": "GRAPH",
     "groups.c": "GROUPS",
     "history_differences.h": "GUESSED && !RECURRENCES && !GAUSS && !DEVICE",
@@ -172,7 +176,6 @@ CONDITIONS = {
     "level.c": "MONITOR",
     "members.c": "EACH || GROUPS || PACKS || ATTITUDES",
     "members_attitudes.c": "ATTITUDES",
-    "newton.c": "NEWTON",
     "newton_corrected.c": "!SPARSE",
     "newton_corrected_sparse.c": "SPARSE",
     "newton_inverted.c": "!INVERSE_UNROLLED && !SPARSE && !PATH",
@@ -185,7 +188,6 @@ CONDITIONS = {
     "packs.c": "PACKS",
     "packs_explicit.c": "EXPLICIT",
     "packs_splitting.c": "!EXPLICIT",
-    "path.c": "PATH",
     "path_lanes.c": "PATH",
     "placing.c": "KICKED",
     "placing_level.c": "MONITOR",
@@ -201,7 +203,6 @@ CONDITIONS = {
     "rows_single.c": "ONE_ROW",
     "sizes.c": "!DEVICE",
     "solver.h": "!DEVICE",
-    "splitting.c": "SPLITTING",
     "stage_alone.c": "IMPLICIT && !GUESSED",
     "stage_predicted.c": "GUESSED && !DEVICE",
     "stages.c": "COMPOSED",
@@ -209,13 +210,8 @@ CONDITIONS = {
     "status.c": "!DEVICE",
     "step_of_run.c": "!BLOCKS",
     "tangent.c": "TANGENT",
-    "tangent_explicit.c": "TANGENT && EXPLICIT",
-    "tangent_gauss.c": "TANGENT && GAUSS",
     "tangent_implicit.c": "TANGENT && IMPLICIT",
-    "tangent_newton.c": "TANGENT && NEWTON",
-    "tangent_path.c": "TANGENT && PATH",
     "tangent_product.c": "TANGENT",
-    "tangent_splitting.c": "TANGENT && SPLITTING",
 }
 
 #: Hooks: functions that others call in statements of their own, each with the condition for the statement.

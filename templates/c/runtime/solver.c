@@ -5,10 +5,7 @@
 
 #include "solver.h"
 #include "start_policy.h"
-#include "newton.c"
-#include "path.c"
-#include "gauss.c"
-#include "explicit.c"
+#include "steps.c"
 #include "attitude.c"
 #include "level.c"
 #include "gauge.c"
