@@ -1,7 +1,7 @@
 """The lexer of C, and what its tokens are read for."""
 
 from phigen import resources
-from phigen.targets.c.tokens import TokenKind, names, tokens, without_word
+from phigen.targets.c.tokens import TokenKind, lexemes, names, tokens, without_word
 from phigen.targets.c.unused import functions_of
 
 CODE = 'f(x_1, 0x1p-3f) /* a "word" */ + "no /* comment */ 1.0" - .5e-3 * 12u;'
@@ -11,6 +11,7 @@ def test_tokens_are_the_text():
     runtime = (path.read_text(encoding="utf-8") for path in (resources.templates() / "c/runtime").glob("*.[ch]"))
     for text in (CODE, *runtime):
         assert "".join(token.text for token in tokens(text)) == text
+        assert "".join(token.text for token in lexemes(text)) == text
 
 
 def test_kinds_of_tokens():
@@ -21,6 +22,14 @@ def test_kinds_of_tokens():
     assert kinds['/* a "word" */'] is TokenKind.COMMENT
     assert kinds['"no /* comment */ 1.0"'] is TokenKind.STRING
     assert names(CODE) == {"f", "x_1"}
+
+
+def test_lexemes_are_whole_operators_and_directives():
+    text = "#define A(x) x + \\\n    'c' /* 1 */\na->b <<= c+++d; f(...) # 1"
+    (first, *others) = (t for t in lexemes(text) if t.kind is not TokenKind.SPACE)
+    assert first.kind is TokenKind.DIRECTIVE
+    assert first.text.endswith("'c' /* 1 */")
+    assert " ".join(t.text for t in others) == "a -> b <<= c ++ + d ; f ( ... ) # 1"
 
 
 def test_words_go_with_the_space_behind_them():

@@ -12,12 +12,10 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-_TOKEN = re.compile(
-    r"(?P<trivia>\s+|/\*.*?\*/|^[ \t]*\#(?:[^\n\\]|\\.|\\\n)*)"
-    r"|(?P<word>[A-Za-z_]\w*)|(?P<number>\.?\d(?:[eEpP][-+]|[\w.])*)|(?P<text>\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])*')"
-    r"|(?P<sign><<=|>>=|\.\.\.|->|\+\+|--|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|.)",
-    re.DOTALL | re.MULTILINE,
-)
+from phigen.targets.c.tokens import TokenKind, lexemes
+
+#: The kinds of tokens that the grammar does not see.
+_TRIVIA = (TokenKind.SPACE, TokenKind.COMMENT, TokenKind.DIRECTIVE)
 
 #: Precedence of binary operators, as in C.
 _PRECEDENCE = {
@@ -56,10 +54,10 @@ class _Text:
     after: dict[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for match in _TOKEN.finditer(self.code):
-            if match.lastgroup != "trivia":
+        for token in lexemes(self.code):
+            if token.kind not in _TRIVIA:
                 self.significant.append(len(self.tokens))
-            self.tokens.append(match[0])
+            self.tokens.append(token.text)
 
     def __getitem__(self, place: int) -> str:
         return self.tokens[self.significant[place]] if place < len(self.significant) else ""
@@ -209,9 +207,9 @@ def _with_void(code: str) -> str:
 
 def _cast(code: str) -> Iterator[str]:
     before = ""
-    for match in _TOKEN.finditer(code):
-        if match["word"] in _UNUSED and before in (";", "{", "}"):
+    for token in lexemes(code):
+        if token.text in _UNUSED and before in (";", "{", "}"):
             yield "(void)"
-        if match.lastgroup != "trivia":
-            before = match[0]
-        yield match[0]
+        if token.kind not in _TRIVIA:
+            before = token.text
+        yield token.text

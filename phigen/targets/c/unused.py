@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from phigen.targets.c.tokens import CToken, TokenKind, names, tokens
+from phigen.targets.c.tokens import CToken, TokenKind, lexemes, names
 
 #: First words of what declares no function, or one of the library.
 _TYPES = ("typedef", "enum", "struct", "union")
@@ -48,11 +48,11 @@ def _types(lines: Sequence[str]) -> set[int]:
 
 def _used(text: str) -> set[str]:
     """The names in a text that are not those of members: these follow a point or an arrow."""
-    used, before = set[str](), "  "
+    used, before = set[str](), ""
     for _, token in _code(text):
-        if token.kind is TokenKind.NAME and before[-1] != "." and before[-2:] != "->":
+        if token.kind is TokenKind.NAME and before not in (".", "->"):
             used.add(token.text)
-        before = before[-1] + token.text
+        before = token.text
     return used | {name for line in text.splitlines() if line.startswith("#") for name in names(line)}
 
 
@@ -94,13 +94,10 @@ def declarations_of(lines: Sequence[str]) -> Iterator[Function]:
 
 def _code(text: str) -> Iterator[tuple[int, CToken]]:
     """Yield the tokens of a text without white space, comments and directives, each after the number of its line."""
-    line, fresh, directive = 0, True, False
-    for token in tokens(text):
-        ends = token.kind is TokenKind.SPACE and "\n" in token.text
-        directive = not ends and (directive or (fresh and token.text == "#"))
-        if token.kind not in (TokenKind.SPACE, TokenKind.COMMENT) and not directive:
+    line = 0
+    for token in lexemes(text):
+        if token.kind not in (TokenKind.SPACE, TokenKind.COMMENT, TokenKind.DIRECTIVE):
             yield line, token
-        fresh = ends or (fresh and token.kind is TokenKind.SPACE)
         line += token.text.count("\n")
 
 
