@@ -93,6 +93,14 @@ COTANGENT = (
         ),
     ),
     StateBlock("end", "PATH", ("double end[PHI_DIM]; /* the state at which x is taken */",)),
+    StateBlock(
+        "after",
+        "GAUSS",
+        (
+            "int chained; /* whether after has values */",
+            "double after[PHI_UNKNOWNS][PHI_WIDTH]; /* by the unknowns of the stages, in the step after */",
+        ),
+    ),
 )
 
 #: Linearised stages in SIMD lanes.

@@ -107,6 +107,7 @@ def _of_pullback(program: Program, step: Step) -> dict[str, object]:
         "kept": 3 * program.dimension,
         "gauge_passed": "gauge.T, " * bool(program.held),
         "t0_too": ", t0" * bool(program.time),
+        "chained": functions_of(program).chained,
         "found": f"_early(stage, found{moment})" if step.refresh else "found",
         "said_of_level": said if program.monitor else "a gauge is held fixed.",
     }

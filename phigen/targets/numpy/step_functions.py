@@ -50,12 +50,14 @@ class StepPart:
 class StepFunctions:
     """The text of one kind of step: that of a stage, of its tangent map, and of its transpose.
 
-    ``adjoint`` has the kernels that the transpose needs beside its own.
+    ``adjoint`` has the kernels that the transpose needs beside its own. With ``chained`` the transpose of a step starts
+    from that of the step after.
     """
 
     stage: Callable[[Program, Any], StepPart]
     tangent: Callable[[Program, Any], StepPart]
     adjoint: Callable[[Program, Any], StepPart]
+    chained: bool = False
 
 
 def _guess(program: Program) -> str:
@@ -178,6 +180,7 @@ STEP_FUNCTIONS: Mapping[str, StepFunctions] = {
         stage=_gauss,
         tangent=_gauss_tangent,
         adjoint=_gauss_adjoint,
+        chained=True,
     ),
     "splitting": StepFunctions(
         stage=_splitting,

@@ -80,17 +80,63 @@ static double phi_change_back(phi_lanes *before, phi_lanes *after)
     return largest;
 }
 
+#if PHI_FRAMED
+/* Cotangents of unknowns from those in the frame of the end of the step: the transpose of the change of frame, whose
+   columns are the images of unit vectors. */
+static void phi_see_back(const phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *bar)
+{
+    phi_lanes seen_bar[PHI_UNKNOWNS], unit[PHI_UNKNOWNS];
+    double image[PHI_UNKNOWNS][PHI_WIDTH];
+    memcpy(seen_bar, bar, sizeof seen_bar);
+    for (int first = 0; first < PHI_UNKNOWNS; first += PHI_NODES) {
+        memset(unit, 0, sizeof unit);
+        for (int i = 0; i < PHI_NODES && first + i < PHI_UNKNOWNS; ++i) unit[first + i][i] = 1.0;
+        phi_see(s, end, unit, image);
+        for (int i = 0; i < PHI_NODES && first + i < PHI_UNKNOWNS; ++i) {
+            memset(bar[first + i], 0, sizeof bar[0]);
+            for (int l = 0; l < PHI_UNKNOWNS; ++l)
+                for (int lane = 0; lane < PHI_WIDTH; ++lane) bar[first + i][lane] += image[l][i] * seen_bar[l][lane];
+        }
+    }
+}
+
+#endif
+/* Starting values for the cotangents of the stage increments, from the cotangents of the unknowns in the step after: the
+   predictor of steps, with the stages in the opposite order. */
+static void phi_predict_back(const phi_solver *s, const double end[PHI_UNKNOWNS], const double end_bar[PHI_UNKNOWNS],
+    const phi_cotangent *bar, phi_lanes *moves_bar)
+{
+    phi_lanes after[PHI_UNKNOWNS], reversed[PHI_UNKNOWNS];
+    memcpy(after, bar->after, sizeof after);
+#if PHI_FRAMED
+    phi_see_back(s, end, after);
+#else
+    (void)s;
+    (void)end;
+#endif
+    memset(reversed, 0, sizeof reversed);
+    for (int k = 0; k < PHI_UNKNOWNS; ++k)
+        for (int i = 0; i < PHI_NODES; ++i) reversed[k][i] = after[k][PHI_NODES - 1 - i];
+    phi_mixed(phi_prediction[PHI_PREDICTORS - 1], reversed, after); /* the last predictor reads one step */
+    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
+        for (int lane = 0; lane < PHI_WIDTH; ++lane) moves_bar[k][lane] = end_bar[k];
+        for (int i = 0; i < PHI_NODES; ++i) moves_bar[k][i] += after[k][PHI_NODES - 1 - i];
+    }
+}
+
 /* Solve for the cotangents of the stage increments by fixed-point sweeps, from the cotangent of their sum. */
 static phi_status phi_collocate_back(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
-    const double end_bar[PHI_UNKNOWNS], phi_lanes *moves_bar)
+    const double end[PHI_UNKNOWNS], const double end_bar[PHI_UNKNOWNS], phi_lanes *moves_bar, phi_cotangent *bar)
 {
     phi_lanes z_bar[PHI_UNKNOWNS], next[PHI_UNKNOWNS];
     double last = HUGE_VAL, size = 0.0;
     int stalls = 0;
+    const int first = bar->chained; /* the first sweep whose change shows the rate: a prediction has no z_bar */
     for (int k = 0; k < PHI_UNKNOWNS; ++k) size += fabs(end_bar[k]);
     memset(z_bar, 0, sizeof z_bar);
     memset(next, 0, sizeof next);
-    phi_mixed_back(end_bar, z_bar, moves_bar);
+    if (bar->chained) phi_predict_back(s, end, end_bar, bar, moves_bar);
+    else phi_mixed_back(end_bar, z_bar, moves_bar);
     for (int sweep = 0; sweep < PHI_MAX_SWEEPS; ++sweep) {
         phi_unknowns_bar(s, point, weights, z, moves_bar, next);
         const double change = phi_change_back(z_bar, next), rate = change / fmax(last, DBL_MIN);
@@ -98,8 +144,12 @@ static phi_status phi_collocate_back(const phi_solver *s, double point[PHI_POINT
         memcpy(z_bar, next, sizeof next);
         phi_mixed_back(end_bar, z_bar, moves_bar);
         if (rate > PHI_ADJOINT_STALLED && change <= PHI_ADJOINT_ROUNDING * size) ++stalls;
-        if (stalls > 1 || (sweep > 0 && change * rate <= PHI_ADJOINT_SOLVED * size)) return PHI_OK;
-        last = change;
+        if (stalls > 1 || (sweep > first && change * rate <= PHI_ADJOINT_SOLVED * size)) {
+            memcpy(bar->after, z_bar, sizeof z_bar);
+            bar->chained = 1;
+            return PHI_OK;
+        }
+        last = sweep < first ? HUGE_VAL : change;
     }
     return PHI_NO_CONVERGENCE;
 }
@@ -120,7 +170,7 @@ static phi_status phi_stage_adjoint(const phi_solver *s, const double *trail, ph
     phi_stage_change_adjoint(s->coef, point, end, bar->x, x, end_bar, coef);
     for (int k = 0; k < PHI_DIM; ++k) bar->x[k] += x[k];
     for (int k = 0; k < PHI_COEFFICIENTS; ++k) bar->coef[k] += coef[k];
-    const phi_status status = phi_collocate_back(s, point, weights, z, end_bar, moves);
+    const phi_status status = phi_collocate_back(s, point, weights, z, end, end_bar, moves, bar);
     if (status == PHI_OK) phi_add_stages(s, point, weights, z, moves, bar);
     return status;
 }
