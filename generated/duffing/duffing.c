@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 5eaa384f587586ca6de79fecff8356d0c557928423037a2b053d3c6977628fe9
+ * body-sha256: 806f3514db3ccb67d3598b20e754387e626b29a62e32827da4a8c208edca3ed7
  */
 #include "duffing.h"
 #include <float.h>
@@ -23,7 +23,7 @@ enum { duffing_PREPARED = 22 };       /* number of the first coefficients, funct
 enum { duffing_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
 #define duffing_TOLERANCE 1e-20       /* largest estimated error after an accepted correction */
 
-/* The middle of a step, where the time is taken. */
+/* Midpoint of the step, at which time-dependent coefficients are evaluated. */
 #define duffing_middles 0.5
 
 static int duffing_allowed(const duffing_params *params)

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2f281a1dad0a8107fe0528c1d2763b12d89e1a3ab32715d8adefb7de571054da
+ * body-sha256: 5434dfdefab06e5f3fe0179a98b61feec72eeaff2aac23ca57eeebd9d2033f1c
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -43,10 +43,13 @@ const POSITIVE = ["omega"];
 /** A step of size h is the composition of stages of these fractions of h. */
 const FRACTIONS = [1.0];
 
-/** Where the middle of each of them lies, as a fraction of the step: there the time is taken. */
+/** Midpoint of each stage, as a fraction of the step, at which time-dependent coefficients are evaluated. */
 const MIDDLES = [0.5];
 
-/** Coefficients that depend on parameters and step size only; after them, those that depend on the time too. */
+/**
+ * Coefficients that depend on parameters and step size only; after them, those that also depend on
+ * the time.
+ */
 const PREPARED = 22;
 
 /** Coefficients. */
@@ -55,7 +58,7 @@ const COEFFICIENTS = 33;
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** The error that may remain, relative to y. */
+/** Largest accepted error, relative to y. */
 const TOLERANCE = 1e-20;
 
 /** Everything that depends on parameters and step size only. */
@@ -193,7 +196,7 @@ const DIFFERENCES = 9;
 
 // ---- Errors ----
 
-/** What statuses mean. */
+/** Descriptions of statuses. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -201,7 +204,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Why a step could not be made, or no solver; the state before it stands. */
+/** Error for a step that failed, or a solver that cannot be made; the state before it stays. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -216,7 +219,7 @@ export class StepError extends Error {
   }
 }
 
-/** Numbers as many as wanted, all finite; StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -225,7 +228,9 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** Steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+/**
+ * Make `count` steps of a solver. Throws StepError if count is not a number of steps, and if a step fails.
+ */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
@@ -234,15 +239,15 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
-// The parts of some systems only:
+// Parts of some systems only:
 
 // ---- The solver ----
 
 const number = new Float64Array(1);
 
 /**
- * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
- * they have to be, and give finite coefficients for a step so short that it has no part in it.
+ * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
+ * where required, and give finite coefficients for a negligibly small step.
  */
 function admitted(given) {
   const params = { ...DEFAULT_PARAMETERS, ...given };
@@ -289,7 +294,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h, from which the time is counted if steps are equal in it. */
+  /** Steps and time at the last change of h, from which the time is counted. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -368,10 +373,10 @@ export class Solver {
   }
 
   /**
-   * Between steps: stand at x, with time, parameters and any gauge as they are. Throws StepError for what
-   * is not allowed; then all is as before.
+   * Between steps: replace the state by x; time, parameters and gauge are unchanged. Throws StepError for
+   * values that are not admissible; then nothing changes.
    *
-   * @param {ArrayLike<number>} x it may lie off the leaf: the Casimirs are from then on those of x
+   * @param {ArrayLike<number>} x may lie on another symplectic leaf; Casimirs are then those of x
    * @returns {this}
    */
   setState(x) {
@@ -379,7 +384,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: add a change to the state, as an impulse does; else as setState.
+   * Between steps: add a change to the state, such as an impulse; otherwise as setState.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -435,7 +440,7 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
-  /** The Hamiltonian, at x and its time or elsewhere. */
+  /** The Hamiltonian, at x and its time or at given ones. */
   hamiltonian(x = this.x, t = this.t) {
     energyAt(this.params, t, x, number);
     return number[0];
@@ -486,16 +491,16 @@ function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
-/** The names of what a step changes. */
+/** Names of the fields that a step changes. */
 const SAVED = ["x", "carry", "t"];
 
-/** Return copies of what a step changes. */
+/** Return copies of the fields that a step changes. */
 function savedState(solver) {
   const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
   return Object.fromEntries(copies);
 }
 
-/** Set what a step changes to copies. */
+/** Restore the fields that a step changes from copies. */
 function restoreState(solver, copies) {
   for (const [name, value] of Object.entries(copies)) {
     if (value.slice) solver[name].set(value);
@@ -506,8 +511,8 @@ function restoreState(solver, copies) {
 // ---- The implicit step, by Newton's method ----
 
 /**
- * Size of a correction relative to each component of y, but no finer than FLOOR of the largest; NaN if it
- * is NaN.
+ * Size of a correction relative to each component of y, or to FLOOR times the largest if that is more; NaN if
+ * the correction is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -530,10 +535,9 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance.
- * The increment is corrected to first order by the last Newton correction, so that correction costs no
- * evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
- * TOLERANCE.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
+ * last correction changes the increment to first order, without another evaluation: it is accepted if the
+ * remaining error, quadratic in it, is below TOLERANCE.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -566,17 +570,17 @@ function attempt(solver, stage) {
   return "NO_CONVERGENCE";
 }
 
-/** One stage of a step: a status. */
+/** Make one stage of a step; returns a status. */
 function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }
 
-/** The coefficients that are functions of the time. */
+/** The coefficients that depend on the time. */
 function refreshAt(row, t, dw, out) {
   refresh(row, t, out);
 }
 
-/** Compute the coefficients of the next step that are functions of the time or of the noise. */
+/** Compute the coefficients of the next step that depend on the time or on the noise. */
 function renew({ coef, t, h, dw }) {
   coef.forEach((row, stage) => refreshAt(row, t + MIDDLES[stage] * h, dw, row.subarray(PREPARED)));
 }
@@ -586,7 +590,7 @@ function clearHistory(solver, stage) {
   solver.history[stage].clear();
 }
 
-/** Move the predictors of all stages with the state, to x. */
+/** Shift the predictors of all stages with the state, to x. */
 function moveHistory(solver, x) {
   for (const history of solver.history) history.move(solver.x, x);
 }
@@ -596,27 +600,27 @@ function startFrom(history, x, y) {
   if (!history.predict(y)) y.set(x);
 }
 
-// ---- Starting guesses, and whether a solution may be right ----
+// ---- Predictors, and the check of solutions ----
 
 /**
- * The last value of the unknown and its backward differences, which the next is extrapolated by. For
- * speed only.
+ * Predictor: the last solution and its backward differences, from which the next one is extrapolated. Affects
+ * the speed only.
  */
 class History {
-  /** Differences that are known. */
+  /** Number of differences that are known. */
   count = 0;
-  /** How many of them the extrapolation adds up. */
+  /** Number of differences that the extrapolation adds up. */
   order = 0;
   #difference = Array.from({ length: DIFFERENCES }, () => new Float64Array(DIM));
 
-  /** Forget everything. */
+  /** Clear the predictor. */
   clear() {
     this.count = this.order = 0;
     for (const row of this.#difference) row.fill(0);
   }
 
   /**
-   * The state has been moved: the last value moves with it, and its differences stay.
+   * Shift the last value with the state, after this has been changed; differences are unchanged.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -631,11 +635,11 @@ class History {
   }
 
   /**
-   * The guess for the next value: the sum of the differences.
+   * Predict the next value by the sum of the differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if there is none, or if it is far away, where the equation of a step has
-   *   solutions that have nothing to do with the motion
+   * @returns {boolean} false if there is no prediction, or if it is far away, where the equation of a step
+   *     has solutions unrelated to the motion
    */
   predict(value) {
     let distance = 0;
@@ -651,8 +655,8 @@ class History {
   }
 
   /**
-   * Take in a solved value. The guess of order k missed it by its k-th difference: the next is of the
-   * best order.
+   * Update the predictor with a solution. The error of the prediction of order k is the k-th difference; the
+   * order with the smallest error is used next.
    *
    * @param {Float64Array} value
    */
@@ -683,8 +687,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is that of the motion. Where the step is too large, the equation may have been
- * solved by a point far away, at another energy, that has nothing to do with it.
+ * Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
+ * at another energy, and unrelated to the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -714,7 +718,7 @@ function plausible(solver, stage, increment) {
 }
 
 /**
- * One stage. A guess from earlier steps may have misled it: then once more without.
+ * Make one stage. If it fails from the predicted value, it is tried again from the state.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -729,7 +733,7 @@ function retried(solver, stage, attempt) {
   return attempt(solver, stage);
 }
 
-/** The size of the increments of the state by the noise: there is none. */
+/** Size of the noise in the increments of the state: 0. */
 function sizeOfNoise() {
   return 0;
 }
@@ -740,13 +744,13 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * The state moved by change + small in compensated arithmetic, where small is the carry and what is as
- * small: were that rounded with the change, corrections of one sign would add up to a drift.
+ * Add change + small to the state in compensated arithmetic. small holds the compensation term and other
+ * small terms: rounded together with change, they would drift.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
  * @param {ArrayLike<number>} small
- * @returns {boolean} false, and the state as before, if the sum is not finite
+ * @returns {boolean} false, with the state unchanged, if the sum is not finite
  */
 function advance({ x, carry }, change, small) {
   for (let i = 0; i < DIM; i++) {
@@ -762,7 +766,7 @@ function advance({ x, carry }, change, small) {
   return true;
 }
 
-/** The smallest normal number: keeps quotients of sizes finite. */
+/** The smallest normal number: avoids division by zero. */
 const TINY = 2.2250738585072014e-308;
 
 /**

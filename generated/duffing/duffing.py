@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 470fd55104398a4ab1795187f8c8decf84814fcd2ba04e5c71488e9b5b4ff163
+# body-sha256: 870ce6eca93df628e5c1f73d8ad837742291685c16af6806268829282f62d827
 import numpy as np
 
 VERSION = "0.1.0"
@@ -26,7 +26,7 @@ POSITIVE = ("omega",)
 # Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
 GAUGE = ()
 
-# A step of size h is the composition of steps of these fractions of h.
+# A step of size h is composed of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
@@ -101,8 +101,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
-    it has no part in it.
+    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
+    step.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -214,10 +214,9 @@ MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Whether steps lead where the motion does; arrays (members, DIM).
+    """Return whether the increments of steps agree with the motion; arrays (members, DIM).
 
-    Where the step is too large, the equation may have been solved by a point far away, at another energy, that has
-    nothing to do with it.
+    If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
     """
     _, parameters, h, t = stage
     moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -231,7 +230,7 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, guess):
-    """What _attempt finds, with a status for what is not plausible."""
+    """Return the result of _attempt, with a status for implausible solutions."""
     following, rest, value, status = _attempt(stage[0], x, carry, guess)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
@@ -251,9 +250,8 @@ def _size(y, delta):
 def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
-    The increment is corrected to first order by the last Newton correction, which is accepted when the error that
-    remains, quadratic in it, is below 1e-20. Returns new x, carry, y, and a status for each member,
-    "" if good.
+    The last correction changes the increment to first order; it is accepted if the remaining error, quadratic in it,
+    is below 1e-20. Returns new x, carry, y, and a status for each member, "" if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -268,7 +266,7 @@ def _attempt(coef, x, carry, y):
         status[open_[~finite]] = "NOT_FINITE"
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
-        # The second test: corrections no longer shrink, the solve has reached the level of rounding.
+        # Second criterion: corrections no longer shrink, the solve has reached rounding level.
         done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
@@ -284,13 +282,13 @@ def _attempt(coef, x, carry, y):
 
 
 def _advance(stage, x, carry, memory):
-    """One stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
+    """Make one stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
     guess = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, guess)
     guessed = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & guessed)
     if len(failed):
-        # A prediction from earlier steps may be bad: repeat from y = x.
+        # A prediction may be bad: repeat from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
     return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
@@ -306,7 +304,8 @@ MIDDLES = (0.5,)
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return what depends on neither state nor time, for each stage: coefficients, parameters, step size, midpoint.
+    """Return the data of each stage that depend on neither state nor time: coefficients, parameters, step size,
+    midpoint.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -338,12 +337,12 @@ def step(x, h, t0=0.0, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
+    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

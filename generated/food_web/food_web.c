@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 307ad34d460dddc6940d6b949dd0857e96a571af3a731fc418041e831906ba50
+ * body-sha256: 923411e6a87ff9bb4cafd6736f2cc28f46f6b9b7d1b0fe5f4dfc294552aac072
  */
 #include "food_web.h"
 #include <limits.h>
@@ -17,7 +17,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
 #endif
 
 /* ---- The model ---- */
@@ -31,10 +31,10 @@ enum { food_web_FLOWS = 25 };         /* in a step */
 /* Along each axis: the smallest size. */
 static const size_t food_web_least[food_web_AXES] = { 1 };
 
-/* For each part of H, 1 if it belongs to the sites of one colour, and so has a flow for each colour. */
+/* For each part of H, 1 if it consists of one flow for each colour of sites. */
 static const unsigned char food_web_by_colour[] = { 1 };
 
-/* The part of H that a flow belongs to, from 1 on; *flow becomes the colour of the sites that it updates. */
+/* Part of H of a flow, counted from 1; *flow becomes the colour of the sites that it updates. */
 static int food_web_part_of_flow(const food_web_solver *s, int *flow)
 {
     int part = 1;
@@ -42,8 +42,7 @@ static int food_web_part_of_flow(const food_web_solver *s, int *flow)
     return part;
 }
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
-   the last flow and the first of the next step together. */
+/* Times of the flows, as fractions of a step, one for each row of coefficients; the last merges two flows. */
 static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.0792036964311957, 0.0792036964311957,
     0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818,
     -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498,
@@ -51,11 +50,11 @@ static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.079203696431195
     -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663,
     0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* What these are: 0 the first flow, 1 those between, 2 the last, 3 those between, backwards. */
+/* Kind of each flow: 0 first, 1 all inner ones, 2 last, 3 the inner ones in reverse order. */
 static const unsigned char food_web_flow_parts[food_web_ROWS_OF_FLOWS] = { 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3,
     0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 0 };
 
-/* Whether all parameters are finite, and positive where they have to be. */
+/* Whether all parameters are finite, and positive where required. */
 static int food_web_allowed(const food_web_params *params, size_t sites, size_t bonds)
 {
     for (size_t k = 0; params->A != NULL && k < bonds; ++k)
@@ -353,14 +352,14 @@ static void food_web_put_parameter(const food_web_solver *s, double *rows, const
     if (values != NULL) food_web_put(s, rows, values);
 }
 
-/* The parameters at sites into rows. */
+/* Copy the parameters at sites into rows. */
 static void food_web_put_parameters(food_web_solver *s, const food_web_params *params)
 {
     food_web_put_parameter(s, s->x[1], params->k, 1.0);
 s->params.k = NULL;
 }
 
-/* The parameters at bonds, in the order of the bonds of each site. */
+/* Copy the parameters at bonds, in the order of the bonds of each site. */
 static void food_web_put_at_bonds(food_web_solver *s, const food_web_params *params)
 {
     for (int k = 0; k < s->bonds[s->sites]; ++k) {

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 8f43d66e54c190bb49b8c68140d325ccf9d334c10478ead877fb54404179c063
+# body-sha256: 441d1531b4c56fd766f3d1a910b7075563cbe081949e8f2e8106c2a7b47dcf3d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -21,11 +21,11 @@ DEFAULT_PARAMETERS = {
     "k": 1.0,
 }
 
-# Parameters that may be arrays with a value at each site, and those that have to be positive.
+# Parameters that may be arrays with a value at each site, and those that must be positive.
 AT_SITES = ("k",)
 POSITIVE = ("k",)
 
-# Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
+# Along each axis: whether the ends are open, the smallest size, the number that divides all sizes.
 OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
@@ -52,18 +52,18 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Why a step cannot be made."""
+    """Error in a step: the status."""
 
 
 def _finite(values):
-    """The values, or FailedError."""
+    """Return the values; raises FailedError if one is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
 
 
 class _Sites:
-    """The sites of a lattice of some size, with all parameters."""
+    """Sites of a lattice of given sizes, with all parameters."""
 
     def __init__(self, shape, parameters):
         self.sizes = tuple(shape[1:])
@@ -87,11 +87,11 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """() for one number."""
+        """() for a parameter with one value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """The values of the sites that lie so far away; those beyond open ends are values of others."""
+        """Return the values at an offset from each site; beyond open ends they are arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -102,7 +102,7 @@ class _Sites:
         return values
 
     def present(self, *bounds):
-        """1 at sites where all from low to high is on the lattice, along each open axis, else 0."""
+        """Return 1 where all sites from offset low to offset high exist, along each open axis, else 0."""
         if bounds not in self._known:
             there = np.ones(self.sizes)
             for place, size, low, high in zip(self._positions, self.sizes, bounds[::2], bounds[1::2]):
@@ -128,11 +128,12 @@ class _Graph(_Sites):
         super().__init__(shape, parameters)
 
     def shape_of(self, parameter):
-        """() for one number."""
+        """() for a parameter with one value."""
         return (len(self.ends),) if parameter in AT_BONDS else super().shape_of(parameter)
 
     def bonds(self, end, chosen):
-        """The bonds of all sites that are their end a, or b, or either: the site here, that there, number of the bond."""
+        """Return the bonds of all sites that are their end a, or b, or either: the site itself, the site at the
+        other end, the number of the bond."""
         key = (end, chosen, chosen and self.colour)
         if key not in self._known:
             ways = [self.ends[:, ::way] for name, way in (("a", 1), ("b", -1)) if end in ("", name)]
@@ -145,12 +146,12 @@ class _Graph(_Sites):
         return self._known[key]
 
     def summed(self, values, here):
-        """The sums at sites of values of bonds."""
+        """Return sums at sites over the values of bonds."""
         return np.bincount(here, np.broadcast_to(values, here.shape), self.sizes[0])
 
 
-# For each part of H whether it is that of one colour of sites. The flows of a step are those of all parts and colours; in
-# SCHEDULE 0 is the first of them, 2 the last, 1 are all between, 3 these backwards.
+# For each part of H, whether it consists of one flow for each colour of sites. In SCHEDULE 0 is the first flow of a
+# step, 1 all inner ones, 2 the last, 3 the inner ones in reverse order.
 BY_COLOUR = (True,)
 
 
@@ -178,7 +179,7 @@ class _Coloured(_Graph):
 
 
 def _advance(sites, rows, x, past):
-    """One step; raises FailedError. Nothing of the past is remembered."""
+    """Make one step; raises FailedError. There is no predictor."""
     for (part, sites.colour), row in sites.schedule:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -186,7 +187,7 @@ def _advance(sites, rows, x, past):
 
 
 def _coefficients(sites, h):
-    """The coefficients of all flows of a step."""
+    """Return the coefficients of all flows of a step."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -202,7 +203,8 @@ def _started(x, parameters):
 
 
 def step(x, h, **parameters):
-    """The state (DIM, *sizes) after one step of size h, of either sign; raises StepError."""
+    """Return the state (DIM, *sizes) after one step of size h, of either sign;
+    raises StepError."""
     return integrate(x, h, 1, **parameters)[-1]
 
 
@@ -227,24 +229,24 @@ def integrate(x0, h, steps, stride=1, **parameters):
 
 
 def density(x, **parameters):
-    """The density of the Hamiltonian at the sites (*sizes)."""
+    """Return the density of the Hamiltonian at the sites (*sizes)."""
     x, sites = _started(x, parameters)
     return _energy(sites.parameters, x, sites)[0]
 
 
 def hamiltonian(x, **parameters):
-    """The Hamiltonian of a state (DIM, *sizes)."""
+    """Return the Hamiltonian of a state (DIM, *sizes)."""
     return float(density(x, **parameters).sum())
 
 
 def casimirs(x, **parameters):
-    """The densities of the Casimirs (CASIMIRS, *sizes)."""
+    """Return the densities of the Casimirs (CASIMIRS, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
 
 def vector_field(x, **parameters):
-    """pi(x) grad H(x), of the shape of x."""
+    """Return pi(x) grad H(x), of the shape of x."""
     x, sites = _started(x, parameters)
     return _vector_field(sites.parameters, x, sites)
 

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 9179bdbfe50b98003e0ede55bc8cae58a0ee11c5965494b733aa3aba3967aaea
+ * body-sha256: 9b4e5c39c68dd9cb7ae3cf443169f4fff979e3917555e3986bb06ad8151237e6
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -26,7 +26,7 @@ enum { guiding_centre_TERMS = 30 };
 enum { guiding_centre_SERIES = 55 }; /* Taylor series of a path, those of the coordinates first */
 enum { guiding_centre_FIXED = 1 };   /* values that are constant along a path */
 
-/* A step of size h is the composition of steps of these fractions of h. */
+/* A step of size h is composed of steps of these fractions of h. */
 static const double guiding_centre_fractions[guiding_centre_STAGES] = { 0.4144907717943757,
     0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
 
@@ -256,7 +256,7 @@ static double guiding_centre_taylor_power(const double *a, const double *b, doub
     return sum / (double)k;
 }
 
-/* The first coefficients of the series of a path, those of the coordinates given. */
+/* First coefficients of the series of a path; those of the coordinates are given. */
 static void guiding_centre_path_begin(const double *coef, const double p[4],
     double s[55][guiding_centre_TERMS + 1], double f[1])
 {
@@ -314,7 +314,7 @@ static void guiding_centre_path_begin(const double *coef, const double p[4],
     s[54][0] = s[52][0] - s[53][0];
 }
 
-/* Coefficient k of the series, and with it coefficient k + 1 of the coordinates. */
+/* Coefficient k of the series, and coefficient k + 1 of the coordinates. */
 static void guiding_centre_path_order(const double *coef, const double p[4],
     double s[55][guiding_centre_TERMS + 1], const double f[1], int k)
 {
@@ -378,7 +378,7 @@ static void guiding_centre_path_order(const double *coef, const double p[4],
     s[3][k + 1] = s[54][k] / (double)(k + 1);
 }
 
-/* The slope of the path at a point m. */
+/* Slope of the path at a point m. */
 static void guiding_centre_path_field(const double *coef, const double p[4], const double m[4],
     double field[4])
 {

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 9b69f0ac362ba5bffe18ed73514cd1419ba9f44cdbd9ae3e0ddcfc1bfb80c1e3
+ * body-sha256: fbd75100b00c9e95e14c2effd4be65ae3f4953b4bffd56a359a5b521e9f8fb56
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -17,7 +17,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
 #endif
 
 /* ---- The model ---- */
@@ -36,22 +36,20 @@ enum { heisenberg_SPAN = 1 }; /* slices beside one that a flow reads: pieces of 
 static const size_t heisenberg_least[heisenberg_AXES] = { 2, 2, 2 };
 static const int heisenberg_open[heisenberg_AXES] = { 0, 0, 0 };
 
-/* The rows that kernels read, by their offsets along all axes but the last. */
+/* Rows that kernels read, by their offsets along all axes but the last. */
 static const int heisenberg_lines[heisenberg_LINES][heisenberg_AXES] = { { 0, 0, 0 }, { -1, 0, 0 },
     { 0, -1, 0 }, { 0, 1, 0 }, { 1, 0, 0 } };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
-   the last flow and the first of the next step together. */
+/* Times of the flows, as fractions of a step, one for each row of coefficients; the last merges two flows. */
 static const double heisenberg_times[heisenberg_ROWS_OF_FLOWS] = { 0.5, 0.5, 1.0, 0.5, 0.5, 1.0 };
 
-/* The parts of H that they are of. */
+/* The part of H of each flow. */
 static const unsigned char heisenberg_flow_parts[heisenberg_ROWS_OF_FLOWS] = { 1, 2, 3, 2, 1, 1 };
 
-/* Of each part of H the planes behind and ahead that are read, the fields that are read there, and those
-   changed. */
+/* For each part of H: planes read before and after a site, fields read there, fields changed. */
 static const heisenberg_stage heisenberg_stages_of[] = { { 1, 1, 1, 6 }, { 1, 1, 2, 5 }, { 1, 1, 4, 3 } };
 
-/* Whether all parameters are finite, and positive where they have to be. */
+/* Whether all parameters are finite, and positive where required. */
 static int heisenberg_allowed(const heisenberg_params *params, size_t sites)
 {
     for (size_t k = 0; params->B != NULL && k < sites; ++k)
@@ -86,8 +84,7 @@ typedef struct {
 #define heisenberg_EACH_SITE
 #endif
 
-/* Update the halo of a row for the sites from..to: copies of the other end, or mirrored values at open ends,
-   where terms that read them have weight 0. */
+/* Update the halo for the sites from..to: copies of the other end, or mirrored values of weight 0. */
 static inline void heisenberg_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)
@@ -205,7 +202,7 @@ static inline double heisenberg_sin_lane(double u)
     return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
 
-/* sin(t), in the loops over sites: a polynomial, no branches. No number beyond |t| = 0.5. */
+/* sin(t), for loops over sites: a branch-free polynomial. NaN for |t| > 0.5. */
 static inline double heisenberg_sin_near(double t)
 {
     const double z = t * t + (fabs(t) <= 0.5 ? 0.0 : (double)NAN);
@@ -213,7 +210,7 @@ static inline double heisenberg_sin_near(double t)
         + z * (2.755710024095779e-06 + z * -2.495193626528338e-08))));
 }
 
-/* 1 - cos(t), in the loops over sites: a polynomial, no branches. No number beyond |t| = 0.5. */
+/* 1 - cos(t), for loops over sites: a branch-free polynomial. NaN for |t| > 0.5. */
 static inline double heisenberg_versin_near(double t)
 {
     const double z = t * t + (fabs(t) <= 0.5 ? 0.0 : (double)NAN);
@@ -598,7 +595,7 @@ static void heisenberg_put_parameter(const heisenberg_solver *s, double *rows, c
     if (values != NULL) heisenberg_put(s, rows, values);
 }
 
-/* The parameters at sites into rows. */
+/* Copy the parameters at sites into rows. */
 static void heisenberg_put_parameters(heisenberg_solver *s, const heisenberg_params *params)
 {
     heisenberg_put_parameter(s, s->x[3], params->B, 0.2);

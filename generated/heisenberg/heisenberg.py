@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e546df8a2fd4b2bf7cd06497b7c523289899b68e1437e1efb68de0459db932c3
+# body-sha256: a1ccfe0dda44eb79f1ba282dc0373b4b82c6ba2e20393e513c79487b3c2046ad
 import numpy as np
 
 VERSION = "0.1.0"
@@ -21,11 +21,11 @@ DEFAULT_PARAMETERS = {
     "B": 0.2,
 }
 
-# Parameters that may be arrays with a value at each site, and those that have to be positive.
+# Parameters that may be arrays with a value at each site, and those that must be positive.
 AT_SITES = ("B",)
 POSITIVE = ()
 
-# Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
+# Along each axis: whether the ends are open, the smallest size, the number that divides all sizes.
 OPEN = (False, False, False,)
 LEAST = (2, 2, 2,)
 PERIODS = (1, 1, 1,)
@@ -52,18 +52,18 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Why a step cannot be made."""
+    """Error in a step: the status."""
 
 
 def _finite(values):
-    """The values, or FailedError."""
+    """Return the values; raises FailedError if one is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
 
 
 class _Sites:
-    """The sites of a lattice of some size, with all parameters."""
+    """Sites of a lattice of given sizes, with all parameters."""
 
     def __init__(self, shape, parameters):
         self.sizes = tuple(shape[1:])
@@ -87,11 +87,11 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """() for one number."""
+        """() for a parameter with one value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """The values of the sites that lie so far away; those beyond open ends are values of others."""
+        """Return the values at an offset from each site; beyond open ends they are arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -102,7 +102,7 @@ class _Sites:
         return values
 
     def present(self, *bounds):
-        """1 at sites where all from low to high is on the lattice, along each open axis, else 0."""
+        """Return 1 where all sites from offset low to offset high exist, along each open axis, else 0."""
         if bounds not in self._known:
             there = np.ones(self.sizes)
             for place, size, low, high in zip(self._positions, self.sizes, bounds[::2], bounds[1::2]):
@@ -112,7 +112,7 @@ class _Sites:
 
 
 def _advance(sites, rows, x, past):
-    """One step; raises FailedError. Nothing of the past is remembered."""
+    """Make one step; raises FailedError. There is no predictor."""
     for part, row in SCHEDULE:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -120,7 +120,7 @@ def _advance(sites, rows, x, past):
 
 
 def _coefficients(sites, h):
-    """The coefficients of all flows of a step."""
+    """Return the coefficients of all flows of a step."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -136,7 +136,8 @@ def _started(x, parameters):
 
 
 def step(x, h, **parameters):
-    """The state (DIM, *sizes) after one step of size h, of either sign; raises StepError."""
+    """Return the state (DIM, *sizes) after one step of size h, of either sign;
+    raises StepError."""
     return integrate(x, h, 1, **parameters)[-1]
 
 
@@ -161,24 +162,24 @@ def integrate(x0, h, steps, stride=1, **parameters):
 
 
 def density(x, **parameters):
-    """The density of the Hamiltonian at the sites (*sizes)."""
+    """Return the density of the Hamiltonian at the sites (*sizes)."""
     x, sites = _started(x, parameters)
     return _energy(sites.parameters, x, sites)[0]
 
 
 def hamiltonian(x, **parameters):
-    """The Hamiltonian of a state (DIM, *sizes)."""
+    """Return the Hamiltonian of a state (DIM, *sizes)."""
     return float(density(x, **parameters).sum())
 
 
 def casimirs(x, **parameters):
-    """The densities of the Casimirs (CASIMIRS, *sizes)."""
+    """Return the densities of the Casimirs (CASIMIRS, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
 
 def vector_field(x, **parameters):
-    """pi(x) grad H(x), of the shape of x."""
+    """Return pi(x) grad H(x), of the shape of x."""
     x, sites = _started(x, parameters)
     return _vector_field(sites.parameters, x, sites)
 

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; Energy level e = -H(x0): K = monitor (H + e) is 0 along a
  *   monitored trajectory; The solver
- * body-sha256: 4d43c27fa80296e0a52f946a6eaf8898b797d94c4d2d25b4c43e9ba5c162815b
+ * body-sha256: 8195c1ee440b053ea0e9e937a134309bb52e1d450d702c057fd845b638ba8c98
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -153,7 +153,7 @@ static void kepler_eccentric_change1(const double coef[2], const double state[4]
     change[3] = sqrt(t1);
 }
 
-/* x follows the flow of H_1 for the time that coef is prepared for. */
+/* Apply the flow of H_1 to x, over the time for which coef was prepared. */
 static inline void kepler_eccentric_flow1(const double *coef, double x[6], double moved[6],
     const double start[6])
 {
@@ -178,7 +178,7 @@ static void kepler_eccentric_change2(const double coef[4], const double state[4]
     change[2] = sqrt(t7);
 }
 
-/* x follows the flow of H_2 for the time that coef is prepared for. */
+/* Apply the flow of H_2 to x, over the time for which coef was prepared. */
 static inline void kepler_eccentric_flow2(const double *coef, double x[6], double moved[6],
     const double start[6])
 {

@@ -7,7 +7,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 43f2a88fb2cb98f9a95c67fbe0690f5b4a1dcc9bcd0bea2c2a12d83f30e5c32c
+# body-sha256: e4f3c6d8970a3a15ac2d8cf4b2413c6f77d849b231569510b921e242a88bcaf5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -26,7 +26,7 @@ POSITIVE = ()
 # Constant of a trajectory: the energy level e = -H(x0), see gauge().
 GAUGE = ("e",)
 
-# A step of size h is the composition of steps of these fractions of h.
+# A step of size h is composed of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
@@ -101,8 +101,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
-    it has no part in it.
+    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
+    step.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -161,9 +161,10 @@ FLOWS = (_flow1, _flow2,)
 
 
 def _advance(stage, x, carry, memory):
-    """Make one step of all members: the flows of the parts of K, one after another; the memory becomes its time.
+    """Make one step of all members: the flows of the parts of K, one after another; the memory becomes its physical
+    time.
 
-    No number for it means that one of the logarithms of K was left by its argument.
+    The time is NaN if the argument of a logarithm of K has left its domain.
     """
     coef, elapsed = stage[0], np.zeros(len(x))
     for part, row in SCHEDULE:
@@ -175,7 +176,7 @@ def _advance(stage, x, carry, memory):
 
 
 def _prepare(parameters, gauge, h):
-    """The coefficients of all rows."""
+    """Return the coefficients of all rows."""
     return [c for time in TIMES for c in _prepare_row(parameters, gauge, time * h)]
 
 
@@ -209,7 +210,7 @@ def _time_of(stage, x, value):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return what does not depend on the state, for each stage: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -233,12 +234,12 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
+    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
  *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 3c388a9cf6f1e1a71c405ef7bd71558436b8089abb4c9143a94b5fcfaed85be5
+ * body-sha256: 874fa71a82088d9aed0dad78e21cb8bbd634b8c1addff55ade2d82ff41dc7fcf
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -18,7 +18,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
 #endif
 
 /* ---- The model ---- */
@@ -143,8 +143,8 @@ typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES];
 #define kowalevski_gauss_EACH_LANE
 #endif
 
-/* Gauss collocation: the nodes c_j, the weights b_j, and the matrix mu = A diag(1/b) that mixes the stages;
-   row j has the factors of stage j. mu_ij + mu_ji is 1, without rounding: so the method is symplectic. */
+/* Gauss collocation: the nodes c_j, the weights b_j, and the matrix mu = A diag(1/b); row j has the factors
+   of stage j. mu_ij + mu_ji is exactly 1 in floating point, which makes the method symplectic. */
 static const double kowalevski_gauss_nodes[kowalevski_gauss_NODES] = { 0.019855071751231884,
     0.10166676129318664, 0.2372337950418355, 0.4082826787521751, 0.591717321247825, 0.7627662049581645,
     0.8983332387068134, 0.9801449282487681 };
@@ -171,7 +171,7 @@ static const double kowalevski_gauss_mixing[kowalevski_gauss_NODES][kowalevski_g
 };
 
 enum { kowalevski_gauss_PREDICTORS = 3 };
-/* Predictors of the stages of a step from those of the last one, then of the one before. */
+/* Predictors of the stages of a step, from the stage increments of the last step, then of the one before. */
 static const double kowalevski_gauss_prediction[kowalevski_gauss_PREDICTORS][kowalevski_gauss_EARLIER
     * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH] = {
     {
@@ -262,7 +262,7 @@ static const double kowalevski_gauss_prediction[kowalevski_gauss_PREDICTORS][kow
     }
 };
 
-/* The unknowns of all stages, each a sum over the moves of all. */
+/* Unknowns of all stages: weighted sums of the stage increments. */
 static inline void kowalevski_gauss_mixed(const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH],
     double moves[][kowalevski_gauss_WIDTH], kowalevski_gauss_lanes *z)
 {
@@ -277,7 +277,7 @@ static inline void kowalevski_gauss_mixed(const double matrix[kowalevski_gauss_N
     }
 }
 
-/* The same from the moves of two steps. */
+/* As kowalevski_gauss_mixed, with the stage increments of two steps. */
 static void kowalevski_gauss_mixed_twice(const double matrix[kowalevski_gauss_EARLIER
     * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], double last[][kowalevski_gauss_WIDTH],
     double older[][kowalevski_gauss_WIDTH], kowalevski_gauss_lanes *z)

@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 72 additions, 95 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 86879e4b767a208c0c588fc93a75353bea4a18d0ecdbb8997ef8be20a1bb3577
+# body-sha256: c1ef5cb6f46b990e31f5551a7d16c5133a77c812d8497ef64f93cf002eac58ea
 import numpy as np
 
 VERSION = "0.1.0"
@@ -24,7 +24,7 @@ POSITIVE = ()
 # Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
 GAUGE = ()
 
-# A step of size h is the composition of steps of these fractions of h.
+# A step of size h is composed of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
@@ -99,8 +99,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
-    it has no part in it.
+    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
+    step.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -216,7 +216,7 @@ ROUNDING = 4e-16  # ... if it changes no more than this: a part of 0.4 let Casim
 NEARLY_ROUNDING = 2e-14  # so is the second up to this that changes no less than the one before
 TRIALS = 32  # steps from one comparison of predictors to the next: it takes as long as two sweeps
 
-# Gauss collocation: nodes, weights, and the matrix mu that mixes the stages; mu + mu.T is 1 everywhere, without rounding.
+# Gauss collocation: nodes, weights, and the matrix mu = A diag(1/b); mu + mu.T is exactly 1 everywhere.
 NODES = np.array((0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751, 0.591717321247825, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681,))
 WEIGHTS = np.array((0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.181341891689181, 0.181341891689181, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813,))
 MIXING = np.array([
@@ -230,7 +230,7 @@ MIXING = np.array([
     [1.005482808253216, 0.9912514332308027, 1.012225914113298, 0.9830238267636289, 1.0247213458032003, 0.9599572962220551, 1.0818949631055814, 0.5],
 ])
 
-# What predicts the stages of a step from the moves of the last one.
+# Predictor of the stages of a step from the stage increments of the last one.
 PREDICTION = np.array([
     [-0.02555927517325182, 0.04002129143135487, -0.05438417540508904, 0.07325812815024581, -0.10358367993934758, 0.16169236863280928, -0.300652702075914, 0.7665056642259032],
     [-0.731830042234206, 1.1482708114924747, -1.5619903409759361, 2.092481756221542, -2.890132218774026, 4.215817523809776, -6.477865419312276, 9.082300892538074],
@@ -247,18 +247,18 @@ PLAIN = 0
 
 
 def _point(stage, x):
-    """Where a step starts, at all stages: (members, stages, coordinates)."""
+    """Return the start of a step for all stages: (members, stages, coordinates)."""
     return np.broadcast_to(x[:, np.newaxis, :], (len(x), len(WEIGHTS), x.shape[1]))
 
 
 def _slopes(stage, point, z):
-    """h b_j f(Z_j) at all stages; arrays (unknowns, members, stages)."""
+    """Return h b_j f(Z_j) at all stages; arrays (unknowns, members, stages)."""
     weights = np.broadcast_to(np.reshape(stage[2], (-1, 1)) * WEIGHTS, point.shape[:2])
     return np.moveaxis(_stage_field(stage[0][:, :, np.newaxis], point, z, [weights]), -1, 0)
 
 
 def _change_of(x, change, moves):
-    """The largest change at any stage, relative to the size of the unknowns: (members,)."""
+    """Return the largest change at any stage, relative to the size of the unknowns: (members,)."""
     size = np.sqrt(np.sum(x**2, axis=-1))[:, np.newaxis]
     size = np.where(size > 0, size, np.sqrt(np.sum(moves[:PLAIN] ** 2, axis=0)) + np.finfo(float).tiny)
     plain, rest = np.sum(change[:PLAIN] ** 2, axis=0) / size**2, np.sum(change[PLAIN:] ** 2, axis=0)
@@ -266,7 +266,8 @@ def _change_of(x, change, moves):
 
 
 def _solved(stage, x, z):
-    """The moves of all stages, (unknowns, members, stages), by sweeps from z, and a status for each member, "" if good."""
+    """Return the increments of all stages, (unknowns, members, stages), by sweeps from z, and a status for each
+    member."""
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
     point = _point(stage, x)
     found = _slopes(stage, point, z)
@@ -280,7 +281,7 @@ def _solved(stage, x, z):
         before = previous[open_]
         rate = size / np.maximum(before, np.finfo(float).tiny)
         rates[open_] = np.where((rate > 0) & (rate < 1) & (size > NEARLY_ROUNDING), 0.7 * rates[open_] + 0.3 * rate, rates[open_])
-        # Solved where what the next sweep would change is lost in rounding, or where sweeps change nothing but rounding.
+        # Converged if the next sweep would change less than rounding, or if changes no longer shrink.
         slow = (rate >= 1) | (rate > np.maximum(1.5 * rates[open_], STALLED))
         rises[open_] += (rate >= 1) & (size <= NEARLY_ROUNDING)
         done = (rates[open_] * size <= SOLVED) | (slow & (size <= ROUNDING)) | (rises[open_] > 1)
@@ -296,9 +297,9 @@ def _solved(stage, x, z):
 
 
 def _factors_at(fractions):
-    """Factors of the moves in the offsets from the end of a step, (fractions, stages): the collocation polynomial.
+    """Return the weights of the stage increments in offsets from the end of a step, (fractions, stages).
 
-    They are integrals of Lagrange polynomials from 1 on, as sums of Legendre polynomials.
+    They evaluate the collocation polynomial: integrals of Lagrange polynomials from 1 on, by Legendre polynomials.
     """
     x, nodes = 2 * np.reshape(fractions, (-1, 1)) - 1, 2 * NODES - 1
     legendre = np.polynomial.legendre.legvander
@@ -307,22 +308,22 @@ def _factors_at(fractions):
 
 
 def _interpolated(stage, x, moves, fractions):
-    """States at fractions of a step that ends at x, (fractions, DIM), from its moves as seen from its end."""
+    """Return states at fractions of a step that ends at x, (fractions, DIM), from its increments in the frame of x."""
     offsets = np.moveaxis(moves @ _factors_at(fractions).T, -1, 1)[:, :, 0]
     return x + _stage_change(stage[0], _point(stage, np.repeat(x, len(fractions), axis=0))[:, 0], offsets)
 
 
 def _with_new_step(memory, ratio):
-    """The memory for a step of another size, that of the last one times a ratio: it holds the unknowns themselves."""
+    """Return the predictor of a step of another size, that of the last one times a ratio: predicted unknowns."""
     if memory[1].ndim != 3 or not abs(ratio) <= 1:
         return (np.zeros((1, 1)),) * 2
     return (np.matmul(memory[1], _factors_at(1 + ratio * NODES).T)[np.newaxis],) * 2
 
 
 def _advance(stage, x, carry, memory):
-    """One step of all members.
+    """Make one step of all members.
 
-    `memory` holds the moves of the last step, and these as seen from its end, once there was one, or the start of the sweeps.
+    `memory` holds the stage increments of the last step, and these in the frame of its end, or the start of the sweeps.
     """
     predicted = memory[1].ndim > 2
     anew = np.zeros((8, len(x), len(WEIGHTS)))
@@ -330,7 +331,7 @@ def _advance(stage, x, carry, memory):
     moves, status = _solved(stage, x, start)
     failed = np.flatnonzero(status != "")
     if predicted and len(failed):
-        # A prediction may mislead: once more without.
+        # If a step fails from the prediction, it is tried again without one.
         moves[:, failed], status[failed] = _solved(_stage_at(stage, failed), x[failed], anew[:, failed])
     end = np.sum(moves, axis=-1)
     following, rest = _sum(x, carry, _stage_change(stage[0], _point(stage, x)[:, 0], end))
@@ -346,7 +347,7 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return what does not depend on the state, for each stage: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -370,12 +371,12 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
+    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3488f48fea992fb5c61009e4a1eb36243d016a4a2ae674c9a114b3c7c99f83eb
+ * body-sha256: 80f33341f46e1cdb2012d0c0a3d28adb8f6ba4239c9e282022e9ab07380ad9ab
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -82,7 +82,7 @@ const PROBE_STEP = 1e-100;
 
 // ---- Errors ----
 
-/** What statuses mean. */
+/** Descriptions of statuses. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -90,7 +90,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Why a step could not be made, or no solver; the state before it stands. */
+/** Error for a step that failed, or a solver that cannot be made; the state before it stays. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -105,7 +105,7 @@ export class StepError extends Error {
   }
 }
 
-/** Numbers as many as wanted, all finite; StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -114,7 +114,9 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** Steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+/**
+ * Make `count` steps of a solver. Throws StepError if count is not a number of steps, and if a step fails.
+ */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
@@ -123,15 +125,15 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
-// The parts of some systems only:
+// Parts of some systems only:
 
 // ---- The solver ----
 
 const number = new Float64Array(1);
 
 /**
- * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
- * they have to be, and give finite coefficients for a step so short that it has no part in it.
+ * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
+ * where required, and give finite coefficients for a negligibly small step.
  */
 function admitted(given) {
   const params = { ...DEFAULT_PARAMETERS, ...given };
@@ -176,7 +178,7 @@ export class Solver {
   params;
   /** Coefficients of each stage: functions of parameters and step size. */
   coef = emptyTables();
-  /** Steps and time at the last change of h, from which the time is counted if steps are equal in it. */
+  /** Steps and time at the last change of h, from which the time is counted. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -251,10 +253,10 @@ export class Solver {
   }
 
   /**
-   * Between steps: stand at x, with time, parameters and any gauge as they are. Throws StepError for what
-   * is not allowed; then all is as before.
+   * Between steps: replace the state by x; time, parameters and gauge are unchanged. Throws StepError for
+   * values that are not admissible; then nothing changes.
    *
-   * @param {ArrayLike<number>} x it may lie off the leaf: the Casimirs are from then on those of x
+   * @param {ArrayLike<number>} x may lie on another symplectic leaf; Casimirs are then those of x
    * @returns {this}
    */
   setState(x) {
@@ -262,7 +264,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: add a change to the state, as an impulse does; else as setState.
+   * Between steps: add a change to the state, such as an impulse; otherwise as setState.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -317,7 +319,7 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
-  /** The Hamiltonian, at x and its time or elsewhere. */
+  /** The Hamiltonian, at x and its time or at given ones. */
   hamiltonian(x = this.x, t = this.t) {
     energyAt(this.params, t, x, number);
     return number[0];
@@ -363,16 +365,16 @@ function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
-/** The names of what a step changes. */
+/** Names of the fields that a step changes. */
 const SAVED = ["x", "carry", "t"];
 
-/** Return copies of what a step changes. */
+/** Return copies of the fields that a step changes. */
 function savedState(solver) {
   const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
   return Object.fromEntries(copies);
 }
 
-/** Set what a step changes to copies. */
+/** Restore the fields that a step changes from copies. */
 function restoreState(solver, copies) {
   for (const [name, value] of Object.entries(copies)) {
     if (value.slice) solver[name].set(value);
@@ -384,7 +386,7 @@ function restoreState(solver, copies) {
 
 const increment = new Float64Array(DIM);
 
-/** One stage of a step, x + increment(x): a status. */
+/** One stage of a step, x + increment(x); returns a status. */
 function makeStage(solver, stage) {
   explicit(solver.coef[stage], solver.x, increment);
   solver.evaluations++;
@@ -397,13 +399,13 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * The state moved by change + small in compensated arithmetic, where small is the carry and what is as
- * small: were that rounded with the change, corrections of one sign would add up to a drift.
+ * Add change + small to the state in compensated arithmetic. small holds the compensation term and other
+ * small terms: rounded together with change, they would drift.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
  * @param {ArrayLike<number>} small
- * @returns {boolean} false, and the state as before, if the sum is not finite
+ * @returns {boolean} false, with the state unchanged, if the sum is not finite
  */
 function advance({ x, carry }, change, small) {
   for (let i = 0; i < DIM; i++) {

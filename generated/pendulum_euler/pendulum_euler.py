@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 31b50c80d0e86ccde194ed74607226524e96dc3df487744ddeac13ed61794fc7
+# body-sha256: a5b498132104d71c698474c15f140a65cfc7a2dcb1e20f4d0ce113e1f5c93631
 import numpy as np
 
 VERSION = "0.1.0"
@@ -24,7 +24,7 @@ POSITIVE = ("g",)
 # Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
 GAUGE = ()
 
-# A step of size h is the composition of steps of these fractions of h.
+# A step of size h is composed of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
@@ -99,8 +99,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
-    it has no part in it.
+    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
+    step.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -137,7 +137,7 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return what does not depend on the state, for each stage: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -161,12 +161,12 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
+    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

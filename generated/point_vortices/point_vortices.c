@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 19f54c4d8efb202ddc1514c41fb9c987438832ef9dccbab26c6f0eac17153393
+ * body-sha256: 45df1d19a44fbeb86ce17ab62e02bf16aec8876b9488684bdc8b42b26e5182ba
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -19,7 +19,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
 #endif
 
 /* ---- The model ---- */
@@ -38,7 +38,7 @@ static const size_t point_vortices_least[point_vortices_AXES] = { 1 };
 static const double point_vortices_times[point_vortices_ROWS_OF_FLOWS] = { 0.4144907717943757,
     0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
 
-/* Whether all parameters are finite, and positive where they have to be. */
+/* Whether all parameters are finite, and positive where required. */
 static int point_vortices_allowed(const point_vortices_params *params, size_t sites)
 {
     if (params->G == NULL) return 0;
@@ -326,7 +326,7 @@ static void point_vortices_put_parameter(const point_vortices_solver *s, double 
     if (values != NULL) point_vortices_put(s, rows, values);
 }
 
-/* The parameters at sites into rows. */
+/* Copy the parameters at sites into rows. */
 static void point_vortices_put_parameters(point_vortices_solver *s, const point_vortices_params *params)
 {
     point_vortices_put_parameter(s, s->x[2], params->G, 1.0);

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a5fa36202d5f613007a41b3a2c543254e11d1b3eefa70c54d7605d9c370bf2a2
+# body-sha256: 4f662b0b61ed5dd6558f5cac61a251ec7f94e5f3e68f156e8b1ac52bb4f29d1b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -22,11 +22,11 @@ DEFAULT_PARAMETERS = {
     "G": 1.0,
 }
 
-# Parameters that may be arrays with a value at each site, and those that have to be positive.
+# Parameters that may be arrays with a value at each site, and those that must be positive.
 AT_SITES = ("G",)
 POSITIVE = ()
 
-# Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
+# Along each axis: whether the ends are open, the smallest size, the number that divides all sizes.
 OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
@@ -53,18 +53,18 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Why a step cannot be made."""
+    """Error in a step: the status."""
 
 
 def _finite(values):
-    """The values, or FailedError."""
+    """Return the values; raises FailedError if one is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
 
 
 class _Sites:
-    """The sites of a lattice of some size, with all parameters."""
+    """Sites of a lattice of given sizes, with all parameters."""
 
     def __init__(self, shape, parameters):
         self.sizes = tuple(shape[1:])
@@ -88,11 +88,11 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """() for one number."""
+        """() for a parameter with one value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """The values of the sites that lie so far away; those beyond open ends are values of others."""
+        """Return the values at an offset from each site; beyond open ends they are arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -103,7 +103,7 @@ class _Sites:
         return values
 
     def present(self, *bounds):
-        """1 at sites where all from low to high is on the lattice, along each open axis, else 0."""
+        """Return 1 where all sites from offset low to offset high exist, along each open axis, else 0."""
         if bounds not in self._known:
             there = np.ones(self.sizes)
             for place, size, low, high in zip(self._positions, self.sizes, bounds[::2], bounds[1::2]):
@@ -112,7 +112,7 @@ class _Sites:
         return self._known[bounds]
 
 
-# Sweeps that a stage may take, and corrections by Newton's method.
+# Largest numbers of sweeps of a stage, and of Newton corrections.
 MOST_SWEEPS = 200
 DIFFERENCES = 4  # that predictions of a stage are extrapolated from
 PATIENCE = 10  # sweeps after which slow ones are left to Newton's method
@@ -124,18 +124,18 @@ NEARLY_SETTLED = 2.0**-30  # ... unless they are below this
 
 
 def _usual(y):
-    """The sizes of fields, none much less than the largest."""
+    """Return the sizes of fields, none much smaller than the largest."""
     sizes = np.abs(y).max(tuple(range(1, y.ndim)))
     return sizes + LEAST_SIZE * sizes.max() + 1e-300
 
 
 def _size(change, y):
-    """How large a change of y is, field by field."""
+    """Return the size of a change of y, field by field."""
     return (np.abs(change).max(tuple(range(1, y.ndim))) / _usual(y)).max()
 
 
 def _by_sweeps(coef, x, y, sites):
-    """y at the middle of a stage, by sweeps from a guess until only rounding would change."""
+    """Return the solution y of a stage, by fixed-point sweeps from a prediction to rounding level."""
     before = 0.0
     for sweeps in range(1, MOST_SWEEPS + 1):
         following = _relax(coef, x, y, sites)
@@ -144,7 +144,7 @@ def _by_sweeps(coef, x, y, sites):
         _finite(following)
         change = _size(following - y, following)
         y, shrunk = following, before - change
-        # What further sweeps would change, with the rate change / before, or that changes shrink no more.
+        # Expected change by further sweeps, at the rate change / before; or changes that no longer shrink.
         if change * change <= shrunk * SETTLED or (shrunk <= 0.0 and change <= ROUNDING and sweeps > 1):
             return y
         if sweeps > PATIENCE and change > max(SLOW * before, NEARLY_SETTLED):
@@ -154,7 +154,7 @@ def _by_sweeps(coef, x, y, sites):
 
 
 def _remember(differences, value):
-    """Add a value to a list of backward differences, which begins with the best order of a guess."""
+    """Update a list of backward differences with a value; returns the order whose prediction was best."""
     order, least, following = 1, np.inf, value
     for k in range(min(len(differences), DIFFERENCES)):
         last = differences[k]
@@ -168,7 +168,7 @@ def _remember(differences, value):
 
 
 def _advance(sites, rows, x, past):
-    """One step; raises FailedError. The past has, of each stage, the order of guesses and differences of y - x.
+    """Make one step; raises FailedError. `past` has the predictor of each stage: order, and differences of y - x.
     """
     for stage, (_, row) in enumerate(SCHEDULE):
         order, differences = past.get(stage, (0, []))
@@ -186,7 +186,7 @@ PLAUSIBLE = 1.5  # the motion reaches no further, in sizes of x and of its motio
 
 
 def _middle(coef, x, guess, sites, past):
-    """y at the middle of a stage: by sweeps until they fail to solve one, then by Newton's method."""
+    """Return the solution y of a stage: by fixed-point sweeps until they fail, then by Newton's method."""
     if "stiff" not in past:
         try:
             return _by_sweeps(coef, x, guess, sites)
@@ -199,7 +199,7 @@ def _middle(coef, x, guess, sites, past):
 
 
 def _newton(coef, x, y, sites):
-    """y at the middle of a stage by Newton's method; raises FailedError."""
+    """Return the solution y of a stage by Newton's method; raises FailedError."""
     before, far = 0.0, PLAUSIBLE * (np.abs(x) + np.abs(_relax(coef, x, x, sites) - x)).sum()
     for correction in range(MOST_SWEEPS):
         swept = _finite(_relax(coef, x, y, sites))
@@ -216,7 +216,7 @@ def _newton(coef, x, y, sites):
 
 
 def _krylov(matrix, side, usual):
-    """A solution of matrix(v) = side, as well as it can be by GMRES without a restart, for fields of usual sizes."""
+    """Return an approximate solution of matrix(v) = side by GMRES without restart, for fields of usual sizes."""
     usual = usual.reshape(-1, *(1,) * (side.ndim - 1))
     length = np.sqrt(((side / usual) ** 2).sum())
     if length == 0.0:
@@ -244,7 +244,7 @@ def _krylov(matrix, side, usual):
 
 
 def _coefficients(sites, h):
-    """The coefficients of all flows of a step."""
+    """Return the coefficients of all flows of a step."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -260,7 +260,8 @@ def _started(x, parameters):
 
 
 def step(x, h, **parameters):
-    """The state (DIM, *sizes) after one step of size h, of either sign; raises StepError."""
+    """Return the state (DIM, *sizes) after one step of size h, of either sign;
+    raises StepError."""
     return integrate(x, h, 1, **parameters)[-1]
 
 
@@ -285,24 +286,24 @@ def integrate(x0, h, steps, stride=1, **parameters):
 
 
 def density(x, **parameters):
-    """The density of the Hamiltonian at the sites (*sizes)."""
+    """Return the density of the Hamiltonian at the sites (*sizes)."""
     x, sites = _started(x, parameters)
     return _energy(sites.parameters, x, sites)[0]
 
 
 def hamiltonian(x, **parameters):
-    """The Hamiltonian of a state (DIM, *sizes)."""
+    """Return the Hamiltonian of a state (DIM, *sizes)."""
     return float(density(x, **parameters).sum())
 
 
 def casimirs(x, **parameters):
-    """The densities of the Casimirs (CASIMIRS, *sizes)."""
+    """Return the densities of the Casimirs (CASIMIRS, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
 
 def vector_field(x, **parameters):
-    """pi(x) grad H(x), of the shape of x."""
+    """Return pi(x) grad H(x), of the shape of x."""
     x, sites = _started(x, parameters)
     return _vector_field(sites.parameters, x, sites)
 
@@ -313,7 +314,7 @@ def _prepare(parameters, h):
 
 
 def _over_others(values, sites):
-    """The sums over all other sites b of values (a, b)."""
+    """Return sums over all other sites b of values (a, b)."""
     values = np.array(np.broadcast_to(values, sites.sizes * 2))
     np.fill_diagonal(values, 0.0)
     return values.sum(axis=1)

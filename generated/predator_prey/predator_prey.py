@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d35bd44393f17711e8a5cea89362859624c1af656591b7a6563b8e3a69f1e37d
+# body-sha256: 2f6ab3961b31cf72653b76c2db96f51ae6e1f66892f5ddbcbf1d7247b7ba2603
 import numpy as np
 
 VERSION = "0.1.0"
@@ -28,7 +28,7 @@ POSITIVE = ("growth", "attack", "gain", "death",)
 # Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
 GAUGE = ()
 
-# A step of size h is the composition of steps of these fractions of h.
+# A step of size h is composed of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
@@ -103,8 +103,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
-    it has no part in it.
+    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
+    step.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -208,10 +208,9 @@ MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Whether steps lead where the motion does; arrays (members, DIM).
+    """Return whether the increments of steps agree with the motion; arrays (members, DIM).
 
-    Where the step is too large, the equation may have been solved by a point far away, at another energy, that has
-    nothing to do with it.
+    If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
     """
     _, parameters, h = stage
     moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -225,7 +224,7 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, guess):
-    """What _attempt finds, with a status for what is not plausible."""
+    """Return the result of _attempt, with a status for implausible solutions."""
     following, rest, value, status = _attempt(stage[0], x, carry, guess)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
@@ -245,9 +244,8 @@ def _size(y, delta):
 def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
-    The increment is corrected to first order by the last Newton correction, which is accepted when the error that
-    remains, quadratic in it, is below 1e-20. Returns new x, carry, y, and a status for each member,
-    "" if good.
+    The last correction changes the increment to first order; it is accepted if the remaining error, quadratic in it,
+    is below 1e-20. Returns new x, carry, y, and a status for each member, "" if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -262,7 +260,7 @@ def _attempt(coef, x, carry, y):
         status[open_[~finite]] = "NOT_FINITE"
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
-        # The second test: corrections no longer shrink, the solve has reached the level of rounding.
+        # Second criterion: corrections no longer shrink, the solve has reached rounding level.
         done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
@@ -278,13 +276,13 @@ def _attempt(coef, x, carry, y):
 
 
 def _advance(stage, x, carry, memory):
-    """One stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
+    """Make one stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
     guess = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, guess)
     guessed = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & guessed)
     if len(failed):
-        # A prediction from earlier steps may be bad: repeat from y = x.
+        # A prediction may be bad: repeat from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
     return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
@@ -296,7 +294,7 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return what does not depend on the state, for each stage: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -320,12 +318,12 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
+    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

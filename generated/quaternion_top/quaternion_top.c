@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 9156f618fbb05e0231a140f7618b5c075007fca3d741c7ac2645218c8579dbc4
+ * body-sha256: 68b2735aa6d61ec5fac8647ecd3035fec86c0b5eb06e509828252308784b25a2
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -404,7 +404,7 @@ static int quaternion_top_plausible(const quaternion_top_solver *s,
     return fabs(H[2] - H[0]) <= quaternion_top_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 
-/* The first coefficients of the series of a path, those of the coordinates given. */
+/* First coefficients of the series of a path; those of the coordinates are given. */
 static void quaternion_top_path_begin(const double *coef, const double p[7],
     double s[84][quaternion_top_TERMS + 1], double f[1])
 {
@@ -489,7 +489,7 @@ static void quaternion_top_path_begin(const double *coef, const double p[7],
     s[83][0] = s[77][0] + s[82][0];
 }
 
-/* Coefficient k of the series, and with it coefficient k + 1 of the coordinates. */
+/* Coefficient k of the series, and coefficient k + 1 of the coordinates. */
 static void quaternion_top_path_order(const double *coef, const double p[7],
     double s[84][quaternion_top_TERMS + 1], const double f[1], int k)
 {
@@ -583,7 +583,7 @@ static void quaternion_top_path_order(const double *coef, const double p[7],
     s[6][k + 1] = s[83][k] / (double)(k + 1);
 }
 
-/* The slope of the path at a point m. */
+/* Slope of the path at a point m. */
 static void quaternion_top_path_field(const double *coef, const double p[7], const double m[7],
     double field[7])
 {

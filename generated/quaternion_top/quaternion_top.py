@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 4c17bc72419a7463bd10883683ac32b995e9edcccf53db69d93a035222754089
+# body-sha256: 1d36e0aae63c20bee858d144b8db8e2a7d33ff6162043be99209a97606c1958f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -30,7 +30,7 @@ POSITIVE = ("I1", "I2", "I3",)
 # Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
 GAUGE = ("length",)
 
-# A step of size h is the composition of steps of these fractions of h.
+# A step of size h is composed of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
@@ -105,8 +105,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
-    it has no part in it.
+    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
+    step.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -455,9 +455,9 @@ CONTRACTING = 0.05  # part of the residual that an iteration with a useful Jacob
 
 
 def _holds(coef, p, m, slope):
-    """For which members dm/dt = pi(m) p holds at m, where the expansion has the given slope.
+    """Return for which members dm/dt = pi(m) p holds at m, where the expansion has the given slope.
 
-    One with gaps between its terms, like t + t**9, or across a kink only looks as if it had converged.
+    An expansion with gaps between its terms, like t + t**9, or across a kink may only seem to have converged.
     """
     e = [m[:, i] for i in range(DIM)] + [None] * (84 - DIM)
     e[7] = p[:, 6] * e[5]
@@ -551,22 +551,22 @@ def _holds(coef, p, m, slope):
 
 
 def _product(a, b, k):
-    """Coefficient k of the product of two Taylor series."""
+    """Return coefficient k of the product of two Taylor series."""
     return sum(a[j] * b[k - j] for j in range(k + 1))
 
 
 def _chain(a, d, k):
-    """Coefficient k >= 1 of the Taylor series of f(a), where d is that of f'(a): f(a)' = f'(a) a'."""
+    """Return coefficient k >= 1 of the Taylor series of f(a); d is the series of f'(a): f(a)' = f'(a) a'."""
     return sum(j * a[j] * d[k - j] for j in range(1, k + 1)) / k
 
 
 def _power(a, b, r, k):
-    """Coefficient k >= 1 of the Taylor series of b = a**r, times a[0]: a b' = r a' b."""
+    """Return coefficient k >= 1 of the Taylor series of b = a**r, times a[0]: a b' = r a' b."""
     return sum(((r + 1.0) * j - k) * a[j] * b[k - j] for j in range(1, k + 1)) / k
 
 
 def _piece(coef, p, start):
-    """The path dm/dt = pi(m) p, 0 <= t <= 1, from start, by its Taylor series; arrays (members, DIM).
+    """Return the path dm/dt = pi(m) p, 0 <= t <= 1, from start, by its Taylor series; arrays (members, DIM).
 
     Returns m(1) - start, the mean of m - start, and for which members 30 terms sufficed.
     """
@@ -750,9 +750,10 @@ def _piece(coef, p, start):
 
 
 def _path(coef, x, p):
-    """The whole path in 1, 2, 4, ... pieces until each expansion converges: change of x, mean of m - x, pieces made.
+    """Return the whole path in 1, 2, 4, ... pieces until each expansion converges: change of x, mean of m - x,
+    pieces made.
 
-    NaN where the path is too long or leaves the domain.
+    NaN if the path is too long or leaves the domain.
     """
     change, mean, made = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
     left = np.arange(len(x))
@@ -772,14 +773,16 @@ def _path(coef, x, p):
 
 
 def _residual(coef, x, p):
-    """p - grad S_h(mean of the path from x under p), the path's change of x, an approximate Jacobian, pieces made."""
+    """Return p - grad S_h(mean of the path from x with covector p), the change of x along the path, an approximate
+    Jacobian, and the number of pieces."""
     change, mean, made = _path(coef, x, p)
     slope, jacobian = _generate(coef, x + mean)
     return p - slope, change, jacobian, made
 
 
 def _differences(coef, x, p, residual):
-    """The Jacobian by differences, for steps so large that the approximate one does not contract; pieces made.
+    """Return the Jacobian by differences, for steps so large that the approximate one does not contract; and the
+    number of pieces.
 
     NaN where a path cannot be followed.
     """
@@ -813,10 +816,9 @@ MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Whether steps lead where the motion does; arrays (members, DIM).
+    """Return whether the increments of steps agree with the motion; arrays (members, DIM).
 
-    Where the step is too large, the equation may have been solved by a point far away, at another energy, that has
-    nothing to do with it.
+    If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
     """
     _, parameters, h = stage
     moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -830,17 +832,17 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, guess):
-    """What _attempt finds, with a status for what is not plausible."""
+    """Return the result of _attempt, with a status for implausible solutions."""
     following, rest, value, status = _attempt(stage[0], x, carry, guess)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
 
 
 def _attempt(coef, x, carry, p):
-    """Solve p = grad S_h(mean of the path from x under p), and move to the end of that path; arrays (members, DIM).
+    """Solve p = grad S_h(mean of the path from x with covector p), and move to its end; arrays (members, DIM).
 
-    Where that takes more than MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
-    Returns new x, carry, p, and a status for each member, "" if good.
+    If that needs more than MOST_PIECES pieces, the step is too large for a meaningful solution. Returns new x,
+    carry, p, and a status for each member, "" if good.
     """
     x, carry, p = x.copy(), carry.copy(), p.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -852,7 +854,7 @@ def _attempt(coef, x, carry, p):
         norm = np.max(np.abs(p[open_]), axis=-1) + np.finfo(float).tiny
         size = np.max(np.abs(residual), axis=-1) / norm
         finite = np.isfinite(residual).all(axis=-1)
-        # The second test: residuals no longer shrink, the solve has reached the level of rounding.
+        # Second criterion: residuals no longer shrink, the solve has reached rounding level.
         done = (size <= SOLVED) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
@@ -878,12 +880,12 @@ def _attempt(coef, x, carry, p):
 
 
 def _advance(stage, x, carry, memory):
-    """One stage of all members; `memory` holds the last two p, for the starting guess."""
+    """Make one stage of all members; `memory` holds the last two p, for the predictor."""
     following, rest, p, status = _solved(stage, x, carry, 2 * memory[0] - memory[1])
     guessed = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & guessed)
     if len(failed):
-        # A guess from earlier steps may mislead: once more from p = 0.
+        # A prediction may be bad: repeat from p = 0.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], np.zeros_like(x[failed]))
         following[failed], rest[failed], p[failed], status[failed] = again
     return following, rest, (p, np.where(guessed[:, np.newaxis], memory[0], p)), status
@@ -892,7 +894,7 @@ def _advance(stage, x, carry, memory):
 def _choose_gauge(parameters, x):
     """Return for each Casimir C the lambda that minimises |grad H - lambda grad C| at x: (members, number of them).
 
-    Zero where that gives nothing finite.
+    Zero where the result is not finite.
     """
     products = _products(parameters, x)
     with np.errstate(all="ignore"):
@@ -931,7 +933,7 @@ def _products(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return what does not depend on the state, for each stage: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -955,12 +957,12 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
+    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: several steps or members at once; Newton's method in
  *   lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members:
  *   implicit steps; Ensembles
- * body-sha256: 0e8960ac866b6baa0aec11578486641192d291282b2f9e1cdfcb98f5728544ec
+ * body-sha256: 750fd449918d4f36c91e5691b95cc8404000a7d36edeef7e5624b0ca98bd562e
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -23,7 +23,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
 #endif
 
 /* ---- The model ---- */
@@ -40,7 +40,7 @@ static int rigid_body_allowed(const rigid_body_params *params)
         && isfinite(params->I3) && params->I3 > 0.0;
 }
 
-/* The polynomial with these coefficients, the constant first. */
+/* Polynomial with these coefficients, the constant first. */
 static inline double rigid_body_polynomial(const double *coefficients, int count, double s)
 {
     double value = coefficients[--count];
@@ -985,11 +985,11 @@ typedef double rigid_body_lanes[rigid_body_LANES];
 #define rigid_body_EACH_LANE
 #endif
 
-/* rigid_body_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
+/* rigid_body_phi0 for loops over lanes; branch-free. NaN for |s| > 4.0. */
 static inline double rigid_body_phi0_lane(double s)
 {
     const double ss = s * s;
-    /* every second term each, as neither then is waited for */
+    /* two interleaved Horner schemes, to halve the chain of dependent operations */
     double sum = 1.455172475614865e-27, other = 5.744790668872202e-26;
     sum = sum * ss + 2.267952452337683e-24;
     other = other * ss + 8.953517427037546e-23;
@@ -1009,11 +1009,11 @@ static inline double rigid_body_phi0_lane(double s)
     return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* rigid_body_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
+/* rigid_body_phi1 for loops over lanes; branch-free. NaN for |s| > 4.0. */
 static inline double rigid_body_phi1_lane(double s)
 {
     const double ss = s * s;
-    /* every second term each, as neither then is waited for */
+    /* two interleaved Horner schemes, to halve the chain of dependent operations */
     double sum = 6.266191399131027e-28, other = 2.328275960983784e-26;
     sum = sum * ss + 8.617186003308303e-25;
     other = other * ss + 3.1751334332727565e-23;

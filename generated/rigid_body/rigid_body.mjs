@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bbc6539cdadfd72890d81f78222f17ac0d4df993394d2a3b3a26f5d7248cb7fb
+ * body-sha256: c04772134dfda9a6132df4e3d62bf431912f85aeebe5b8234a34cfbf0588679b
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -55,7 +55,7 @@ const COEFFICIENTS = 35;
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** The error that may remain, relative to y. */
+/** Largest accepted error, relative to y. */
 const TOLERANCE = 1e-20;
 
 /** The polynomial with these coefficients, the constant first. */
@@ -494,7 +494,7 @@ const CLOSE_CALL = 1e-12;
 
 // ---- Errors ----
 
-/** What statuses mean. */
+/** Descriptions of statuses. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -502,7 +502,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Why a step could not be made, or no solver; the state before it stands. */
+/** Error for a step that failed, or a solver that cannot be made; the state before it stays. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -517,7 +517,7 @@ export class StepError extends Error {
   }
 }
 
-/** Numbers as many as wanted, all finite; StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -526,7 +526,9 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** Steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+/**
+ * Make `count` steps of a solver. Throws StepError if count is not a number of steps, and if a step fails.
+ */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
@@ -535,15 +537,15 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
-// The parts of some systems only:
+// Parts of some systems only:
 
 // ---- The solver ----
 
 const number = new Float64Array(1);
 
 /**
- * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
- * they have to be, and give finite coefficients for a step so short that it has no part in it.
+ * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
+ * where required, and give finite coefficients for a negligibly small step.
  */
 function admitted(given) {
   const params = { ...DEFAULT_PARAMETERS, ...given };
@@ -592,7 +594,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h, from which the time is counted if steps are equal in it. */
+  /** Steps and time at the last change of h, from which the time is counted. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -671,10 +673,10 @@ export class Solver {
   }
 
   /**
-   * Between steps: stand at x, with time, parameters and any gauge as they are. Throws StepError for what
-   * is not allowed; then all is as before.
+   * Between steps: replace the state by x; time, parameters and gauge are unchanged. Throws StepError for
+   * values that are not admissible; then nothing changes.
    *
-   * @param {ArrayLike<number>} x it may lie off the leaf: the Casimirs are from then on those of x
+   * @param {ArrayLike<number>} x may lie on another symplectic leaf; Casimirs are then those of x
    * @returns {this}
    */
   setState(x) {
@@ -682,7 +684,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: add a change to the state, as an impulse does; else as setState.
+   * Between steps: add a change to the state, such as an impulse; otherwise as setState.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -738,7 +740,7 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
-  /** The Hamiltonian, at x and its time or elsewhere. */
+  /** The Hamiltonian, at x and its time or at given ones. */
   hamiltonian(x = this.x, t = this.t) {
     energyAt(this.params, t, x, number);
     return number[0];
@@ -784,16 +786,16 @@ function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
-/** The names of what a step changes. */
+/** Names of the fields that a step changes. */
 const SAVED = ["x", "carry", "t"];
 
-/** Return copies of what a step changes. */
+/** Return copies of the fields that a step changes. */
 function savedState(solver) {
   const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
   return Object.fromEntries(copies);
 }
 
-/** Set what a step changes to copies. */
+/** Restore the fields that a step changes from copies. */
 function restoreState(solver, copies) {
   for (const [name, value] of Object.entries(copies)) {
     if (value.slice) solver[name].set(value);
@@ -804,8 +806,8 @@ function restoreState(solver, copies) {
 // ---- The implicit step, by Newton's method ----
 
 /**
- * Size of a correction relative to each component of y, but no finer than FLOOR of the largest; NaN if it
- * is NaN.
+ * Size of a correction relative to each component of y, or to FLOOR times the largest if that is more; NaN if
+ * the correction is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -828,10 +830,9 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance.
- * The increment is corrected to first order by the last Newton correction, so that correction costs no
- * evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
- * TOLERANCE.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
+ * last correction changes the increment to first order, without another evaluation: it is accepted if the
+ * remaining error, quadratic in it, is below TOLERANCE.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -864,7 +865,7 @@ function attempt(solver, stage) {
   return "NO_CONVERGENCE";
 }
 
-/** One stage of a step: a status. */
+/** Make one stage of a step; returns a status. */
 function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }
@@ -874,7 +875,7 @@ function clearHistory(solver, stage) {
   solver.history[stage].clear();
 }
 
-/** Move the predictors of all stages with the state, to x. */
+/** Shift the predictors of all stages with the state, to x. */
 function moveHistory(solver, x) {
   for (const history of solver.history) history.move(solver.x, x);
 }
@@ -884,27 +885,27 @@ function startFrom(history, x, y) {
   if (!history.predict(y)) y.set(x);
 }
 
-// ---- Starting guesses, and whether a solution may be right ----
+// ---- Predictors, and the check of solutions ----
 
 /**
- * The last value of the unknown and its backward differences, which the next is extrapolated by. For
- * speed only.
+ * Predictor: the last solution and its backward differences, from which the next one is extrapolated. Affects
+ * the speed only.
  */
 class History {
-  /** Differences that are known. */
+  /** Number of differences that are known. */
   count = 0;
-  /** How many of them the extrapolation adds up. */
+  /** Number of differences that the extrapolation adds up. */
   order = 0;
   #difference = Array.from({ length: DIFFERENCES }, () => new Float64Array(DIM));
 
-  /** Forget everything. */
+  /** Clear the predictor. */
   clear() {
     this.count = this.order = 0;
     for (const row of this.#difference) row.fill(0);
   }
 
   /**
-   * The state has been moved: the last value moves with it, and its differences stay.
+   * Shift the last value with the state, after this has been changed; differences are unchanged.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -919,11 +920,11 @@ class History {
   }
 
   /**
-   * The guess for the next value: the sum of the differences.
+   * Predict the next value by the sum of the differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if there is none, or if it is far away, where the equation of a step has
-   *   solutions that have nothing to do with the motion
+   * @returns {boolean} false if there is no prediction, or if it is far away, where the equation of a step
+   *     has solutions unrelated to the motion
    */
   predict(value) {
     let distance = 0;
@@ -939,8 +940,8 @@ class History {
   }
 
   /**
-   * Take in a solved value. The guess of order k missed it by its k-th difference: the next is of the
-   * best order.
+   * Update the predictor with a solution. The error of the prediction of order k is the k-th difference; the
+   * order with the smallest error is used next.
    *
    * @param {Float64Array} value
    */
@@ -971,8 +972,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is that of the motion. Where the step is too large, the equation may have been
- * solved by a point far away, at another energy, that has nothing to do with it.
+ * Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
+ * at another energy, and unrelated to the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -1002,7 +1003,7 @@ function plausible(solver, stage, increment) {
 }
 
 /**
- * One stage. A guess from earlier steps may have misled it: then once more without.
+ * Make one stage. If it fails from the predicted value, it is tried again from the state.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -1017,19 +1018,19 @@ function retried(solver, stage, attempt) {
   return attempt(solver, stage);
 }
 
-/** The size of the increments of the state by the noise: there is none. */
+/** Size of the noise in the increments of the state: 0. */
 function sizeOfNoise() {
   return 0;
 }
 
-/** Take the gauge from the options of a solver, else choose it at the initial state. */
+/** Read the gauge from the options of a solver, else choose it at the initial state. */
 function takeGauge(solver, { gauge }) {
   solver.gauge = gauge ? finite(gauge, GAUGE.length, "gauge") : chooseGauge(solver.params, solver.x);
 }
 
-// ---- The choice of the gauge: multiples of Casimirs taken from H ----
+// ---- The choice of the gauge: multiples of Casimirs subtracted from H ----
 
-/** The direction of the motion at a point, of size 1; 0 where there is none. */
+/** Direction of the motion at a point, a unit vector; 0 at equilibria. */
 function direction(params, at) {
   const slope = new Float64Array(DIM);
   vectorField(params, at, slope);
@@ -1042,8 +1043,8 @@ function total(values) {
 }
 
 /**
- * A short piece of the trajectory from x, by a Runge-Kutta method with steps of one length: steps of one
- * time would leave the neighbourhood of a state that hardly moves by far too much.
+ * Sample a short piece of the trajectory from x, by a Runge-Kutta method whose steps have equal length in
+ * phase space: with steps of equal time, a slow state would leave its neighbourhood.
  */
 function sampled(params, x) {
   const states = [Float64Array.from(x)];
@@ -1068,7 +1069,7 @@ function gaugeError(params, gauge, samples) {
   return sum;
 }
 
-/** The error polynomial at centre + t width, by Newton's formula from forward differences. */
+/** Value of the error polynomial at centre + t width, by Newton's formula from forward differences. */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
   for (let k = DEGREE - 1; k >= 0; k--) error = difference[k] + ((t + DEGREE / 2 - k) / (k + 1)) * error;
@@ -1076,8 +1077,8 @@ function errorOnLine(difference, t) {
 }
 
 /**
- * How many widths multiple c is to be moved for the least error: the best on grids, each finer than the
- * one before.
+ * Shift of the multiple with index c, in units of width, that minimises the error: searched on successively
+ * finer grids.
  */
 function leastOnLine(params, gauge, c, width, samples) {
   const errors = [];
@@ -1107,9 +1108,9 @@ function leastOnLine(params, gauge, c, width, samples) {
 }
 
 /**
- * The multiples that minimise the leading error along a short piece of the trajectory, one after the
- * other, from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives
- * nothing finite.
+ * The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
+ * starting from the least-squares solution of grad H = sum of multiples of grad C. Zero where a result is not
+ * finite.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x
@@ -1143,13 +1144,13 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * The state moved by change + small in compensated arithmetic, where small is the carry and what is as
- * small: were that rounded with the change, corrections of one sign would add up to a drift.
+ * Add change + small to the state in compensated arithmetic. small holds the compensation term and other
+ * small terms: rounded together with change, they would drift.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
  * @param {ArrayLike<number>} small
- * @returns {boolean} false, and the state as before, if the sum is not finite
+ * @returns {boolean} false, with the state unchanged, if the sum is not finite
  */
 function advance({ x, carry }, change, small) {
   for (let i = 0; i < DIM; i++) {
@@ -1165,7 +1166,7 @@ function advance({ x, carry }, change, small) {
   return true;
 }
 
-/** The smallest normal number: keeps quotients of sizes finite. */
+/** The smallest normal number: avoids division by zero. */
 const TINY = 2.2250738585072014e-308;
 
 /**

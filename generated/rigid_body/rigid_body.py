@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 58776aac1f699b42dc16f2d3ce7d43d779695ecaad1d6f5f959e09edbc9b6144
+# body-sha256: e9919bf5a3cbba3ceaafde06e7231e954c1adc27f375d887e5edda7efa91d7b1
 import numpy as np
 
 VERSION = "0.1.0"
@@ -28,7 +28,7 @@ POSITIVE = ("I1", "I2", "I3",)
 # Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
 GAUGE = ("C",)
 
-# A step of size h is the composition of steps of these fractions of h.
+# A step of size h is composed of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
@@ -103,8 +103,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
-    it has no part in it.
+    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
+    step.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -460,10 +460,9 @@ MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Whether steps lead where the motion does; arrays (members, DIM).
+    """Return whether the increments of steps agree with the motion; arrays (members, DIM).
 
-    Where the step is too large, the equation may have been solved by a point far away, at another energy, that has
-    nothing to do with it.
+    If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
     """
     _, parameters, h = stage
     moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -477,7 +476,7 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, guess):
-    """What _attempt finds, with a status for what is not plausible."""
+    """Return the result of _attempt, with a status for implausible solutions."""
     following, rest, value, status = _attempt(stage[0], x, carry, guess)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
@@ -497,9 +496,8 @@ def _size(y, delta):
 def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
-    The increment is corrected to first order by the last Newton correction, which is accepted when the error that
-    remains, quadratic in it, is below 1e-20. Returns new x, carry, y, and a status for each member,
-    "" if good.
+    The last correction changes the increment to first order; it is accepted if the remaining error, quadratic in it,
+    is below 1e-20. Returns new x, carry, y, and a status for each member, "" if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -514,7 +512,7 @@ def _attempt(coef, x, carry, y):
         status[open_[~finite]] = "NOT_FINITE"
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
-        # The second test: corrections no longer shrink, the solve has reached the level of rounding.
+        # Second criterion: corrections no longer shrink, the solve has reached rounding level.
         done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
@@ -530,13 +528,13 @@ def _attempt(coef, x, carry, y):
 
 
 def _advance(stage, x, carry, memory):
-    """One stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
+    """Make one stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
     guess = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, guess)
     guessed = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & guessed)
     if len(failed):
-        # A prediction from earlier steps may be bad: repeat from y = x.
+        # A prediction may be bad: repeat from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
     return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
@@ -554,9 +552,10 @@ CLOSE_CALL = 1e-12  # errors, in sizes of all on a line, that are as good: round
 
 
 def _line(error_of, gauge, c, width):
-    """The error where one multiple varies, of centre + (j - DEGREE / 2) width for j = 0 ... DEGREE, as forward differences (DEGREE + 1, members).
+    """Return the error as a function of one multiple, at centre + (j - DEGREE / 2) width for j = 0 ... DEGREE, as
+    forward differences (DEGREE + 1, members), and its size before.
 
-    S_3 is cubic in H, so these are those of a polynomial of degree six. Also their size, before.
+    S_3 is cubic in H, so the error is a polynomial of degree six.
     """
     moved, errors = gauge.copy(), []
     for j in range(DEGREE + 1):
@@ -566,7 +565,7 @@ def _line(error_of, gauge, c, width):
 
 
 def _least_on_line(difference, size):
-    """Where that polynomial is least, in units of width: the best t on grids, each finer than the one before."""
+    """Return the shift that minimises the polynomial, in units of width, searched on successively finer grids."""
 
     def value(t):
         error = difference[DEGREE]
@@ -607,8 +606,8 @@ def _samples(parameters, x, count=SAMPLES):
 def _choose_gauge(parameters, x):
     """Return the lambda that minimise the leading error along a short piece of each trajectory: (members, number of them).
 
-    One after the other, from the least-squares solution of grad H = sum of lambda grad C; zero where that gives
-    nothing finite.
+    One after the other, starting from the least-squares solution of grad H = sum of lambda grad C; zero where a
+    result is not finite.
     """
     points = _samples(parameters, x)
     sums = _products(parameters, points).sum(axis=0)
@@ -685,7 +684,7 @@ def _products(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return what does not depend on the state, for each stage: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -709,12 +708,12 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
+    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

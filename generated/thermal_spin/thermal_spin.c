@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 2bb86dccdaaabe8bd12611aad35d2be6cc4e67eb68c34cf565a557af96ca9c4e
+ * body-sha256: fcb2825c298a3b1f8820ff5525800cd287e1326bb880d557e4b0fc9378ff063c
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -31,7 +31,7 @@ enum { thermal_spin_PREPARED = 7 }; /* number of the first coefficients, functio
 enum { thermal_spin_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
 #define thermal_spin_TOLERANCE 1e-20 /* largest estimated error after an accepted correction */
 
-#define thermal_spin_BOUND 6.0 /* bound of normal variates, so that steps do not fail by rare large ones */
+#define thermal_spin_BOUND 6.0 /* bound of normal variates: rare large ones would make steps fail */
 
 static int thermal_spin_allowed(const thermal_spin_params *params)
 {
@@ -39,7 +39,7 @@ static int thermal_spin_allowed(const thermal_spin_params *params)
         && params->damping_rate > 0.0;
 }
 
-/* The polynomial with these coefficients, the constant first. */
+/* Polynomial with these coefficients, the constant first. */
 static inline double thermal_spin_polynomial(const double *coefficients, int count, double s)
 {
     double value = coefficients[--count];
@@ -365,8 +365,7 @@ static double thermal_spin_bits(uint32_t high, uint32_t low)
     return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
 }
 
-/* Two independent normal variates of variance 1 by Box and Muller, truncated at thermal_spin_BOUND, from a
-   counter. */
+/* Two independent standard normal variates (Box and Muller), truncated at thermal_spin_BOUND. */
 static void thermal_spin_two_normals(uint64_t seed, uint32_t c[4], double normals[2])
 {
     thermal_spin_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: fd93c1779658a5ab4d89c0d64639ffe6469afea9910dee9da6ccf0d6d722247f
+# body-sha256: 6137f611808f4b4ffbaa5c28b84eba839a37ba588067a5af0ea2fe996aaeae5a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -33,7 +33,7 @@ POSITIVE = ("T", "damping_rate",)
 # Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
 GAUGE = ()
 
-# A step of size h is the composition of steps of these fractions of h.
+# A step of size h is composed of steps of these fractions of h.
 FRACTIONS = (1.0,)
 
 
@@ -108,8 +108,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
-    it has no part in it.
+    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
+    step.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -302,10 +302,9 @@ MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Whether steps lead where the motion does; arrays (members, DIM).
+    """Return whether the increments of steps agree with the motion; arrays (members, DIM).
 
-    Where the step is too large, the equation may have been solved by a point far away, at another energy, that has
-    nothing to do with it.
+    If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
     """
     _, parameters, h, dw = stage
     moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -321,7 +320,7 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, guess):
-    """What _attempt finds, with a status for what is not plausible."""
+    """Return the result of _attempt, with a status for implausible solutions."""
     following, rest, value, status = _attempt(stage[0], x, carry, guess)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
@@ -341,9 +340,8 @@ def _size(y, delta):
 def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
-    The increment is corrected to first order by the last Newton correction, which is accepted when the error that
-    remains, quadratic in it, is below 1e-20. Returns new x, carry, y, and a status for each member,
-    "" if good.
+    The last correction changes the increment to first order; it is accepted if the remaining error, quadratic in it,
+    is below 1e-20. Returns new x, carry, y, and a status for each member, "" if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -358,7 +356,7 @@ def _attempt(coef, x, carry, y):
         status[open_[~finite]] = "NOT_FINITE"
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
-        # The second test: corrections no longer shrink, the solve has reached the level of rounding.
+        # Second criterion: corrections no longer shrink, the solve has reached rounding level.
         done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
@@ -374,7 +372,8 @@ def _attempt(coef, x, carry, y):
 
 
 def _advance(stage, x, carry, memory):
-    """Make one stage of all members. `memory` holds the last offset only, since noise cannot be predicted."""
+    """Make one stage of all members. `memory` holds the last offset y - x only: steps with noise cannot be
+    predicted."""
     following, rest, y, status = _solved(stage, x, carry, x)
     return following, rest, (y - x, y - x), status
 
@@ -384,8 +383,8 @@ def _choose_gauge(parameters, x):
     return np.zeros((len(x), 0))
 
 
-# The sources of noise; the increments that each has in a step, of a part of it; where normal variates are cut off, so that
-# no rare one makes a step impossible.
+# The sources of noise; the increments of each in a step; the parts of a step with increments of their own; the bound of
+# normal variates, since rare larger ones would make steps fail.
 SOURCES = ("bath_x", "bath_y", "bath_z",)
 PARTS = 1
 BOUND = 6.0
@@ -404,12 +403,12 @@ def _philox(counter, key):
 
 
 def _unit(high, low):
-    """Numbers from 0 up to, but not including, 1, of 53 of the bits of two words."""
+    """Numbers from 0 up to, but not including, 1, from 53 bits of two words."""
     return ((high >> np.uint64(5)) * 67108864.0 + (low >> np.uint64(6))) * 2.0**-53
 
 
 def _two_normals(seed, counter):
-    """Two arrays of independent normal variates of variance 1 by Box and Muller, from the words of a counter."""
+    """Return two arrays of independent standard normal variates (Box and Muller), from the words of a counter."""
     a, b, c, d = _philox(counter, (seed & 0xFFFFFFFF, seed >> 32))
     radius = np.minimum(np.sqrt(-2.0 * np.log(_unit(a, b) + 2.0**-54)), BOUND)
     angle = 6.283185307179586 * _unit(c, d)
@@ -429,8 +428,8 @@ def _normals(seed, members, step):
 def _drawing(h, count, seed=0, member=0, step0=0, increments=None):
     """Return the increments of the noise as a function of the number of steps done: (increments, members).
 
-    They are a function of seed, member (that of the first, or an array of all) and the number of the step, step0 + done,
-    and of nothing else; or `increments` (steps, increments) for all members, or (steps, members, increments).
+    They are a function of seed, member (that of the first, or an array of all) and the number of the step, step0 +
+    done, only; or `increments` (steps, increments) for all members, or (steps, members, increments).
     """
     members = np.arange(count) + member if np.ndim(member) == 0 else np.asarray(member)
     if increments is None:
@@ -441,7 +440,8 @@ def _drawing(h, count, seed=0, member=0, step0=0, increments=None):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return what depends on parameters and step only: coefficients (coefficients, members or 1), parameters, step."""
+    """Return the data that depend on parameters and step only: coefficients (coefficients, members or 1),
+    parameters, step."""
     return [(_table(_prepare(parameters, h)), parameters, h)]
 
 
@@ -467,12 +467,12 @@ def step(x, h, seed=0, member=0, step0=0, increments=None, gauge=None, **paramet
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError for other lengths than that of x."""
+    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for those that are not admissible."""
+    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: fdfd1f303a33d7343ceb6b1b78e0c5e7ff2e8a5d2bc1306deac6067330511433
+ * body-sha256: b9737e702bc0860c2ff30af7fa543724a39c7bc158b66389e1bf33e1bcb255f5
  */
 #include "toda.h"
 #include <math.h>
@@ -16,7 +16,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
 #endif
 
 /* ---- The model ---- */
@@ -32,17 +32,16 @@ enum { toda_FLOWS = 13 };         /* in a step */
 /* Along each axis: the smallest size. */
 static const size_t toda_least[toda_AXES] = { 2 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
-   the last flow and the first of the next step together. */
+/* Times of the flows, as fractions of a step, one for each row of coefficients; the last merges two flows. */
 static const double toda_times[toda_ROWS_OF_FLOWS] = { 0.08298440641740498, 0.2452989571842711,
     0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083,
     -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711,
     0.08298440641740498, 0.16596881283480996 };
 
-/* The parts of H that they are of. */
+/* The part of H of each flow. */
 static const unsigned char toda_flow_parts[toda_ROWS_OF_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 1 };
 
-/* Whether all parameters are finite, and positive where they have to be. */
+/* Whether all parameters are finite, and positive where required. */
 static int toda_allowed(const toda_params *params, size_t sites)
 {
     (void)params, (void)sites;
@@ -75,8 +74,7 @@ typedef struct {
 #define toda_EACH_SITE
 #endif
 
-/* Update the halo of a row for the sites from..to: copies of the other end, or mirrored values at open ends,
-   where terms that read them have weight 0. */
+/* Update the halo for the sites from..to: copies of the other end, or mirrored values of weight 0. */
 static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)

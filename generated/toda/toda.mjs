@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ab3efcd8297fbd3689b7ef05c9753bd26a2929234dc74e9e5cd6c8c027c9dc2c
+ * body-sha256: 9320a8e9431639e1219b97d65914cadb73696b29f7f90f22993b0dc698649fd9
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -41,15 +41,15 @@ const DEFAULT_PARAMETERS = Object.freeze({
 const POSITIVE = [];
 const AT_SITES = [];
 
-/** Along each axis: whether the ends are open, the smallest size, what sizes are multiples of. */
+/** Along each axis: whether the ends are open, the smallest size, the number that divides all sizes. */
 const OPEN = [false];
 const LEAST = [2];
 const PERIODS = [1];
 
-/** The sites that kernels read beside a site, by their offsets along the axes. */
+/** The neighbours of a site that kernels read, by their offsets along the axes. */
 const NEAR = [[-1], [1]];
 
-/** Terms of H that open ends take away: the least and the largest offsets that they reach along each axis. */
+/** Terms of H that open ends remove: the smallest and the largest offset of their sites along each axis. */
 const BOUNDS = [];
 
 /** Numbers that depend on parameters and step size only, in each of their rows. */
@@ -143,7 +143,7 @@ const PROBE_STEP = 1e-100;
 
 // ---- Errors ----
 
-/** What statuses mean. */
+/** Descriptions of statuses. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -151,7 +151,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Why a step could not be made, or no solver; the state before it stands. */
+/** Error for a step that failed, or a solver that cannot be made; the state before it stays. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -166,7 +166,7 @@ export class StepError extends Error {
   }
 }
 
-/** Numbers as many as wanted, all finite; StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -175,7 +175,9 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** Steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+/**
+ * Make `count` steps of a solver. Throws StepError if count is not a number of steps, and if a step fails.
+ */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
@@ -232,7 +234,7 @@ export class Solver {
   before;
   /** Predictors and other results of steps of one size, for later steps. */
   past = {};
-  /** Steps and time at the last change of h: the time is a multiple of h from there. */
+  /** Steps and time at the last change of h, from which the time is counted. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -357,9 +359,9 @@ function prepareRow(params, time, h, row) {
 
 // ---- The sites ----
 
-/** The sites of a lattice: their parameters, and tables of those that kernels read beside a site. */
+/** The sites of a lattice: their parameters, and tables of the neighbours that kernels read. */
 class Sites {
-  /** From the options of a solver, with the sizes; StepError for what is not allowed. */
+  /** Initialise from the options of a solver, with the sizes; throws StepError for values not allowed. */
   constructor(sizes, options) {
     const fits = (n, axis) => Number.isInteger(n) && n >= LEAST[axis] && n % PERIODS[axis] === 0;
     if (sizes.length !== AXES.length || !sizes.every(fits)) {
@@ -370,7 +372,9 @@ class Sites {
     this.count = sizes.reduce((product, n) => product * n, 1);
     this.params = this.#admitted(options.params ?? {});
     const every = (Kind, value) => Kind.from({ length: this.count }, (_, i) => value(i));
-    /** The neighbours of each site, and whether terms of H are there, for each kind of them. */
+    /**
+     * The neighbours of each site, and 1 or 0 for terms of H that exist there or not, for each kind of term.
+     */
     this.near = NEAR.map((offset) => every(Int32Array, (i) => this.#beside(i, offset)));
     this.present = BOUNDS.map((bounds) => every(Float64Array, (i) => this.#holds(i, bounds)));
     /** The flows of a step: a part of H, a row of coefficients. */
@@ -378,8 +382,8 @@ class Sites {
   }
 
   /**
-   * All parameters: those given, and defaults. StepError unless they are known and finite, and positive
-   * where they have to be.
+   * All parameters: the given ones, and defaults. Throws StepError unless they are known and finite, and
+   * positive where required.
    */
   #admitted(given) {
     const unknown = Object.keys(given).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
@@ -397,7 +401,7 @@ class Sites {
     return Object.freeze(params);
   }
 
-  /** Where a site is along each axis. */
+  /** Position of each site along each axis. */
   #place(site) {
     const place = [];
     for (let axis = AXES.length - 1; axis >= 0; axis--) {
@@ -407,7 +411,7 @@ class Sites {
     return place;
   }
 
-  /** The site that lies so far away; beyond open ends another, where kernels take it times 0. */
+  /** The site at an offset; beyond open ends any site, since kernels multiply it by 0. */
   #beside(site, offset) {
     return this.#place(site).reduce((sum, from, axis) => {
       const size = this.sizes[axis];
@@ -418,7 +422,7 @@ class Sites {
     }, 0);
   }
 
-  /** 1 where all from low to high is on the lattice, along each axis that is open, else 0. */
+  /** 1 where all sites from offset low to offset high exist, along each open axis, else 0. */
   #holds(site, bounds) {
     const place = this.#place(site);
     const inside = ([low, high], axis) => place[axis] + low >= 0 && place[axis] + high < this.sizes[axis];
@@ -426,7 +430,7 @@ class Sites {
   }
 }
 
-/** Whether all of these are finite. */
+/** Whether all numbers are finite. */
 function allFinite(values) {
   let zero = 0;
   for (let k = 0; k < values.length; k++) zero += 0 * values[k];
@@ -435,7 +439,7 @@ function allFinite(values) {
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----
 
-/** One step: a status. If it fails, the state is of no use. */
+/** Make one step; returns a status. If it fails, the state is undefined. */
 function makeStep(solver) {
   const { x, rows, sites } = solver;
   for (const [part, row] of sites.flows) {

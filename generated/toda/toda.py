@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: c02754ff65b6429ab1fa6e3e78947512e848a2bb562310a3d3daddbc61dcb706
+# body-sha256: f34091f4fcbfef16f21b8b291c22fc70fca3fa6700512269c3644314c84c72fd
 import numpy as np
 
 VERSION = "0.1.0"
@@ -19,11 +19,11 @@ CASIMIRS = ("momentum", "length",)
 DEFAULT_PARAMETERS = {
 }
 
-# Parameters that may be arrays with a value at each site, and those that have to be positive.
+# Parameters that may be arrays with a value at each site, and those that must be positive.
 AT_SITES = ()
 POSITIVE = ()
 
-# Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
+# Along each axis: whether the ends are open, the smallest size, the number that divides all sizes.
 OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
@@ -50,18 +50,18 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Why a step cannot be made."""
+    """Error in a step: the status."""
 
 
 def _finite(values):
-    """The values, or FailedError."""
+    """Return the values; raises FailedError if one is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
 
 
 class _Sites:
-    """The sites of a lattice of some size, with all parameters."""
+    """Sites of a lattice of given sizes, with all parameters."""
 
     def __init__(self, shape, parameters):
         self.sizes = tuple(shape[1:])
@@ -85,11 +85,11 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """() for one number."""
+        """() for a parameter with one value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """The values of the sites that lie so far away; those beyond open ends are values of others."""
+        """Return the values at an offset from each site; beyond open ends they are arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -100,7 +100,7 @@ class _Sites:
         return values
 
     def present(self, *bounds):
-        """1 at sites where all from low to high is on the lattice, along each open axis, else 0."""
+        """Return 1 where all sites from offset low to offset high exist, along each open axis, else 0."""
         if bounds not in self._known:
             there = np.ones(self.sizes)
             for place, size, low, high in zip(self._positions, self.sizes, bounds[::2], bounds[1::2]):
@@ -110,7 +110,7 @@ class _Sites:
 
 
 def _advance(sites, rows, x, past):
-    """One step; raises FailedError. Nothing of the past is remembered."""
+    """Make one step; raises FailedError. There is no predictor."""
     for part, row in SCHEDULE:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -118,7 +118,7 @@ def _advance(sites, rows, x, past):
 
 
 def _coefficients(sites, h):
-    """The coefficients of all flows of a step."""
+    """Return the coefficients of all flows of a step."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -134,7 +134,8 @@ def _started(x, parameters):
 
 
 def step(x, h, **parameters):
-    """The state (DIM, *sizes) after one step of size h, of either sign; raises StepError."""
+    """Return the state (DIM, *sizes) after one step of size h, of either sign;
+    raises StepError."""
     return integrate(x, h, 1, **parameters)[-1]
 
 
@@ -159,24 +160,24 @@ def integrate(x0, h, steps, stride=1, **parameters):
 
 
 def density(x, **parameters):
-    """The density of the Hamiltonian at the sites (*sizes)."""
+    """Return the density of the Hamiltonian at the sites (*sizes)."""
     x, sites = _started(x, parameters)
     return _energy(sites.parameters, x, sites)[0]
 
 
 def hamiltonian(x, **parameters):
-    """The Hamiltonian of a state (DIM, *sizes)."""
+    """Return the Hamiltonian of a state (DIM, *sizes)."""
     return float(density(x, **parameters).sum())
 
 
 def casimirs(x, **parameters):
-    """The densities of the Casimirs (CASIMIRS, *sizes)."""
+    """Return the densities of the Casimirs (CASIMIRS, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
 
 def vector_field(x, **parameters):
-    """pi(x) grad H(x), of the shape of x."""
+    """Return pi(x) grad H(x), of the shape of x."""
     x, sites = _started(x, parameters)
     return _vector_field(sites.parameters, x, sites)
 

@@ -69,7 +69,7 @@ static void phi_draw(const phi_solver *s, size_t steps, int part)
 
 #endif
 #if PHI_NOISE
-/* Make some steps: the flows of the noise, those of H, and those of the noise in reverse order, with new increments. */
+/* Make some steps: flows of the noise, those of H, and those of the noise in reverse order. */
 #else
 /* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
 #endif

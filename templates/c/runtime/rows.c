@@ -35,8 +35,7 @@ static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
 }
 
 #endif
-/* Update the halo of a row for the sites from..to: copies of the other end, or mirrored values at open ends, where
-   terms that read them have weight 0. */
+/* Update the halo for the sites from..to: copies of the other end, or mirrored values of weight 0. */
 static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
 #if PHI_OPEN_ROWS

@@ -6,13 +6,13 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * The state moved by change + small in compensated arithmetic, where small is the carry and what is as
- * small: were that rounded with the change, corrections of one sign would add up to a drift.
+ * Add change + small to the state in compensated arithmetic. small holds the compensation term and other
+ * small terms: rounded together with change, they would drift.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
  * @param {ArrayLike<number>} small
- * @returns {boolean} false, and the state as before, if the sum is not finite
+ * @returns {boolean} false, with the state unchanged, if the sum is not finite
  */
 export function advance({ x, carry }, change, small) {
   for (let i = 0; i < DIM; i++) {

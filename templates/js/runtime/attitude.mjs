@@ -11,7 +11,7 @@ import { ATTITUDE, ELEMENT } from "./model.mjs";
 
 const adds = new Float64Array(ELEMENT);
 
-/** Multiply the element of a trajectory by a factor, given less 1, in compensated arithmetic. */
+/** Multiply the element of a trajectory by a factor, given minus 1, in compensated arithmetic. */
 export function turnBy({ turned, turnedCarry }, factor) {
   turnAdds(turned, factor, adds);
   for (let i = 0; i < ELEMENT; i++) {
@@ -24,7 +24,7 @@ export function turnBy({ turned, turnedCarry }, factor) {
   normalise(turned, turnedCarry);
 }
 
-/** Begin at an element, where the solver is now. */
+/** Initialise the element at the present state of the solver. */
 export function beginAttitude(solver, first) {
   solver.firstElement = Float64Array.from(first);
   solver.turned = identityElement();
@@ -32,14 +32,17 @@ export function beginAttitude(solver, first) {
   takeTurningRate(solver);
 }
 
-/** The group element of the body: the first, the gauge rotation since then, if any, and all steps. */
+/**
+ * The group element of the body: the initial one, the gauge rotation since then, if any, and the factors of
+ * all steps.
+ */
 export function currentElement(solver) {
   const found = new Float64Array(ELEMENT);
   multiplyAfter(firstOf(solver), solver.turned, found);
   return found;
 }
 
-/** The element of an attitude, and of a position, of users. */
+/** The group element of an attitude and a position of the public interface. */
 export function elementOf(steps, attitude, position) {
   const given = [...(attitude ?? identityElement().subarray(0, ATTITUDE))];
   addPosition(given, position);

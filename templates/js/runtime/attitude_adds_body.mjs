@@ -1,7 +1,7 @@
 import { quaternionProduct } from "./attitude_quaternions.mjs";
 import { addPositions } from "./attitude_adds_body_position.mjs";
 
-/** Compute what a factor, given less 1, adds to an element. */
+/** Compute the change of an element under multiplication by a factor, given minus 1. */
 export function turnAdds(element, factor, added) {
   quaternionProduct(element, factor, added);
   addPositions(element, factor, added);

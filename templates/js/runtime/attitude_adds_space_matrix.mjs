@@ -1,6 +1,6 @@
 import { matrixProduct } from "./attitude_matrices.mjs";
 
-/** Compute what a factor, given less 1, adds to an element. */
+/** Compute the change of an element under multiplication by a factor, given minus 1. */
 export function turnAdds(element, factor, added) {
   matrixProduct(factor, element, added);
 }

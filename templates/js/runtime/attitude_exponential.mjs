@@ -6,8 +6,9 @@ const smallCovector = new Float64Array(COVECTOR);
 const squared = new Float64Array(ELEMENT);
 
 /**
- * exp(P) - 1 of a covector, which ends with a bound for the square of its size: P/2^k, doubled k times.
- * Rounding errors double too; if the matrices are orthogonal, that is restored each time.
+ * exp(P) - 1 by scaling and squaring: exp(P/2^k) - 1, doubled k times. The last number of the covector bounds
+ * the square of its norm. Rounding errors double too; for orthogonal matrices orthogonality is restored after
+ * each doubling.
  */
 export function fromCovector(covector, element) {
   let size = covector[COVECTOR - 1];

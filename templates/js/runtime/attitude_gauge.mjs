@@ -11,14 +11,14 @@ export function takeTurningRate(solver) {
   solver.attitudeFrom = solver.t;
 }
 
-/** The first group element, and the gauge rotation since then. */
+/** The initial group element, and the gauge rotation since then. */
 export function firstOf({ firstElement, turningRate, t, attitudeFrom }) {
   const both = new Float64Array(ELEMENT);
   multiplyAfter(firstElement, uniformMotion(turningRate, t - attitudeFrom), both);
   return both;
 }
 
-/** Start the attitude anew at its present value, after x has been set. */
+/** Restart the attitude at its present value, after x has been set. */
 export function restartAttitude(solver) {
   const element = currentElement(solver);
   beginAttitude(solver, elementOf(solver.steps, element.subarray(0, ATTITUDE), element.subarray(ATTITUDE)));

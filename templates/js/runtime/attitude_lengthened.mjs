@@ -1,4 +1,4 @@
-/** Divide a quaternion, given less 1, by its length. */
+/** Divide a quaternion, given minus 1, by its length. */
 export function shorten(q) {
   const excess = q[0] * (2 + q[0]) + q[1] * q[1] + (q[2] * q[2] + q[3] * q[3]);
   const length = Math.sqrt(1 + excess);

@@ -30,7 +30,7 @@ export function identityElement() {
   return one;
 }
 
-/** Divide a quaternion by its length, of which the size of its largest number is an estimate. */
+/** Divide a quaternion by its length; the magnitude of its largest number is an estimate of the length. */
 export function makeUnit(element, largest) {
   for (let i = 0; i < 4; i++) element[i] /= largest;
   const length = Math.hypot(...element.subarray(0, 4));

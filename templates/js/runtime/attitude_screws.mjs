@@ -1,4 +1,4 @@
-/** What rotating the vector at the end of an element by a quaternion, of which one is less, adds to it. */
+/** Change of the vector at the end of an element under rotation by a quaternion, given minus 1. */
 export function rotationAdds(w, q, element) {
   const [v1, v2, v3] = element.subarray(4);
   const x = q[2] * v3 - q[3] * v2;

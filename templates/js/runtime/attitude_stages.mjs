@@ -4,7 +4,7 @@ import { ELEMENT } from "./model.mjs";
 
 const factorOfStage = new Float64Array(ELEMENT);
 
-/** Turn the body by the group element of a stage whose equation is solved by y. */
+/** Multiply the attitude by the group element of a stage with its solution y. */
 export function turnStage(solver, stage, y) {
   factorBy(solver.coef[stage], y, factorOfStage);
   turnBy(solver, factorOfStage);

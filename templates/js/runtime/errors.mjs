@@ -1,6 +1,6 @@
 // ---- Errors ----
 
-/** What statuses mean. */
+/** Descriptions of statuses. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -8,7 +8,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Why a step could not be made, or no solver; the state before it stands. */
+/** Error for a step that failed, or a solver that cannot be made; the state before it stays. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -23,7 +23,7 @@ export class StepError extends Error {
   }
 }
 
-/** Numbers as many as wanted, all finite; StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 export function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;

@@ -6,11 +6,12 @@ import { allFinite } from "./sites.mjs";
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----
 
-/** One step: a status. If it fails, the state is of no use. */
+/** Make one step; returns a status. If it fails, the state is undefined. */
 export function makeStep(solver) {
   const { x, rows, sites } = solver;
   // #if NOISE
-  const back = sites.flows.length - SOURCES.length; // flows of the noise come first, and last backwards
+  // flows of the noise come first and, in reverse order, last
+  const back = sites.flows.length - SOURCES.length;
   let number = 0;
   // #endif
   // #if BY_COLOUR

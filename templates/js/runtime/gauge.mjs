@@ -3,9 +3,9 @@ import { CLOSE_CALL, DEGREE, FIRST_REACH, GRIDS, MESH, SAMPLES } from "./gauge_s
 import { REACH_OF_GRID, SAMPLE_LENGTH, SWEEPS } from "./gauge_search.mjs";
 import { DIM, GAUGE, guide, products, vectorField } from "./model.mjs";
 
-// ---- The choice of the gauge: multiples of Casimirs taken from H ----
+// ---- The choice of the gauge: multiples of Casimirs subtracted from H ----
 
-/** The direction of the motion at a point, of size 1; 0 where there is none. */
+/** Direction of the motion at a point, a unit vector; 0 at equilibria. */
 function direction(params, at) {
   const slope = new Float64Array(DIM);
   vectorField(params, at, slope);
@@ -18,8 +18,8 @@ function total(values) {
 }
 
 /**
- * A short piece of the trajectory from x, by a Runge-Kutta method with steps of one length: steps of one
- * time would leave the neighbourhood of a state that hardly moves by far too much.
+ * Sample a short piece of the trajectory from x, by a Runge-Kutta method whose steps have equal length in
+ * phase space: with steps of equal time, a slow state would leave its neighbourhood.
  */
 function sampled(params, x) {
   const states = [Float64Array.from(x)];
@@ -44,7 +44,7 @@ function gaugeError(params, gauge, samples) {
   return sum;
 }
 
-/** The error polynomial at centre + t width, by Newton's formula from forward differences. */
+/** Value of the error polynomial at centre + t width, by Newton's formula from forward differences. */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
   for (let k = DEGREE - 1; k >= 0; k--) error = difference[k] + ((t + DEGREE / 2 - k) / (k + 1)) * error;
@@ -52,8 +52,8 @@ function errorOnLine(difference, t) {
 }
 
 /**
- * How many widths multiple c is to be moved for the least error: the best on grids, each finer than the
- * one before.
+ * Shift of the multiple with index c, in units of width, that minimises the error: searched on successively
+ * finer grids.
  */
 function leastOnLine(params, gauge, c, width, samples) {
   const errors = [];
@@ -83,9 +83,9 @@ function leastOnLine(params, gauge, c, width, samples) {
 }
 
 /**
- * The multiples that minimise the leading error along a short piece of the trajectory, one after the
- * other, from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives
- * nothing finite.
+ * The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
+ * starting from the least-squares solution of grad H = sum of multiples of grad C. Zero where a result is not
+ * finite.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x

@@ -1,10 +1,10 @@
 import { GAUGE, products } from "./model.mjs";
 
-// ---- The choice of the gauge: multiples of Casimirs taken from H ----
+// ---- The choice of the gauge: multiples of Casimirs subtracted from H ----
 
 /**
- * For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
- * that gives nothing finite.
+ * For each Casimir C the multiple c that minimises |grad H - c grad C| at the initial state; zero where it is
+ * not finite.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x

@@ -16,23 +16,23 @@ export function stages() {
   return Array.from({ length: NODES }, () => new Float64Array(UNKNOWNS));
 }
 
-/** What the last step tells of the next one. For speed only. */
+/** Predictor: results of the last step from which the next one starts. Affects the speed only. */
 export class History {
   /** 0 before the first step. */
   count = 0;
-  /** Sweeps that the last step took, and the rate at which their changes shrink. */
+  /** Sweeps of the last step, and the factor by which their changes shrink. */
   sweeps = 2;
   rate = 0.5;
-  /** The moves of the stages of the last step, as seen from its end, and its size. */
+  /** Increments of the stages of the last step, in the frame of its end, and its size. */
   moves = stages();
   h = NaN;
 
-  /** Forget everything. */
+  /** Clear the predictor. */
   clear() {
     this.count = 0;
   }
 
-  /** The state has been moved: forget everything. */
+  /** Clear the predictor, after the state has been changed. */
   move() {
     this.clear();
   }
@@ -81,7 +81,7 @@ export function startOf({ x, t }) {
   return point;
 }
 
-/** The unknowns of all stages, each a sum over the moves of all. */
+/** The unknowns of all stages: weighted sums of the stage increments. */
 export function mixed(matrix, moves, z) {
   for (let i = 0; i < NODES; i++) {
     z[i].fill(0);
@@ -125,7 +125,10 @@ function changeOf(start, before, after) {
 const predicted = stages();
 const mixedMoves = stages();
 
-/** The moves of all stages, by sweeps from those that the last step predicts: a status. */
+/**
+ * Solve for the increments of all stages by fixed-point sweeps, starting from the prediction; returns a
+ * status.
+ */
 export function collocate(solver, stage, start, history, moves) {
   let last = Infinity;
   let rising = 0;
@@ -157,18 +160,19 @@ export function collocate(solver, stage, start, history, moves) {
     const slow = rate >= 1 || rate > Math.max(STALLED, 1.5 * history.rate);
     if (rate >= 1 && change <= NEARLY_ROUNDING) rises++;
     if (solved || (slow && change <= ROUNDING) || rises > 1) {
-      const early = sweep === history.sweeps || rate > 2 * history.rate; // the first change was rounding too
+      // the first change was at rounding level
+      const early = sweep === history.sweeps || rate > 2 * history.rate;
       history.sweeps = Math.max(2, early ? history.sweeps - 1 : sweep - 1);
       return "OK";
     }
-    rising = rate >= 1 ? rising + 1 : 0; // transients may rise over as many sweeps as there are stages
+    rising = rate >= 1 ? rising + 1 : 0; // transients may grow for as many sweeps as there are stages
     if (rising >= NODES + MOST_RISING) return "NO_CONVERGENCE";
     last = change;
   }
   return "NO_CONVERGENCE";
 }
 
-/** The sum of the moves of all stages. */
+/** The sum of the increments of all stages. */
 export function endOf(moves) {
   const end = new Float64Array(UNKNOWNS);
   for (const move of moves) for (let k = 0; k < UNKNOWNS; k++) end[k] += move[k];
@@ -199,7 +203,7 @@ function attempt(solver, stage) {
   return "OK";
 }
 
-/** One step: a status. What the last step predicts may mislead: then once more without. */
+/** Make one step; returns a status. If it fails from the prediction, it is tried again without one. */
 export function makeStage(solver, stage) {
   const status = attempt(solver, stage);
   if (status === "OK" || solver.history[stage].count === 0) return status;

@@ -1,4 +1,4 @@
-/** Store the move of a stage. */
+/** Store the increment of a stage. */
 export function keepMove(coef, end, move, to) {
   to.set(move);
 }

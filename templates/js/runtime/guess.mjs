@@ -5,27 +5,27 @@ import { makePerTau } from "./level.mjs";
 import { sizeOfNoise } from "./noise_none.mjs";
 import { DIM, FRACTIONS } from "./model.mjs";
 
-// ---- Starting guesses, and whether a solution may be right ----
+// ---- Predictors, and the check of solutions ----
 
 /**
- * The last value of the unknown and its backward differences, which the next is extrapolated by. For
- * speed only.
+ * Predictor: the last solution and its backward differences, from which the next one is extrapolated. Affects
+ * the speed only.
  */
 export class History {
-  /** Differences that are known. */
+  /** Number of differences that are known. */
   count = 0;
-  /** How many of them the extrapolation adds up. */
+  /** Number of differences that the extrapolation adds up. */
   order = 0;
   #difference = Array.from({ length: DIFFERENCES }, () => new Float64Array(DIM));
 
-  /** Forget everything. */
+  /** Clear the predictor. */
   clear() {
     this.count = this.order = 0;
     for (const row of this.#difference) row.fill(0);
   }
 
   /**
-   * The state has been moved: the last value moves with it, and its differences stay.
+   * Shift the last value with the state, after this has been changed; differences are unchanged.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -40,11 +40,11 @@ export class History {
   }
 
   /**
-   * The guess for the next value: the sum of the differences.
+   * Predict the next value by the sum of the differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if there is none, or if it is far away, where the equation of a step has
-   *   solutions that have nothing to do with the motion
+   * @returns {boolean} false if there is no prediction, or if it is far away, where the equation of a step
+   *     has solutions unrelated to the motion
    */
   predict(value) {
     let distance = 0;
@@ -60,8 +60,8 @@ export class History {
   }
 
   /**
-   * Take in a solved value. The guess of order k missed it by its k-th difference: the next is of the
-   * best order.
+   * Update the predictor with a solution. The error of the prediction of order k is the k-th difference; the
+   * order with the smallest error is used next.
    *
    * @param {Float64Array} value
    */
@@ -92,8 +92,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is that of the motion. Where the step is too large, the equation may have been
- * solved by a point far away, at another energy, that has nothing to do with it.
+ * Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
+ * at another energy, and unrelated to the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -124,7 +124,7 @@ export function plausible(solver, stage, increment) {
 }
 
 /**
- * One stage. A guess from earlier steps may have misled it: then once more without.
+ * Make one stage. If it fails from the predicted value, it is tried again from the state.
  *
  * @param {Solver} solver
  * @param {number} stage

@@ -3,7 +3,7 @@ import { MOST_SWEEPS, relax, slope } from "./model.mjs";
 import { allFinite } from "./sites.mjs";
 import { sizeOf, solved, usual } from "./sweeps.mjs";
 
-// ---- Newton's method for a stage that sweeps do not solve, its linear equations in Krylov spaces ----
+// ---- Newton's method with Krylov spaces, for stages that fixed-point sweeps do not solve ----
 
 const dot = (a, b) => a.reduce((sum, v, k) => sum + v * b[k], 0);
 const norm = (a) => Math.sqrt(dot(a, a));
@@ -14,7 +14,7 @@ function add(a, factor, b) {
   for (let k = 0; k < a.length; k++) a[k] += factor * b[k];
 }
 
-/** A solution of matrix(v) = side, as well as GMRES can without a restart; null where that is of no use. */
+/** A solution of matrix(v) = side by GMRES without restart; null if it is useless. */
 function krylov(matrix, side) {
   const length = norm(side);
   const solution = new Float64Array(side.length);
@@ -53,7 +53,7 @@ function krylov(matrix, side) {
   return solution;
 }
 
-/** v of v - S v = side, with the derivative S of the equation for y and usual sizes; null as above. */
+/** v with v - S v = side, where S is the derivative of a sweep; null as above. */
 export function linearised(coef, x, y, side, sizes, sites) {
   const count = y.length / sizes.length;
   const unit = (k) => sizes[Math.floor(k / count)];
@@ -66,7 +66,7 @@ export function linearised(coef, x, y, side, sizes, sites) {
   return scaled && scaled.map((v, k) => v * unit(k));
 }
 
-/** y at the middle of a stage by Newton's method; null where there is none near x. */
+/** Solution y of a stage by Newton's method; null if there is none near x. */
 export function byNewton(coef, x, guess, sites) {
   const y = Float64Array.from(guess);
   const image = new Float64Array(y.length);

@@ -81,7 +81,7 @@ export class Solver {
   before;
   /** Predictors and other results of steps of one size, for later steps. */
   past = {};
-  /** Steps and time at the last change of h: the time is a multiple of h from there. */
+  /** Steps and time at the last change of h, from which the time is counted. */
   #stepsBefore = 0;
   #timeBefore = 0;
 

@@ -5,7 +5,7 @@ import { energy, monitor } from "./model.mjs";
 
 const one = new Float64Array(1);
 
-/** e = -H(x0), which a trajectory holds fixed: K = monitor (H + e) is 0 along it. */
+/** e = -H(x0), constant along a trajectory: K = monitor (H + e) is 0 along it. */
 export function chooseGauge(params, x) {
   energy(params, x, one);
   return Float64Array.of(-one[0]);
@@ -24,7 +24,7 @@ export function expectPassingTime(solver) {
   throw new StepError("BAD_ARGUMENT", 0, `the monitor is ${rate} at x0`);
 }
 
-/** Make a vector field per unit of the physical time one per unit of tau. */
+/** Convert a vector field from physical time to tau. */
 export function makePerTau(params, x, field) {
   const rate = rateAt(params, x);
   for (let i = 0; i < field.length; i++) field[i] *= rate;

@@ -2,7 +2,7 @@ import { StepError } from "./errors.mjs";
 import { chooseGauge, rateAt } from "./level.mjs";
 import { FRACTIONS, prepare } from "./model.mjs";
 
-/** Take the energy level of a state to which a solver is moved. Throws StepError if it has none. */
+/** Set the energy level after the state was changed. Throws StepError if the new state has none. */
 export function takeLevel(solver, x) {
   const [rate, level] = [rateAt(solver.params, x), chooseGauge(solver.params, x)];
   if (!(Number.isFinite(rate) && rate > 0 && Number.isFinite(level[0]))) {

@@ -1,6 +1,6 @@
 import { DIM } from "./model.mjs";
 
-/** The smallest normal number: keeps quotients of sizes finite. */
+/** The smallest normal number: avoids division by zero. */
 export const TINY = 2.2250738585072014e-308;
 
 /**

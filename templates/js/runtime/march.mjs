@@ -2,7 +2,9 @@ import { StepError } from "./errors.mjs";
 
 // ---- Many steps ----
 
-/** Steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+/**
+ * Make `count` steps of a solver. Throws StepError if count is not a number of steps, and if a step fails.
+ */
 export function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);

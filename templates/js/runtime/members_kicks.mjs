@@ -7,10 +7,10 @@ import { DIM } from "./model.mjs";
 /** Members of Solver: changes of the state between steps. */
 export class Kicks {
   /**
-   * Between steps: stand at x, with time, parameters and any gauge as they are. Throws StepError for what
-   * is not allowed; then all is as before.
+   * Between steps: replace the state by x; time, parameters and gauge are unchanged. Throws StepError for
+   * values that are not admissible; then nothing changes.
    *
-   * @param {ArrayLike<number>} x it may lie off the leaf: the Casimirs are from then on those of x
+   * @param {ArrayLike<number>} x may lie on another symplectic leaf; Casimirs are then those of x
    * @returns {this}
    */
   setState(x) {
@@ -18,7 +18,7 @@ export class Kicks {
   }
 
   /**
-   * Between steps: add a change to the state, as an impulse does; else as setState.
+   * Between steps: add a change to the state, such as an impulse; otherwise as setState.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}

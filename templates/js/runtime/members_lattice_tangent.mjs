@@ -4,8 +4,7 @@ import { finite } from "./errors.mjs";
 export class Tangent {
   /**
    * Make one step as `step` does, and multiply vectors by its derivative, exact to round-off. Throws
-   * StepError;
-   * then the state is as before.
+   * StepError; then the state is unchanged.
    *
    * @param {number} h
    * @param {ArrayLike<number>[]} vectors laid out as x

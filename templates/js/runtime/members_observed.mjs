@@ -3,7 +3,7 @@ import { OBSERVABLES } from "./model.mjs";
 
 /** Members of Solver: the observables. */
 export class Observed {
-  /** The observables, in the order of OBSERVABLES, at x and its time or elsewhere. */
+  /** The observables, in the order of OBSERVABLES, at x and its time or at given ones. */
   observables(x = this.x, t = this.t) {
     const out = new Float64Array(OBSERVABLES.length);
     observablesAt(this.params, t, x, out);

@@ -6,11 +6,11 @@ import { forgetSteps } from "./gauss.mjs";
 /** Members of Solver: the derivative of a step. */
 export class Tangent {
   /**
-   * One step as `step` makes it, and its derivative, to round-off, with any gauge held fixed. Throws
-   * StepError; then the state is as before.
+   * Make one step as `step` does, and compute its derivative, exact to round-off, for a fixed gauge. Throws
+   * StepError; then the state is unchanged.
    *
    * @param {number} h
-   * @returns {Float64Array} entry i * DIM + j is the derivative of the new x[i] along the old x[j]
+   * @returns {Float64Array} entry i * DIM + j is the derivative of the new x[i] by the old x[j]
    */
   stepTangent(h) {
     const before = savedState(this);
@@ -21,7 +21,7 @@ export class Tangent {
     if (status === "OK") return tangent;
     restoreState(this, before);
     forgetSteps(this);
-    Object.assign(this, { steps, h: NaN }); // coefficients belong to the time after the step
+    Object.assign(this, { steps, h: NaN }); // coefficients for the time after the step
     throw new StepError(status, steps);
   }
 }

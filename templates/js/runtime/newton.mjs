@@ -12,8 +12,8 @@ import { DIM, MAX_ITERATIONS, TOLERANCE, linearise } from "./model.mjs";
 // ---- The implicit step, by Newton's method ----
 
 /**
- * Size of a correction relative to each component of y, but no finer than FLOOR of the largest; NaN if it
- * is NaN.
+ * Size of a correction relative to each component of y, or to FLOOR times the largest if that is more; NaN if
+ * the correction is.
  */
 export function relativeSize(y, correction) {
   let norm = 0;
@@ -36,10 +36,9 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance.
- * The increment is corrected to first order by the last Newton correction, so that correction costs no
- * evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
- * TOLERANCE.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
+ * last correction changes the increment to first order, without another evaluation: it is accepted if the
+ * remaining error, quadratic in it, is below TOLERANCE.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -78,7 +77,7 @@ function attempt(solver, stage) {
   return "NO_CONVERGENCE";
 }
 
-/** One stage of a step: a status. */
+/** Make one stage of a step; returns a status. */
 export function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }

@@ -5,7 +5,7 @@ import { twoNormals, words } from "./philox.mjs";
 
 // ---- Noise ----
 
-/** Normal variates of variance 1, in pairs: all increments of a step. */
+/** Draw normal variates of variance 1, in pairs: the increments of a step. */
 function normals(seed, member, step, values) {
   const [low, high] = words(step);
   for (let k = 0; k < DRAWS; k += 2) {
@@ -15,7 +15,7 @@ function normals(seed, member, step, values) {
 }
 
 /**
- * The increments of the next step: those given, or random ones.
+ * Set the increments of the next step: the given ones, or random ones.
  *
  * @returns {boolean} false if one is not finite, or some are missing
  */
@@ -26,14 +26,14 @@ function draw(solver, given) {
     dw.set(given);
   } else {
     normals(seed, member, BigInt(step0) + BigInt(steps), dw);
-    const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS); // so that a step of -h undoes one of h
+    const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS); // so that a step of -h inverts one of h
     for (let k = 0; k < DRAWS; k++) dw[k] *= size;
     orderDraws(dw, h);
   }
   return dw.every(Number.isFinite);
 }
 
-/** Take the increments of the next step. Throws StepError if they are given and not admissible. */
+/** Read the increments of the next step. Throws StepError if given ones are not admissible. */
 export function drawStep(solver, given) {
   if (!draw(solver, given)) throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${given}`);
 }

@@ -5,7 +5,7 @@ export function noiseFieldsAt(params, t, x, out) {
   noiseFields(params, x, out);
 }
 
-/** The coefficients that are functions of the increments dw of the noise, and of the time if H is one. */
+/** The coefficients that depend on the increments dw of the noise, and on the time if H depends on it. */
 export function refreshAt(row, t, dw, out) {
   refresh(row, dw, out);
 }

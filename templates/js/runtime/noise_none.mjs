@@ -1,4 +1,4 @@
-/** The size of the increments of the state by the noise: there is none. */
+/** Size of the noise in the increments of the state: 0. */
 export function sizeOfNoise() {
   return 0;
 }

@@ -19,8 +19,8 @@ const end = new Float64Array(DIM);
 const field = new Float64Array(DIM);
 
 /**
- * Whether dm/dt = pi(m) p holds at the end of an expansion, where it has the given slope: one with gaps
- * between its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had
+ * Whether dm/dt = pi(m) p holds at the end of an expansion, where it has the given slope. An expansion with
+ * gaps between its terms, like t + t^9, or across the kink of an absolute value, may only seem to have
  * converged.
  */
 function holds(coef, p) {
@@ -34,8 +34,8 @@ function holds(coef, p) {
 }
 
 /**
- * A path for 0 <= t <= 1, from start, by its Taylor series: shift is m(1) - start, mean the mean of m -
- * start. The number of terms follows from their size; false if TERMS do not suffice.
+ * Path for 0 <= t <= 1, from start, by its Taylor series: shift is m(1) - start, mean the mean of m - start.
+ * The size of the terms decides their number. Returns false if TERMS terms do not suffice.
  */
 function followPiece(coef, p, start, shift, mean) {
   let norm = 0;
@@ -70,11 +70,11 @@ const shift = new Float64Array(DIM);
 const local = new Float64Array(DIM);
 
 /**
- * The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of
- * the path lies on the symplectic leaf of x.
+ * Whole path from x, in 1, 2, 4, ... pieces until each expansion converges. For any p, the end of the path
+ * lies on the symplectic leaf of x.
  *
- * @returns {{good: boolean, made: number}} false if the path is too long or leaves the domain; all pieces
- *   made
+ * @returns {{good: boolean, made: number}} good: whether the path is not too long and stays in the domain;
+ *     made: number of all pieces
  */
 function followPath(coef, x, p, change, mean) {
   let made = 0;
@@ -101,8 +101,8 @@ function followPath(coef, x, p, change, mean) {
 const mean = new Float64Array(DIM);
 
 /**
- * The residual p - grad S_h(y) of the equation for p, y the mean of the path, with the path's change of x
- * and an approximate Jacobian of the residual; see `followPath` for what it returns.
+ * Residual p - grad S_h(y) of the equation for p, where y is the mean of the path; also the change of x along
+ * the path and an approximate Jacobian of the residual. Returns the value of `followPath`.
  */
 function findResidual(solver, coef, p, y, residual, change, jacobian) {
   const path = followPath(coef, solver.x, p, change, mean);
@@ -119,7 +119,7 @@ const elsewhere = new Float64Array(DIM);
 const other = new Float64Array(DIM);
 const unused = new Float64Array(DIM * DIM);
 
-/** The Jacobian by differences, for steps so large that the approximate one does not contract. */
+/** Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
 function differentiate(solver, coef, p, residual, jacobian) {
   let norm = TINY;
   let made = 0;
@@ -142,8 +142,8 @@ const change = new Float64Array(DIM);
 const jacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes
- * more than MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
+ * Solve p = grad S_h(mean of the path from x with covector p), and move to the end of that path. If that
+ * needs more than MOST_PIECES pieces, the step is too large for a meaningful solution.
  */
 function attempt(solver, stage) {
   const coef = solver.coef[stage];
@@ -164,7 +164,7 @@ function attempt(solver, stage) {
       norm = Math.max(norm, Math.abs(p[i]));
     }
     size /= norm;
-    // The second test: residuals no longer shrink, the solve has reached the level of rounding.
+    // Second criterion: residuals no longer shrink, the solve has reached rounding level.
     if (size <= SOLVED || (previous < NEARLY_SOLVED && size > SHRINKING * previous)) {
       if (!plausible(solver, stage, change)) return "NO_CONVERGENCE";
       // #if MONITOR
@@ -189,7 +189,7 @@ function attempt(solver, stage) {
   return "NO_CONVERGENCE";
 }
 
-/** One stage of a step: a status. */
+/** Make one stage of a step; returns a status. */
 export function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }

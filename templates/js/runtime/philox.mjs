@@ -28,7 +28,7 @@ function philox(counter, key) {
   return [a, b, c, d];
 }
 
-/** A number from 0 up to, but not including, 1, of 53 of the bits of two words. */
+/** A number from 0 up to, but not including, 1, from 53 bits of two words. */
 function unit(high, low) {
   return ((high >>> 5) * 67108864 + (low >>> 6)) * 2 ** -53;
 }
@@ -39,7 +39,7 @@ export function words(number) {
   return [Number(bits & 0xffffffffn), Number(bits >> 32n)];
 }
 
-/** Two normal variates of variance 1 by Box and Muller, cut off at BOUND, from a counter of four words. */
+/** Two standard normal variates (Box and Muller), truncated at BOUND, from a counter of four words. */
 export function twoNormals(counter, key) {
   const [a, b, c, d] = philox(counter, key);
   const radius = Math.min(Math.sqrt(-2 * Math.log(unit(a, b) + 2 ** -54)), BOUND);
@@ -47,7 +47,10 @@ export function twoNormals(counter, key) {
   return [radius * Math.cos(angle), radius * Math.sin(angle)];
 }
 
-/** What random numbers are a function of, of the options of a solver; StepError for what is not allowed. */
+/**
+ * Read the arguments of the random numbers from the options of a solver; throws StepError for values not
+ * allowed.
+ */
 export function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   for (const [name, value] of Object.entries({ seed, member, step0 })) {
     if (!((Number.isInteger(value) || typeof value === "bigint") && value >= 0)) {
@@ -57,7 +60,7 @@ export function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   return { seed, member, step0 };
 }
 
-/** Take the selection of random numbers from the options of a solver. */
+/** Select the random numbers by the options of a solver. */
 export function takeDraws(solver, options) {
   Object.assign(solver, drawsOf(options));
 }

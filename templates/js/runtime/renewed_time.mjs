@@ -1,6 +1,6 @@
 import { refresh } from "./model.mjs";
 
-/** The coefficients that are functions of the time. */
+/** The coefficients that depend on the time. */
 export function refreshAt(row, t, dw, out) {
   refresh(row, t, out);
 }

@@ -6,7 +6,7 @@ import { twoNormals, words } from "./philox.mjs";
 
 /**
  * The increments of all sites in a part of the next step: a function of seed, member, step, part and site
- * alone. A step of -h has them in the order in which it undoes one of h.
+ * only. A step of -h has them in reverse order, so that it inverts a step of h.
  */
 export function drawAtSites(solver, part) {
   const { seed, member, step0, steps, h, sites } = solver;
@@ -26,7 +26,9 @@ export function drawAtSites(solver, part) {
   }
 }
 
-/** Throw StepError unless the number of steps made before fits its place in the random numbers. */
+/**
+ * Throw StepError unless the number of steps made before fits its field in the counter of the random numbers.
+ */
 export function expectFewSteps({ step0 }) {
   if (step0 >= 2 ** 48) throw new StepError("BAD_ARGUMENT", 0, `step0 is ${step0}`);
 }

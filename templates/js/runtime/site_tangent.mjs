@@ -6,7 +6,10 @@ import { usual } from "./sweeps.mjs";
 
 // ---- Tangent vectors of the series ----
 
-/** Where a stage carries v, in place: dy = S dy + side is solved, and moves it; false where that fails. */
+/**
+ * Carry a tangent vector v through a stage, in place: solve dy = S dy + side, and add its increment; returns
+ * false on failure.
+ */
 export function carry(coef, x, y, v, sites) {
   const sizes = usual(y);
   const count = y.length / sizes.length;

@@ -11,9 +11,9 @@ import { BY_COLOUR } from "./model.mjs";
 
 // ---- The sites ----
 
-/** The sites of a lattice: their parameters, and tables of those that kernels read beside a site. */
+/** The sites of a lattice: their parameters, and tables of the neighbours that kernels read. */
 export class Sites {
-  /** From the options of a solver, with the sizes; StepError for what is not allowed. */
+  /** Initialise from the options of a solver, with the sizes; throws StepError for values not allowed. */
   constructor(sizes, options) {
     const fits = (n, axis) => Number.isInteger(n) && n >= LEAST[axis] && n % PERIODS[axis] === 0;
     if (sizes.length !== AXES.length || !sizes.every(fits)) {
@@ -27,7 +27,9 @@ export class Sites {
     // #endif
     this.params = this.#admitted(options.params ?? {});
     const every = (Kind, value) => Kind.from({ length: this.count }, (_, i) => value(i));
-    /** The neighbours of each site, and whether terms of H are there, for each kind of them. */
+    /**
+     * The neighbours of each site, and 1 or 0 for terms of H that exist there or not, for each kind of term.
+     */
     this.near = NEAR.map((offset) => every(Int32Array, (i) => this.#beside(i, offset)));
     this.present = BOUNDS.map((bounds) => every(Float64Array, (i) => this.#holds(i, bounds)));
     // #if COLOURS
@@ -40,7 +42,7 @@ export class Sites {
     });
     // #if SEAMS
     this.#colours = colours;
-    /** Along each axis the first site of the seam; that behind the last where there is none. */
+    /** Along each axis the first site of the boundary seam; the size where there is none. */
     this.seams = SEAMS.map(([period, wide], axis) => {
       const left = sizes[axis] % period;
       return sizes[axis] - (left && left + Math.max(0, Math.ceil((wide - left) / period)) * period);
@@ -57,11 +59,11 @@ export class Sites {
     // #endif
     // #endif
     // #if GATHER
-    /** What bonds or pairs add up at each site. */
+    /** Sums over bonds or pairs, at each site. */
     this.sums = new Float64Array(GATHERED * this.count);
     // #endif
     // #if NOISE
-    /** The increments of the noise in a part of a step, of one source after the other. */
+    /** The increments of the noise in a part of a step, source by source. */
     this.dw = new Float64Array(SOURCES.length * this.count);
     // #endif
     // #if SPLIT
@@ -70,7 +72,7 @@ export class Sites {
       return Array.from({ length: many ? this.colourCount : 1 }, (_, colour) => [part, colour]);
     });
     // #if TIMED
-    flows.push(null); // the time advances in the place of a last flow
+    flows.push(null); // the time advances in place of a last flow
     // #endif
     const kinds = [flows.slice(0, 1), flows.slice(1, -1), flows.slice(-1), flows.slice(1, -1).reverse()];
     /** The flows of a step: a part of H, a row of coefficients, a colour. */
@@ -83,8 +85,8 @@ export class Sites {
   }
 
   /**
-   * All parameters: those given, and defaults. StepError unless they are known and finite, and positive
-   * where they have to be.
+   * All parameters: the given ones, and defaults. Throws StepError unless they are known and finite, and
+   * positive where required.
    */
   #admitted(given) {
     const unknown = Object.keys(given).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
@@ -110,7 +112,7 @@ export class Sites {
     return Object.freeze(params);
   }
 
-  /** Where a site is along each axis. */
+  /** Position of each site along each axis. */
   #place(site) {
     const place = [];
     for (let axis = AXES.length - 1; axis >= 0; axis--) {
@@ -120,7 +122,7 @@ export class Sites {
     return place;
   }
 
-  /** The site that lies so far away; beyond open ends another, where kernels take it times 0. */
+  /** The site at an offset; beyond open ends any site, since kernels multiply it by 0. */
   #beside(site, offset) {
     return this.#place(site).reduce((sum, from, axis) => {
       const size = this.sizes[axis];
@@ -135,7 +137,7 @@ export class Sites {
   #colours;
   #begins = new Map();
 
-  /** 1 where the site at an offset has that colour, by number, and lies on just a window of seams, else 0. */
+  /** 1 where the site at an offset has a colour and lies on exactly the given seams, else 0. */
   begins(number, window) {
     const key = `${number} ${window}`;
     const [colour, offset] = WANTED[number];
@@ -150,7 +152,7 @@ export class Sites {
   }
 
   // #endif
-  /** 1 where all from low to high is on the lattice, along each axis that is open, else 0. */
+  /** 1 where all sites from offset low to offset high exist, along each open axis, else 0. */
   #holds(site, bounds) {
     const place = this.#place(site);
     const inside = ([low, high], axis) => place[axis] + low >= 0 && place[axis] + high < this.sizes[axis];
@@ -158,7 +160,7 @@ export class Sites {
   }
   // #if GRAPH
 
-  /** The bonds, from a site a to a site b each. */
+  /** The bonds, each from a site a to a site b. */
   #connect(bonds) {
     const known = bonds.length % 2 === 0 && Array.from(bonds).every((end, k) => {
       return Number.isInteger(end) && end >= 0 && end < this.count && end !== bonds[k ^ 1];
@@ -171,7 +173,7 @@ export class Sites {
     // #if BY_COLOUR
     const before = Array.from({ length: this.count }, () => []);
     this.ends.a.forEach((a, k) => before[Math.max(a, this.ends.b[k])].push(Math.min(a, this.ends.b[k])));
-    /** The colour of each site: the first that no neighbour before it has. */
+    /** Greedy colouring: each site takes the first colour that no earlier neighbour has. */
     this.colours = new Int32Array(this.count);
     before.forEach((others, site) => {
       const taken = new Set(others.map((other) => this.colours[other]));
@@ -182,8 +184,8 @@ export class Sites {
   }
 
   /**
-   * The bonds of all sites that are their end a, or b, or either: the site here, that there, the number of
-   * the bond. Of a colour only those whose site is of it, here or there, as `chosen` says.
+   * The bonds of all sites that are their end a, or b, or either: the site itself, the site at the other end,
+   * the number of the bond. `chosen` restricts them to bonds whose site, here or there, has a colour.
    */
   bonds(end, chosen, colour) {
     const key = `${end} ${chosen} ${chosen && colour}`;
@@ -207,7 +209,7 @@ export class Sites {
   // #endif
 }
 
-/** Whether all of these are finite. */
+/** Whether all numbers are finite. */
 export function allFinite(values) {
   let zero = 0;
   for (let k = 0; k < values.length; k++) zero += 0 * values[k];

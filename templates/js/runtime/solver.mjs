@@ -7,7 +7,7 @@ import { restoreState, savedState } from "./saving.mjs";
 import { energyAt, vectorFieldAt } from "./autonomous.mjs";
 import { BEGIN, CASIMIRS, COORDINATES, DEFAULT_PARAMETERS, DIM, END, FRACTIONS } from "./model.mjs";
 import { NAME, ORDER, POSITIVE, SPEC_SHA256, VERSION, casimirs } from "./model.mjs";
-// The parts of some systems only:
+// Parts of some systems only:
 import { clearHistory } from "./history.mjs";
 import { expectNonnegative } from "./nonnegative.mjs";
 import { drawStep } from "./noise.mjs";
@@ -23,8 +23,8 @@ import { renew } from "./renewed_stages.mjs";
 const number = new Float64Array(1);
 
 /**
- * All parameters: those passed, else defaults. Throws StepError unless they are known and finite, positive if
- * they have to be, and give finite coefficients for a step so short that it has no part in it.
+ * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
+ * where required, and give finite coefficients for a negligibly small step.
  */
 function admitted(given) {
   const params = { ...DEFAULT_PARAMETERS, ...given };
@@ -56,7 +56,7 @@ export class Solver {
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
   // #state fields
-  /** Steps and time at the last change of h, from which the time is counted if steps are equal in it. */
+  /** Steps and time at the last change of h, from which the time is counted. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -104,7 +104,7 @@ export class Solver {
     return this.integrate(h, 1);
   }
 
-  /** One step between correctors. Throws StepError; then the state is as before. */
+  /** Make one step between correctors. Throws StepError; then the state is unchanged. */
   #stepOfRun(h) {
     // #endif
     this.#setStep(h);
@@ -151,7 +151,10 @@ export class Solver {
   }
 
   // #if CORRECTED
-  /** End a run. StepError where the corrector fails; then, or without a step, the state is as before. */
+  /**
+   * End a run. Throws StepError if the corrector fails; then, or without a step, the state is that before the
+   * run.
+   */
   #endRun(before) {
     const status = this.steps > before.steps ? makeStage(this, 0, END) : "";
     if (status === "OK") return;
@@ -179,7 +182,7 @@ export class Solver {
   // #members tangent
   // #members interpolate
   // #members ensemble
-  /** The Hamiltonian, at x and its time or elsewhere. */
+  /** The Hamiltonian, at x and its time or at given ones. */
   hamiltonian(x = this.x, t = this.t) {
     energyAt(this.params, t, x, number);
     return number[0];

@@ -7,10 +7,12 @@ import { DIM, FLOWS, SCHEDULE } from "./model.mjs";
 
 const at = new Float64Array(DIM);
 const moved = new Float64Array(DIM);
-/** Increments; for a monitor the time that a flow takes, and what is no number where a logarithm has none. */
+/** Increments; with a monitor also the physical time of a flow, NaN outside the domain of a logarithm. */
 const change = new Float64Array(DIM + 2);
 
-/** The flows of one step, or those of a corrector: a status. If it fails, the state is as before. */
+/**
+ * Make the flows of one step, or those of a corrector; returns a status. If it fails, the state is unchanged.
+ */
 export function makeStage(solver, _, flows = SCHEDULE) {
   const { x, carry } = solver;
   const [rows] = solver.coef;

@@ -1,4 +1,4 @@
-/** Set y to x: earlier solutions predict nothing of a step with noise. */
+/** Set y to x: solutions of steps with noise cannot be predicted. */
 export function startFrom(history, x, y) {
   y.set(x);
 }

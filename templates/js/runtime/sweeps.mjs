@@ -6,7 +6,7 @@ import { byNewton } from "./krylov.mjs";
 import { drawAtSites } from "./site_noise.mjs";
 import { carry } from "./site_tangent.mjs";
 
-// ---- The step of the series: stages, of which each solves an equation on the whole lattice ----
+// ---- The step of the series: stages, each with an equation on the whole lattice ----
 
 /** The largest magnitude among some values. */
 function most(values, from, to) {
@@ -18,7 +18,7 @@ function most(values, from, to) {
   return largest;
 }
 
-/** The sizes of the fields of y, none much less than the largest. */
+/** The sizes of the fields of y, none much smaller than the largest. */
 export function usual(y) {
   const count = y.length / DIM;
   const whole = most(y, 0, y.length);
@@ -26,7 +26,7 @@ export function usual(y) {
   return Float64Array.from({ length: DIM }, (_, k) => largest(k) + LEAST_SIZE * whole + 1e-300);
 }
 
-/** How large a change of y is, field by field. */
+/** Size of a change of y, field by field. */
 export function sizeOf(change, y) {
   const count = y.length / DIM;
   return usual(y).reduce((largest, own, k) => {
@@ -35,13 +35,13 @@ export function sizeOf(change, y) {
   }, 0);
 }
 
-/** Whether further sweeps would change y by less than rounding does, or their changes shrink no more. */
+/** Whether further sweeps would change y by less than rounding, or changes no longer shrink. */
 export function solved(change, before, first) {
   if (change * change <= (before - change) * SETTLED) return true;
   return change >= before && change <= ROUNDING && !first;
 }
 
-/** y at the middle of a stage, by sweeps from a guess; null where they fail. */
+/** Solution y of a stage by fixed-point sweeps from a prediction; null on failure. */
 function bySweeps(coef, x, guess, sites) {
   let y = guess;
   let before = 0;
@@ -58,7 +58,7 @@ function bySweeps(coef, x, guess, sites) {
   return null;
 }
 
-/** Add a value to a list of backward differences; the order of the guess that would have been best. */
+/** Update a list of backward differences with a value; returns the order whose prediction was best. */
 function remember(differences, value) {
   let order = 1;
   let least = Infinity;
@@ -74,7 +74,7 @@ function remember(differences, value) {
   return order;
 }
 
-/** One step: a status. If it fails, the state is of no use. */
+/** Make one step; returns a status. If it fails, the state is undefined. */
 export function makeStep(solver) {
   const { x, rows, sites, past } = solver;
   // #if NOISE
@@ -92,7 +92,7 @@ export function makeStep(solver) {
       for (let k = 0; k < guess.length; k++) guess[k] += difference[k];
     }
     let y = past.stiff ? null : bySweeps(coef, x, guess, sites);
-    if (y === null) { // from here on it is Newton's
+    if (y === null) { // Newton's method from here on
       past.stiff = true;
       y = byNewton(coef, x, guess, sites);
     }

@@ -21,10 +21,10 @@ export function multiplied(a, b) {
 }
 
 /**
- * The derivative of the step that a solver has just made, the product of those of its stages.
+ * The derivative of the step that a solver has just made: the product of the derivatives of its stages.
  *
  * @param {Solver} solver
- * @param {{x: Float64Array, carry: Float64Array}} at the state before the step; is moved through it
+ * @param {{x: Float64Array, carry: Float64Array}} at the state before the step; advanced to its end
  * @returns {{status: string, tangent: Float64Array}}
  */
 export function tangentOf(solver, at) {

@@ -8,7 +8,10 @@ import { stageChange, stageChangeJacobian, stageSlopeJacobian } from "./model.mj
 
 const WIDE = DIM + UNKNOWNS;
 
-/** Derivatives of the moves along coordinate j, by sweeps of linear equations; null if they do not end. */
+/**
+ * Derivatives of the stage increments by coordinate j: fixed-point sweeps of linear equations; null if they
+ * do not converge.
+ */
 function variedAlong(solver, slopes, j) {
   const [z, moves] = [stages(), stages()];
   let previous = Infinity;
@@ -33,7 +36,7 @@ function variedAlong(solver, slopes, j) {
   return null;
 }
 
-/** The derivative of the step that the solver has made from a state, and its change. */
+/** Derivative and change of the step that the solver has made from a state. */
 export function differentiateStage(solver, stage, at) {
   const twin = { ...at, t: at.t, coef: solver.coef, h: solver.h, evaluations: 0 };
   const start = startOf(twin);

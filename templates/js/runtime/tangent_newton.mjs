@@ -7,8 +7,8 @@ import { solvedForAll, tangentSolved } from "./tangent_solve.mjs";
 // ---- The derivative of an implicit stage ----
 
 /**
- * alpha = x gives Dy = jacobian^-1, and the stage is 1 + incrementJacobian Dy. All is evaluated at the y of
- * the stage itself, found from its remembered value by corrections that shrink no more.
+ * alpha = x gives Dy = jacobian^-1, and the stage has the derivative 1 + incrementJacobian Dy. y is solved to
+ * rounding level, starting from the stored value.
  */
 export function differentiateStage(solver, stage, at) {
   const y = solver.history[stage].last();

@@ -8,7 +8,9 @@ import { solvedForAll, tangentSolved } from "./tangent_solve.mjs";
 
 // ---- The derivative of a stage along paths ----
 
-/** Whether the path and its variation satisfy their equation at a point m, where they have this slope. */
+/**
+ * Whether the path and its variation satisfy their equation at a point m, where they have the given slope.
+ */
 function tangentHolds(coef, p, f, m, slope) {
   const field = new Float64Array(2 * DIM);
   const scale = [0, 0];
@@ -20,8 +22,8 @@ function tangentHolds(coef, p, f, m, slope) {
 }
 
 /**
- * The path dm/dt = pi(m) p with its variation, 0 <= t <= 1, by their Taylor series: change is the end minus
- * the start, mean the mean minus the start.
+ * Path dm/dt = pi(m) p with its variation, 0 <= t <= 1, by Taylor series: change is the end minus the start,
+ * mean the mean minus the start.
  *
  * @returns {boolean} false if TERMS do not suffice
  */
@@ -57,10 +59,10 @@ function varyPiece(coef, p, start, change, mean) {
 }
 
 /**
- * End and mean of the whole path from x under p, minus x, with their variations under a variation of x (the
- * first DIM seeds) or of p (the others): the state, then its variation.
+ * End and mean of the whole path from x with covector p, minus x, with their variations under a variation of
+ * x (the first DIM seeds) or of p (the others): the state, then its variation.
  *
- * @returns {{change: Float64Array, mean: Float64Array} | null} null if it cannot be followed
+ * @returns {{change: Float64Array, mean: Float64Array} | null} null if the path cannot be followed
  */
 function varyPath(coef, x, p, seed) {
   const start = Float64Array.from({ length: 2 * DIM }, (_, i) => (i < DIM ? x[i] : Number(i - DIM === seed)));
@@ -81,8 +83,8 @@ function varyPath(coef, x, p, seed) {
 }
 
 /**
- * p = grad S_h(mean) gives (1 - H mean_p) Dp = H mean_x with H the Hessian of S_h, and the stage is end_x +
- * end_p Dp, with p found from the remembered mean by corrections that shrink no more.
+ * p = grad S_h(mean) gives (1 - H mean_p) Dp = H mean_x with H the Hessian of S_h, and the stage has the
+ * derivative end_x + end_p Dp. p is solved to rounding level, starting from the stored mean.
  */
 export function differentiateStage(solver, stage, at) {
   const coef = solver.coef[stage];

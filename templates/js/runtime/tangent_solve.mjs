@@ -2,7 +2,7 @@ import { solve } from "./linear.mjs";
 import { TANGENT_NEARLY_SOLVED, TANGENT_SHRINKING, TANGENT_SOLVED } from "./tangent_policy.mjs";
 import { DIM } from "./model.mjs";
 
-/** Whether a solve has reached the level of rounding, by its last two corrections. */
+/** Whether a solve has reached rounding level, by its last two corrections. */
 export function tangentSolved(size, previous) {
   return size <= TANGENT_SOLVED || (size < TANGENT_NEARLY_SOLVED && size > TANGENT_SHRINKING * previous);
 }
