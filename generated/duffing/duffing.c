@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 806f3514db3ccb67d3598b20e754387e626b29a62e32827da4a8c208edca3ed7
+ * body-sha256: 89102d9c5d41b64cfbb23b0a891de02c6ee13a610c89bd8c4efd7caeeda2258c
  */
 #include "duffing.h"
 #include <float.h>
@@ -137,7 +137,7 @@ void duffing_vector_field(const duffing_params *params, double t, const double x
     out[1] = q + A * cos(omega * t) - q * (q * q);
 }
 
-#define duffing_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define duffing_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 /* ---- Compensated sums, linear equations ---- */
 static int duffing_finite(const double *values, int count)
@@ -194,7 +194,7 @@ static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[d
 }
 
 /* ---- Predictors ---- */
-#define duffing_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
+#define duffing_REACH 4.0 /* largest distance of a prediction from the last value, relative to that value */
 
 /* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
@@ -232,8 +232,9 @@ static void duffing_remember(duffing_history *history, const double value[duffin
     if (history->count < duffing_DIFFERENCES) ++history->count;
 }
 
-#define duffing_PLAUSIBLE 1.5         /* length of steps always accepted, in sizes of state and motion */
-#define duffing_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
+/* steps up to this length, relative to state and motion, are accepted */
+#define duffing_PLAUSIBLE 1.5
+#define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
    at another energy, and unrelated to the motion. */
@@ -258,10 +259,10 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define duffing_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
+#define duffing_FLOOR 1e-6 /* smaller components of y are measured relative to this fraction of the largest */
 
-#define duffing_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
-#define duffing_SHRINKING 0.25     /* ... if one is more than this part of the one before */
+#define duffing_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
+#define duffing_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double duffing_size(const double y[duffing_DIM], const double delta[duffing_DIM])

@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 04ea6bfca53af5338538b3524773de71ca97de178c8db8077d06cc3abedbf8fc
+ * body-sha256: 918a6e27ceda27c59aa757cc12a16e5722cebb418789316d275643e9bd68d41a
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -47,7 +47,7 @@ typedef struct {
     double t; /* the time of x */
     double h; /* size of the last step; NaN before the first step */
     duffing_params params; /* the parameters, set by duffing_init; do not change them */
-    double coef[duffing_COEFFICIENTS]; /* functions of params and h; behind them, functions of the time too */
+    double coef[duffing_COEFFICIENTS]; /* functions of params and h, then functions of the time too */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
     duffing_history history; /* predictor of the starting value of the iteration */

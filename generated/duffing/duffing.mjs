@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5434dfdefab06e5f3fe0179a98b61feec72eeaff2aac23ca57eeebd9d2033f1c
+ * body-sha256: 12ba785d5a37a0d91333765aef8665f50932a2ad43b075b361626c123faa4a85
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -173,25 +173,25 @@ function vectorField(params, t, x, out) {
   out[1] = q + params.A * Math.cos(params.omega * t) - q * (q * q);
 }
 
-/** So short that coefficients are finite */
+/** A step size for which coefficients are finite */
 const PROBE_STEP = 1e-100;
 
-/** Components of y are measured no finer than by this part of the largest */
+/** Smaller components of y are measured relative to this fraction of the largest */
 const FLOOR = 1e-6;
 
-/** Corrections below this have reached the level of rounding, ... */
+/** A correction below this is rounding ... */
 const NEARLY_SOLVED = 1e-8;
-/** ... if one is more than this part of the one before */
+/** ... if it exceeds this fraction of the one before */
 const SHRINKING = 0.25;
 
-/** Length of steps always accepted, in sizes of state and motion */
+/** Steps up to this length, relative to state and motion, are accepted */
 const PLAUSIBLE = 1.5;
-/** Relative change of energy in longer steps */
+/** Largest relative change of energy in longer steps */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** How far from the last value a prediction may be, in sizes of that value */
+/** Largest distance of a prediction from the last value, relative to that value */
 const REACH = 4.0;
-/** That are stored: those of higher order amplify rounding more than they gain */
+/** Number of stored differences; higher ones would amplify rounding errors */
 const DIFFERENCES = 9;
 
 // ---- Errors ----

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 923411e6a87ff9bb4cafd6736f2cc28f46f6b9b7d1b0fe5f4dfc294552aac072
+ * body-sha256: bfd367c6af4047976861568ff13424908ce4ea36e8d369b159bcb78ea5859195
  */
 #include "food_web.h"
 #include <limits.h>
@@ -164,7 +164,7 @@ static inline double food_web_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* What all other sites b add to the forces of H_1 at a site a. */
+/* Contributions of all other sites b to the forces of H_1 at a site a. */
 static inline void food_web_gather1(const double *coef, const food_web_row *row, double *const *at_bonds,
     double sign)
 {
@@ -314,7 +314,7 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
 }
 
 /* ---- The lattice ---- */
-#define food_web_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define food_web_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 enum { food_web_BUFFER = 256 }; /* number of densities summed in one pass */
 

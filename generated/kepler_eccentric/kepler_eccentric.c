@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; Energy level e = -H(x0): K = monitor (H + e) is 0 along a
  *   monitored trajectory; The solver
- * body-sha256: 8195c1ee440b053ea0e9e937a134309bb52e1d450d702c057fd845b638ba8c98
+ * body-sha256: 0e5ad0b6c80ac181b2c66d4c2214a03c31f797e217bcccc001ca46bd0e1ce46e
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -75,7 +75,7 @@ double kepler_eccentric_monitor(const kepler_eccentric_params *params, const dou
     return 1.0 / (t3 + 0.5 * (oblateness * (t3 * (t3 * t3)) * (1.0 - 3.0 * (t1 / t2))));
 }
 
-#define kepler_eccentric_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define kepler_eccentric_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 /* ---- The explicit step ---- */
 static int kepler_eccentric_finite(const double *values, int count)

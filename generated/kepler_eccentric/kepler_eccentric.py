@@ -7,7 +7,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e4f3c6d8970a3a15ac2d8cf4b2413c6f77d849b231569510b921e242a88bcaf5
+# body-sha256: 126839ab8cbee3ec6cc52f33fab64643b683dc03622b47261e99768dc59d17e3
 import numpy as np
 
 VERSION = "0.1.0"
@@ -79,7 +79,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # so short that coefficients are finite
+PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
  *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 874fa71a82088d9aed0dad78e21cb8bbd634b8c1addff55ade2d82ff41dc7fcf
+ * body-sha256: a565298c8e99eb972ce4b6895c1eaf5f63e402ea84f69362d5997383bddbbdb9
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -26,8 +26,9 @@ const kowalevski_gauss_params kowalevski_gauss_default_params = { 0 };
 
 /* unknowns that are offsets of coordinates; others are those of group elements */
 enum { kowalevski_gauss_PLAIN = 0 };
-enum { kowalevski_gauss_POINT = 6 };        /* numbers that say where a step starts */
-enum { kowalevski_gauss_MAX_SWEEPS = 100 }; /* over the stages of a step */
+/* numbers that define the start of a step: coordinates, and the time if H depends on it */
+enum { kowalevski_gauss_POINT = 6 };
+enum { kowalevski_gauss_MAX_SWEEPS = 100 }; /* largest number of sweeps over the stages of a step */
 
 /* Everything that depends on parameters only. */
 static void kowalevski_gauss_prepare(const kowalevski_gauss_params *params, double h, double coef[restrict 1])
@@ -92,7 +93,7 @@ void kowalevski_gauss_vector_field(const kowalevski_gauss_params *params, const 
     out[5] = 0.5 * (G1 * P2) - 0.5 * (G2 * P1);
 }
 
-#define kowalevski_gauss_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define kowalevski_gauss_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 /* ---- Compensated sums ---- */
 static int kowalevski_gauss_finite(const double *values, int count)
@@ -519,18 +520,18 @@ static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, const double e
 }
 
 enum {
-    /* sweeps that change more than those before, beyond transients: the step is too large */
+    /* growing changes after transients: with more sweeps of this kind, the step is too large */
     kowalevski_gauss_MOST_RISING = 3,
-    /* steps from one comparison of predictors to the next: it takes as long as two sweeps */
+    /* steps between comparisons of the predictors; a comparison costs as much as two sweeps */
     kowalevski_gauss_TRIALS = 32,
 };
-/* what a next sweep may change; 2e-17 leaves a linear drift of energy and Casimirs */
+/* largest squared change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs */
 #define kowalevski_gauss_SOLVED 2e-18
-/* a sweep that changes more than this part of the one before is the last ... */
+/* sweeps end when a change exceeds this fraction of the one before ... */
 #define kowalevski_gauss_STALLED 0.8
-/* ... if it changes no more than this: a part of 0.4 let Casimirs drift; */
+/* ... and is below this; a fraction of 0.4 let Casimirs drift; */
 #define kowalevski_gauss_ROUNDING 4e-16
-/* so is the second up to this that changes no less than the one before */
+/* ... or with the second change below this that is not smaller than the one before */
 #define kowalevski_gauss_NEARLY_ROUNDING 2e-14
 
 /* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if they do not

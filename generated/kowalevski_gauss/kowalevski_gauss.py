@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 72 additions, 95 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: c1ef5cb6f46b990e31f5551a7d16c5133a77c812d8497ef64f93cf002eac58ea
+# body-sha256: 84e6d81d2c49d0eb4d784e4a07db3e14697fb36fca24291edf90b9ca5c08b5a0
 import numpy as np
 
 VERSION = "0.1.0"
@@ -77,7 +77,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # so short that coefficients are finite
+PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
@@ -209,12 +209,12 @@ def _next_frame(coef, z, k):
         ]
 
 
-MOST_RISING = 3  # sweeps that change more than those before, beyond transients: the step is too large
-SOLVED = 2e-18  # what a next sweep may change; 2e-17 leaves a linear drift of energy and Casimirs
-STALLED = 0.8  # a sweep that changes more than this part of the one before is the last ...
-ROUNDING = 4e-16  # ... if it changes no more than this: a part of 0.4 let Casimirs drift;
-NEARLY_ROUNDING = 2e-14  # so is the second up to this that changes no less than the one before
-TRIALS = 32  # steps from one comparison of predictors to the next: it takes as long as two sweeps
+MOST_RISING = 3  # growing changes after transients: with more sweeps of this kind, the step is too large
+SOLVED = 2e-18  # largest squared change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs
+STALLED = 0.8  # sweeps end when a change exceeds this fraction of the one before ...
+ROUNDING = 4e-16  # ... and is below this; a fraction of 0.4 let Casimirs drift;
+NEARLY_ROUNDING = 2e-14  # ... or with the second change below this that is not smaller than the one before
+TRIALS = 32  # steps between comparisons of the predictors; a comparison costs as much as two sweeps
 
 # Gauss collocation: nodes, weights, and the matrix mu = A diag(1/b); mu + mu.T is exactly 1 everywhere.
 NODES = np.array((0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751, 0.591717321247825, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681,))

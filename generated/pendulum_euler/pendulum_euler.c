@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e3ebd941258608a71d299d6fb98115e98fff8e60ac5c24633b34ffc3f4a63975
+ * body-sha256: cf5335f029bd7fd902fc176bded5441ae26deb988c9be012d090109e258e88c4
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -56,7 +56,7 @@ void pendulum_euler_vector_field(const pendulum_euler_params *params, const doub
     out[1] = -(g * sin(q));
 }
 
-#define pendulum_euler_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define pendulum_euler_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 /* ---- The solver ---- */
 static int pendulum_euler_finite(const double *values, int count)

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 80f33341f46e1cdb2012d0c0a3d28adb8f6ba4239c9e282022e9ab07380ad9ab
+ * body-sha256: bfe20a7153aaddaa8b371064f6a011e80eb93abef0a5cd4fcea3719ccdbc0858
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -77,7 +77,7 @@ function vectorField(params, x, out) {
   out[1] = -(params.g * Math.sin(q));
 }
 
-/** So short that coefficients are finite */
+/** A step size for which coefficients are finite */
 const PROBE_STEP = 1e-100;
 
 // ---- Errors ----

@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a5b498132104d71c698474c15f140a65cfc7a2dcb1e20f4d0ce113e1f5c93631
+# body-sha256: 887c3f7476cfab77a20167862f803bd692c9f389608ff1bab8d77255287e11ea
 import numpy as np
 
 VERSION = "0.1.0"
@@ -77,7 +77,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # so short that coefficients are finite
+PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):

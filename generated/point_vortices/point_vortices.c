@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 45df1d19a44fbeb86ce17ab62e02bf16aec8876b9488684bdc8b42b26e5182ba
+ * body-sha256: ad89e3d628d300d0f5f4263084990c08f335dff4ccedaf68c38879d733f43ca6
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -28,8 +28,8 @@ const point_vortices_params point_vortices_default_params = { NULL };
 enum { point_vortices_RESERVED = 84 };     /* arrays over the sites in the memory of a solver */
 enum { point_vortices_ROW = 1 };           /* coefficients of one flow */
 enum { point_vortices_ROWS_OF_FLOWS = 5 }; /* rows of coefficients */
-enum { point_vortices_SIDES = 2 };         /* y before and after a sweep */
-enum { point_vortices_MOST_SWEEPS = 200 }; /* that a stage may take */
+enum { point_vortices_SIDES = 2 };         /* arrays of y: before and after a sweep */
+enum { point_vortices_MOST_SWEEPS = 200 }; /* largest number of sweeps of a stage */
 
 /* Along each axis: the smallest size. */
 static const size_t point_vortices_least[point_vortices_AXES] = { 1 };
@@ -113,7 +113,7 @@ static inline point_vortices_row point_vortices_piece_of(const point_vortices_so
     return row;
 }
 
-/* What a site b adds to the forces at a site a. */
+/* Contribution of a site b to the forces at a site a. */
 static inline void point_vortices_pair_forces(const point_vortices_row *row)
 {
     const double *restrict G_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
@@ -151,7 +151,7 @@ static inline void point_vortices_pair_energy(const point_vortices_row *row)
     }
 }
 
-/* What a site b adds to the forces at a site a, and to their variations. */
+/* Contribution of a site b to the forces at a site a, and to their variations. */
 static inline void point_vortices_pair_slopes(const point_vortices_row *row)
 {
     const double *varied_x_0 = row->varied[0], *varied_y_0 = row->varied[1];
@@ -201,7 +201,7 @@ static inline void point_vortices_relax(const double *coef, const point_vortices
     }
 }
 
-/* What a stage adds to x at a site, from y around it. */
+/* Increment of x at a site by a stage, from y at the site and its neighbours. */
 static inline void point_vortices_increment(const double *coef, const point_vortices_row *row)
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
@@ -213,7 +213,7 @@ static inline void point_vortices_increment(const double *coef, const point_vort
     }
 }
 
-/* A sweep, or to x the end of a stage, for a piece of a row. */
+/* A sweep, or to x the end of a stage, for a row segment. */
 static void point_vortices_stage_piece(const point_vortices_solver *s, const double *coef, double *const *y,
     double *const *to, size_t unit)
 {
@@ -226,7 +226,7 @@ static void point_vortices_stage_piece(const point_vortices_solver *s, const dou
     else point_vortices_relax(coef, &row);
 }
 
-/* How y at a site follows y around it. */
+/* Derivative of y at a site along a variation of y. */
 static inline void point_vortices_slope(const double *coef, const point_vortices_row *row)
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
@@ -238,7 +238,7 @@ static inline void point_vortices_slope(const double *coef, const point_vortices
     }
 }
 
-/* How a sweep follows y along v, for a piece of a row. */
+/* How a sweep follows y along v, for a row segment. */
 static void point_vortices_slope_piece(const point_vortices_solver *s, const double *coef, double *const *y,
     double *const *v, double *const *to, size_t unit)
 {
@@ -273,7 +273,7 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 }
 
 /* ---- The lattice ---- */
-#define point_vortices_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define point_vortices_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 /* Before a loop over row segments: threads share its iterations. */
 #ifdef _OPENMP
@@ -418,14 +418,14 @@ static void point_vortices_copy(double *const *to, double *const *from, const po
 
 /* ---- The stages ---- */
 enum {
-    point_vortices_PATIENCE = 10, /* sweeps after which slow ones are left to Newton's method */
+    point_vortices_PATIENCE = 10, /* sweeps after which slow convergence is left to Newton's method */
 };
-/* fields are measured no finer than by this part of the largest */
+/* smaller fields are measured relative to this fraction of the largest */
 #define point_vortices_LEAST_SIZE 0.001
-#define point_vortices_SETTLED 0x1p-55        /* what further sweeps may still change, in sizes of y */
+#define point_vortices_SETTLED 0x1p-55        /* largest expected change by further sweeps, relative to y */
 #define point_vortices_ROUNDING 0x1p-40       /* changes below this may be rounding */
-#define point_vortices_SLOW 0.6               /* slower changes are left to Newton's method, ... */
-#define point_vortices_NEARLY_SETTLED 0x1p-30 /* ... unless they are below this */
+#define point_vortices_SLOW 0.6               /* slower convergence is left to Newton's method ... */
+#define point_vortices_NEARLY_SETTLED 0x1p-30 /* ... unless changes are below this */
 
 enum { point_vortices_WIDTH = 32 }; /* number of partial results, so that loops vectorise */
 
@@ -544,10 +544,10 @@ static void point_vortices_forget(point_vortices_solver *s)
 }
 
 /* ---- Krylov spaces ---- */
-/* how well a correction solves the equation for it, if the space allows, ... */
-#define point_vortices_SOLVED 1e-6
-#define point_vortices_USEFUL 0.9    /* ... and how well it has to */
-#define point_vortices_PLAUSIBLE 1.5 /* the motion reaches no further, in sizes of x and of its motion */
+#define point_vortices_SOLVED 1e-6 /* relative residual at which the iteration for a correction ends, ... */
+#define point_vortices_USEFUL 0.9  /* ... and the largest one that is accepted */
+/* solutions farther from x than this, relative to x and its motion, are rejected */
+#define point_vortices_PLAUSIBLE 1.5
 
 /* Scalar product of x and y, in units of the usual size of each field. Row segments are added in order: the
    bits do not depend on threads. */

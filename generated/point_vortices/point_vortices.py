@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 4f662b0b61ed5dd6558f5cac61a251ec7f94e5f3e68f156e8b1ac52bb4f29d1b
+# body-sha256: 7d214094199002b40d8dea8e844f6b211affcbeef6fd711ac9b581e32fca0a9f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -114,13 +114,13 @@ class _Sites:
 
 # Largest numbers of sweeps of a stage, and of Newton corrections.
 MOST_SWEEPS = 200
-DIFFERENCES = 4  # that predictions of a stage are extrapolated from
-PATIENCE = 10  # sweeps after which slow ones are left to Newton's method
-LEAST_SIZE = 0.001  # fields are measured no finer than by this part of the largest
-SETTLED = 2.0**-55  # what further sweeps may still change, in sizes of y
+DIFFERENCES = 4  # number of differences in the predictor of a stage
+PATIENCE = 10  # sweeps after which slow convergence is left to Newton's method
+LEAST_SIZE = 0.001  # smaller fields are measured relative to this fraction of the largest
+SETTLED = 2.0**-55  # largest expected change by further sweeps, relative to y
 ROUNDING = 2.0**-40  # changes below this may be rounding
-SLOW = 0.6  # slower changes are left to Newton's method, ...
-NEARLY_SETTLED = 2.0**-30  # ... unless they are below this
+SLOW = 0.6  # slower convergence is left to Newton's method ...
+NEARLY_SETTLED = 2.0**-30  # ... unless changes are below this
 
 
 def _usual(y):
@@ -179,10 +179,10 @@ def _advance(sites, rows, x, past):
     return x
 
 
-DIRECTIONS = 24  # of the Krylov space that a correction is taken from
-SOLVED = 1e-6  # how well a correction solves the equation for it, if the space allows, ...
-USEFUL = 0.9  # ... and how well it has to
-PLAUSIBLE = 1.5  # the motion reaches no further, in sizes of x and of its motion
+DIRECTIONS = 24  # dimension of the Krylov space of a correction
+SOLVED = 1e-6  # relative residual at which the iteration for a correction ends, ...
+USEFUL = 0.9  # ... and the largest one that is accepted
+PLAUSIBLE = 1.5  # solutions farther from x than this, relative to x and its motion, are rejected
 
 
 def _middle(coef, x, guess, sites, past):

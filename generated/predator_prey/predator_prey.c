@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 32a4a274312f2d3c8a53cc2ec10b844df0c5522fb77e51ee9b794c5f99cc2517
+ * body-sha256: 39b62988cf6e9c2a205e9e7c1579702c92d716bcecb64005d49e4a531ed957be
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -108,7 +108,7 @@ void predator_prey_vector_field(const predator_prey_params *params, const double
     out[1] = -(t1 * (death / prey - gain));
 }
 
-#define predator_prey_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define predator_prey_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 /* ---- Compensated sums, linear equations ---- */
 static int predator_prey_finite(const double *values, int count)
@@ -168,7 +168,8 @@ static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_D
 }
 
 /* ---- Predictors ---- */
-#define predator_prey_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
+/* largest distance of a prediction from the last value, relative to that value */
+#define predator_prey_REACH 4.0
 
 /* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
@@ -206,9 +207,9 @@ static void predator_prey_remember(predator_prey_history *history, const double 
     if (history->count < predator_prey_DIFFERENCES) ++history->count;
 }
 
-/* length of steps always accepted, in sizes of state and motion */
+/* steps up to this length, relative to state and motion, are accepted */
 #define predator_prey_PLAUSIBLE 1.5
-#define predator_prey_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
+#define predator_prey_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
    at another energy, and unrelated to the motion. */
@@ -233,10 +234,11 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define predator_prey_FLOOR 0.0 /* components of y are measured no finer than by this part of the largest */
+/* smaller components of y are measured relative to this fraction of the largest */
+#define predator_prey_FLOOR 0.0
 
-#define predator_prey_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
-#define predator_prey_SHRINKING 0.25     /* ... if one is more than this part of the one before */
+#define predator_prey_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
+#define predator_prey_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double predator_prey_size(const double y[predator_prey_DIM], const double delta[predator_prey_DIM])

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 2f6ab3961b31cf72653b76c2db96f51ae6e1f66892f5ddbcbf1d7247b7ba2603
+# body-sha256: 066f4efe694170b81d25e95fa954047713de04b84b6c7dbe357c1b3991bde771
 import numpy as np
 
 VERSION = "0.1.0"
@@ -81,7 +81,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # so short that coefficients are finite
+PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
@@ -203,8 +203,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # length of steps always accepted, in sizes of state and motion
-MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
+PLAUSIBLE = 1.5  # steps up to this length, relative to state and motion, are accepted
+MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
@@ -230,9 +230,9 @@ def _solved(stage, x, carry, guess):
     return following, rest, value, status
 
 
-FLOOR = 0.0  # components of y are measured no finer than by this part of the largest
-NEARLY_SOLVED = 1e-8  # corrections below this have reached the level of rounding, ...
-SHRINKING = 0.25  # ... if one is more than this part of the one before
+FLOOR = 0.0  # smaller components of y are measured relative to this fraction of the largest
+NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
+SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
 
 
 def _size(y, delta):

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 68b2735aa6d61ec5fac8647ecd3035fec86c0b5eb06e509828252308784b25a2
+ * body-sha256: 3f6d902c0f32f500808e69bba6cf443560ffbdf57a9b12fdf07ac4b95253ed8d
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -281,7 +281,7 @@ void quaternion_top_vector_field(const quaternion_top_params *params, const doub
     out[6] = 0.5 * (w * t3) + (0.5 * (x_ * t4) - 0.5 * (y * t7));
 }
 
-#define quaternion_top_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define quaternion_top_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 /* ---- Compensated sums, linear equations ---- */
 static int quaternion_top_finite(const double *values, int count)
@@ -341,7 +341,8 @@ static int quaternion_top_solve(double matrix[quaternion_top_DIM * quaternion_to
 }
 
 /* ---- Predictors ---- */
-#define quaternion_top_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
+/* largest distance of a prediction from the last value, relative to that value */
+#define quaternion_top_REACH 4.0
 
 /* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
@@ -379,9 +380,9 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
     if (history->count < quaternion_top_DIFFERENCES) ++history->count;
 }
 
-/* length of steps always accepted, in sizes of state and motion */
+/* steps up to this length, relative to state and motion, are accepted */
 #define quaternion_top_PLAUSIBLE 1.5
-#define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
+#define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
    at another energy, and unrelated to the motion. */
@@ -678,23 +679,24 @@ static void quaternion_top_path_field(const double *coef, const double p[7], con
 
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
-    quaternion_top_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
-    /* of all paths of a solve: steps that need more are wrong by as much as the state */
+    quaternion_top_LONGEST_PATH = 128, /* largest number of pieces of a path, a power of 2 */
+    /* ... of all paths of a solve: steps that need more have errors of the size of the state */
     quaternion_top_MOST_PIECES = 512,
-    /* iterations with the approximate Jacobian, before it is asked whether it contracts */
+    /* iterations with the approximate Jacobian before its contraction is checked */
     quaternion_top_PATIENCE = 3,
 };
-#define quaternion_top_NEGLIGIBLE 1e-17 /* terms that rounding hides in their sum, in sizes of the path */
-/* coordinates are measured no finer than by this part of all together */
+/* terms of a series below this, relative to the path, are rounding */
+#define quaternion_top_NEGLIGIBLE 1e-17
+/* smaller coordinates are measured relative to this fraction of their sum */
 #define quaternion_top_LEAST_SHARE 1e-5
-/* rounding of the slope of a path, in sizes of the path and its slope */
+/* rounding of the slope of a path, relative to the path and its slope */
 #define quaternion_top_ROUNDED_SLOPE 2e-15
-/* of arguments in a quotient, in sizes of p: about the root of rounding */
+/* difference of arguments in a difference quotient, relative to p: the root of rounding */
 #define quaternion_top_DIFFERENCE 1e-7
-#define quaternion_top_SOLVED 4e-16        /* a residual, in sizes of p, that is rounding; */
-#define quaternion_top_NEARLY_SOLVED 1e-12 /* one below this is so too if it is ... */
-#define quaternion_top_SHRINKING 0.25      /* ... more than this part of the one before */
-/* part of the residual that an iteration with a useful Jacobian leaves at most */
+#define quaternion_top_SOLVED 4e-16        /* a residual below this, relative to p, is rounding; */
+#define quaternion_top_NEARLY_SOLVED 1e-12 /* one below this is rounding too ... */
+#define quaternion_top_SHRINKING 0.25      /* ... if it exceeds this fraction of the one before */
+/* largest reduction factor of the residual by an iteration with a useful Jacobian */
 #define quaternion_top_CONTRACTING 0.05
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope. An expansion with gaps

@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: several steps or members at once; Newton's method in
  *   lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members:
  *   implicit steps; Ensembles
- * body-sha256: 750fd449918d4f36c91e5691b95cc8404000a7d36edeef7e5624b0ca98bd562e
+ * body-sha256: c484eb1c5fc29a72eff6229fcb623792767076c96aac13f5b17abc358cd24099
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -347,7 +347,7 @@ void rigid_body_vector_field(const rigid_body_params *params, const double x[3],
     out[2] = x1 * t2 - x2 * t3;
 }
 
-#define rigid_body_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define rigid_body_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 /* ---- Compensated sums, linear equations ---- */
 static int rigid_body_finite(const double *values, int count)
@@ -519,7 +519,8 @@ static int rigid_body_train(rigid_body_history *history, int component)
 }
 
 /* ---- Predictors ---- */
-#define rigid_body_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
+/* largest distance of a prediction from the last value, relative to that value */
+#define rigid_body_REACH 4.0
 
 /* Whether a prediction is near the state. Far away the equation of a step has solutions unrelated to the
    motion. */
@@ -629,8 +630,9 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
         rigid_body_fit(history);
 }
 
-#define rigid_body_PLAUSIBLE 1.5         /* length of steps always accepted, in sizes of state and motion */
-#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
+/* steps up to this length, relative to state and motion, are accepted */
+#define rigid_body_PLAUSIBLE 1.5
+#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
    at another energy, and unrelated to the motion. */
@@ -655,10 +657,11 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define rigid_body_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
+/* smaller components of y are measured relative to this fraction of the largest */
+#define rigid_body_FLOOR 1e-6
 
-#define rigid_body_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
-#define rigid_body_SHRINKING 0.25     /* ... if one is more than this part of the one before */
+#define rigid_body_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
+#define rigid_body_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double rigid_body_size(const double y[rigid_body_DIM], const double delta[rigid_body_DIM])
@@ -710,17 +713,18 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
 
 /* ---- The choice of the gauge: multiples of Casimirs subtracted from H ---- */
 enum {
-    rigid_body_SAMPLES = 32, /* states along a short piece of the trajectory */
+    rigid_body_SAMPLES = 32, /* number of states along a short piece of the trajectory */
     /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */
     rigid_body_DEGREE = 6,
-    rigid_body_SWEEPS = 4,        /* most rounds over the multiples */
-    rigid_body_GRIDS = 3,         /* on a line, each finer than the one before by the factor mesh */
-    rigid_body_FIRST_REACH = 24,  /* points of the first grid to either side */
-    rigid_body_REACH_OF_GRID = 8, /* points of the others to either side */
+    rigid_body_SWEEPS = 4, /* most rounds over all multiples */
+    /* number of grids on a line, each finer than the one before by the factor mesh */
+    rigid_body_GRIDS = 3,
+    rigid_body_FIRST_REACH = 24,  /* points of the first grid on either side */
+    rigid_body_REACH_OF_GRID = 8, /* points of the other grids on either side */
 };
-#define rigid_body_MESH 0.125         /* of the first grid, in widths of the error */
-#define rigid_body_SAMPLE_LENGTH 0.25 /* from one state to the next, in sizes of the first */
-/* errors, in sizes of all on a line, that are as good: rounding does not decide */
+#define rigid_body_MESH 0.125         /* mesh of the first grid, in widths of the error */
+#define rigid_body_SAMPLE_LENGTH 0.25 /* distance between successive states, relative to the first */
+/* errors that differ less than this, relative to all on a line, are equal: rounding must not decide */
 #define rigid_body_CLOSE_CALL 1e-12
 
 /* Direction of the motion at a point, a unit vector; 0 at equilibria. */

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c04772134dfda9a6132df4e3d62bf431912f85aeebe5b8234a34cfbf0588679b
+ * body-sha256: b34a58733052c8ff505fe25b0d8a5026495850fa4871739a959450b9d7a51f76
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -452,44 +452,44 @@ function vectorField(params, x, out) {
   out[2] = x1 * t2 - x2 * t3;
 }
 
-/** So short that coefficients are finite */
+/** A step size for which coefficients are finite */
 const PROBE_STEP = 1e-100;
 
-/** Components of y are measured no finer than by this part of the largest */
+/** Smaller components of y are measured relative to this fraction of the largest */
 const FLOOR = 1e-6;
 
-/** Corrections below this have reached the level of rounding, ... */
+/** A correction below this is rounding ... */
 const NEARLY_SOLVED = 1e-8;
-/** ... if one is more than this part of the one before */
+/** ... if it exceeds this fraction of the one before */
 const SHRINKING = 0.25;
 
-/** Length of steps always accepted, in sizes of state and motion */
+/** Steps up to this length, relative to state and motion, are accepted */
 const PLAUSIBLE = 1.5;
-/** Relative change of energy in longer steps */
+/** Largest relative change of energy in longer steps */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** How far from the last value a prediction may be, in sizes of that value */
+/** Largest distance of a prediction from the last value, relative to that value */
 const REACH = 4.0;
-/** That are stored: those of higher order amplify rounding more than they gain */
+/** Number of stored differences; higher ones would amplify rounding errors */
 const DIFFERENCES = 9;
 
-/** States along a short piece of the trajectory */
+/** Number of states along a short piece of the trajectory */
 const SAMPLES = 32;
 /** S_3 is cubic in H, so the square of the error is of degree six in each multiple */
 const DEGREE = 6;
-/** Most rounds over the multiples */
+/** Most rounds over all multiples */
 const SWEEPS = 4;
-/** On a line, each finer than the one before by the factor mesh */
+/** Number of grids on a line, each finer than the one before by the factor mesh */
 const GRIDS = 3;
-/** Points of the first grid to either side */
+/** Points of the first grid on either side */
 const FIRST_REACH = 24;
-/** Points of the others to either side */
+/** Points of the other grids on either side */
 const REACH_OF_GRID = 8;
-/** Of the first grid, in widths of the error */
+/** Mesh of the first grid, in widths of the error */
 const MESH = 0.125;
-/** From one state to the next, in sizes of the first */
+/** Distance between successive states, relative to the first */
 const SAMPLE_LENGTH = 0.25;
-/** Errors, in sizes of all on a line, that are as good: rounding does not decide */
+/** Errors that differ less than this, relative to all on a line, are equal: rounding must not decide */
 const CLOSE_CALL = 1e-12;
 
 // ---- Errors ----

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e9919bf5a3cbba3ceaafde06e7231e954c1adc27f375d887e5edda7efa91d7b1
+# body-sha256: 4c5172fa8e4a0cee226b0243060909384b8c531643df47c835133b1e1d1f635f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -81,7 +81,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # so short that coefficients are finite
+PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
@@ -455,8 +455,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # length of steps always accepted, in sizes of state and motion
-MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
+PLAUSIBLE = 1.5  # steps up to this length, relative to state and motion, are accepted
+MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
@@ -482,9 +482,9 @@ def _solved(stage, x, carry, guess):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # components of y are measured no finer than by this part of the largest
-NEARLY_SOLVED = 1e-8  # corrections below this have reached the level of rounding, ...
-SHRINKING = 0.25  # ... if one is more than this part of the one before
+FLOOR = 1e-6  # smaller components of y are measured relative to this fraction of the largest
+NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
+SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
 
 
 def _size(y, delta):
@@ -540,15 +540,15 @@ def _advance(stage, x, carry, memory):
     return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
 
 
-SAMPLES = 32  # states along a short piece of the trajectory
+SAMPLES = 32  # number of states along a short piece of the trajectory
 DEGREE = 6  # S_3 is cubic in H, so the square of the error is of degree six in each multiple
-SWEEPS = 4  # most rounds over the multiples
-GRIDS = 3  # on a line, each finer than the one before by the factor mesh
-FIRST_REACH = 24  # points of the first grid to either side
-REACH_OF_GRID = 8  # points of the others to either side
-MESH = 0.125  # of the first grid, in widths of the error
-SAMPLE_LENGTH = 0.25  # from one state to the next, in sizes of the first
-CLOSE_CALL = 1e-12  # errors, in sizes of all on a line, that are as good: rounding does not decide
+SWEEPS = 4  # most rounds over all multiples
+GRIDS = 3  # number of grids on a line, each finer than the one before by the factor mesh
+FIRST_REACH = 24  # points of the first grid on either side
+REACH_OF_GRID = 8  # points of the other grids on either side
+MESH = 0.125  # mesh of the first grid, in widths of the error
+SAMPLE_LENGTH = 0.25  # distance between successive states, relative to the first
+CLOSE_CALL = 1e-12  # errors that differ less than this, relative to all on a line, are equal: rounding must not decide
 
 
 def _line(error_of, gauge, c, width):

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: fcb2825c298a3b1f8820ff5525800cd287e1326bb880d557e4b0fc9378ff063c
+ * body-sha256: 01effde402dbfe4ebe7ac35faadff6faff4afacf508cc935a0a4b0524f6640a0
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -202,7 +202,7 @@ void thermal_spin_noise_fields(const thermal_spin_params *params, const double x
     out[8] = 0.0;
 }
 
-#define thermal_spin_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define thermal_spin_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 /* ---- Compensated sums, linear equations ---- */
 static int thermal_spin_finite(const double *values, int count)
@@ -259,8 +259,9 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
     return 1;
 }
 
-#define thermal_spin_PLAUSIBLE 1.5         /* length of steps always accepted, in sizes of state and motion */
-#define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* relative change of energy in longer steps */
+/* steps up to this length, relative to state and motion, are accepted */
+#define thermal_spin_PLAUSIBLE 1.5
+#define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
    at another energy, and unrelated to the motion. */
@@ -289,10 +290,11 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define thermal_spin_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
+/* smaller components of y are measured relative to this fraction of the largest */
+#define thermal_spin_FLOOR 1e-6
 
-#define thermal_spin_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
-#define thermal_spin_SHRINKING 0.25     /* ... if one is more than this part of the one before */
+#define thermal_spin_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
+#define thermal_spin_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double thermal_spin_size(const double y[thermal_spin_DIM], const double delta[thermal_spin_DIM])

@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cffbec7cf1832c6f2ae4493f419b616083efe3e1a88158ddb6c22b0e8881e420
+ * body-sha256: 49afd0605d5e2470d1e43938a64ea54626359a64d320fa447bec577c9dc495ff
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -50,10 +50,9 @@ typedef struct {
     uint64_t seed, first_step; /* with member, these select the random numbers: see thermal_spin_set_noise */
     uint32_t member;
     double dw[thermal_spin_DRAWS]; /* increments of the noise in the last step */
-    double h;                      /* size of the last step; NaN before the first step */
-    thermal_spin_params params;    /* the parameters, set by thermal_spin_init; do not change them */
-    /* functions of params and h; behind them, functions of dw and time too */
-    double coef[thermal_spin_COEFFICIENTS];
+    double h; /* size of the last step; NaN before the first step */
+    thermal_spin_params params; /* the parameters, set by thermal_spin_init; do not change them */
+    double coef[thermal_spin_COEFFICIENTS]; /* functions of params and h, then functions of dw and time too */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
 } thermal_spin_solver;

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 47390f6a9b347342edc342f791bad2eac0e233daa2471888885eb271f0e90008
+ * body-sha256: e21268222f3a74f61eebf02a834a4ef26670b1c428af1abbaf705c52f5d8e2e7
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -268,25 +268,25 @@ function vectorField(params, x, out) {
   out[2] = y * t4 + x_ * t3;
 }
 
-/** So short that coefficients are finite */
+/** A step size for which coefficients are finite */
 const PROBE_STEP = 1e-100;
 
-/** Components of y are measured no finer than by this part of the largest */
+/** Smaller components of y are measured relative to this fraction of the largest */
 const FLOOR = 1e-6;
 
-/** Corrections below this have reached the level of rounding, ... */
+/** A correction below this is rounding ... */
 const NEARLY_SOLVED = 1e-8;
-/** ... if one is more than this part of the one before */
+/** ... if it exceeds this fraction of the one before */
 const SHRINKING = 0.25;
 
-/** Length of steps always accepted, in sizes of state and motion */
+/** Steps up to this length, relative to state and motion, are accepted */
 const PLAUSIBLE = 1.5;
-/** Relative change of energy in longer steps */
+/** Largest relative change of energy in longer steps */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** How far from the last value a prediction may be, in sizes of that value */
+/** Largest distance of a prediction from the last value, relative to that value */
 const REACH = 4.0;
-/** That are stored: those of higher order amplify rounding more than they gain */
+/** Number of stored differences; higher ones would amplify rounding errors */
 const DIFFERENCES = 9;
 
 // ---- Errors ----

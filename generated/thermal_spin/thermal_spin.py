@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 6137f611808f4b4ffbaa5c28b84eba839a37ba588067a5af0ea2fe996aaeae5a
+# body-sha256: 2ea2baa4cadddfc30d9c76c13f1dacb84cd5012472c20c78243b9c2dc6f31069
 import numpy as np
 
 VERSION = "0.1.0"
@@ -86,7 +86,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # so short that coefficients are finite
+PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
@@ -297,8 +297,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # length of steps always accepted, in sizes of state and motion
-MAX_ENERGY_CHANGE = 0.5  # relative change of energy in longer steps
+PLAUSIBLE = 1.5  # steps up to this length, relative to state and motion, are accepted
+MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
@@ -326,9 +326,9 @@ def _solved(stage, x, carry, guess):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # components of y are measured no finer than by this part of the largest
-NEARLY_SOLVED = 1e-8  # corrections below this have reached the level of rounding, ...
-SHRINKING = 0.25  # ... if one is more than this part of the one before
+FLOOR = 1e-6  # smaller components of y are measured relative to this fraction of the largest
+NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
+SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
 
 
 def _size(y, delta):

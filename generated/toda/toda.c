@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: b9737e702bc0860c2ff30af7fa543724a39c7bc158b66389e1bf33e1bcb255f5
+ * body-sha256: 174950ceeeffe2d3ad0ff5000c9e6e38e0e44e35fa5f1cf9ec4dced58f940693
  */
 #include "toda.h"
 #include <math.h>
@@ -236,7 +236,7 @@ static void toda_vector_field_row(const toda_row *row, double *restrict out)
 }
 
 /* ---- The lattice ---- */
-#define toda_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+#define toda_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
 enum { toda_BUFFER = 256 }; /* number of densities summed in one pass */
 

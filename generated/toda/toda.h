@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f1447d323b4f26cca9026ced4dcfef05fb4d6ea7a3d3902e31e91e18cb5b413e
+ * body-sha256: fed85edb170b14abd0bc08dd010c77d2cb55e1de974b21c2d83a6a4173e823b8
  */
 #ifndef TODA_H
 #define TODA_H
@@ -38,7 +38,7 @@ typedef struct {
     double *x[toda_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */
     double *before[toda_DIM]; /* fields before the present steps, restored if one fails */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
-    size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */
+    size_t far; /* number of the next steps that use full-range functions */
     size_t steps; /* number of successful steps since toda_init */
     double t; /* time since toda_init */
     double h; /* size of the last step */

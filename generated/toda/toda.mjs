@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9320a8e9431639e1219b97d65914cadb73696b29f7f90f22993b0dc698649fd9
+ * body-sha256: e2863b1b9197f3b60e30da73d4e02d9368838251020d0533eb90ec8aac2aea7a
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -138,7 +138,7 @@ function vectorField(params, x, sites, out) {
   }
 }
 
-/** So short that coefficients are finite */
+/** A step size for which coefficients are finite */
 const PROBE_STEP = 1e-100;
 
 // ---- Errors ----

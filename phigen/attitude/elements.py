@@ -30,7 +30,7 @@ _HALF = number(Fraction(1, 2))
 class Direction:
     """An element before division: the quaternion ``turn`` by its ``length``, ``shift`` by the square of that.
 
-    ``factor`` is that by which ``turn`` is a multiple of the one in `with_phi`.
+    ``factor`` is the ratio of ``turn`` to that of `with_phi`.
     """
 
     turn: tuple[Expression, ...]
@@ -69,7 +69,7 @@ def _shift(p: Vector, t: Vector, factors: Vector) -> tuple[Expression, ...]:
 
 
 def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
-    """The quaternion of p less 1, and what it translates by if ``t`` is not empty."""
+    """The quaternion of p minus 1 and, if ``t`` is not empty, its translation."""
     increment = direction(p, t, cayley=cayley)
     per = ONE / increment.length
     s = dot(p, p)
@@ -80,9 +80,9 @@ def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
 def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
     """exp(r), or exp(r, t), in the same form, for rotations by any angle.
 
-    Without a translation, about a coordinate axis, it is not divided by its length: (1, tan(|r|/2)) takes least to be
-    made, from what a flow has of the angle in any case, and to be multiplied by. Products are divided at the end of a
-    step. With one it has sin and 1 − cos of half the angle, as the flow in `phigen.attitude.parts.by_angles`.
+    Without a translation and about a coordinate axis it is not divided by its length: (1, tan(|r|/2)) is the
+    cheapest form, since a flow knows the angle anyway. Products are normalised at the end of a step. With a
+    translation it has sin and 1 − cos of half the angle, as the flow in `phigen.attitude.parts.by_angles`.
     """
     s, turning = dot(r, r), [ri for ri in r if not ri.is_zero]
     if len(turning) == 1 and not t:
@@ -121,7 +121,7 @@ def product(a: Vector, b: Vector) -> list[Expression]:
 
 
 def rotated(q: Vector, v: Vector) -> list[Expression]:
-    """q v q̄: the vector rotated, and stretched by |q|²."""
+    """q v q̄: the vector rotated, and scaled by |q|²."""
     w, u = q[0], q[1:]
     along, size, once = dot(u, v), w**2 - dot(u, u), cross(u, v)
     return [size * a + 2 * along * b + 2 * w * c for a, b, c in zip(v, u, once, strict=True)]

@@ -32,9 +32,9 @@ Dense = tuple[tuple[Expression, ...], ...]
 class Group:
     """A group and its algebra, with covectors of ``dimension`` components.
 
-    ``spatial`` tells that x are momenta in space: elements are multiplied from the left. ``matrices``, one for each
-    component, are there for an attitude that is a matrix; else the components of ``rotation`` make quaternions, and
-    ``vectors`` are those that such a rotation rotates.
+    ``spatial`` says that x are momenta in space: elements are multiplied from the left. ``matrices``, one for each
+    component, exist if the attitude is a matrix; otherwise the components of ``rotation`` make quaternions, and
+    ``vectors`` are the vectors that they rotate.
     """
 
     spatial: bool
@@ -133,7 +133,7 @@ def _components(algebra: LieAlgebra, i: int, j: int, triple: Sequence[int]) -> d
 
 
 def _numbers(row: Mapping[int, Expression], triple: Sequence[int]) -> dict[int, object]:
-    """The entries of a row by their places in a triple, or −1; numbers as such."""
+    """The entries of a row by their positions in a triple, or −1; numbers unchanged."""
     return {_place(triple, k): c.value if c.is_number else c for k, c in row.items()}
 
 
@@ -163,7 +163,7 @@ def _is_vector(algebra: LieAlgebra, rotation: Triple, translation: Sequence[int]
 
 
 def _matrices(system: System, algebra: LieAlgebra, kind: str) -> Group:
-    """The matrices of the named algebra, with its sign; for so(3) in any notation the rotations of its sign."""
+    """The matrices of the named algebra, with its sign; for so(3) in any notation, rotations with its sign."""
     representation = closed_representation(algebra) if kind == "cayley" else known_representation(algebra)
     if representation is None:
         raise refused(

@@ -1,12 +1,12 @@
 """Group elements that are matrices: exp(P) and the Cayley transform of P = Σ p_i E_i, less 1, as straight formulas.
 
-By the theorem of Cayley and Hamilton, Pᴺ = Σ_{j<N} q_j Pʲ for a matrix of N rows. So all powers, and with them the
-series of exp, are combinations of 1, P, …, P^{N−1}, whose factors follow from one another by numbers: N − 2 products of
-matrices in all. The q_j are, up to signs, the elementary symmetric functions of the eigenvalues, which by Newton's
-identities follow from the traces of powers.
+By the theorem of Cayley and Hamilton, Pᴺ = Σ_{j<N} q_j Pʲ for a matrix of N rows. So all powers, and the series of
+exp, are combinations of 1, P, …, P^{N−1}, whose scalar factors obey a recurrence: N − 2 products of matrices in all.
+The q_j are, up to signs, the elementary symmetric functions of the eigenvalues, which by Newton's identities follow
+from the traces of powers.
 
-In flows of a splitting most P turn in planes, or shift: P³ = −sP with a number s, where exp(P) is
-1 + sin(√s)/√s P + (1 − cos √s)/s P², for any s.
+In flows of a splitting most P are rotations in planes, or shifts: P³ = −sP with a number s. Then exp(P) is 1 +
+sin(√s)/√s P + (1 − cos √s)/s P², for any s.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def multiplied(a: Sequence[Expression], b: Sequence[Expression]) -> Flat:
 
 
 def flow_exponential(group: Group, p: Sequence[Expression], positive: Sequence[str]) -> Flat | None:
-    """The entries of exp(P) − 1 for a P that is a sum of commuting ones with P³ = −sP; None for others."""
+    """The entries of exp(P) − 1 for a P that is a sum of commuting matrices with P³ = −sP; None for others."""
     basis = [(pi, m) for pi, m in zip(p, group.matrices, strict=True) if not pi.is_zero]
     ratios = [_ratio(m) for _, m in basis]
     if all(r is not None for r in ratios) and all(_commute(a, b) for (_, a), (_, b) in combinations(basis, 2)):

@@ -1,10 +1,10 @@
 """The elements of exact flows: of parts of H whose gradient is constant along their own flow, exp(t∇H_k).
 
 A part is written as c C + Q + R with a Casimir C, Q = ½c′|m|² for the angular momentum m, and R, such that the
-gradients of Q and of R are constant along the flows of both. Then the flow of the part is, in the group,
-exp(t∇Q) exp(t∇R) and what C turns: x does not feel that, and over a step all its times add up to h, so it is put back
-once for all. Where that would be no uniform motion, with forces, a monitor, the time in H, and for noise, C has an
-element in each flow, as Q and R have. A flow that is composed of commuting ones has the product of their elements.
+gradients of Q and of R are constant along the flows of both. Then the flow of the part is, in the group, exp(t∇Q)
+exp(t∇R) times the rotation by C. This rotation does not change x, and over a step its times add up to h, so it is
+applied once. If it is not uniform (with forces, a monitor, the time in H, or noise), C has an element in each flow,
+like Q and R. A flow that is composed of commuting ones has the product of their elements.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ MOST_PIECES = 4
 class Turning:
     """A part as ``casimir`` + the sum of ``terms``, whose flows are made in turn.
 
-    ``put_back`` says whether what the Casimir turns is put back once a step.
+    ``put_back`` says whether the rotation by the Casimir is applied once a step.
     """
 
     casimir: Expression
@@ -89,7 +89,7 @@ def _by_angles(system: System, group: Group, flow: Flow, turning: Turning) -> Fl
 
 
 def _of_angle(function: str, sign: Expression, angle: Expression, *, double: bool) -> Expression:
-    """A function of an angle, or of its double, by the sine of the angle and 1 less its cosine."""
+    """A function of an angle or of its double, in terms of the sine and 1 − cosine of the angle."""
     sine, versine = call("sin", angle), call("versin", angle)
     if double:
         sine, versine = 2 * (sine * (ONE - versine)), 2 * sine**2
@@ -97,7 +97,7 @@ def _of_angle(function: str, sign: Expression, angle: Expression, *, double: boo
 
 
 def _of_square(function: str, square: Expression) -> Expression:
-    """A function of the root of 4s by those of the root of s."""
+    """A function of the root of 4s, in terms of functions of the root of s."""
     sine = call("sinroot", square)
     return sine * call("cosroot", square) if function == "sinroot" else ONE - 2 * (square * sine**2)
 
@@ -184,7 +184,7 @@ def factor_elements(
 
 
 def joined(group: Group, elements: Sequence[Sequence[Expression]]) -> list[Expression]:
-    """The element of the factors, one after the other, less 1 as they are."""
+    """The element of the factors, one after the other, minus 1."""
     leading, *others = elements
     result = list(leading)
     for later in others:

@@ -25,7 +25,7 @@ from phigen.gauss.star_algebra import StarAlgebra, Vector
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.symbolic.tower import rational
 
-#: Largest dimension of the Lie algebra, that of sp(6): larger ones have larger A than may be used.
+#: Largest dimension of the Lie algebra, that of sp(6): larger ones have an A above the limit.
 MOST_SIMPLE = 21
 
 #: Largest number of terms in the table of products. The bases of `named` algebras, permuted and scaled, have up to
@@ -34,7 +34,7 @@ MOST_TERMS = 2000
 
 
 def enveloping(lie: LieAlgebra) -> StarAlgebra | None:
-    """Return the algebra A of a simple Lie algebra, or of the sum of one and a centre of one dimension, or None."""
+    """Return the algebra A of a simple Lie algebra, or of the sum of one and a one-dimensional centre, or None."""
     field, m = lie.field, lie.dimension
     if not field.is_rational or m > MOST_SIMPLE:
         return None

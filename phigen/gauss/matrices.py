@@ -209,7 +209,7 @@ def _functional(
         part = {i: half}
         add_multiple(part, star[i], half)
         symmetric.append(part)
-    # skew elements orthogonal to g are in the kernels of the traces and of the projection on symmetric elements
+    # the traces and the projection on symmetric elements vanish on skew elements orthogonal to g
     rows = [{i: v[k] for i, v in enumerate(symmetric) if k in v} for k in range(len(hull))]
     others = kernel(field, [*traces, *(r for r in rows if r)], len(hull))
     if Span(field, skew).dimension == len(basis):  # g is all of them, as that of se(n)

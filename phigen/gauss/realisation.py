@@ -31,7 +31,7 @@ from phigen.symbolic.expression import ONE, ZERO, Expression
 class Plain:
     """Coordinates (indices) that are unknowns themselves.
 
-    Their brackets are constant, or the step is no Poisson map: its structure is one to truncation.
+    Their brackets are constant; otherwise the step is Poisson up to truncation only.
     """
 
     indices: tuple[int, ...]

@@ -253,7 +253,7 @@ def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expre
 
 
 def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) -> list[Expression]:
-    """Return derivatives of the unknowns as seen from the end of a step: G* = G⁻¹ times those of group elements."""
+    """Return derivatives of the unknowns in the frame of the end of a step: G* = G⁻¹ times those of group elements."""
     values = list(slopes[: points.starts[0]])
     for group, first in zip(points.realisation.groups, points.starts, strict=True):
         algebra = group.algebra

@@ -25,10 +25,10 @@ MOST_STAGES = 8
 BAND = Fraction(1, 4)
 
 
-#: Steps that the predictors of C with lanes read.
+#: Number of steps that the predictors of vectorised C read.
 EARLIER = 2
 
-#: Bands of these predictors, as `BAND`, and the steps that each reads; solvers take the one that is best at the time.
+#: Bands of these predictors, as `BAND`, and the steps that each reads; solvers use the one that was best recently.
 #: Errors of predicted slopes on the Kowalevski top, at steps of 0.1, 0.25, 0.5, 1: 3e-10, 4e-8, 8e-5, 0.1; by `BAND`
 #: alone 3e-5, 6e-5, 3e-4, 0.2.
 BANDS = ((Fraction(3, 32), EARLIER), (Fraction(3, 16), EARLIER), (Fraction(3, 8), 1))
@@ -38,7 +38,8 @@ BANDS = ((Fraction(3, 32), EARLIER), (Fraction(3, 16), EARLIER), (Fraction(3, 8)
 class Precision:
     """Floating-point numbers: the ``spacing`` from 1 to 2, whose multiples below 2, and 1 minus them, are exact.
 
-    Predictors take values to be known up to relative errors of ``noise``, those of steps of any size of ``fine_noise``.
+    Predictors assume relative errors ``noise`` of the values, or ``fine_noise`` for errors independent of the step
+    size.
     """
 
     spacing: Fraction
@@ -90,9 +91,9 @@ def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
 
 @cache
 def predictors(stages: int, precision: Precision = DOUBLE) -> list[list[list[float]]]:
-    """Return matrices as ``prediction`` of `Tableau`, one for each of `BANDS`.
+    """Return matrices like ``prediction`` of `Tableau`, one for each of `BANDS`.
 
-    Columns are of the stages of the last step, then of those of the step before.
+    Columns belong to the stages of the last step, then to those of the step before.
     """
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)
@@ -187,7 +188,7 @@ def _extrapolation(
 
 
 def _sinc(x: Fraction) -> Fraction:
-    """Return sin(x)/x to more digits than are used."""
+    """Return sin(x)/x to more digits than are needed."""
     term = value = Fraction(1)
     square = Fraction(round(x * x * 10**DIGITS), 10**DIGITS)
     for k in range(1, 40):

@@ -35,7 +35,7 @@ def found_casimirs(
     declared: Mapping[str, Expression],
     used_names: Collection[str],
 ) -> tuple[dict[str, Expression], tuple[str, ...]]:
-    """Casimirs independent of the declared ones, under names C1, C2, … that are not taken; and notes.
+    """Casimirs independent of the declared ones, under free names C1, C2, …; and notes.
 
     The search ends when their number is the corank of π. Notes say what was left out.
     """

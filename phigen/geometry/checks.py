@@ -12,7 +12,7 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
-#: The name of the statement that makes the strong order 1.
+#: The name of the statement that implies the higher strong order.
 COMMUTING = "the sources of noise commute, hence strong order 1"
 
 
@@ -123,7 +123,7 @@ def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
 def _temperature(
     system: System, slope: Sequence[Expression], drawn: Sequence[Expression], spread: Sequence[Expression]
 ) -> Expression | None:
-    """The T for which 2T (πζ + f) + Σ σ² (XH) X has no part along ∇H at some point; None if there is none."""
+    """The T for which 2T (πζ + f) + Σ σ² (XH) X has no component along ∇H at some point; None if there is none."""
     lost = total(a * b for a, b in zip(slope, drawn, strict=True))
     gained = total(a * b for a, b in zip(slope, spread, strict=True))
     for k in range(ATTEMPTS):

@@ -1,9 +1,9 @@
 """Units of errors of energy, Casimirs and invariants: the same wherever errors are measured, printed or drawn.
 
-Errors are relative to the value at the start. Where that is much less than the terms it is the sum of, it says where
-the zero of energies lies and not how large energies are; errors are then relative to these terms. For a system they are
-Σ |x_i ∂_i H| at the start: what a relative change of the coordinates changes H by, whatever constant is added to it.
-For a lattice they are the magnitudes of the energies of the sites. Where they are 0 too, errors are absolute.
+Errors are relative to the value at the start. If that value is much smaller than its terms, it depends on the choice
+of the zero of energy; then errors are relative to the terms. For a system the terms are Σ |x_i ∂_i H| at the start:
+the change of H by a relative change of the coordinates, independent of added constants. For a lattice they are the
+magnitudes of the energies of the sites. If they are 0 too, errors are absolute.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from phigen.geometry.system import System
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient
 
-#: A value below this part of its terms counts as zero.
+#: A value below this fraction of its terms counts as zero.
 SMALL = 1e-3
 
-#: Energy error, in its unit, above which users are warned: a tenth of the energy is no small perturbation of it.
+#: Energy error, in its unit, above which users are warned: a tenth of the energy is not a small perturbation.
 LARGE_ENERGY_ERROR = 0.1
 
 RELATIVE, TERMS, SITES, ABSOLUTE = "relative", "of its terms", "of its sites", "absolute"
@@ -38,10 +38,10 @@ def rounding(steps: int) -> float:
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit of the errors of a quantity: its ``size``, of the ``kind`` `RELATIVE`, `TERMS`, `SITES` or `ABSOLUTE`.
+    """Unit of the errors of a quantity: its ``size``, and the ``kind`` `RELATIVE`, `TERMS`, `SITES` or `ABSOLUTE`.
 
-    ``terms`` are those of the quantity at the start, which rounding is in proportion to, in this unit. ``moves`` tells
-    that the quantity is no invariant, since time, forces or noise change it: what it differs by is no error.
+    ``terms`` are those of the quantity at the start, in this unit; rounding errors are proportional to them.
+    ``moves`` says that time, forces or noise change the quantity, so that its changes are not errors.
     """
 
     size: float = 1.0
@@ -82,7 +82,7 @@ def moving(system: System) -> list[str]:
 
 
 def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
-    """The unit of a quantity with that value at the start and that sum of terms, which are of the ``kind``."""
+    """The unit of a quantity with the given value and sum of terms at the start, where terms are of the ``kind``."""
     if abs(value) > SMALL * terms and math.isfinite(value):
         return Unit(abs(value), RELATIVE, max(1.0, terms / abs(value)))
     return Unit(terms, kind) if 0 < terms < math.inf else Unit()

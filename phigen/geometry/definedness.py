@@ -11,7 +11,7 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
-#: Points that are tried, and the factors by which they are tried: near 0, around 1 and far off.
+#: Points that are tried, and the factors by which they are tried: near 0, around 1 and far away.
 POINTS = 64
 SCALES = (Fraction(1), Fraction(1, 32), Fraction(30))
 #: A value above this magnitude is not 0: the rounding of an expression that vanishes stays far below.
@@ -21,11 +21,11 @@ Point = Mapping[str, float]
 
 
 def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Statement]:
-    """A statement for each of H, π, the Casimirs and the invariants that seems to have no value anywhere.
+    """A statement for each of H, π, the Casimirs and the invariants that seems to be undefined everywhere.
 
-    ``starts`` are the coordinates and parameters where runs start. Refuted is what divides by zero, by exact proof
-    where there is one, and what has a value neither at any sampled point nor at any of the starts; where there are no
-    starts, the latter is undecided.
+    ``starts`` are the coordinates and parameters at the starts of runs. An expression is refuted if it divides by
+    zero (by exact proof if possible), or if it has no value at the sampled points and at the starts; without starts,
+    the latter is undecided.
     """
     for name, roots in _parts(system).items():
         divisor = _divided_by_zero(roots, system.positive)
@@ -38,7 +38,7 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
 
 
 def undefined_starts(system: System, starts: Mapping[str, Point]) -> Iterator[Statement]:
-    """A statement for each run, by its name, that starts where some part of the system has no value."""
+    """A statement for each run, by its name, at whose start some part of the system has no value."""
     parts = _parts(system)
     for run, point in starts.items():
         without = [name for name, roots in parts.items() if not _is_defined(roots, point)]
@@ -75,7 +75,7 @@ def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> 
 
 
 def _may_be_zero(e: Expression, positive: Collection[str]) -> bool:
-    """Whether the values at some points do not exclude that it vanishes."""
+    """Whether the values at some points are compatible with 0."""
     names = symbols_of(e)
     for k in range(POINTS):
         try:

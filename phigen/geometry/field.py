@@ -68,9 +68,9 @@ class Ratio:
 class Field(Arithmetic[Scalar]):
     """The smallest field Q(symbols) that holds the given expressions.
 
-    A function of parameters (``sqrt(l)``, ``pi``) is one more independent symbol: relations between such
-    functions are not used, so an element that is zero only by one of them is taken for non-zero. This
-    affects only which algebraic structure is found; what is built from it is proved in a `Tower`.
+    A function of parameters (``sqrt(l)``, ``pi``) is one more independent symbol. Relations between such functions
+    are not used, so an element that vanishes only by one of them counts as non-zero. This affects the recognition of
+    algebraic structures only; everything built from them is proved in a `Tower`.
     """
 
     def __init__(self, expressions: Iterable[Expression] = ()) -> None:
@@ -109,7 +109,7 @@ class Field(Arithmetic[Scalar]):
         return self.number(value)
 
     def variable(self, name: str) -> Scalar:
-        """KeyError: the symbols that the field has are atoms."""
+        """KeyError: symbols of the field are not decomposed."""
         raise KeyError(name)
 
     def power(self, base: Scalar, exponent: Fraction) -> Scalar:
@@ -119,7 +119,7 @@ class Field(Arithmetic[Scalar]):
         return base ** int(exponent)
 
     def function(self, name: str, args: list[Scalar]) -> Scalar:
-        """KeyError: the functions that the field has are atoms."""
+        """KeyError: functions of the field are not decomposed."""
         raise KeyError(name)
 
     def expression(self, element: Scalar) -> Expression:

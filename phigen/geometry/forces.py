@@ -1,7 +1,7 @@
 """Forces beside the Hamiltonian: ẋ = π(∇H + ζ) + f, with a covector field ζ and a vector field f.
 
-πζ is tangent to the leaves, so ζ keeps all Casimirs; every field tangent to the leaves is of this form. Damping by the
-double bracket is ζ = λ π∇H, for which dH/dt = −λ |π∇H|². f may be anything, and changes Casimirs, as a rule.
+πζ is tangent to the leaves, so ζ keeps all Casimirs; every field tangent to the leaves is of this form. Damping by
+the double bracket is ζ = λ π∇H, for which dH/dt = −λ |π∇H|². f may be any field, and usually changes Casimirs.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from phigen.symbolic.expression import ZERO, Expression
 
 @dataclass(frozen=True)
 class Forces:
-    """``covector`` ζ with the damping in it and ``vector`` f, by coordinates.
+    """``covector`` is ζ including the damping, ``vector`` is f, by coordinates.
 
     ``damping`` is λ, 0 if there is none, and ``undamped`` is ζ without it.
     """
@@ -27,7 +27,7 @@ class Forces:
 
 
 def forces_of(spec_forces: SpecForces, coordinates: Sequence[str], field: Sequence[Expression]) -> Forces | None:
-    """The forces of a spec, None where it has none; ``field`` is π∇H."""
+    """The forces of a spec, None without forces; ``field`` is π∇H."""
     if not spec_forces:
         return None
     damping = spec_forces.damping or ZERO

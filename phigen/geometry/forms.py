@@ -66,7 +66,7 @@ def algebra_of_form(form: PoissonForm, coordinates: Sequence[str]) -> LieAlgebra
     if not isinstance(form, LieAlgebraForm):
         return None
     if form.family:
-        # Before the matrices are built: so(1000) is a typing error that would take minutes.
+        # Checked before the matrices are built: so(1000), a typing error, would take minutes.
         _expect_dimension(f"{form.family}({form.size})", families.dimension(form.family, form.size), len(coordinates))
         algebra = families.named(form.family, form.size)
     elif form.matrices:
@@ -130,7 +130,7 @@ def _minor(
 ) -> Expression:
     """The determinant of as many of the last rows as there are columns, by Laplace expansion along the first of them.
 
-    ``known`` keeps the minors: there are 2ⁿ of them, where the expansion has n! terms.
+    ``known`` caches the minors: there are 2ⁿ of them, whereas the expansion has n! terms.
     """
     if not columns:
         return ONE

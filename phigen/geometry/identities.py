@@ -13,17 +13,17 @@ from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
 
 #: Degrees up to which polynomials are recognised: those of constant, linear and log-canonical tensors.
 DEGREE = 2
-#: Points in turn where the values are taken, (a, a + b, a + 2b, …); many functions are rational at the first two.
+#: Points at which values are taken, in this order: (a, a + b, a + 2b, …); many functions are rational at the first two.
 _BASES = ((0, 0), (1, 0), (2, 1))
-#: Lines that are tried for one on which the function has values.
+#: Number of lines that are tried until the function has values on one.
 _LINES = 8
 
 
 def polynomial_by_identity(e: Expression, coordinates: Sequence[str]) -> Expression | None:
-    """The polynomial in the coordinates, of degree ≤ `DEGREE`, that the expression equals; None if it is none.
+    """The polynomial in the coordinates, of degree ≤ `DEGREE`, that equals the expression; None if there is none.
 
-    The coefficients are Taylor coefficients at a point, and the equality is proved, in the ring of the functions that
-    occur. None too where there is no proof.
+    The coefficients are Taylor coefficients at a point, and the equality is proved in the ring of the functions that
+    occur. None also if there is no proof.
     """
     moving = [c for c in symbols_of(e) if c in coordinates]
     if not _flat_on_a_line(e, moving):

@@ -27,7 +27,7 @@ def jacobi_identity(system: System) -> Statement:
 
 
 def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
-    """The cyclic sums that are not 0, from the products that are not 0: few in large structures."""
+    """The cyclic sums that are not 0, computed from non-zero products: few in large structures."""
     names = system.coordinates
     n = range(len(names))
     images = iter(tower.convert_all([e for row in system.poisson for e in row]))

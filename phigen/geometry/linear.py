@@ -68,7 +68,7 @@ class Span(Generic[Key]):
     def _reduce(self, vector: Mapping[Key, Scalar]) -> tuple[dict[Key, Scalar], dict[int, Scalar]]:
         rest = {k: v for k, v in vector.items() if v != 0}
         combination: dict[int, Scalar] = {}
-        # Reduced rows: no row has the pivot of another, so those of the vector itself are all that matter.
+        # Reduced rows: no row contains the pivot of another, so only the pivots of the vector itself matter.
         for row, factor in [(self._by_pivot[k], v) for k, v in rest.items() if k in self._by_pivot]:
             add_multiple(rest, row.entries, -factor)
             add_multiple(combination, row.combination, -factor)

@@ -25,7 +25,7 @@ class Source:
     amplitude: Expression
 
     def impulse(self, coordinates: Sequence[str]) -> tuple[Expression, ...]:
-        """σ∇g, the covector that an increment of the noise is a multiple of."""
+        """σ∇g, the covector by which an increment of the noise acts."""
         return tuple(self.amplitude * g for g in gradient(self.hamiltonian, coordinates))
 
 

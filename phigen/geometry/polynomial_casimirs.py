@@ -13,7 +13,7 @@ from phigen.geometry.shapes import LiePoisson, Matrix, Shape, Terms, coordinate_
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.horner import horner
 
-#: Most unknown coefficients of one linear system, without and with parameters in π.
+#: Most unknown coefficients in one linear system, without and with parameters in π.
 UNKNOWNS, UNKNOWNS_WITH_PARAMETERS = 800, 60
 
 Exponents = tuple[int, ...]

@@ -18,7 +18,8 @@ _ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIV
 def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequence[Mapping[str, float]]) -> Statement:
     """Whether ``e`` is positive wherever it is defined and not 0; ``positive`` names symbols that are.
 
-    Proved by the form alone; refuted by a point of ``starts`` where it is not; checked at these otherwise.
+    Proved by the form alone; refuted by a point of ``starts`` at which it is not positive; otherwise checked at the
+    starts.
     """
     for point in starts:
         try:
@@ -40,7 +41,7 @@ def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequ
 def not_negative(
     name: str, e: Expression, positive: Collection[str], points: Sequence[Mapping[str, float]]
 ) -> Statement | None:
-    """Whether ``e`` is nowhere negative: by its form alone, else at ``points``; None where neither tells."""
+    """Whether ``e`` is nowhere negative: by its form alone, else at ``points``; None if neither decides."""
     if _sign_of_negative(e, positive) == POSITIVE:
         return Statement(name, REFUTED, "negative by its form", shortened(e))
     if sign_of(e, positive):
@@ -83,7 +84,7 @@ def sign_of(e: Expression, positive: Collection[str]) -> str | None:
                 return args[0] or NOT_NEGATIVE
             return None if None in args else NOT_NEGATIVE if NOT_NEGATIVE in args else POSITIVE
         if e.op == "pow":
-            # A fractional power is that of a value which is not negative, and not negative itself.
+            # A fractional power of a non-negative value, which is not negative.
             exponent = Fraction(e.value)
             even = exponent.denominator % 2 == 0 or exponent.numerator % 2 == 0
             sign = args[0] or (NOT_NEGATIVE if even else None)

@@ -37,7 +37,8 @@ class Coordinates:
 
 
 def change_of_coordinates(form: PullbackForm, coordinates: Sequence[str]) -> Coordinates:
-    """The map of a pull-back and its inverse; raises `SpecError` if none is given or found, or a given one is wrong."""
+    """The map of a pull-back and its inverse; raises `SpecError` if none is given or found, or if a given one is
+    wrong."""
     _expect_size(form, coordinates)
     backward = form.inverse or _inverse(form, coordinates)
     forward = dict(zip(form.coordinates, form.map, strict=True))
@@ -101,7 +102,7 @@ def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression
 
 
 def _of_affine_map(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...] | None:
-    """x = J⁻¹(y − ψ(0)) where the Jacobian matrix J of ψ is constant; None where it is not."""
+    """x = J⁻¹(y − ψ(0)) if the Jacobian matrix J of ψ is constant; else None."""
     columns = [[_simplified(e) for e in derivatives(form.map, c)] for c in coordinates]
     if any(s in coordinates for s in symbols_of(*(e for column in columns for e in column))):
         return None
@@ -156,6 +157,6 @@ def _solved(e: Expression, value: Expression, x: str) -> Expression | None:
 
 
 def _simplified(e: Expression) -> Expression:
-    """Through the ring, where that leaves fewer operations."""
+    """Rewritten in the ring if that takes fewer operations."""
     tower = Tower(symbols_of(e), [e])
     return min(tower.expression(tower.convert(e)), e, key=lambda f: sum(1 for node in topological([f]) if node.args))

@@ -63,7 +63,8 @@ def _residues(rows: Sequence[Sequence[Fraction]], prime: int) -> list[int]:
 
 
 def _numerical_rank(rows: Sequence[Sequence[tuple[Any, Any]]]) -> int:
-    """Rank of a matrix of (value, scale), by elimination with full pivoting; what is tiny against the scale is 0."""
+    """Rank of a matrix of (value, scale), by elimination with full pivoting; values tiny relative to their scale are
+    0."""
     left = [[value for value, _ in row] for row in rows]
     threshold = max((scale for row in rows for _, scale in row), default=1) * 10**-ZERO_DIGITS
     rank = 0

@@ -18,7 +18,7 @@ from phigen.geometry.linear import Span, kernel
 from phigen.symbolic.expression import Expression
 
 Sparse = dict[tuple[int, int], Scalar]
-#: Above this dimension named families are not built to be compared.
+#: Above this dimension named families are not built for comparison.
 _LARGEST_MATCHED = 45
 
 
@@ -28,7 +28,7 @@ def known_representation(algebra: LieAlgebra) -> Representation | None:
 
 
 def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
-    """Faithful representations, the preferred ones first; not the one that came with the algebra."""
+    """Faithful representations, the preferred ones first, except the one that came with the algebra."""
     yield from _matching_families(algebra)
     field = algebra.field
     adjoint = _adjoint(algebra, field)

@@ -1,6 +1,6 @@
 """Conversion between sympy and `Expression`: systems built from sympy objects, systems as sympy objects, LaTeX.
 
-Only modules that need sympy import this one, since that takes a quarter of a second.
+Only modules that need sympy import this module, since importing sympy takes a quarter of a second.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _node(e: Any, args: list[Expression]) -> Expression:
 
 def _rational(e: Any) -> Fraction:
     """A number, within the limits that hold in spec files."""
-    # Bounded before the conversion: a Float of 1e999999 would have as many digits.
+    # Checked before the conversion: a Float of 1e999999 would have as many digits.
     if abs(e) < limits.NUMBER and (e == 0 or abs(e) > Fraction(1, limits.DENOMINATOR)):
         value = Fraction(str(e)) if e.is_Float else Fraction(int(e.p), int(e.q))
         if limits.number_is_bounded(value):
@@ -105,7 +105,7 @@ def closed_function(order: int, s: Any) -> Any:
 
 
 def expanded_function(order: int, s: Any, degree: int) -> Any:
-    """A derivative of φ as a polynomial in s, right up to a degree: φ(s) = Σ |B_{2n+2}| s^n/(2n+2)!."""
+    """A derivative of φ as a polynomial in s, correct up to a degree: φ(s) = Σ |B_{2n+2}| s^n/(2n+2)!."""
     u = sympy.Dummy("u")
     known = (abs(sympy.bernoulli(2 * n + 2)) / sympy.factorial(2 * n + 2) * u**n for n in range(degree + order + 1))
     return sympy.diff(sum(known), u, order).subs(u, s)
@@ -142,15 +142,15 @@ def to_sympy(
 ) -> Any:
     """The expression in sympy, e.g. for ``sympy.latex``.
 
-    ``symbols`` are those of sympy by their names here; others are real, and the momentum of x becomes ``p_x``.
-    ``special`` says what the derivatives of φ become.
+    ``symbols`` maps names to symbols of sympy; others are real, and the momentum of x becomes ``p_x``. ``special``
+    selects the form of the derivatives of φ.
     """
     return _Sympy(symbols or {}, special).values(familiar([e]))[0]
 
 
 @dataclass(frozen=True)
 class SympySystem:
-    """A `System` in sympy; `System.from_sympy` takes all of it back.
+    """A `System` in sympy; `System.from_sympy` converts it back.
 
     Symbols are real, those of parameters that are positive in the system positive. ``poisson`` is an immutable n×n
     matrix, ``parameters`` maps symbols to their default values. ``casimirs`` are the declared ones and those found.

@@ -28,15 +28,14 @@ _SHOWN = 60
 
 @dataclass(frozen=True, repr=False)
 class System:
-    """ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), or with ``forces`` and sources of ``noise`` beside that.
+    """ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), possibly with ``forces`` and sources of ``noise``.
 
-    ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; expressions use the coordinates and parameters as
-    symbols. ``casimirs`` holds the declared ones first, in the order of the spec, then the found ones
-    (``C1``, ``C2``, …; ``declared`` has the names of the former). ``shape`` is what π was recognised as,
-    ``form`` what the spec said. ``time`` is the symbol of t, which H and the invariants may contain; empty if there is
-    none. ``observables`` are quantities to record, of which nothing is proved. ``notes`` says what was not searched
-    for, and why. ``spec`` is where it comes from, None for a system built in
-    Python.
+    ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; expressions use the coordinates and parameters as symbols.
+    ``casimirs`` holds the declared ones first, in the order of the spec, then the found ones (``C1``, ``C2``, …;
+    ``declared`` has the names of the former). ``shape`` is the recognised shape of π, ``form`` the form in the spec.
+    ``time`` is the symbol of t, which H and the invariants may contain; empty if there is none. ``observables`` are
+    quantities to record; nothing is proved about them. ``notes`` says which searches were omitted, and why. ``spec``
+    is the spec of the system, None if it was built in Python.
     """
 
     name: str
@@ -95,7 +94,8 @@ class System:
 
     @property
     def positive(self) -> tuple[str, ...]:
-        """Names of the parameters that are positive, or nonnegative: what holds for all positive values holds at 0."""
+        """Names of the parameters that are positive or nonnegative: a statement for all positive values also holds
+        at 0."""
         return tuple(p.name for p in self.parameters if p.bound)
 
     @property
@@ -257,7 +257,7 @@ def hamiltonian_vector_field(poisson: Matrix, differential: Sequence[Expression]
 
 
 def _located(error: SpecError, locations: Mapping[tuple[Any, ...], Location]) -> SpecError:
-    """The error with the place of the spec's ``poisson`` part where it has none."""
+    """The error, with the place of the spec's ``poisson`` section if it has no place."""
     place = locations.get(("poisson",))
     return SpecError(
         [Diagnostic(d.message, d.location or place, d.hint, d.source_line, d.severity) for d in error.diagnostics]

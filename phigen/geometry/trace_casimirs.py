@@ -10,7 +10,7 @@ from phigen.geometry.linear import Span, coprime_integers
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.tower import Poly, Tower
 
-#: Powers are expanded; beyond this size of matrix they are not worth it.
+#: Largest size of matrices whose powers are expanded.
 _LARGEST = 8
 _MOST_TERMS, _MOST_PRODUCTS = 300, 100_000
 
@@ -18,8 +18,8 @@ _MOST_TERMS, _MOST_PRODUCTS = 300, 100_000
 def trace_casimirs(coordinates: Sequence[str], representation: Representation) -> Iterator[Expression]:
     """tr X^m for m = 1, 2, …, size, where X = Σ x_i E^i and E^i is dual to E_i under tr(E_i E_j).
 
-    They generate the coefficients of the characteristic polynomial of X. Nothing if the trace form is
-    degenerate, a matrix contains parameters, or the matrices are large; what has too many terms is left out.
+    They generate the coefficients of the characteristic polynomial of X. Empty if the trace form is degenerate, a
+    matrix contains parameters, or the matrices are large; traces with too many terms are left out.
     """
     if representation.size > _LARGEST:
         return
@@ -37,7 +37,7 @@ def trace_casimirs(coordinates: Sequence[str], representation: Representation) -
     for m in range(1, representation.size + 1):
         if m > 2 and m % 2:
             powers.append(_times(tower, powers[-1], element))
-        # tr X^m from the powers of half its exponent, which have far fewer terms than X^(m-1).
+        # tr X^m from powers with half of the exponent, which have far fewer terms than X^(m-1).
         pairs = [(powers[m // 2][i][j], powers[m - m // 2][j][i]) for i in n for j in n]
         if sum(len(a) * len(b) for a, b in pairs) > _MOST_PRODUCTS:
             return

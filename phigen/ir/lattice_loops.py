@@ -21,7 +21,7 @@ from phigen.symbolic import symbols
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: The share of each of two sites in the energy of their bond or pair.
+#: The share of each of its two sites in the energy of a bond or pair.
 _HALF = number(Fraction(1, 2))
 
 
@@ -210,7 +210,7 @@ class LatticeLoops:
 
     @cached_property
     def numbers(self) -> tuple[str, ...]:
-        """The parameters that are one number each."""
+        """The parameters with one value for all sites."""
         arrays = {*self.step.sites.parameters, *self.step.sites.at_bonds}
         return tuple(p.name for p in self.program.parameters if p.name not in arrays)
 

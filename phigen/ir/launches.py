@@ -38,8 +38,8 @@ class SiteLaunch:
 class LatticeLaunches:
     """All kernels of a lattice: the sweeps of each of the ``parts`` of H, and others by their names.
 
-    ``arrays`` are the arguments of all kernels behind the first five, in order. ``seams`` are the tests for seams, each
-    a colour and an offset; ``numbers`` the parameters that are one number each, in the order of kernels.
+    ``arrays`` are the arguments of all kernels after the first five, in order. ``seams`` are the conditions on
+    boundary seams, each a colour and an offset; ``numbers`` the parameters with one value, in the order of kernels.
     """
 
     parts: tuple[tuple[SiteLaunch, ...], ...] = ()
@@ -49,4 +49,4 @@ class LatticeLaunches:
     bounds: tuple[tuple[tuple[int, int], ...], ...] = ()  # of each weight of a term at open ends, along each axis
     seams: tuple[tuple[int, tuple[int, ...]], ...] = ()
     numbers: tuple[str, ...] = ()
-    reductions: tuple[tuple[str, str], ...] = ()  # kind of each observable, and what it is over
+    reductions: tuple[tuple[str, str], ...] = ()  # of each observable, over sites, bonds or pairs

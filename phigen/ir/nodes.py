@@ -19,7 +19,7 @@ from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
-#: The kind of symbols that are printed as they are, since the printed function reserves them; and the kind of those
+#: The kind of symbols that are printed unchanged, since the printed function reserves them; and the kind of symbols
 #: that are printed by their text, unless the user has the same name.
 FIXED, LABEL = "fixed", "label"
 
@@ -281,7 +281,7 @@ class Unpack:
 class Store:
     """Assign a value to the element at the site of the loop or, if it ``adds``, add the value to the element.
 
-    An ``extreme``, ``max`` or ``min``, replaces the element only where it is larger or smaller. ``offset`` and ``end``
+    An ``extreme``, ``max`` or ``min``, replaces the element only if it is larger or smaller. ``offset`` and ``end``
     select other elements, as in `Load`.
     """
 

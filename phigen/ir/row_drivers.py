@@ -21,7 +21,8 @@ BEGIN, SECOND, THIRD, STOP, LOW, HIGH = (ir.fixed(name) for name in ("begin", "s
 SEGMENT = ir.Prefix("&", ROW)
 LENGTH, STATE = ir.Member(S, "length"), ir.Member(S, "x")
 
-#: First site, and site after the last, of the part of a row segment that a loop runs over; none of the whole segment.
+#: First site of the part of a row segment that a loop runs over, and the site after the last; none for the whole
+#: segment.
 Sites = tuple[ir.Value, ir.Value] | None
 #: The sites away from open ends and boundary seams, those near them, and all of them in their order.
 AWAY, FIRST_SITES, LAST_SITES = (SECOND, THIRD), (BEGIN, SECOND), (THIRD, STOP)
@@ -59,8 +60,8 @@ class RowSegment:
 class RowDrivers:
     """Builder of the row drivers of one lattice.
 
-    ``halo`` is the number of sites that are copied beside a row. With ``may_be_empty`` segments may have no site. With
-    ``one_loop`` the parts of H are distinguished inside one loop over row segments, else each has a loop.
+    ``halo`` is the number of sites in the halo beside a row. With ``may_be_empty`` segments may have no site. With
+    ``one_loop`` the parts of H are distinguished inside one loop over row segments, else each part has its own loop.
     """
 
     layout: RowLayout
@@ -98,7 +99,7 @@ class RowDrivers:
             head.append(ir.Declare(ir.Type.SIZE, ((ir.fixed("units").symbol, ir.Called("units", (S,))),)))
         if orders:
             head.append(ir.Comment("the fields in other orders, in which loops that are for one order serve others"))
-        said = ", for a piece of a row" * alone + ", for the pieces of rows from first on, before end" * several
+        said = ", for a row segment" * alone + ", for the row segments first ... end - 1" * several
         function = ir.Function(name, doc + said, Role.OTHER, ("s", *parameters, *range_names), (*head, *orders, *body))
         return discard_unread(function)
 

@@ -1,8 +1,9 @@
-"""The parts of a program that are computed in lanes: blocks of implicit steps, or packs of members.
+"""The parts of a program that are computed in lanes: blocks of implicit steps, or SIMD batches of members.
 
-A lane is one of `LANES` points at which kernels are evaluated at once. An integration with implicit steps solves a
-block of `LANES` steps together, an ensemble groups of members. Members with explicit steps form packs of `LANES`.
-This stage decides whether lanes are possible and fit on the stack, and which kernels they need; targets print them.
+A lane is one of `LANES` points at which kernels are evaluated together. An integration with implicit steps solves a
+block of `LANES` steps together, an ensemble solves a group of members. Members with explicit steps form batches
+(packs) of `LANES` members. This stage decides whether lanes are possible and fit on the stack, and which kernels
+they need; targets print them.
 """
 
 from __future__ import annotations
@@ -130,7 +131,7 @@ class Traces:
 
 @dataclass(frozen=True)
 class Stages:
-    """The stages of a Gauss method, one in each lane; ``narrow`` where half of the lanes suffice."""
+    """The stages of a Gauss method, one in each lane; ``narrow`` if half of the lanes suffice."""
 
     kernels: tuple[LaneKernel, ...]
     calls: frozenset[str]
@@ -220,7 +221,7 @@ def _rows(program: Program, step: Sweeps) -> Rows:
         kernel for kernel in step.kernels if id(kernel) not in of_coefficients and kernel.name not in observable_names
     ]
     if program.profile != "fast":
-        if not (program.extras.tangent or step.adjoint):  # variations are differences of sweeps there
+        if not (program.extras.tangent or step.adjoint):  # there, derivatives are replaced by differences of sweeps
             varied_names = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
             looped = [kernel for kernel in looped if not kernel.reads_variations and kernel.name not in varied_names]
         return Rows(with_formulas(operations(looped) & set(FULL_RANGE_FUNCTIONS)), (), frozenset())

@@ -13,7 +13,7 @@ from phigen.symbolic.symbols import FIXED, SERIES, Symbol, momentum
 #: Largest number of terms in the expansion of a path about its middle; the runtime has the same number.
 MAX_TERMS = 16
 
-#: Numbers of terms to try in the expansion of its derivatives: the first that fits on the stack is taken.
+#: Numbers of terms to try in the expansion of the derivatives; the first that fits on the stack is used.
 SLOPE_TERMS = (12, 8)
 SLOPE_TERMS_BACK = (MAX_TERMS, 12, 8)
 

@@ -61,7 +61,7 @@ def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
 def bonds_in(path: Path, parameters: Collection[str]) -> tuple[NDArray[np.int64], dict[str, Floats]]:
     """Return the ends of bonds (bonds, 2) in a ``.csv`` file, and the columns of ``parameters``, by name.
 
-    Without column names the file holds nothing but the ends.
+    Without column names, the file contains the ends only.
     """
     table = _table(path)
     names = table.names or ENDS

@@ -40,10 +40,11 @@ def powers(exponents: Mapping[str, int]) -> Expression:
 
 @dataclass(frozen=True)
 class SumFactors:
-    """Powers of parameters at sites that may be 0, by which all forces of bonds or pairs on one field are multiplied.
+    """Powers of parameters at sites that may be 0, by which all forces of bonds or pairs on one field are
+    multiplied.
 
-    The sums over bonds and pairs are without them: ``at_site`` is their product, and ``at_end`` has their exponents by
-    the symbols ``m[a]``.
+    They are left out of the sums over bonds and pairs: ``at_site`` is their product, and ``at_end`` has their
+    exponents by the symbols ``m[a]``.
     """
 
     at_site: Expression = ONE
@@ -51,7 +52,7 @@ class SumFactors:
 
 
 def sum_factors(cell: Cell, name: str) -> SumFactors:
-    """Return the powers that are taken out of the sums in the force on a field; none with brackets along bonds."""
+    """Return the powers that are taken out of the sums in the force on a field; none if brackets run along bonds."""
     if not cell.vanishing or cell.bond_bracket or cell.relation == GRID:
         return SumFactors()
     density = cell.bond_hamiltonian + cell.pair_hamiltonian

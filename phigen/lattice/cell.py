@@ -57,7 +57,7 @@ class Cell:
 
     @property
     def driven(self) -> bool:
-        """Whether H is no invariant: H depends on the time, or forces or noise do work."""
+        """Whether H is not conserved: H depends on the time, or forces or noise do work."""
         return bool(self.time or self.forces or self.noise)
 
     @property
@@ -116,7 +116,7 @@ class Cell:
         return tuple(self.additive_terms(self.hamiltonian))
 
     def additive_terms(self, density: Expression) -> Iterator[Expression]:
-        """Yield the terms of a sum; a factor that is the same at all sites is multiplied into each of them."""
+        """Yield the terms of a sum; a common factor with one value at all sites is multiplied into each of them."""
         yield from self._terms(density, ())
 
     def _terms(self, density: Expression, factors: tuple[Expression, ...]) -> Iterator[Expression]:

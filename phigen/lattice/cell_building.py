@@ -15,7 +15,7 @@ from phigen.symbolic.neighbours import Neighbours, minus
 
 @dataclass(frozen=True)
 class Misfit:
-    """A size of a run that is no multiple of the period of the colouring; ``fitting`` is a multiple near it."""
+    """A size of a run that is not a multiple of the colour period; ``fitting`` is a multiple near it."""
 
     run: str
     axis: str
@@ -28,7 +28,7 @@ class Misfit:
 
 
 class MisfitError(SpecError):
-    """Sizes of runs that are no multiples of the periods of the colouring; ``reason`` says so in one line."""
+    """Sizes of runs that are not multiples of the colour periods; ``reason`` says so in one line."""
 
     def __init__(self, diagnostics: list[Diagnostic], reason: str = "") -> None:
         super().__init__(diagnostics)
@@ -90,7 +90,7 @@ def expect_coloured(spec: Spec, cell: Cell, periods: Sequence[int]) -> None:
 
 
 def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
-    """Return the sizes of runs that are no multiples of the periods."""
+    """Return the sizes of runs that are not multiples of the periods."""
     return [
         Misfit(run.name, axis, size, period, max(size // period, -(-least // period)) * period)
         for run in spec.runs.values()

@@ -34,7 +34,7 @@ LATE = Symbol("late")
 
 
 def expect_applicable(cell: Cell, spec: Spec) -> None:
-    """Raise `SpecError` for monitors of lattices that are not those of this module."""
+    """Raise `SpecError` for a monitor that is not of the form of this module."""
     if spec.monitor is None:
         return
     message, hint = "", "remove monitor; steps are equal in the time then"
@@ -55,7 +55,7 @@ def expect_applicable(cell: Cell, spec: Spec) -> None:
 
 
 def negative_part(cell: Cell, flows: Sequence[CellFlow], spec: Spec) -> int:
-    """Return the number of the part B. Raises `SpecError` where there are not two parts, of which one is negative."""
+    """Return the number of the part B. Raises `SpecError` unless there are two parts, one of them negative."""
     if len(flows) != 2:
         message = f"monitor: log needs H = A + B of two parts with elementary flows; here there are {len(flows)}"
         raise SpecError([spec.diagnostic(("monitor",), message, "remove monitor; steps are equal in the time then")])

@@ -1,8 +1,7 @@
 """Proofs that the splitting of a lattice is correct, for all sizes at once.
 
-The parts sum to H. The coordinates of a part commute over all the lattice, so the components of its gradient are
-constant along its flow. With these components constant, and neighbours that stand still, the motion of a site solves
-its equation.
+The parts sum to H. The coordinates of a part commute over the whole lattice, so the components of its gradient are
+constant along its flow. With constant components and fixed neighbours, the motion of a site solves its equation.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Kernels of observables of a lattice: energy, Casimirs, vector field, and the observables of the spec.
 
-An observable that is one number has a density at sites, which targets add up, or take the extremes of. Of terms that
-reach beyond an open end a sum takes none, as H does; an extreme leaves out the sites where any term does.
+An observable that is one number has a density at sites, of which targets compute the sum or an extreme. A sum omits
+the terms that reach beyond an open end, as H does; an extreme omits the sites with such a term.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from phigen.spec.names import ADDITIVE
 from phigen.symbolic.expression import ONE, Expression, call, number, symbol, total
 from phigen.symbolic.symbols import GATHERED, Symbol
 
-#: The share of a pair at each of its sites, for which it is summed up.
+#: The share of each of its two sites in the value of a pair.
 _SHARE = number(Fraction(1, 2))
 
 
 def observables(cell: Cell, *, single: bool = False) -> Observables:
-    """Return the kernels of all that is observed, for code in ``single`` or in double precision."""
+    """Return the kernels of all observables, for code in ``single`` or in double precision."""
     origin = [0] * len(cell.axes)
     density = total(present(cell, s.low, s.high, origin) * s.expression for s in summands_of(cell) if not s.bond)
     casimirs = [density for density, _ in cell.casimirs.values()]
@@ -50,7 +50,8 @@ def observables(cell: Cell, *, single: bool = False) -> Observables:
 
 
 def observed_sums(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the sums and extremes of observables of bonds, where they begin, or of pairs, in both orders."""
+    """Return the sums and extremes of observables of bonds (at the site where they start) or of pairs (in both
+    orders)."""
     names = [name for name, reduction in cell.reductions.items() if reduction.over != "sites"]
     sums: dict[str, Expression] = {Symbol(GATHERED, name): cell.observables[name] for name in names}
     kinds = {name: cell.reductions[name].kind for name in names}
@@ -61,7 +62,7 @@ def observed_sums(cell: Cell) -> tuple[BondSum, ...]:
 def _density(cell: Cell, name: str, *, single: bool) -> Expression:
     """Return the density of an observable at a site, with symbols for sums and extremes over bonds and pairs.
 
-    Where it reaches beyond an open end, it is a number that is not the largest, or the least, of any two.
+    If it reaches beyond an open end, the density is a number that no extreme selects.
     """
     reduction = cell.reductions[name]
     if reduction.over != "sites":
@@ -83,5 +84,5 @@ def _within(cell: Cell, density: Expression) -> Expression:
 
 
 def _present(cell: Cell, term: Expression) -> Expression:
-    """Return 1 where all sites of a term are on the lattice, else 0."""
+    """Return 1 if all sites of a term are on the lattice, else 0."""
     return present(cell, *cell.extent(term), [0] * len(cell.axes)) if cell.axes else ONE

@@ -1,7 +1,7 @@
 """The series on a lattice, S_h = hH: a stage is the implicit step of order 2 of a bi-realisation, and stages compose.
 
-A stage solves y = x − (α − x)(y, h∇H(y)) for y on the whole lattice; then x moves by (β − α)(y, h∇H(y)). With the
-covectors written out, both are formulas of a site and its neighbourhood, for all H and π.
+A stage solves y = x − (α − x)(y, h∇H(y)) for y on the whole lattice; then x is updated by (β − α)(y, h∇H(y)). With
+the covectors written out, both are formulas of a site and its neighbourhood, for all H and π.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ T = TypeVar("T")
 class SeriesPlan:
     """The bi-realisation, and the stages of order 2 that a step is composed of, as ``fractions`` of it.
 
-    ``middle`` is y at a site as a formula of y around it and of x there (`initial`); ``increment`` is the increment
-    of x. Both have an entry for each field, with the step of the stage as `TIME`.
+    ``middle`` is y at a site, as a formula of y at its neighbourhood and of x at the site (`initial`); ``increment``
+    is the increment of x. Both have an entry for each field, with the step of the stage as `TIME`.
     """
 
     realisation: CellRealisation
@@ -49,9 +49,9 @@ class SeriesPlan:
     fractions: tuple[float, ...]
     middle: Mapping[str, Expression]
     increment: Mapping[str, Expression]
-    since: str = field(default="", kw_only=True)  # reason for the series although H splits
+    since: str = field(default="", kw_only=True)  # reason for using the series although H splits
 
-    #: The scheme, as in specs; a stage solves an equation, and H is in no parts.
+    #: The scheme, as in specs; a stage is an equation, and H has no parts.
     scheme = "series"
     is_implicit, weak_order = True, 1
     flows: ClassVar[tuple[CellFlow, ...]] = ()
@@ -69,7 +69,7 @@ class SeriesPlan:
 
     @property
     def site_kind(self) -> str | None:
-        """The kind of the bi-realisation, where it is one of a site and does not couple sites."""
+        """The kind of the bi-realisation if it is one of a single site."""
         return self.kind if self.realisation.site else None
 
     @property
@@ -98,7 +98,7 @@ class SeriesPlan:
         ]
 
     def acting(self, forces: SpecForces) -> str:
-        """The words of the header on forces, which are in the covector, or given by halves."""
+        """The words of the header on forces: they are in the covector, or are applied in halves."""
         return "p = h (grad H + zeta)" + ", impulse h f by halves before and after" * bool(forces.vector)
 
     def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
@@ -106,26 +106,30 @@ class SeriesPlan:
         yield from ()
 
     def equation(self, cell: Cell, coefficients: Coefficients, *, tangent: bool) -> Equation:
-        """The kernels of a stage, and those of its derivative if they are asked for."""
+        """The kernels of a stage and, if requested, of its derivative."""
         size = len(self.middle)
         values = coefficients.hoist([*self.middle.values(), *self.increment.values()])
         relax = site_kernel(
             cell, "relax", "y at a site from x there and y around it", values[:size], "y", coefficients, Role.RELAX
         )
-        purpose = "what a stage adds to x at a site, from y around it"
+        purpose = "increment of x at a site by a stage, from y at the site and its neighbours"
         advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients, Role.ADVANCE)
         slopes = coefficients.hoist(along(cell, values[:size]))
-        slope = site_kernel(cell, "slope", "how y at a site follows y around it", slopes, "v", coefficients, Role.SLOPE)
+        slope = site_kernel(
+            cell, "slope", "derivative of y at a site along a variation of y", slopes, "v", coefficients, Role.SLOPE
+        )
         if not tangent:
             return Equation(relax, advance, slope)
         starts, ends = (coefficients.hoist(e) for e in (along_start(values[:size]), along(cell, values[size:])))
-        side = site_kernel(cell, "side", "how y at a site follows x there", starts, "v", coefficients, Role.SIDE)
-        purpose = "how what a stage adds to x at a site follows y around it"
+        side = site_kernel(
+            cell, "side", "derivative of y at a site along a variation of x", starts, "v", coefficients, Role.SIDE
+        )
+        purpose = "derivative of the increment of x at a site along a variation of y"
         follow = site_kernel(cell, "follow", purpose, ends, "v", coefficients, Role.FOLLOW)
         return Equation(relax, advance, slope, (side, follow))
 
     def either(self, splitting: Callable[[SplittingPlan], T], series: Callable[[SeriesPlan], T]) -> T:
-        """The result of the second function, which takes series."""
+        """The result of the second function, the case of a series."""
         return series(self)
 
     def schedule(self) -> Schedule:
@@ -156,7 +160,7 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return the maps with p = h(∇H + ζ) + Σ ΔW σ∇g at all sites that they mention."""
+    """Return α and β with p = h(∇H + ζ) + Σ ΔW σ∇g at all sites that they mention."""
     at = SiteFields(cell, sums_by_field(cell))
     covectors: dict[str, Expression] = {}
     for name in symbols_of(*maps.values()):
@@ -169,7 +173,7 @@ def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expre
 
 
 def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, Expression], dict[str, Expression]]:
-    """Return y and the increment of x with half of the impulse hf before and half after the motion."""
+    """Return y and the increment of x, with half of the impulse hf before the motion and half after it."""
     at, half = SiteFields(cell), number(Fraction(1, 2))
     impulse = {f: symbol(TIME) * at.impulse(f) for f in cell.fields}
     start: dict[str, Expression] = {initial(f): symbol(initial(f)) + half * e for f, e in impulse.items()}

@@ -1,10 +1,10 @@
-"""Proofs that the series on a lattice is correct, made for each build.
+"""Proofs that the series on a lattice is correct, made at each build.
 
 The axioms of the bi-realisation are proved at one site where π is local, else on a periodic box. The box is so large
 that the sites of α at two neighbouring sites do not wrap around; by translation the proof holds for every larger box.
 
-Then follows the equation of a stage. Its y at a site, as it is written, solves α(y, p) = x for any p. With p = h∇H
-the increment is hπ∇H up to O(h²), so a stage, being symmetric, has order 2.
+The next statement is the equation of a stage: its y at a site solves α(y, p) = x for any p. With p = h∇H the
+increment is hπ∇H up to O(h²), so a stage, being symmetric, has order 2.
 """
 
 from __future__ import annotations

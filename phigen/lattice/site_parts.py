@@ -103,7 +103,7 @@ class Colouring:
     def with_seams(self, cell: Cell) -> Colouring:
         """Return the colouring with seams so wide that terms at the two ends of a seam commute.
 
-        Nor do terms at one end move values that equations for coordinates at the other end read.
+        Values at one end that equations for coordinates at the other end read are constant along the flow too.
         """
         return replace(self, seams=tuple(_seam(cell, a, p) for a, p in enumerate(self.periods(cell.boundary))))
 

@@ -48,6 +48,6 @@ def _transposed_kernel(kernel: Kernel, coefficients: Coefficients) -> Kernel:
         kernel.name + BACK,
         {f"{output.name}_bar": output.values},
         variables | table_input,
-        "cotangents of all that is read, from those of what is found",
+        "cotangents of the values that are read, from those of the results",
     )
     return replace(transpose, role=kernel.role.transposed)

@@ -72,7 +72,7 @@ class SplittingPlan:
     parts: CellSplitting
     choice: ScheduledMethod
     noise: tuple[CellFlow, ...] = ()
-    since: str = ""  # reason for more colours than the fewest
+    since: str = ""  # reason for using more colours than the minimum
     negative: int | None = None  # with a monitor, the part B of K = log(A + e) − log(−B)
 
     #: The scheme, as in specs, and the name of the method for the user; a step is one stage of explicit flows.
@@ -128,7 +128,7 @@ class SplittingPlan:
         ]
 
     def acting(self, forces: SpecForces) -> str:
-        """The words of the header on forces; flows of their own need none."""
+        """The words of the header on forces; forces with flows of their own need none."""
         return ""
 
     def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
@@ -142,7 +142,7 @@ class SplittingPlan:
         """No equation: all flows are explicit."""
 
     def either(self, splitting: Callable[[SplittingPlan], T], series: Callable[[SeriesPlan], T]) -> T:
-        """The result of the first function, which takes splittings."""
+        """The result of the first function, the case of a splitting."""
         return splitting(self)
 
     def schedule(self) -> Schedule:
@@ -224,8 +224,8 @@ def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
 def _coloured(cell: Cell, search: type[PartSearch], spec: Spec) -> tuple[CellSplitting, tuple[CellFlow, ...], str]:
     """Return the parts of H and of the forces for the fewest colours that fit the sizes of all runs.
 
-    With them goes the reason for not taking fewer colours. If no number of colours fits, the scheme ``splitting``
-    takes the fewest, and the runs are refused later; the scheme ``auto`` raises `MisfitError`.
+    Also returns the reason for not using fewer colours. If no number of colours fits, the scheme ``splitting`` takes
+    the fewest, and the runs are refused later; the scheme ``auto`` raises `MisfitError`.
     """
     best: tuple[CellSplitting, tuple[CellFlow, ...]] | None = None
     rejected: list[Misfit] = []
@@ -317,7 +317,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
     sites = _sites(cell, plan.colouring, [*kernels, *observed.kernels])
     kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell, varied=solved is not None)
     if partners:
-        purpose = "what a pair adds to the energy of a part of H, or to its variation"
+        purpose = "contribution of a pair to the energy of a part of H, or to its variation"
         of_parts = ((n, _gather(cell, merged_ends([s]), f"{n}_of_pairs", purpose)) for n, s in sums_of_parts)
         partners = replace(partners, of_parts=tuple((n, g or Gather((), ())) for n, g in of_parts))
     if partners:
@@ -368,7 +368,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
 def _any_number(method: Alternation | Nystrom, *, dated: bool) -> Schedule:
     """Return a method for any number of flows; see `Sweeps`.
 
-    If H is ``dated``, the advance of the time takes the place of a last flow.
+    If H is ``dated`` (depends on the time), the advance of the time takes the place of a last flow.
     """
     assert isinstance(method, Alternation)
     backwards = {(1, 2): (3, 2)}
@@ -408,7 +408,7 @@ def _sweep(
     location = f" on the seam {flow.window}" if flow.window else " near seams" if near_seam else ""
     purpose = f"the flow of {hamiltonian}{location}: {motion.manner}".replace(KICK, KICK.kind)
     kernel = site_kernel(cell, f"sweep{k}{suffix}", purpose, increments, "change", coefficients, Role.SWEEP)
-    purpose = f"what all other sites b add to the forces of H_{k} at a site a"
+    purpose = f"contributions of all other sites b to the forces of H_{k} at a site a"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
     tangent_sweep = _tangent(cell, motion, f"{k}{suffix}", coefficients, late=late) if tangent else None
     inside, window = flow.beside is not None and not near_seam, flow.window if near_seam else None
@@ -425,7 +425,7 @@ def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coeffici
     purpose = f"the derivative of sweep {suffix.replace('_', '.')}"
     kernel = site_kernel(cell, f"tangent{suffix}", purpose, slopes, "change", coefficients, Role.SWEEP_TANGENT)
     sums = [replace(s, values=with_variations(cell, s.values)) for s in motion.gathered]
-    purpose = "what all other sites b add to forces at a site a, and to their variations"
+    purpose = "contributions of all other sites b to forces at a site a, and to their variations"
     return Sweep(kernel, updated, motion.colour, _gather(cell, sums, f"gather_tangent{suffix}", purpose, coefficients))
 
 
@@ -457,7 +457,7 @@ def _partners(cell: Cell, *, varied: bool) -> Partners | None:
     if cell.relation == GRID:
         return None
     kind = "bond" if cell.relation == GRAPH else "pair"
-    empty, purpose, sums = Gather((), ()), "what a site b adds to the forces at a site a", site_sums(cell)
+    empty, purpose, sums = Gather((), ()), "contribution of a site b to the forces at a site a", site_sums(cell)
     varied_sums = [replace(s, values=with_variations(cell, s.values)) for s in sums] if varied else []
     return Partners(
         _gather(cell, energies(cell), f"{kind}_energy", f"the energy of a {kind}") or empty,

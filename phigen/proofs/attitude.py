@@ -95,12 +95,12 @@ def _first_term(compilation: CompiledSeries) -> Expression:
 
 
 def _gauss_statements(attitude: Attitude, compilation: CompiledGauss) -> Iterator[Statement]:
-    """Statement on the rate of the element of a Gauss step at its start, which moves as the stages do."""
+    """Statement on the rate of the element of a Gauss step at its start."""
     system, group = compilation.system, attitude.group
     pace = compilation.gauge.pace(system)
     points = stage_map(compilation.discretised, compilation.gauss, pace)
     values = group_element(points, group)
-    assert values is not None  # else the program had no attitude
+    assert values is not None  # otherwise the program would have no attitude
     at_start = dict.fromkeys(points.unknowns, ZERO)
     slopes = dict(zip(points.unknowns, substitute(vector_field(points, at_unknowns(points)), at_start), strict=True))
     rates = [total(substitute([e], at_start)[0] * slopes[z] for z, e in row.items())

@@ -59,8 +59,8 @@ class Examination:
     def mistakes(self) -> list[tuple[str, Statement]]:
         """The false statements with their groups, without those that may follow from an earlier false one.
 
-        Casimirs and invariants stand for themselves. The axioms of a bi-realisation, and the flows of a splitting, are
-        about the same few formulas: the first that fails says what is wrong.
+        Casimirs and invariants are independent of each other. The axioms of a bi-realisation, and the flows of a
+        splitting, are about the same few formulas: the first failure shows the error.
         """
         mistakes = []
         for group, listed in self.groups.items():

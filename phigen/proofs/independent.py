@@ -46,7 +46,7 @@ Pair = tuple[str, Any, Any]
 
 @dataclass(frozen=True)
 class Agreement:
-    """Whether both derivations agree on S_``term``, or where it is None on ∇S_h or on α and β.
+    """Whether both derivations agree on S_``term`` or, if that is None, on ∇S_h or on α and β.
 
     ``sympy`` and ``compiler`` are the seconds that they took for S_1 … S_term; of terms derived before, only
     the seconds of sympy are known.
@@ -72,11 +72,10 @@ class OutOfTimeError(BaseException):
 
 
 def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Agreement]:
-    """S_1 … S_terms, by default those of the method, then ∇S_h, α and β: each when it is derived.
+    """S_1 … S_terms, by default those of the method, then ∇S_h, α and β: each as soon as it is derived.
 
-    ∇S_h, as the program has it, is compared if it needs no further S_i.
-    Where steps follow paths, α and β are in the S_i alone. Raises `LimitError` when all has taken so many ``seconds``,
-    or when a polynomial has too many terms.
+    ∇S_h of the program is compared if it needs no further S_i. If steps follow paths, α and β enter through the S_i
+    only. Raises `LimitError` when the ``seconds`` are used up, or when a polynomial has too many terms.
     """
     terms = terms or compilation.stage.terms
     derivation: _Derivation | None = None
@@ -109,7 +108,8 @@ def _limit(compilation: CompiledSeries, step: str, reached: int, reason: str) ->
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raises `OutOfTimeError` in what lasts longer; without effect outside the main thread, which has no signals.
+    """Raises `OutOfTimeError` if the context takes longer; without effect outside the main thread, which alone
+    receives signals.
 
     Python drops an exception in a destructor or the callback of a weak reference, so it is raised again every second.
     """
@@ -133,7 +133,7 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 
 class _Derivation:
-    """Both derivations of one compilation, as far as they have come."""
+    """Both derivations of one compilation, as far as they have been computed."""
 
     def __init__(self, compilation: CompiledSeries, terms: int) -> None:
         self._compilation, self._terms = compilation, terms
@@ -155,7 +155,7 @@ class _Derivation:
         return closed_form(self._maps(maps), self._dictionary.covector)
 
     def _maps(self, maps: Sequence[Expression]) -> list[Any]:
-        """α or β as the compiler has it, φ expanded at 0."""
+        """α or β of the compiler, with φ expanded at 0."""
 
         def expanded(order: int, s: Any) -> Any:
             least = min(sum(mu) for mu in closed_form([s], self._dictionary.covector)(self._degree)[0])
@@ -198,7 +198,7 @@ class _Derivation:
         return Agreement(statement, i, self._taken, end - middle)
 
     def _gradient(self) -> Agreement:
-        """∇S_h of one stage, coefficients written out."""
+        """∇S_h of one stage, with coefficients replaced by their expressions."""
         scheme, h = self._compilation.scheme, self._dictionary.step
         start = time.perf_counter()
         slope = scheme.generating.coefficients.written_out(scheme.generating.slope)
@@ -230,7 +230,7 @@ class _Derivation:
         return chart.kind == exponential.KIND or flat
 
     def _at_origin(self) -> list[Pair]:
-        """α(x, 0) and β(x, 0) beside x, which the coefficients of higher degree leave out."""
+        """α(x, 0) and β(x, 0) minus x, which the coefficients of higher degree do not contain."""
         chart, origin = self._compilation.realisation, dict.fromkeys(self._dictionary.covector, 0)
         return [
             (f"{name}_{x} at p = 0", e.subs(origin), x)
@@ -262,8 +262,8 @@ class _Derivation:
 def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: str) -> Statement:
     """Whether both of each pair are equal, as functions of their symbols.
 
-    They are if the difference is 0 as a polynomial in functions, by the relations of `Functions`: that is a proof. Else
-    values at points, in `DIGITS` digits, refute it or agree.
+    Equality is proved if the difference is 0 as a polynomial in functions, by the relations of `Functions`.
+    Otherwise values at points, in `DIGITS` digits, refute it or agree.
     """
     fewest, open_pairs = POINTS, 0
     for label, theirs, mine in pairs:
@@ -285,7 +285,7 @@ def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: 
 
 
 def _tried(pair: Sequence[Any], positive: Collection[str]) -> str | int:
-    """A point where both differ, with their values; else the number of points where they agree."""
+    """A point where both differ, with their values; otherwise the number of points where they agree."""
     symbols = sorted(set().union(*(e.free_symbols for e in pair)), key=str)
     values = sympy.lambdify(symbols, list(pair), modules=[{Sign.__name__: mpmath.sign}, "mpmath"], cse=True)
     agreeing = 0

@@ -54,7 +54,7 @@ def monitor(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
     """g of dt = g dτ is positive; no statement without a monitor."""
     if spec.monitor is None or isinstance(spec.monitor, str):
         return {}
-    positive = [p.name for p in spec.parameters if p.positive]  # a factor that may be 0 is not
+    positive = [p.name for p in spec.parameters if p.positive]  # a factor that may be 0 is not positive
     return {MONITOR: (positivity("g > 0", spec.monitor, positive, _starts(system, spec)),)}
 
 
@@ -136,9 +136,9 @@ def _method_by_series(compilation: CompiledSeries) -> dict[str, tuple[Statement,
 
 
 def series_statements(compilation: CompiledSeries) -> Iterator[Statement]:
-    """S_1 … S_k solve the Hamilton–Jacobi equation; the S_i of even index vanish where the order rests on it."""
+    """S_1 … S_k solve the Hamilton–Jacobi equation; S_i of even index vanish if the order relies on it."""
     system, realisation, plan = compilation.discretised, compilation.realisation, compilation.stage
-    terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 is what makes the order k + 1
+    terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 implies the order k + 1
     equation = "∂_t S_t = H(α(x, ∇S_t))" if not system.time else "∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t"
     name = f"{equation} for S_t = {sum_of_terms(plan.terms)}"
     try:

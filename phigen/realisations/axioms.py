@@ -98,7 +98,7 @@ def _brackets(system: System, realisation: BiRealisation) -> Iterator[Statement]
     n = len(alpha)
     pairs = [(i, j) for j in range(n) for i in range(j)]
     pulled = _pulled_back(system, alpha, pairs), _pulled_back(system, beta, pairs)
-    # p ↦ −p changes the sign of brackets: where it maps α to β, half of them follow from the others.
+    # p ↦ −p changes the sign of brackets: if it maps α to β, half of the brackets follow from the others.
     mirrored = realisation.symmetric and is_symmetric(alpha, beta, system.coordinates)
     everything = [*alpha, *beta, *pulled[0], *([] if mirrored else pulled[1])]
     others = [s for s in symbols_of(*everything) if s not in variables]

@@ -53,10 +53,10 @@ BUILDERS: dict[str, Builder] = {
 
 
 def realise(system: System, choice: BirealisationChoice | None = None) -> BiRealisation:
-    """The bi-realisation that a spec asks for (default: ``auto``).
+    """The bi-realisation requested by a spec (default: ``auto``).
 
-    Nothing is assumed of it: pass it to `phigen.realisations.axioms.check`. Raises `SpecError`, located at the
-    spec's ``birealisation`` or ``poisson``, for kinds that do not apply to the system and unknown ones.
+    It is not proved here: pass it to `phigen.realisations.axioms.check`. Raises `SpecError`, located at the spec's
+    ``birealisation`` or ``poisson``, for unknown kinds and for kinds that do not apply to the system.
     """
     choice = choice or BirealisationChoice()
     try:

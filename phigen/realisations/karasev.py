@@ -49,7 +49,7 @@ def build(system: System, choice: BirealisationChoice, *, degree: int = DEGREE) 
 def series(system: System, degree: int) -> list[Expression]:
     """α(x, p) to a degree in p, from mean(α, p) = x: α = x − Σ_{j=1}^{degree} (D^j x)(α)/(j+1)!, by substitution.
 
-    Terms of higher degree that the substitution leaves are not those of the series, and not to be used.
+    Terms of higher degree produced by the substitution are not those of the series, and must not be used.
     """
     coordinates = system.coordinates
     x: list[Expression] = [symbol(c) for c in coordinates]

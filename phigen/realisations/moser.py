@@ -27,7 +27,7 @@ class Step:
 
 
 def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
-    """The factors of ψ in the order in which functions are pulled back, right up to weight ``top`` of ψ*Ω = ω.
+    """The factors of ψ in the order in which functions are pulled back, correct up to weight ``top`` of ψ*Ω = ω.
 
     ``forms`` are the parts of Ω by weight, ω at weight 1, odd weights only. Parts that vanish give no factor.
     """

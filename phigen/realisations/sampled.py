@@ -1,4 +1,5 @@
-"""The axioms of a large bi-realisation, checked in exact arithmetic at points: a proof would multiply out too much.
+"""The axioms of a large bi-realisation, checked in exact arithmetic at points, since a proof would expand too many
+terms.
 
 At a point the brackets of all pairs together are products of two matrices of numbers, the derivatives in x and in p.
 """
@@ -27,7 +28,7 @@ Point = Mapping[str, Fraction]
 
 
 def is_large(system: System, realisation: BiRealisation) -> bool:
-    """Whether the brackets of α and β are to be checked at points; those that are not rational never are."""
+    """Whether the brackets of α and β are to be checked at points; never if they are not rational."""
     maps = [*realisation.alpha, *realisation.beta]
     if not is_rational(*maps, *(e for row in system.poisson for e in row)):
         return False

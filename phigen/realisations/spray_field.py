@@ -1,4 +1,4 @@
-"""A Poisson spray as a vector field on T*U: made from what a spec says, checked, and its Lie series.
+"""A Poisson spray as a vector field on T*U: construction from a spec, checks, and its Lie series.
 
 X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j = Σ f_jkl(x) p_k p_l: it lifts πp and is homogeneous of weight 1
 (paper, section "Poisson Spray and Moser's trick"; its example sums over i < j for all i, j).
@@ -39,7 +39,7 @@ class Spray:
 
 
 def make_spray(system: System, name_or_forces: str | Sequence[Expression]) -> Spray:
-    """The spray that a spec asks for, see `build`; SpecError if it is none."""
+    """The spray requested by a spec, see `build`; raises `SpecError` if it is not a spray."""
     name, forces = _covector_part(system, name_or_forces)
     velocity = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
     space = Cotangent(system.coordinates, [*velocity, *forces])

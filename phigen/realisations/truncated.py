@@ -17,7 +17,7 @@ from phigen.symbolic.taylor import Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import UNDECIDED, Statement, decide_elements
 
-#: The reason why no statement about higher degrees is needed where steps follow paths.
+#: The reason why statements about higher degrees are not needed if steps follow paths.
 EXACT_PATH = "steps follow the exact path, for which Karasev's theorem is the proof"
 
 

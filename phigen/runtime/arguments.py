@@ -93,7 +93,8 @@ def count(value: int, what: str, minimum: int, most: int = _MOST) -> int:
 def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -> float:
     """Return the time of a start, 0 by default.
 
-    If the Hamiltonian does not depend on the time, t0 may be the name of a parameter, and is added to ``more``.
+    If the Hamiltonian does not depend on the time, the name t0 may be a parameter's, and its value is added to
+    ``more``.
     """
     if t0 is None or interface.time:
         return 0.0 if t0 is None else number(t0, "the time t0")
@@ -106,7 +107,7 @@ def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -
 def draws(interface: Interface, more: dict[str, Any], named: Mapping[str, int | None] = NONE_DRAWN) -> Draws:
     """Return the random numbers selected by the arguments seed, member and step0.
 
-    Without noise, these names may be names of parameters, and are added to ``more``.
+    Without noise, these names may be those of parameters, and their values are added to ``more``.
     """
     passed = {name: value for name, value in named.items() if value is not None}
     if interface.noise:
@@ -165,8 +166,8 @@ def rows_at(t: Floats, x: Floats, requested_times: Floats) -> Floats:
 def times(t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], more: dict[str, Any]) -> Floats | None:
     """Return the times ``t`` of states, whose leading axes have the given shape, as a flat array.
 
-    Returns None if the Hamiltonian does not depend on the time. Then t may be the name of a parameter, and is added to
-    ``more``.
+    Returns None if the Hamiltonian does not depend on the time. Then t may be the name of a parameter, and its value
+    is added to ``more``.
     """
     if not interface.time:
         if t is not None and "t" not in interface.parameters:

@@ -56,7 +56,7 @@ _EXTRAS = {
     "noise_fields": (None, (_POINTER, _POINTER, _POINTER)),
     "observables": (None, (_POINTER, _POINTER, _POINTER)),
     "ensemble_of": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _LONG, _WORD, _LONG, _POINTER)),
-    "ensemble_attitudes": (_INT, ()),  # as `_of_attitudes` has it
+    "ensemble_attitudes": (_INT, ()),  # the order of `_of_attitudes`
     "set_attitude": (_INT, (_POINTER, _POINTER, _POINTER)),
 }
 

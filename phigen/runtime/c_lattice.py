@@ -127,7 +127,7 @@ class CLatticeSession:
         self._real: Any = np.float32 if interface.single else np.float64
         self._casimirs = len(interface.casimirs)
         self._observed = len(interface.observables), len(interface.observed_fields)
-        # the fields before the last flow of a step, and the compensation terms of the fields now and then
+        # the fields before the last flow of a step, and the compensation terms of both sets of fields
         self._saved_states = 3 if interface.compensated else 1
         self._dear = interface.dear
         self._steps_per_call = max(1, _UPDATES_PER_CALL // math.prod(x0.shape[1:]))
@@ -197,9 +197,10 @@ class CLatticeSession:
         most, least = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
         state = x0_bar.nbytes
         of_step = (int(self._c.trail_size(self._address, 1 + MEASURED_STEPS)) - least) // MEASURED_STEPS
-        # With this size, checkpoints and the tapes of segments fit if each segment is recomputed once.
+        # At this size, checkpoints and the tape of one segment fit if each segment is recomputed once.
         recomputed = least + 3 * math.isqrt(steps * state * of_step)
-        # A whole tape pays where steps are slow, or where sweeps are recomputed by the inverse flow and store little.
+        # A tape of the whole run pays if steps are slow, or if the tape is short because the inverse flow recomputes
+        # states.
         useful = most if self._dear or of_step < state else recomputed
         minimum = max(MIN_TAPE_VALUES * x0_bar.itemsize, least + MIN_CHECKPOINTS * 2 * state)
         size = max(least, min(most or least, max(minimum, min(MAX_TAPE_BYTES, useful))))

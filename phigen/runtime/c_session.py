@@ -18,7 +18,7 @@ Real = Any  # np.float64, or np.float32 where the C computes in single precision
 
 # Python delivers keyboard interrupts between two calls, which last milliseconds for small systems.
 _STEPS_PER_CALL = 1 << 16
-_ALIGNMENT = 64  # bytes, the width of the widest vector registers (AVX-512)
+_ALIGNMENT = 64  # bytes: the width of the widest vector registers (AVX-512)
 
 
 class Cotangents(NamedTuple):

@@ -1,8 +1,8 @@
 """A generated C solver, called through ctypes.
 
-Beside the documented functions of the generated code, two small ones are used: ``size_t NAME_solver_size(void)``, and
-``size_t NAME_solver_steps_done(const NAME_solver *)``, the good steps since ``NAME_init``. Of the solver's struct only
-the first member, ``double x[DIM]``, is looked at; it is copied and stored as the plain value it is.
+Two small functions beside the documented ones are called: ``size_t NAME_solver_size(void)``, and ``size_t
+NAME_solver_steps_done(const NAME_solver *)``, the number of successful steps since ``NAME_init``. Of the solver's
+struct only the first member, ``double x[DIM]``, is read; the struct is copied and stored as bytes.
 """
 
 from __future__ import annotations
@@ -277,8 +277,8 @@ class CSolver:
     def _can_batch_pullback(self, members: Members) -> bool:
         """Whether one call pulls all members back, or one call for each segment of a long run.
 
-        A run of several segments cannot be batched if it has a time or a gauge, since later segments would need those
-        of their starts.
+        A run of several segments cannot be batched if it has a time or a gauge, since each segment would need its
+        own start values of these.
         """
         if not hasattr(self._c, "pullback_each"):
             return False

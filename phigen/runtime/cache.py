@@ -45,7 +45,7 @@ def directory() -> Path:
         return Path(xdg) / "phigen"
     try:
         home = Path.home()
-    except RuntimeError:  # no home at all: a bare container user
+    except RuntimeError:  # a container user without a home directory
         return _private_directory()
     return home / ("Library/Caches" if sys.platform == "darwin" else ".cache") / "phigen"
 

@@ -51,7 +51,7 @@ def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) 
 
 
 def objection_to_frames(part: Path) -> str:
-    """Return why a run without checkpoints may not write its frames to that file, or "" if it may."""
+    """Return why a run without checkpoints may not write its frames to a file, or "" if it may."""
     if not part.exists():
         return ""
     return f"{part} holds the frames of an interrupted run: continue it with its checkpoints=, or remove the file"

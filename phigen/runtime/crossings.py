@@ -100,7 +100,7 @@ class CrossingFinder(Generic[C]):
     block: int = BLOCK
     points: int = 1
     latest: C | None = None
-    _sign: float = 1.0  # crossings of sign·g that rise are searched; falling ones are the rising ones of −g
+    _sign: float = 1.0  # searches for zeros where sign·g rises; g falls where −g rises
 
     def follow(
         self, session: C, steps: int, move: Callable[[], object]

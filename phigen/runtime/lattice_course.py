@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
 
-#: Steps for which branches share one saved state: to save one costs as much as some twenty steps of 64 sites.
+#: Steps for which branches share one saved state: saving costs as much as some twenty steps of 64 sites.
 SHARED_STEPS = 16
 
 

@@ -63,7 +63,7 @@ def ensemble(
             final[m] = error.states[-1]
 
     most = cores() if threads is None else arguments.count(threads, "threads", 1)
-    shared = solver.interface.is_shared(math.prod(start.shape[2:]))  # then each member has all threads
+    shared = solver.interface.is_shared(math.prod(start.shape[2:]))  # each member is then integrated by all threads
     in_threads(1 if shared else max(1, min(most, count)), make, range(count))
     states_or_frames = final if stride is None else frames
     if failures:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver, LatticeTrajectory
     from phigen.runtime.lattice_rows import Past
 
-#: Suffixes of files that frames can be written to one by one, and of those that are written at the end.
+#: Suffixes of files to which frames are written one by one, and of files that are written at the end.
 STREAMS = (".npy", ".npz")
 WHOLE = (".csv", ".zarr")
 #: Largest number of columns of a table of states: spreadsheets show some hundred.
@@ -114,7 +114,7 @@ class GrowingFrames:
 
 
 def identity_of(solver: LatticeSolver, at: Beginning, rows: Sequence[int | float]) -> dict[str, Any]:
-    """Return all facts that determine an integration with ``rows``, a description of them, as plain data."""
+    """Return all facts that determine an integration with ``rows`` (a description of the rows), as plain data."""
     arrays = {name: np.asarray(value) for name, value in at.values.items() if np.ndim(value)}
     numbers = {name: float(value) for name, value in at.values.items() if not np.ndim(value)}
     hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": at.x}.items()}
@@ -210,7 +210,7 @@ def stream_path(path: str | Path) -> Path | None:
 
 
 def expect_columns(shape: tuple[int, ...]) -> None:
-    """`ValueError` where states (coordinates, *sizes) have more numbers than a table of them has columns."""
+    """Raise `ValueError` if states (coordinates, *sizes) have more numbers than a table has columns."""
     if (count := int(np.prod(shape))) > MAX_COLUMNS:
         message = f"a .csv of states would have {count} columns, more than {MAX_COLUMNS}"
         raise ValueError(f"{message}; frames go to .npz, and record: [energy, …] makes few columns")

@@ -45,7 +45,7 @@ class RowSteps:
         return np.asarray(begin + (h * self.whole + self.part), dtype=np.float64)
 
     def described(self) -> list[int | float]:
-        """Plain data that identifies these rows."""
+        """Plain data by which a resumed run recognises these rows."""
         rows = [len(self), self.steps, int(self.whole[min(1, len(self) - 1)])]
         spans = [] if self.spans is None else [float(self.spans.sum())]
         return [*rows, *spans, *([] if not self.part.any() else [float(self.part.sum()), float(self.part[-1])])]
@@ -63,7 +63,7 @@ def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSte
 
 
 def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) -> RowSteps:
-    """Return rows at times ``spans`` after the start, and at the end: after ``steps`` steps, or where ``end`` is."""
+    """Return rows at times ``spans`` after the start, and at the end: after ``steps`` steps, or at ``end``."""
     last = h * steps if end is None else end.span
     inner = [span for span in spans if abs(last - span) > EQUAL * abs(last)]
     whole = [whole_steps(h, span) for span in inner]
@@ -84,7 +84,7 @@ def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
 
 @dataclass(frozen=True)
 class Crossed:
-    """A section: where ``g`` of the observables passes through zero, in a ``direction``; ``text`` is g for people."""
+    """A section: the zeros of ``g`` (a function of the observables) in a ``direction``; ``text`` is g for people."""
 
     g: Function
     direction: str
@@ -95,8 +95,9 @@ class Crossed:
 class Past:
     """A finished run that another continues: its rows ``t`` (rows,), ``energy`` and observables, and its states.
 
-    ``x`` (rows, coordinates, *sizes) are those of all rows, None where numbers alone were recorded; ``first`` and
-    ``last`` are the states at its ends. ``columns`` are numbers by name, (rows,). It made ``steps`` steps.
+    ``x`` (rows, coordinates, *sizes) are the states of all rows, None if only numbers were recorded; ``first`` and
+    ``last`` are the first and the last state. ``columns`` are numbers by name, (rows,). The run made ``steps``
+    steps.
     """
 
     t: Floats
@@ -111,8 +112,8 @@ class Past:
 class IntegrationPlan:
     """An integration: its start, its rows, and the number of halvings allowed for a failing step.
 
-    ``begin`` is the time of its start, which `Beginning` has only where H depends on the time. ``transforms`` are made
-    of its frames.
+    ``begin`` is the time of its start, also where `Beginning` has no time because H does not depend on it.
+    ``transforms`` are the spectra and correlations computed from its frames.
     """
 
     at: Beginning
@@ -125,11 +126,11 @@ class IntegrationPlan:
 
     @property
     def times(self) -> Floats:
-        """The times of all rows, those of the past first."""
+        """The times of all rows, including those of a continued run."""
         times = self.rows.times(self.begin, self.at.h)
         return times if self.past is None else np.append(self.past.t, times[1:])
 
     @property
     def steps(self) -> int:
-        """Whole steps up to the end, with those of the past."""
+        """Whole steps up to the end, including those of a continued run."""
         return self.rows.steps + (self.past.steps if self.past else 0)

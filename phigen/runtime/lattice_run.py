@@ -50,7 +50,8 @@ class Sink(Protocol):
 
 @dataclass
 class LatticeRun:
-    """One integration: ``rows`` stores its rows, of which ``count`` are complete, ``crossings`` those of a section."""
+    """One integration. ``rows`` stores its rows, of which ``count`` are complete; ``crossings`` are those of a
+    section."""
 
     solver: LatticeSolver
     plan: IntegrationPlan
@@ -155,7 +156,7 @@ class LatticeRun:
             self._cross(crossings)
 
     def _cross(self, crossings: list[tuple[float, Floats]]) -> None:
-        """Store crossings with the states of the finder's sessions at them."""
+        """Store crossings with the states of the sessions of the finder."""
         assert self.finder
         for (t, _), (_, there) in zip(crossings, self.finder.places, strict=False):
             self.crossed.append(t)

@@ -25,8 +25,9 @@ CHECKPOINT_SECONDS = 2.0
 class LatticeSeries:
     """Numbers along one integration: ``t`` (rows,) and ``columns`` by name, (rows,) each.
 
-    ``first`` and ``last`` are the states (coordinates, *sizes) where it began and ended, after ``steps`` steps of size
-    ``h``, and perhaps a part of one. ``crossings`` are the same numbers where the section of a run was crossed.
+    ``first`` and ``last`` are the states (coordinates, *sizes) at the start and at the end, after ``steps`` steps of
+    size ``h`` and possibly a part of a step. ``crossings`` are the same numbers at the zeros of the section of a
+    run.
     """
 
     t: Floats
@@ -57,10 +58,11 @@ class LatticeSeries:
         return self.solver.ends_of(self)
 
     def save(self, path: str | Path) -> None:
-        """Write ``.csv`` (t and the columns) or ``.npz``, which holds the states at its ends and the parameters too.
+        """Write ``.csv`` (t and the columns) or ``.npz``, which also holds the first and the last state and the
+        parameters.
 
-        Keys of the latter are t, energy, casimir_NAME, observable_NAME, first, last, coordinates, axes, steps, h and
-        parameter_NAME. Raises `ValueError` for other suffixes.
+        Keys of an ``.npz`` are t, energy, casimir_NAME, observable_NAME, first, last, coordinates, axes, steps, h
+        and parameter_NAME. Raises `ValueError` for other suffixes.
         """
         about = self.solver.interface
         columns = [Column("t", ("t",), flat=True)]
@@ -128,7 +130,7 @@ class NumberRows:
 
 
 def _read(session: LatticeSession, about: LatticeInterface, names: Sequence[str]) -> list[float]:
-    """Return the columns of a session; computes what is recorded only."""
+    """Return the columns of a session; only recorded quantities are computed."""
     from phigen.runtime.lattice import reduced
 
     values = {"energy": session.hamiltonian()} if "energy" in names else {}

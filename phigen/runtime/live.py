@@ -25,10 +25,11 @@ if TYPE_CHECKING:
 class LiveSession:
     """A trajectory at its present state, made by `Solver.session`.
 
-    Properties of the state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by name),
-    ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps; `kick` and assignment to ``x``
-    change the state, but neither the predictors of the solver nor a gauge. With a monitor, the energy level e becomes
-    −H of the new state. ``copy()`` returns an independent session. Pickled sessions continue with the same bits.
+    Properties of the state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by
+    name), ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps; `kick` and assignment to
+    ``x`` change the state, but neither the predictors of the solver nor a gauge. With a monitor, the energy level e
+    becomes −H of the new state. ``copy()`` returns an independent session. A session continues with the same bits
+    after pickling.
     """
 
     def __init__(

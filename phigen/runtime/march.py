@@ -51,7 +51,7 @@ def march(
 ) -> Iterator[Piece]:
     """Advance a session to ``steps`` steps of size h, and yield every ``stride``-th state and the last, in pieces.
 
-    If a part of a step follows, so that the run ``goes_on``, the last whole step is no last state.
+    If ``goes_on``, a part of a step follows, and the last whole step is not the last state of the run.
 
     The length of a piece depends on the speed of the machine, the rows do not. ``see_tangent`` receives the derivative
     (DIM, DIM) of each step. ``begun`` is true if the initial state was yielded before. Raises `BackendError` after a

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 
-#: The number of members in a part of an ensemble is a multiple of this, and so of every SIMD width. Then each member is
-#: in the same SIMD batch, and has the same bits, for any number of parts.
+#: The number of members in a part of an ensemble is a multiple of this number, and so of every SIMD width. So each
+#: member stays in the same SIMD batch, with the same bits, for any number of parts.
 PART_GRANULARITY = 32
 
-#: Steps (members × steps) of a further thread that take longer than its start.
+#: Number of steps (members × steps) that take longer than the start of a further thread.
 _STEPS_PER_THREAD = 20_000
 
 #: Members, and steps of members, in one call of C. Python delivers keyboard interrupts between calls.

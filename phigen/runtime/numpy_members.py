@@ -72,14 +72,15 @@ class MemberBatch:
         self._report()
 
     def _begin_run(self, steps: int) -> None:
-        """Follow the flows of a corrector before steps."""
+        """Apply the flows of a corrector before steps."""
         if hasattr(self._module, "_followed") and steps and len(self.who):
             self._before = self.x
             self.x, self._carry = self._module._followed(self._module.BEGIN, self._stages[0], self.x, self._carry)
             self._running = True
 
     def _end_run(self) -> None:
-        """Follow those after steps. Members for which a flow has no solution fail, in their state before the run."""
+        """Apply the inverse corrector after steps. Members for which a flow has no solution fail, with their state
+        before the run."""
         if not self._running:
             return
         x, carry = self._state()
@@ -138,7 +139,7 @@ class MemberBatch:
         return {}
 
     def _leave(self, failed: dict[int, str]) -> None:
-        """Remove failed members. The others keep their predictors too, so that their bits do not change."""
+        """Remove failed members. The others also retain their predictors, so that their bits do not change."""
         remaining = np.delete(np.arange(len(self.who)), list(failed))
         self._report()
         self.failures |= {int(self.who[m]): status for m, status in failed.items()}

@@ -168,7 +168,7 @@ class NumpySession:
             self._commit(*self._tried())
 
     def _run_corrected(self, steps: int) -> None:
-        """Make steps between correctors. Without a good step, or where a corrector fails, the state is as before."""
+        """Make steps between correctors. Without a successful step, or if a corrector fails, the state is unchanged."""
         start, status = (self._x, self._carry, self.steps), ""
         try:
             self._follow("BEGIN")
@@ -187,7 +187,7 @@ class NumpySession:
             raise BackendError(status, self.steps, self._x.copy())
 
     def _follow(self, flows: str) -> None:
-        """Follow the flows of a corrector."""
+        """Apply the flows of a corrector."""
         x, carry = self._module._followed(getattr(self._module, flows), self._stages[0], self._x, self._carry)
         if not np.isfinite(x).all():
             raise BackendError("NOT_FINITE", self.steps, self._x.copy())
@@ -214,7 +214,7 @@ class NumpySession:
                     raise BackendError("NO_CONVERGENCE", self.steps, self._x.copy())
                 tangent = stage[0] @ tangent
         if hasattr(self._module, "_followed"):
-            self.advance(h, 1)  # the stage is differentiated along a whole run, from its beginning
+            self.advance(h, 1)  # derivatives start from the state before the run
         else:
             self._commit(x, carry, memory, stages)
         return tangent

@@ -51,7 +51,7 @@ def run_named(spec: Spec | None, name: str | None) -> Run:
 
 
 def changed(spec: Spec, run: Run, settings: Settings) -> Run:
-    """Return the run with the settings of the caller. Raises `ValueError` and `TypeError` for those that do not fit."""
+    """Return the run with the settings of the caller. Raises `ValueError` and `TypeError` for invalid settings."""
     if settings.steps is not None and settings.until is not None:
         raise TypeError("a run takes either steps or until, not both")
     if settings.stride is not None and settings.every is not None:

@@ -14,7 +14,7 @@ from phigen.symbolic.expression import Expression
 def function_of(
     section: Expression, coordinates: Sequence[str], parameters: Mapping[str, float], time: str = ""
 ) -> Function:
-    """The expression for states (rows, DIM), and for their times (rows,) where there is a time: shape (rows,)."""
+    """The expression at states (rows, DIM), and at their times (rows,) if the spec has a time: shape (rows,)."""
 
     def g(states: Floats, *t: Floats) -> Floats:
         values = {**parameters, **{c: states[:, i] for i, c in enumerate(coordinates)}, **dict.fromkeys([time], *t)}

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeTrajectory
     from phigen.spec.model import CorrelationChoice, SpectrumChoice
 
-#: Frames that a spectrum needs at least: with fewer the window leaves nothing.
+#: Smallest number of frames for a spectrum: with fewer, the Hann window is zero everywhere.
 LEAST_FRAMES = 4
-#: How far apart in time frames may be unequally, relative to their distance.
+#: Largest accepted variation of the time between frames, relative to that time.
 _EQUAL = 1e-6
 
 
@@ -44,7 +44,7 @@ class DynamicSpectrum:
     of: tuple[str, ...]
 
     def variables(self, name: str, prefix: str = "") -> dict[str, tuple[tuple[str, ...], Floats]]:
-        """Return dimensions and values of S, under a ``name``, and of ``q_AXIS`` and ``omega``, with a ``prefix``."""
+        """Return dimensions and values of S under a ``name``, and of ``q_AXIS`` and ``omega`` with a ``prefix``."""
         names = [f"{prefix}q_{axis}" for axis in self.axes] + [f"{prefix}omega"]
         coordinates = zip(names, [*self.q, self.omega], strict=True)
         return {name: (tuple(names), self.values)} | {n: ((n,), values) for n, values in coordinates}
@@ -61,7 +61,8 @@ class DynamicSpectrum:
         root.attrs["of"] = list(self.of)
 
     def plot(self, title: str = "") -> Figure:
-        """A picture of S over q and ω ≥ 0, by its logarithm; of planes and boxes along the first axis, others at q = 0.
+        """A picture of S over q and ω ≥ 0, on a logarithmic scale; for grids of two or three axes along the first,
+        at q = 0 along the others.
 
         Raises `MissingPackageError` without matplotlib.
         """
@@ -83,7 +84,7 @@ class Correlation:
 
 @dataclass(frozen=True)
 class Transforms:
-    """Spectrum and correlation that a run of a spec asks for; None where it does not."""
+    """Spectrum and correlation of a run of a spec; None for those that it does not ask for."""
 
     spectrum: SpectrumChoice | None = None
     correlation: CorrelationChoice | None = None
@@ -92,14 +93,15 @@ class Transforms:
         return bool(self.spectrum or self.correlation)
 
     def expect_frames(self, t: Floats, h: float) -> None:
-        """Raise `ValueError` where frames at the times ``t`` do not serve."""
+        """Raise `ValueError` if frames at the times ``t`` are not suitable for the requested spectrum or
+        correlation."""
         if self.spectrum:
             equal_times(t, h, _number(self.spectrum.after))
         if self.correlation:
             expect_frames(t, h, _number(self.correlation.after))
 
     def of(self, run: LatticeTrajectory) -> tuple[DynamicSpectrum | None, Correlation | None]:
-        """Return both of a trajectory."""
+        """Return spectrum and correlation of a trajectory."""
         asked, pair = self.spectrum, self.correlation
         structure_factor = spectrum(run, asked.of, after=_number(asked.after)) if asked else None
         if pair is None:
@@ -115,8 +117,8 @@ def _number(value: Fraction | None) -> float | None:
 def spectrum(run: LatticeTrajectory, of: Sequence[str], *, after: float | None = None) -> DynamicSpectrum:
     """Return S(q, ω) of some coordinates, over the frames from the time ``after`` on, with a Hann window in time.
 
-    Frames are equal times apart; a last one that is not is left out. Open axes are taken as if they were periodic.
-    Raises `ValueError` for graphs and pairs, names that are no coordinates, and fewer than four frames.
+    Frames must be equally spaced in time; a last frame that is not is left out. Open axes are treated as periodic.
+    Raises `ValueError` for graphs and pairs, unknown coordinates, and fewer than four frames.
     """
     fields = [_index(run, name) for name in ([of] if isinstance(of, str) else of)]
     _expect_grid(run, "a spectrum")
@@ -130,7 +132,7 @@ def spectrum(run: LatticeTrajectory, of: Sequence[str], *, after: float | None =
     total = np.zeros((count, *sizes))
     for k in fields:
         shown = np.array(run.x[first : first + count, k]) * window.reshape(-1, *[1] * len(sizes))
-        # e^{+iωt} in time, so that a wave that moves to larger r has q and ω of one sign
+        # e^{+iωt} in time, so that a wave moving to larger r has q and ω of the same sign
         total += np.abs(np.fft.fftn(np.fft.ifft(shown, axis=0), axes=range(1, 1 + len(sizes)))) ** 2
     total /= float(np.prod(sizes)) ** 2
     values = np.moveaxis(np.fft.fftshift(total), 0, -1)
@@ -144,8 +146,8 @@ def correlation(
 ) -> Floats:
     """Return the correlations ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ for d = 0 … ``up_to`` sites along an axis, (up_to + 1,).
 
-    Means are over all sites, along an open axis over those from which r + d is on the lattice, and over the frames from
-    the time ``after`` on. Raises `ValueError` for graphs and pairs, and for what is no coordinate or axis.
+    Means are over all sites (along an open axis over those with r + d on the lattice), and over the frames from the
+    time ``after`` on. Raises `ValueError` for graphs and pairs, and for unknown coordinates or axes.
     """
     _expect_grid(run, "a correlation")
     if axis not in run.axes:
@@ -170,9 +172,9 @@ def correlation(
 
 
 def equal_times(t: Floats, h: float, after: float | None) -> Floats:
-    """Return the times of the frames of a spectrum: from a time on, without a last one that comes early.
+    """Return the times of the frames of a spectrum: from a given time on, without a last one at a shorter distance.
 
-    Raises `ValueError` for fewer than four, and for frames that are not equal times apart.
+    Raises `ValueError` for fewer than four frames, and for unequal distances in time.
     """
     frames = _later(t, h, after)
     if len(frames) > 2 and abs(frames[-1] - 2 * frames[-2] + frames[-3]) > _EQUAL * abs(frames[1] - frames[0]):
@@ -185,7 +187,7 @@ def equal_times(t: Floats, h: float, after: float | None) -> Floats:
 
 
 def expect_frames(t: Floats, h: float, after: float | None) -> None:
-    """Raise `ValueError` where there is no frame from a time on."""
+    """Raise `ValueError` if no frame is at or after a time."""
     if not len(_later(t, h, after)):
         raise ValueError(f"there are no frames from t = {after!r} on")
 

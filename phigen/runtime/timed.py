@@ -16,7 +16,7 @@ from phigen.runtime.session import Session
 
 
 class Clocked(Protocol):
-    """A session as this module needs it: see `phigen.runtime.session.Followed`."""
+    """The interface of sessions that this module needs: see `phigen.runtime.session.Followed`."""
 
     @property
     def steps(self) -> int: ...

@@ -41,9 +41,10 @@ def pulled_back(
     along: Mapping[str, Sequence[str]],
     purpose: str,
 ) -> Kernel:
-    """Return the derivatives of Σ cotangent · value along some inputs of a kernel, for the values that have ``seeds``.
+    """Return the derivatives of Σ cotangent · value by some inputs of a kernel, over the values that have ``seeds``.
 
-    A seed ``bar`` adds an input of that name, the cotangents of its values; an array x in ``along`` gives ``x_bar``.
+    A seed ``bar`` adds an input ``bar``: the cotangents of its values. An array x in ``along`` gives the output
+    ``x_bar``.
     """
     value = total(
         symbol(Symbol(seed, i)) * e for seed, values in seeds.items() for i, e in enumerate(values) if not e.is_zero
@@ -56,7 +57,7 @@ def pulled_back(
 
 
 def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression]) -> list[Expression]:
-    """Return the slopes with 1 - versin(a) for cos(a) where the values contain versin(a)."""
+    """Return the slopes with 1 - versin(a) for cos(a), if the values contain versin(a)."""
     known = {e.args[0] for e in topological(values) if e.op == "versin"}
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
@@ -97,12 +98,12 @@ def gauss_adjoint(
 ) -> list[Kernel]:
     """Return the transposes of the kernels of a Gauss step.
 
-    The stages are Z_i = Σ_j μ_ij L_j with L_j = w_j f(x, Z_j), and x' = x + D(x, Σ_j L_j). From the cotangent λ of x'
-    follows ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of the unknowns and κ_i of the moves L_i satisfy ζ_i = w_i (∂f/∂z)ᵀ κ_i
-    and κ_i = ε + Σ_j μ_ji ζ_j, which sweeps solve as they do the stages.
+    The stages are Z_i = Σ_j μ_ij L_j with L_j = w_j f(x, Z_j), and x' = x + D(x, Σ_j L_j). From the cotangent λ of
+    x' follows ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of the unknowns and κ_i of the stage increments L_i satisfy ζ_i =
+    w_i (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j μ_ji ζ_j, which fixed-point sweeps solve, as for the stages.
 
-    The first kernel belongs to a sweep. The second returns the contribution of a stage to the cotangents of the start
-    of the step and of the coefficients. The third is the transpose of D.
+    The first kernel is for a sweep. The second returns the contribution of a stage to the cotangents of the start of
+    the step and of the coefficients. The third is the transpose of D.
     """
     seeds = {"move_bar": field.outputs[0].values}
     start = {"x": tuple(coordinates), TABLE: coefficients.table}
@@ -111,9 +112,11 @@ def gauss_adjoint(
         ("stage_start_adjoint", start, "cotangents of the start of the step and of the coefficients"),
     )
     kernels = [
-        pulled_back(field, name, seeds, along, f"{what}, from that of its move") for name, along, what in at_stages
+        pulled_back(field, name, seeds, along, f"{what}, from that of its increment") for name, along, what in at_stages
     ]
-    purpose = "cotangents of the start, of the sum of all moves and of the coefficients, from that of the change"
+    purpose = (
+        "cotangents of the start, of the sum of the stage increments and of the coefficients, from that of the change"
+    )
     along = {"x": tuple(coordinates), "z": change.inputs["z"], TABLE: coefficients.table}
     seeds = {"change_bar": change.outputs[0].values}
     return [*kernels, pulled_back(change, "stage_change_adjoint", seeds, along, purpose)]
@@ -126,7 +129,7 @@ def completed(
     refresh: Kernel | None,
     path: PathAdjoint | None = None,
 ) -> Adjoint:
-    """Return the transpose of a step, once its table is full and ``prepare`` and ``refresh`` exist."""
+    """Return the transpose of a step. The table must be full, and ``prepare`` and ``refresh`` must exist."""
     differentiated = {"params": prepare.inputs["params"]}
     if prepare.inputs.get("gauge") == (LEVEL,):
         differentiated["gauge"] = (LEVEL,)
@@ -192,7 +195,7 @@ def level_adjoint(system: System) -> Kernel:
 
 
 def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, slopes: PathSlopes) -> PathAdjoint:
-    """Return the path traced back with cotangents, and the transpose of the slope along coefficients.
+    """Return the path integrated backward with its cotangents, and the transpose of its slope by the coefficients.
 
     Let λ be the cotangent of x' = m(1), and ν that of y = ∫ m dt. Along the path backwards, ȧ = ∂(π(m)p)/∂mᵀ a + ν
     with the start a = λ. The end value of a is the cotangent of x, ∫ π(m)ᵀ a dt that of p, and ∫ ∂(a·π(m)p)/∂c dt

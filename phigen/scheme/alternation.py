@@ -87,10 +87,10 @@ class Schedule:
     """The flows of one step: part 0 for ``times[0]``, then ``stages`` times the ``pattern``.
 
     The pattern lists parts with the row of ``times`` of each, counted from the first row of the stage. Kicks with
-    modified potential have a multiple in units of h² each: ``multiples`` by row, 0 for other flows. Where H depends
-    on the time, ``moments`` has for each row the fraction of the step at which the time stands still.
+    modified potential have a multiple in units of h² each: ``multiples`` by row, 0 for other flows. If H depends on
+    the time, ``moments`` has for each row the fraction of the step at which H is evaluated.
 
-    A run begins and ends with the flows ``begin`` and ``end``, whose rows follow those of the step: a corrector.
+    A run starts and ends with the flows ``begin`` and ``end`` (a corrector), whose rows follow those of the step.
     """
 
     times: tuple[float, ...]
@@ -120,10 +120,10 @@ class Schedule:
 
 
 def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
-    """Return the schedule of ``parts`` flows where the time advances with the part ``carrier``, the first or the last.
+    """Return the schedule of ``parts`` flows in which the first or the last part, ``carrier``, advances the time.
 
-    The conjugate e of the time, in H + e, belongs to the carrier. Without a flow of this number, the carrier is the
-    flow of e alone, and is left out. In all other parts the time stands still.
+    The conjugate e of the time, in H + e, belongs to the carrier. If no flow has this number, the carrier is the
+    flow of e alone, and is left out. All other parts are evaluated at a fixed time.
     """
     clock, moments = Fraction(0), dict[int, Fraction]()
     for part, row in schedule.flows:
@@ -137,7 +137,7 @@ def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
 
 
 def schedule(method: Alternation, parts: int) -> Schedule:
-    """Return the flows of a step of a method; a single part is followed exactly."""
+    """Return the flows of a step of a method; a single part has one exact flow."""
     if parts == 1:
         return Schedule((1.0,), 0, ())
     alpha = [*method.fractions, Fraction(0)]

@@ -46,8 +46,8 @@ from phigen.symbolic.symbols import STEP
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
 
-#: Largest dimension in which paths are followed in lanes. In five and six the cost of derivatives outweighs lanes:
-#: measured, blocks take 0.6 to 1.9 times as long as single steps.
+#: Largest dimension in which paths are solved in SIMD lanes. In five and six the cost of derivatives outweighs the
+#: gain: measured, blocks take 0.6 to 1.9 times as long as single steps.
 MAX_PATH_LANE_DIMENSION = 4
 
 
@@ -72,7 +72,7 @@ def build_program(
         attitude = stage_attitude(system, group, realisation, scheme.generating, gauge)
     lanes = solver.lanes and extras.offers("lanes", spec.profile)
     elapsed = elapsed_kernel(system, scheme.generating)
-    moved = replace(system, forces=gauged.system.forces)  # with a monitor these are those in τ
+    moved = replace(system, forces=gauged.system.forces)  # with a monitor, step sizes are in τ
     step = _step(moved, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
     attitude = scheme.generating.coefficients.settled(attitude)
     level = level_adjoint(system) if gauge.monitor and extras.adjoint else None
@@ -130,7 +130,7 @@ def _step(
     if realisation.path:
         return _path(system, generating, gauge, inner, extras, lanes=lanes)
     coefficients = generating.coefficients
-    # A monitored step needs y, from which its duration follows.
+    # A monitored step needs y, from which its physical time follows.
     increment = None if gauge.monitor else explicit_kernel(system, realisation, generating, coefficients)
     if increment is None:
         linearise = linearise_kernel(system, realisation, generating, coefficients)
@@ -180,7 +180,7 @@ def _path(
 
 
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of all coefficients; it is the last to be built, once the table is full."""
+    """Return the kernel of all coefficients; it must be built last, when the table is full."""
     return Kernel(
         "prepare",
         "everything that depends on parameters and step size only",
@@ -211,7 +211,7 @@ def _facts(
 
 
 def approximation(realisation: BiRealisation) -> list[str]:
-    """Return the line that labels a solver built on a truncation; none for an exact bi-realisation."""
+    """Return the header line for a solver that is Poisson up to truncation only; none for an exact bi-realisation."""
     if realisation.exact:
         return []
     degree = realisation.degree

@@ -46,7 +46,7 @@ def stage_attitude(
     coefficients, cayley = generating.coefficients, realisation.kind == "cayley"
     p, slope = list(generating.turning), "grad S_h(y), without the forces," if generating.free else "p = grad S_h(y)"
     values = coefficients.hoist(_element_less_one(group, p, cayley))
-    purpose = f"what {slope} turns by, a {'matrix' if group.matrices else 'quaternion'} less 1"
+    purpose = f"the attitude increment of {slope}, a {'matrix' if group.matrices else 'quaternion'} minus 1"
     purpose += ", and what it translates by" * bool(group.translation)
     if group.matrices and not cayley:
         purpose = f"{slope.rstrip(',')}, and {SIZE_OF_COVECTOR}"
@@ -75,7 +75,7 @@ def gauss_attitude(
     element_less_one = group_element(points, group)
     if element_less_one is None:
         raise refused(system, "reconstruct: the group element of this algebra is no quaternion", series)
-    purpose = "what a step turns by, a quaternion less 1" + ", and what it translates by" * bool(group.translation)
+    purpose = "the increment of a step, a quaternion minus 1" + ", and its translation" * bool(group.translation)
     inputs = {"coef": coefficients.slots, "z": points.unknowns}
     turn = Kernel("turn", purpose, inputs, (Output("turn", tuple(coefficients.hoist(element_less_one))),))
     return Attitude(group, False, turn, rate=rate_kernel(system, group, gauge))
@@ -83,13 +83,13 @@ def gauss_attitude(
 
 def _along(group: Group, system: System) -> Kernel:
     """Return the kernel of the element of a path, where p is known but y is not."""
-    p = [symbol(c) for c in system.coordinates]  # under these names, as nothing here depends on x
+    p = [symbol(c) for c in system.coordinates]  # names of the arguments; the kernel does not depend on x
     inputs = {"p": system.coordinates}
-    return Kernel("along", "what p turns by", inputs, (Output("turn", tuple(_element_less_one(group, p, False))),))
+    return Kernel("along", "the increment of p", inputs, (Output("turn", tuple(_element_less_one(group, p, False))),))
 
 
 def _element_less_one(group: Group, p: list[Expression], cayley: bool) -> list[Expression]:
-    """Return the element of p less 1; for exponentials of matrices p itself, and a bound for the square of its size."""
+    """Return the element of p minus 1; for exponentials of matrices p itself, and a bound for its squared norm."""
     if not group.matrices:
         return [*element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=cayley)]
     return cayley_transform(group, p) if cayley else [*p, size_of(group, p)]
@@ -127,7 +127,7 @@ def flow_attitude(
         values = staged([*increment, *_carried(system, group, turning, time)], coefficients)
         parts = tuple(values[: len(increment)]), tuple(values[len(increment) :])
         inputs = {"coef": coefficients.slots, "state": system.coordinates, "element": _carrier(group)}
-        purpose = f"the flow of {names[k - 1]}, and the element of a step with what it turns by"
+        purpose = f"the flow of {names[k - 1]}, and the group element of a step after it"
         kernels.append(Kernel(f"turn{k}", purpose, inputs, (Output("increment", parts[0]), Output("turned", parts[1]))))
     rate = rate_kernel(system, group, gauge, [turning.left for turning in flow_rotations])
     exponential_kernel = _exponential(group) if rate and group.matrices else None
@@ -135,12 +135,12 @@ def flow_attitude(
 
 
 def _carrier(group: Group) -> tuple[Symbol, ...]:
-    """Return the symbols of the product, less 1, of the elements of the flows of a step so far."""
+    """Return the symbols of the product of the elements of the flows of a step so far, minus 1."""
     return tuple(Symbol("element", i) for i in range(group.size))
 
 
 def _carried(system: System, group: Group, turning: Turning, time: Expression) -> list[Expression]:
-    """Return the element, less 1, after one more flow."""
+    """Return the element minus 1 after one more flow."""
     before, factors = [symbol(s) for s in _carrier(group)], factor_elements(system, group, turning, time)
     return joined(group, [before, joined(group, factors)]) if factors else before
 
@@ -170,5 +170,5 @@ def rate_kernel(system: System, group: Group, gauge: Gauge, more: Sequence[Expre
     turning = (*group.rotation, *group.translation)
     values = [*slope, size_of(group, slope)] if group.matrices else [slope[i] for i in turning]
     inputs = {"params": system.parameter_names, **gauge.inputs, "x": system.coordinates}
-    purpose = "the gradient of the Casimirs that are taken from H" + f", and {SIZE_OF_COVECTOR}" * bool(group.matrices)
+    purpose = "the gradient of the Casimirs subtracted from H" + f", and {SIZE_OF_COVECTOR}" * bool(group.matrices)
     return Kernel("rate", purpose, inputs, (Output("rate", tuple(values)),))

@@ -1,4 +1,4 @@
-"""Loops over the bonds of a site, one for both ends of bonds where the ends differ in signs of parameters only."""
+"""Loops over the bonds of a site: one loop for both ends of bonds, if the ends differ in signs of parameters only."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 
 
 def over_ends(gather: Gather) -> list[tuple[Ends, frozenset[str]]]:
-    """The loops over the bonds of a site, each with the parameters that have the opposite sign seen from the end b.
+    """The loops over the bonds of a site, each with the parameters that have the opposite sign at the end b.
 
-    As the direction of a bond has: where what bonds add at that end is what they add at a with some signs changed,
-    which is proved, one loop is for both.
+    Parameters at bonds may depend on the direction of a bond. If the contribution at the end b is proved to be that
+    at the end a with some signs reversed, one loop serves both.
     """
     apart = [(e, frozenset[str]()) for e in gather.ends]
     if len(apart) != 2 or gather.ends[0].chosen != gather.ends[1].chosen:

@@ -85,12 +85,12 @@ def plan(system: System, splitting: SplitHamiltonian, requested: int, compositio
 
 
 def _unsuited(system: System, splitting: SplitHamiltonian, small: int) -> bool:
-    """Whether there are forces, or A depends on the time; the conjugate of the time must belong to A."""
+    """Whether there are forces, or A depends on the time: then the conjugate of the time must belong to A."""
     return len(splitting.flows) != 2 or (bool(system.time) and is_dated(splitting.flows[1 - small], system.time))
 
 
 def _kicks_in_time(system: System, splitting: SplitHamiltonian) -> list[Kick]:
-    """Return the parts that can be V beside T + e: T does not depend on the time, and V commutes with ∂V/∂t."""
+    """Return the parts that can be V beside T + e: T must not depend on the time, and V must commute with ∂V/∂t."""
     kicks_found = []
     for kick in kicks(system.frozen, splitting):
         drift, v = splitting.flows[1 - kick.part], splitting.flows[kick.part].hamiltonian

@@ -90,7 +90,7 @@ def cells(tower: Tower, elements: Sequence[Poly]) -> int:
 
 
 def exceeds(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], most: int) -> bool:
-    """Whether the elements, collected, have more than ``most`` monomials together; much faster than `collect`."""
+    """Whether the collected elements have more than ``most`` monomials together; much faster than `collect`."""
     state, count = _state(tower, coordinates), 0
     if sum(map(len, elements)) <= most:
         return False

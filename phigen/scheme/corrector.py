@@ -26,9 +26,9 @@ SPACING = Fraction("0.418330013267037773994000")
 
 
 def corrector(order: int) -> tuple[Fraction, ...]:
-    """Return the times of flows of A, B, A, …, A that end a run: half a flow of A taken back, then C.
+    """Return the times of flows of A, B, A, …, A at the end of a run: minus half a flow of A, then C.
 
-    Those that begin the run are the same with the other sign, in reversed order. Order 1 is that without C.
+    Those at the start of the run have the other sign and the reverse order. Order 1 has no C.
     """
     times = [-Fraction(1, 2)]
     for c, b in _pairs((order - 1) // 2):
@@ -45,7 +45,7 @@ def schedule(end: Sequence[Fraction]) -> Schedule:
 
 
 def _pairs(count: int) -> tuple[tuple[Fraction, Fraction], ...]:
-    """Return the times (c_i, b_i) for which g is right up to z^{2·count − 1}."""
+    """Return the times (c_i, b_i) for which g is correct up to z^{2·count − 1}."""
     c = [i * SPACING for i in range(count, 0, -1)]
     f = _kernel_series(count + 1)
     rows = [[2 * x ** (2 * k + 1) / factorial(2 * k + 1) for x in c] for k in range(count)]

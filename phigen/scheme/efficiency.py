@@ -1,10 +1,10 @@
-"""A model of the cost of steps: the time of a step, and the step that has an accuracy, for a comparison of schemes.
+"""A model of the cost of steps, to compare schemes: the time of a step, and the step size for a given accuracy.
 
-The time is estimated from the operations of a program. The accuracy is that for which an order is usually asked, an
-orbit error of 10^(−order) over a few turns; lengths of steps are those of Gauss collocation of the same order, which
-is 1. The numbers were fitted to twenty measured pairs of system and order, on a processor with vectors of eight
-doubles: seven systems, rigid bodies, tops, spins, Toda's chain, in dimensions 3 to 15, at the orders 4, 8 and 12.
-`phigen tune` measures instead.
+The time is estimated from the operations of a program. The accuracy is the typical one of an order: an orbit error
+of 10^(−order) over a few turns. Step sizes are relative to Gauss collocation of the same order, which has 1. The
+numbers were fitted to twenty measured pairs of system and order, on a processor with vectors of eight doubles: seven
+systems, rigid bodies, tops, spins, Toda's chain, in dimensions 3 to 15, at the orders 4, 8 and 12. `phigen tune`
+measures instead.
 """
 
 from __future__ import annotations
@@ -15,22 +15,23 @@ from phigen.scheme import nystrom
 from phigen.scheme.program import Program
 from phigen.scheme.step_kinds import GAUSS, NEWTON, PATH, StepKind
 
-#: Nanoseconds of an operation in straight-line code, and of a function: of a library, or by a polynomial in a lane.
+#: Nanoseconds of an operation in straight-line code, and of a function: from a library, or by a polynomial in a lane.
 OPERATION, FUNCTION = 0.5, 7.0
-#: Nanoseconds of an explicit step beside its operations: the sums of coordinates, and the latency of the flows.
+#: Nanoseconds of an explicit step besides its operations: the sums of coordinates, and the latency of the flows.
 EXPLICIT_STEP = 25.0
-#: Nanoseconds of an operation in a Newton iteration, at several lanes; beyond this number they leave the caches.
+#: Nanoseconds of an operation in a Newton iteration, with several lanes; the number of operations that still fit the
+#: caches.
 NEWTON_OPERATION, CACHED_OPERATIONS, UNCACHED_OPERATION = 0.04, 3000, 0.1
 #: Nanoseconds of a step by Newton's method for each entry of its matrix.
 NEWTON_ENTRY = 8.0
-#: Nanoseconds of an operation at a stage, with all stages in lanes and some ten sweeps; of the sums over the stages.
+#: Nanoseconds of an operation at a stage, with all stages in lanes and about ten sweeps; of the sums over the stages.
 STAGE_OPERATION, SWEEPS_OF_STEP = 2.4, 230.0
 #: Additions that take the time of a division.
 DIVISION = 4
 #: Nanoseconds of a step along paths, and of one of its operations.
 PATH_STEP, PATH_OPERATION = 200.0, 0.3
 
-#: Lengths of steps by order, beside those of Gauss collocation. Errors of splittings of Nyström type are smaller.
+#: Step sizes by order, relative to Gauss collocation. Errors of splittings of Nyström type are smaller.
 SERIES_STEPS: Mapping[int, float] = {2: 1.3, 4: 0.75, 6: 0.6, 8: 0.5, 10: 0.43, 12: 0.37, 14: 0.33, 16: 0.3}
 SPLITTING_STEPS: Mapping[int, float] = {2: 1.3, 4: 2.0, 6: 1.3, 8: 0.9, 10: 0.7}
 NYSTROM_STEPS: Mapping[int, float] = {2: 1.3, 4: 4.0, 6: 2.6, 8: 1.7, 10: 1.3}
@@ -39,7 +40,7 @@ NYSTROM_STEPS: Mapping[int, float] = {2: 1.3, 4: 4.0, 6: 2.6, 8: 1.7, 10: 1.3}
 def cost(program: Program, grown: float = 1.0) -> float:
     """Return the estimated nanoseconds for a unit of time, at the accuracy of the order; the unit is arbitrary.
 
-    ``grown`` multiplies the operations: for a lower bound on programs of a higher order.
+    ``grown`` multiplies the operations: it gives a lower bound for programs of a higher order.
     """
     step, even = program.step, program.order + program.order % 2
     return STEP_TIMES.get(step.kind, _explicit)(program, grown) / _steps(program)[even]
@@ -63,7 +64,7 @@ def _steps(program: Program) -> Mapping[int, float]:
 
 
 def _operations(program: Program) -> tuple[int, int]:
-    """Return arithmetic operations, in additions, and function calls."""
+    """Return the number of arithmetic operations, in units of additions, and of function calls."""
     counts = program.about.operations
     return counts["additions"] + counts["multiplications"] + DIVISION * counts["divisions"], counts["functions"]
 

@@ -42,7 +42,7 @@ def _pivots(pattern: Pattern) -> Iterator[tuple[int, int]]:
         below, right = len(columns[k]), len(rows[k])
         fill_in = sum(
             len(rows[k] - rows[i] - {i}) for i in columns[k]
-        )  # an entry that was 0 takes a product and no difference
+        )  # an entry that was 0 costs a product and no difference
         yield k, COST["reciprocal"] + below * (1 + 2 * right) - fill_in + 2 * (below + right) + 1
         for i in columns[k]:
             rows[i] = (rows[i] | rows[k]) - {i, k}

@@ -154,7 +154,7 @@ def build_gauss(
 
 
 def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -> Monitor | None:
-    """The time of a monitored solver."""
+    """The physical time of a monitored solver."""
     if gauge.monitor is None:
         return None
     level = level_adjoint(system) if spec.extras.adjoint else None
@@ -169,7 +169,7 @@ def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
 
 
 def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
-    """Return the Jacobians along coordinates, without the time, then along the unknowns."""
+    """Return the Jacobians by the coordinates, without the time, then by the unknowns."""
     names = (*points.system.coordinates, *points.unknowns)
     kernels = []
     for values, name, subject in (
@@ -179,7 +179,7 @@ def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
         columns = [derivatives(values, s) for s in names]
         flat = coefficients.hoist([c[i] for i in range(len(values)) for c in columns])
         inputs = {"coef": coefficients.slots, "x": points.start, "z": points.unknowns}
-        purpose = f"the Jacobian of {subject} along x, and along the unknowns"
+        purpose = f"the Jacobian of {subject} by x, and by the unknowns"
         kernels.append(Kernel(f"stage_{name}_jacobian", purpose, inputs, (Output("slopes", tuple(flat)),)))
     return GaussTangent(*(_full(k, coefficients) for k in kernels))
 

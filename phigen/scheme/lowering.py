@@ -93,7 +93,7 @@ def _cost(e: Expression) -> int:
 
 
 def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with ½(ab) and ½(ac) as (½a)b and (½a)c, where that takes fewer operations."""
+    """Return the roots with ½(ab) and ½(ac) written as (½a)b and (½a)c, if that takes fewer operations."""
     roots = list(roots)
     while True:
         regrouped = _numbers_regrouped(roots)
@@ -103,7 +103,7 @@ def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with numbers multiplied into a factor first.
+    """Return the roots with numbers first multiplied into a factor.
 
     In a product of a number and a product, the factor is the one that most products with the same number have.
     """

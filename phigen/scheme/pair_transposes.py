@@ -20,7 +20,7 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 _OTHER = {"a": "b", "b": "a"}
 
 
-#: The bonds of a site at the other end of those that begin or end at another, and how these are chosen.
+#: The bonds of a site at the other end of those that start or end at another site, and how they are selected.
 _OPPOSITE = {"": "", "a": "b", "b": "a"}
 _CHOSEN = {"": "", "here": "there", "there": "here"}
 
@@ -28,11 +28,12 @@ _CHOSEN = {"": "", "here": "there", "there": "here"}
 def transposed_at_ends(
     places: Mapping[str, tuple[str, str]], ends: Ends, opposite: Collection[str], back: Kernel, *, summed: bool
 ) -> list[tuple[str, Ends, Kernel]]:
-    """Return the ends at which a site is, with the bonds or pairs that it runs over there, and the kernels.
+    """Return the ends at which a site is, with the bonds or pairs of the loop for that end, and the kernels.
 
-    Each site collects the cotangents that it receives, so that no two sites write to one place. Where bonds are alike
-    from both ends, it runs over them once, as both ends; the kernel computes the sums too if these are to be
-    ``summed``. Else it runs over them as the end b, which reads the cotangents of other sites, and as the end a.
+    Each site collects the cotangents that it receives, so that no two sites write to one place. If bonds are equal
+    at both ends, one loop serves both; its kernel also computes the sums if these are to be ``summed``. Otherwise
+    one loop treats the site as the end b, and reads the cotangents of other sites; a second loop treats it as the
+    end a.
     """
     if ends.of_all:
         whole = paired(places, ends.kernel, back, opposite)
@@ -45,7 +46,8 @@ def transposed_at_ends(
 
 
 def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Kernel:
-    """Restrict a kernel to the cotangents of the site at an end; those of bonds and shared values belong to b."""
+    """Restrict a kernel to the cotangents of the site at an end; the cotangents of bonds and shared values belong to
+    b."""
     outputs = []
     for o in kernel.outputs:
         names = kernel.inputs["site"] if o.name == "site_bar" else ()

@@ -115,7 +115,7 @@ class Modified:
 
 @dataclass(frozen=True)
 class Attitude:
-    """The group element that each stage, or each flow, is the action of.
+    """The group element of each stage, or of each flow: the stage is its action.
 
     ``turn`` is the element of an implicit stage as a function of the solved y, ``along`` as a function of p. Elements
     are less 1. Instead of exp(P) for a matrix P they return the covector p of P and a bound for the square of its

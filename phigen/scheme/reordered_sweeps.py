@@ -1,4 +1,4 @@
-"""Sweeps with the fields in another order: parts of H that differ in nothing else are made by the same loop."""
+"""Sweeps with reordered fields: parts of H that differ in the order of fields only share one loop."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from phigen.symbolic.expression import natural_key, substitute, symbol
 from phigen.symbolic.symbols import GATHERED, Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Most fields of a site whose orders are tried: there are 6 of 3.
+#: Most fields of a site whose orders are tried: 3 fields have 6 orders.
 MOST_FIELDS = 3
 
 
 def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """Yield the other orders of some fields, cyclic ones first, which parts of H often share; none of many fields."""
+    """Yield other orders of some fields, cyclic ones first, which parts of H often share; none of many fields."""
     original = tuple(fields)
     round_ = [original[k:] + original[:k] for k in range(1, len(original))]
     permuted = dict.fromkeys([*round_, *permutations(original)]) if len(original) <= MOST_FIELDS else ()
@@ -26,7 +26,7 @@ def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
 
 
 def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str]) -> dict[str, str]:
-    """Increments of noise in an order of the fields: where each field has a source, that of its own is meant for it."""
+    """Return the increments of noise in an order of the fields, if each field has one source of its own."""
     if len(sites.increments) != len(order):
         return {}
     increments = dict(zip(fields, sites.increments, strict=False))
@@ -34,9 +34,10 @@ def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str])
 
 
 def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str, ...], float]]:
-    """The same sums as functions of the parameters at bonds in another order, and of bonds that run the other way.
+    """Return the sums as functions of reordered parameters at bonds, and of bonds in the opposite direction.
 
-    These where all that they add has the sign of their direction. Also the order, none if it is their own, and 1 or -1.
+    The direction is reversed only if all contributions are odd in it. Also returns the order, none if unchanged, and
+    1 or -1.
     """
     loops = over_ends(gather)
     if len(loops) != 1 or not loops[0][1]:
@@ -59,15 +60,16 @@ def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str
 
 
 def _signed(kernel: Kernel, sign: float) -> Kernel:
-    """Return the kernel, with the opposite values if the sign is negative."""
+    """Return the kernel, with negated values if the sign is negative."""
     values = tuple(-e if sign < 0 else e for e in kernel.roots)
     return replace(kernel, outputs=(Output(kernel.outputs[0].name, values),))
 
 
 def turned(sites: Sites, fields: Sequence[str], order: Sequence[str], sweep: Sweep) -> Sweep | None:
-    """A sweep as a function of other fields: in place of those of an ``order`` it has the ``fields``, one by one.
+    """Return a sweep as a function of other fields: the fields in an ``order`` are replaced by ``fields``, one by
+    one.
 
-    None where it would read neighbours that no sweep reads.
+    None if the result would read neighbours that no sweep reads.
     """
     into = dict(zip(order, fields, strict=True))
     into |= {there: here for here, there in turned_increments(sites, fields, order).items()}
@@ -95,7 +97,7 @@ def turned(sites: Sites, fields: Sequence[str], order: Sequence[str], sweep: Swe
 
 
 def _renamed(kernel: Kernel, names: Mapping[str, str], places: Sequence[int] = ()) -> Kernel:
-    """The kernel with other symbols, and its values in the order of ``places``."""
+    """Return the kernel with other symbols, and its values in the order of ``places``."""
     values = substitute(kernel.roots, {old: symbol(new) for old, new in names.items()})
     inputs = {
         key: tuple(sorted((names.get(s, s) for s in symbols), key=natural_key))

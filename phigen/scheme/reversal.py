@@ -48,8 +48,8 @@ def over_negative_time(values: Sequence[Expression], parities: Mapping[str, int]
 def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> list[Expression]:
     """Return values at the state before a flow, in symbols of the state after it; the inverse flow adds ``changes``.
 
-    Invariant sub-expressions are not computed twice. Sums are such, as that of two spins that rotate about it, and
-    arguments of functions, as |ψ|² if the flow changes phases only; the invariance is proved.
+    Invariant sub-expressions are not computed twice: sums, such as that of two spins that rotate about it, and
+    arguments of functions, such as |ψ|² if the flow changes phases only. The invariance is proved.
     """
     previous = {s: symbol(s) + change for s, change in changes.items()}
 
@@ -78,7 +78,7 @@ def _called_in(value: Expression) -> set[Expression]:
 
 
 def _form(node: Expression, args: Sequence[Form | None]) -> Form | None:
-    """Return a node as a sum of symbols, or None if it is none."""
+    """Return a node as a sum of symbols, or None if it is not one."""
     if node.op == "symbol":
         return {node.value: 1}
     if node.op not in ("add", "sub", "neg") or None in args:

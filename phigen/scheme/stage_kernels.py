@@ -1,4 +1,4 @@
-"""Kernels derived from those of a stage of the series: transposes of some of its values, and blocks at sites."""
+"""Kernels derived from those of a stage of the series: partial transposes, and diagonal blocks at sites."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.steps import Sites, Sweeps
 from phigen.symbolic.expression import ZERO, gradient
 
-#: The kernel of the derivatives of a sweep along the fields at the site itself.
+#: The kernel of the derivatives of a sweep by the fields at the same site.
 _BLOCK = "own_slope"
 
-#: Whether cotangents of fields around are found, and all others.
+#: Whether cotangents of fields at other sites are computed, and all others.
 _ALL, _FIELDS, _OTHERS = (True, True), (True, False), (False, True)
 
-#: By which names, from which kernels, in order: what the end of a stage gives to y; what y gives to y around it, again
-#: and again until the equation is solved; and then what it gives to x and to parameters.
+#: Names of the kernels of a reverse pass, their source kernels, in order: from the end of a stage to y; from y to y at
+#: other sites, repeated until the equation is solved; from y to x and to parameters.
 KERNELS = (("advance_back", "increment", _ALL), ("slope_back", "relax", _FIELDS), ("relax_back", "relax", _OTHERS))
 
 
@@ -39,14 +39,14 @@ def restricted(sites: Sites, fields: Sequence[str], kernel: Kernel, selection: t
 
 
 def site_block(step: Sweeps, fields: Sequence[str], relax: Kernel) -> Kernel:
-    """Return the kernel of the derivatives of a sweep along y at the site: for each field those along all fields."""
+    """Return the kernel of the derivatives of a sweep by y at the same site: for each field, those by all fields."""
     places = step.sites.places
     at_site = {places[s][0]: s for s in relax.inputs["site"] if not any(places[s][1])}
     slopes = [gradient(e, [at_site[f]])[0] if f in at_site else ZERO for e in relax.roots for f in fields]
     return replace(
         relax,
         name=_BLOCK,
-        purpose="how y at a site follows y there",
+        purpose="derivative of y at a site by y at the same site",
         outputs=(Output(_BLOCK, tuple(slopes)),),
         role=Role.OWN_SLOPE,
     )

@@ -30,9 +30,9 @@ TABLE, NOW = "coef", "now"
 class Coefficients:
     """The table of state-independent values; `hoist` fills it and is idempotent on equal values.
 
-    ``values`` are those of ``prepare``, ``renewed`` those that depend on ``inputs`` of a step. Between them lie the
-    entries of ``exponentials``, exp(tA) − 1. The places of the latter two are unknown until the table is full: until
-    `settled` they have symbols of different kinds.
+    ``values`` are those of ``prepare``, ``renewed`` those that depend on ``inputs`` of a step. Between them are the
+    entries of ``exponentials``, exp(tA) − 1. The positions of ``renewed`` and ``exponentials`` are unknown until the
+    table is full: until `settled` they have symbols of other kinds.
     """
 
     def __init__(self, static: Iterable[str], inputs: Iterable[str] = ()) -> None:
@@ -55,7 +55,7 @@ class Coefficients:
 
     @property
     def everything(self) -> list[Expression]:
-        """The expressions of the table; for entries of an exponential, a sum of all that they depend on."""
+        """The expressions of the table; for entries of an exponential, a sum of all values that they depend on."""
         sums = (total(e.exponents) for e in self.exponentials for _ in e.rates)
         return [*self.values, *sums, *self.renewed]
 
@@ -84,7 +84,7 @@ class Coefficients:
     def hoist(self, roots: Sequence[Expression]) -> list[Expression]:
         """Return the roots with each largest state-independent part replaced by a coefficient ``c:k``.
 
-        Plain numbers stay where they are: a literal is cheaper than a load.
+        Plain numbers are not replaced: a literal is cheaper than a load.
         """
         return self._hoisted(roots, lambda name: self._is_fixed(name) or self._is_new(name))
 
@@ -131,7 +131,7 @@ class Coefficients:
         """
         if not self.renewed:
             return None
-        if not self.values:  # the first part of the table must not be empty, for the second to lie elsewhere
+        if not self.values:  # the first part of the table must not be empty, since the second part starts after it
             self.slot(symbol(min(self._static)))
         values = tuple(self._hoisted(self.renewed, self._is_fixed))
         return Kernel(
@@ -142,7 +142,7 @@ class Coefficients:
         )
 
     def settled(self, built: T) -> T:
-        """Return an object built with this table, which is full now, with the final places of the coefficients.
+        """Return an object built with this full table, with the final positions of the coefficients.
 
         The object consists of kernels, recurrences and other frozen dataclasses and tuples. Coefficients that are
         renewed in each step come after all others.

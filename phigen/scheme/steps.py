@@ -24,7 +24,7 @@ BACK = "_back"
 
 @dataclass(frozen=True)
 class PathAdjoint:
-    """The path traced back with cotangents (`phigen.scheme.adjoint`).
+    """The path integrated backward with cotangents (`phigen.scheme.adjoint`).
 
     ``recurrences`` are those of the cotangents, with those of the ``used`` coefficients last. ``curvature`` is ∇S_h and
     its Hessian at the mean, ``slope`` the transpose of ∇S_h along coefficients. ``slopes`` are the recurrences for the
@@ -116,7 +116,7 @@ class _Staged:
 
     @property
     def back(self) -> PathAdjoint | None:
-        """The path traced back with cotangents, if the step follows one and its adjoint was requested."""
+        """The path integrated backward with cotangents, if the step follows one and its adjoint was requested."""
         return self.adjoint.path if self.adjoint else None
 
     @property
@@ -423,11 +423,11 @@ class Splitting(_Scheduled):
 
 @dataclass(frozen=True)
 class Seam:
-    """The boundary seam along an axis, for sizes that are no multiples of the ``period`` of the colours.
+    """The boundary seam along an axis, for sizes that are not multiples of the ``period`` of the colours.
 
-    The seam consists of the last sites: the remainder of the size, and as many periods as make it at least ``wide``.
-    The terms that begin on it also move sites up to ``near`` it. All other terms have colours that fit their
-    neighbours.
+    The seam consists of the last sites: the remainder of the size, and enough periods to make it at least ``wide``.
+    The terms that start on it also update sites within the distance ``near``. All other terms have colours that fit
+    their neighbours.
     """
 
     period: int = 1
@@ -436,7 +436,7 @@ class Seam:
 
     @property
     def least(self) -> int:
-        """The smallest size for any remainder: the seam and as many sites beside it."""
+        """The smallest size for any remainder: the seam, and at least the same number of other sites."""
         return 2 * self.wide + self.period - 1
 
 
@@ -462,17 +462,17 @@ class Sites:
     )  # symbols of kernels of bonds or pairs: field and end
     at_bonds: tuple[str, ...] = ()  # parameters at bonds
     increments: tuple[str, ...] = ()  # of the noise of a site in a part of a step
-    seams: tuple[Seam, ...] = ()  # along each axis, where the colours fit every size
+    seams: tuple[Seam, ...] = ()  # the axes along which the colours fit every size
 
 
 @dataclass(frozen=True)
 class Ends:
     """A ``kernel`` of bonds or pairs between a site, a, and another, b.
 
-    Its inputs are ``coef`` or ``params``, ``site`` and ``bonds``, the parameters at bonds. ``end`` is the end of the
-    bond, as the user lists it, at which the site is: a, b, or "" for either. ``chosen`` says which of the two must
-    have the colour of the sweep: ``here``, ``there``, or "" for neither. ``extremes`` maps numbers of outputs, of which
-    the largest or the least value is kept in place of the sum, to ``max`` or ``min``.
+    Its inputs are ``coef`` or ``params``, ``site`` and ``bonds``, the parameters at bonds. ``end`` says which end of
+    the bond, in the order of the user, the site is: a, b, or "" for either. ``chosen`` says which of the two must
+    have the colour of the sweep: ``here``, ``there``, or "" for neither. ``extremes`` maps numbers of outputs, of
+    which the largest or the least value is kept in place of the sum, to ``max`` or ``min``.
     """
 
     kernel: Kernel
@@ -548,15 +548,16 @@ class PartRates:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Increments of the fields with the indices ``moved`` at all sites of one ``colour``, from values that stand still.
+    """Increments of the fields with the indices ``moved`` at all sites of one ``colour``, from values that the sweep
+    does not change.
 
     Without a colour the sweep updates every site. If it is ``inside``, it omits sites near seams. With a ``window``
     it updates only sites near seams, by the terms that begin on the seams of these axes (bits), or on none.
 
     The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. The symbols of ``present`` are
-    1 where a term of H reaches beyond no open end, or where a site has the colour of the sweep, else 0; ``gathered``
-    are the sums of ``gather``. ``tangent`` is there if derivatives of a step were requested: the increments of the
-    variations of the fields, from the inputs of this sweep and the variations ``varied``.
+    1 if a term of H lies within open ends, or if a site has the colour of the sweep, else 0; ``gathered`` are the
+    sums of ``gather``. ``tangent`` exists if derivatives of a step were requested: the increments of the variations
+    of the fields, from the inputs of this sweep and the variations ``varied``.
     """
 
     kernel: Kernel
@@ -575,11 +576,11 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Equation:
-    """y = x − (α − x)(y, h∇H(y)) at all sites of a lattice, solved for y; then x moves by (β − α)(y, h∇H(y)).
+    """y = x − (α − x)(y, h∇H(y)) at all sites of a lattice, solved for y; x is then updated by (β − α)(y, h∇H(y)).
 
     The inputs of the kernels are those of sweeps, with values of y as ``site``. ``relax``, the right-hand side at a
     site, also reads ``start``, the x of the site. ``advance`` is the increment of x. ``slope`` is the derivative of
-    ``relax`` along a variation of y, for Newton's method. ``tangents`` are there if derivatives of a step were
+    ``relax`` along a variation of y, for Newton's method. ``tangents`` exist if derivatives of a step were
     requested: those of ``relax`` along a variation of x, and of ``advance`` along one of y.
     """
 
@@ -631,8 +632,8 @@ class Sweeps(_Scheduled):
     def is_by_hand(self) -> bool:
         """Whether a caller can drive the sweeps of a step one by one over planes: those of a grid that is split.
 
-        Noise is drawn with the sweep that reads it, so no sweep may read that of neighbours. A seam lies at the ends
-        of the lattice, which a caller with a piece of the lattice does not have.
+        Noise is drawn with the sweep that reads it, so no sweep may read that of neighbours. A seam lies at the end
+        of the lattice, which a caller with a part of the lattice does not have.
         """
         beside = any(base in self.sites.increments and any(offset) for base, offset in self.sites.places.values())
         return self.partners is None and self.equation is None and not beside and not self.sites.seams

@@ -62,9 +62,9 @@ def _from_receiver(
     offset: Sequence[int],
     value: Expression,
 ) -> Expression | None:
-    """Return the contribution to the site at an offset, written from that site.
+    """Return the contribution to the site at an offset, in terms of that site.
 
-    None where the site does not read the values that the contribution needs.
+    None if the site does not read the values that the contribution needs.
     """
     renamed: dict[str, Expression] = {}
     for s in symbols_of(value):

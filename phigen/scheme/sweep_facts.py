@@ -1,4 +1,4 @@
-"""Facts on the sweeps of a lattice that decide what code it gets: elimination, blocking, reverse passes."""
+"""Facts about the sweeps of a lattice that select its code: elimination, blocking, reverse passes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from phigen.scheme.sweep_inverse import can_recompute_fields, once, transposes
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND
 
-#: Diagonals of a matrix beside its own that elimination is for.
+#: Largest number of off-diagonals of a band matrix for which elimination is used.
 MAX_DIAGONALS = 64
 
 
@@ -22,7 +22,7 @@ def reach(step: Sweeps) -> int:
 
 
 def band(step: Sweeps) -> int:
-    """Return the diagonals beside that of the matrix of a stage, site by site; 0 if elimination does not solve it."""
+    """Return the number of off-diagonals of the matrix of a stage, site by site; 0 if elimination does not apply."""
     if not step.equation or step.partners or len(step.sites.axes) > 1:
         return 0
     diagonals = (reach(step) + 1) * len(step.equation.relax.roots) - 1
@@ -30,7 +30,7 @@ def band(step: Sweeps) -> int:
 
 
 def beside_seams(sweep: Sweep) -> bool:
-    """Whether a sweep has loops for sites away from boundary seams only, or near them only."""
+    """Whether a sweep has separate loops for sites away from boundary seams, or only near them."""
     return sweep.inside or sweep.window is not None
 
 
@@ -40,23 +40,23 @@ def first_kind(sites: Sites, sweep: Sweep) -> int | None:
 
 
 def wide(sites: Sites, sweep: Sweep) -> bool:
-    """Whether a sweep over a row may go on to the end of its last vector, since what lies beside is copied afresh."""
+    """Whether a sweep over a row may round up to whole vectors, since the halo beside it is updated afterwards."""
     return len(sites.axes) > 1 and sites.colours == 1 and not sweep.gather and not sweep.is_tangent
 
 
 def chosen_ends(step: Sweeps) -> set[str]:
-    """At which ends of the bonds that sweeps add up there may be the sites of a colour."""
+    """Return the ends of bonds in the sums of sweeps whose sites may have the colour of the sweep."""
     gathers = (sweep.gather for part in step.parts for sweep in part if sweep.gather)
     return {ends.chosen for gather in gathers for ends in gather.ends}
 
 
 def site_blocks(program: Program, step: Sweeps) -> bool:
-    """Whether Krylov spaces are those of the matrix times the inverses of its blocks at sites: for grids."""
+    """Whether Krylov methods are preconditioned with the diagonal blocks of the matrix at sites: for grids."""
     return step.equation is not None and step.partners is None and not band(step) and program.profile == "fast"
 
 
 def waves(program: Program, step: Sweeps) -> bool:
-    """Whether several flows are made at once: of grids, where what a flow reads lies beside."""
+    """Whether wavefront blocking applies: for grids, whose flows read neighbours only."""
     split = step.equation is None and step.partners is None and not step.sites.seams
     return split and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
 
@@ -78,7 +78,7 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
 
 
 def takes(program: Program, step: Sweeps) -> bool:
-    """Whether what a flow hands to sites of a grid on the way back is taken by the loop of the next: in long code."""
+    """Whether the loop of the next flow adds the cotangents that a flow passes to sites of a grid: in long code."""
     if program.profile != "fast" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False
     kernels = [kernel for part in transposes(program, step) for kernel in part]
@@ -95,7 +95,7 @@ def handed_apart(program: Program, step: Sweeps) -> list[bool]:
 
 
 def ways(step: Sweeps) -> list[tuple[int, int]]:
-    """List for each flow of a step its part and the part of the flow after it.
+    """Return for each flow of a step its part and the part of the flow after it.
 
     The first flow is listed once more, for where it is merged with the last flow of the step before."""
     parts = [part for part, _ in step.schedule.flows]
@@ -104,7 +104,7 @@ def ways(step: Sweeps) -> list[tuple[int, int]]:
 
 
 def shares(step: Sweeps) -> bool:
-    """Whether loops over sites have shares in sums over all of them: the cotangents of coefficients, or parameters."""
+    """Whether loops over sites contribute to sums over all sites: the cotangents of coefficients, or parameters."""
     kernels = step.adjoint.steps if step.adjoint else ()
     kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)
     summed = [kernel.along(array) for kernel in kernels for array in (TABLE, "params") if array in kernel.inputs]
@@ -112,7 +112,7 @@ def shares(step: Sweeps) -> bool:
 
 
 def givers(step: Sweeps) -> bool:
-    """Whether rows that hand something to a row are not those that it reads, since beyond open ends there are none."""
+    """Whether rows that contribute cotangents to a row differ from those that it reads, because of open ends."""
     return any(step.sites.open[:-1])
 
 

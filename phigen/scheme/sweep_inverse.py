@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 def once(function: Callable[[Program, Sweeps], T]) -> Callable[[Program, Sweeps], T]:
-    """Cache the last result, for calls with the same two objects: a printer makes dozens of calls for each pair."""
+    """Cache of one result: a printer makes dozens of calls for each pair of objects."""
     last: list[tuple[Program, Sweeps, T]] = []
 
     @wraps(function)
@@ -137,7 +137,7 @@ def apart(transpose: Kernel) -> tuple[Kernel, Kernel] | None:
     read = symbols_of(*(e for o in cotangent_outputs for e in o.values))
     if not state_outputs or not {*transpose.inputs["gathered"]}.isdisjoint(read):
         return None
-    purpose = "the fields before the sweep, from what has been added up for them"
+    purpose = "the fields before the sweep, from sums over bonds or pairs"
     name = transpose.name.removesuffix(BACK) + f"_{UNDONE}"
     return replace(transpose, outputs=cotangent_outputs), replace(
         transpose, name=name, purpose=purpose, outputs=state_outputs

@@ -98,8 +98,8 @@ def graph_series(
 class HamiltonJacobi:
     """S_1, S_2, … of one Hamiltonian in one bi-realisation, each computed once, when it is first needed.
 
-    ``alpha`` gives the source map to the degree in p that S_1 … S_most need: see `reach`.
-    ``static`` are the parameters and the other symbols of the tower, ``times`` the symbol of the time, if there is one.
+    ``alpha`` gives the source map to the degree in p needed for S_1 … S_most: see `reach`. ``static`` are the
+    parameters and the other symbols of the tower, ``times`` the symbol of the time, if there is one.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class HamiltonJacobi:
         return PolynomialSeries(self._polynomials.ring, self._polynomials.first(terms))
 
     def written(self, terms: int) -> PolynomialSeries:
-        """S_1 … S_terms in a tower, or as many of the first of them as are not too large."""
+        """S_1 … S_terms in a tower, without the terms from the first one that is too large."""
         with suppress(OverflowError):
             return self.polynomial(terms)
         with suppress(OverflowError):
@@ -141,7 +141,8 @@ class HamiltonJacobi:
         return self._graphs.first(terms)
 
     def reach(self, terms: int) -> None:
-        """Announce the number of terms, before the first is computed: where α is a series in p, this starts again."""
+        """Announce the number of terms, before the first is computed: if α is a series in p, the computation starts
+        again."""
         if terms <= self._most:
             return
         self._most = terms
@@ -209,7 +210,7 @@ class _Recursion:
         self._sizes: dict[int, int] = {}  # i → monomials of ∇S_i
 
     def first(self, terms: int) -> tuple[Any, ...]:
-        """S_1 … S_terms. An `OverflowError` is final: every later request beyond the last good term raises it again."""
+        """S_1 … S_terms. An `OverflowError` is final: later requests beyond the last computed term raise it again."""
         while len(self._found) < terms:
             if self._overflow:
                 raise self._overflow

@@ -28,7 +28,7 @@ _QUOTIENTS = {
 
 
 class Sign(sympy.Function):  # type: ignore[misc]
-    """The sign of u, whose derivative is 0 wherever it exists; sympy's own has a Dirac delta for it."""
+    """The sign of u, with derivative 0 wherever it exists; sympy's own has a Dirac delta as derivative."""
 
     @classmethod
     def eval(cls, u: Any) -> Any:

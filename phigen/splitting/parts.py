@@ -20,7 +20,7 @@ from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Poly
 
-#: Largest number of companions that are subtracted from the terms, one after the other.
+#: Largest number of companions that are subtracted from the terms.
 MAX_COMPANIONS = 3
 
 

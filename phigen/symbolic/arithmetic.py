@@ -17,7 +17,7 @@ NOTHING: Mapping[int, Any] = MappingProxyType({})
 
 
 class Arithmetic(Generic[T]):
-    """A kind of values that expressions may have; ``+`` and ``-`` are those of the values themselves."""
+    """A domain of values of expressions; ``+`` and ``-`` are those of the values themselves."""
 
     def constant(self, value: Fraction) -> T:
         """A rational number as a value."""

@@ -11,8 +11,8 @@ def economised(
 ) -> list[Fraction]:
     """Σ c_k z^k for 0 ≤ z ≤ radius, or −radius ≤ z ≤ radius if ``symmetric``, with ``terms`` coefficients.
 
-    By Lanczos' method (C. Lanczos, Applied Analysis, 1956): the highest power is replaced, one after the other, by what
-    the Chebyshev polynomial of its degree leaves of it.
+    By Lanczos' method (C. Lanczos, Applied Analysis, 1956): the highest power is replaced by the lower terms of the
+    Chebyshev polynomial of its degree, one power after the other.
     """
     scaled = [c * radius**k for k, c in enumerate(coefficients)]
     while len(scaled) > terms:

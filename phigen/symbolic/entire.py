@@ -18,7 +18,7 @@ from fractions import Fraction
 from itertools import count
 from typing import Any
 
-#: Terms beyond this, relative to the first, are left out of a series in double precision.
+#: Terms of series below this, relative to the first, are omitted in double precision.
 NEGLIGIBLE = 1e-17
 
 _HALF = Fraction(1, 2)
@@ -28,10 +28,10 @@ _HALF = Fraction(1, 2)
 class Entire:
     """A function Σ c_n s^n: its coefficients, and the closed form that is used for |s| > ``radius``.
 
-    ``closed`` are the forms for s > 0 and for s < 0, or one for both, from a library of functions, s and √|s|: math, an
-    mpmath context, or what makes formulas to print. ``known`` is the form for s > 0, and ``slopes`` is the
-    derivative, as `phigen.symbolic.functions` has them; None where there is no derivative.
-    ``meaning`` is for the comments of generated code.
+    ``closed`` are the forms for s > 0 and for s < 0, or one for both, in terms of a library of functions, s and
+    √|s|. The library is math, an mpmath context, or a printer of formulas. ``known`` is the form for s > 0, and
+    ``slopes`` is the derivative, as in `phigen.symbolic.functions`; None without a derivative. ``meaning`` is the
+    comment in generated code.
     """
 
     meaning: str
@@ -123,7 +123,7 @@ class _Library:
 
 
 def by_closed_form(library: Any, name: str, s: Any) -> Any:
-    """The value where s is not small, from functions of a library."""
+    """The value where s is not small, with functions of a library."""
     forms = ENTIRE[name].closed
     return forms[0 if s > 0 else -1](_Library(library), s, library.sqrt(abs(s)))
 
@@ -140,7 +140,7 @@ def in_double(name: str, s: float) -> float:
 
 
 def precisely(context: Any, name: str, s: Any) -> Any:
-    """The value in an mpmath context, to its precision but for a few digits."""
+    """The value in an mpmath context, to its precision except for a few digits."""
     function = ENTIRE[name]
     if abs(s) > 1:
         return by_closed_form(context, name, s)

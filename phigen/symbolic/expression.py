@@ -100,7 +100,7 @@ class Expression:
 
     @property
     def digest(self) -> bytes:
-        """A hash of the content, equal in every process: the order of commuting factors rests on it."""
+        """A hash of the content, equal in every process; it determines the order of commuting factors."""
         stack = [] if self._digest else [self]
         while stack:
             node = stack[-1]
@@ -280,7 +280,7 @@ def mul(a: Expression, b: Expression) -> Expression:
         return neg(mul(a.args[0], b))
     if b.op == "neg":
         return neg(mul(a, b.args[0]))
-    # A number is kept outermost, so that it meets the numbers of later factors.
+    # A number is the outermost factor, so that it is combined with the numbers of later factors.
     if a.op == "mul" and a.args[0].is_number:
         return mul(a.args[0], mul(a.args[1], b))
     if b.op == "mul" and b.args[0].is_number:
@@ -352,7 +352,7 @@ def total(terms: Iterable[Expression]) -> Expression:
 
 
 def total_at(terms: Mapping[int, Expression]) -> Expression:
-    """`total` of a list that has these terms at their places and 0 elsewhere: the same tree, without the zeros."""
+    """`total` of a list that has these terms at their positions and 0 elsewhere: the same tree, without the zeros."""
     items = dict(sorted(terms.items()))
     while len(items) > 1 or any(items):
         sums: dict[int, Expression] = {}
@@ -380,9 +380,9 @@ def _balanced(
 
 
 def topological(roots: Iterable[Expression], known: Container[int] = ()) -> list[Expression]:
-    """All nodes below the roots, arguments before what uses them; the order depends on the content only.
+    """All nodes below the roots, arguments before the nodes that use them; the order depends on the content only.
 
-    ``known`` has the ``id`` of nodes that are left out, with what is below them.
+    Nodes whose ``id`` is in ``known`` are left out, with everything below them.
     """
     order: list[Expression] = []
     done: set[Expression] = set()
@@ -445,7 +445,7 @@ def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
 
 
 def familiar(roots: Sequence[Expression]) -> list[Expression]:
-    """The roots with phigen's own functions written by well-known ones, for s > 0 where that matters."""
+    """The roots with phigen's own functions replaced by well-known ones, for s > 0 if that matters."""
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         known = FUNCTIONS[node.op].known if node.op in FUNCTIONS else None
@@ -556,8 +556,7 @@ _PRECEDENCE = {"add": 1, "sub": 1, "neg": 1, "mul": 2, "pow": 3}
 def text(e: Expression, longest: int = 2000) -> str:
     """The expression in the syntax of a spec; parsing it gives an equal expression.
 
-    Meant for messages: a shared sub-expression is written out wherever it occurs, and what would be longer
-    is cut with an ellipsis.
+    For messages: a shared sub-expression is repeated wherever it occurs, and long texts are cut with an ellipsis.
     """
 
     def wrap(part: tuple[str, int], level: int) -> str:

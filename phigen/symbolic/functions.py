@@ -1,4 +1,4 @@
-"""The elementary functions: everything phigen knows of each, in one record.
+"""The elementary functions: one record for each, with all facts about it.
 
 Rules are callables of plain arithmetic. They take ``call``, which applies a function by its name, so that one rule
 serves expressions, sympy, numbers and elements of a ring alike.
@@ -36,11 +36,11 @@ class Function:
     its values are rational there. ``cost`` is in units of one addition. ``own`` are those of phigen's own, which no
     spec can name.
 
-    ``written`` is how a language writes it: a name, or a text with ``{0}``, ``{1}`` for the arguments; in languages
-    that are not there a function of the generated file does it. ``lanes`` is the same for C's loops over lanes, by
-    functions that have a version for them, whose own entry is their name; ``inline`` ones are instructions or
-    arithmetic in any case.
-    ``near`` tells that flows call a polynomial where arguments are small. ``letters`` is the name in mathematics.
+    ``written`` is its spelling in a language: a name, or a text with ``{0}``, ``{1}`` for the arguments; in
+    languages without an entry, the generated file defines it. ``lanes`` is the same for C's loops over lanes, by
+    functions that have a vectorised version, whose own entry is their name; ``inline`` ones are instructions or
+    arithmetic. ``near`` says that flows call a polynomial for small arguments. ``letters`` is the name in
+    mathematics.
     """
 
     name: str
@@ -340,7 +340,7 @@ def _entire(name: str) -> Function:
     )
 
 
-#: All of them by name, in the order in which files define and lists show them.
+#: All functions by name, in the order in which files define and list them.
 FUNCTIONS: dict[str, Function] = {f.name: f for f in _LISTED}
 FUNCTIONS |= {name: _phi(order) for order, name in enumerate(SPECIAL)}
 FUNCTIONS |= {name: _entire(name) for name in ENTIRE}

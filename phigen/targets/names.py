@@ -14,7 +14,7 @@ from phigen.targets.reserved import Reserved
 
 
 def identifiers(names: Iterable[str], reserved: Reserved) -> dict[str, str]:
-    """Return distinct identifiers for names, in their order. Names that are not reserved are their own identifiers."""
+    """Return distinct identifiers for names, in their order. Names that are not reserved are unchanged."""
     names = list(names)
     chosen = {name: name for name in names if name not in reserved}
     for name in names:

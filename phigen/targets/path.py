@@ -27,7 +27,7 @@ class Syntax:
 
     printer: Callable[[Scope], Printer]
     slope: str  # the statement that sets coefficient k + 1 of coordinate i
-    sums: str  # what a sum over orders is called, by its {kind} or {Kind}
+    sums: str  # the name of a sum over orders, by its {kind} or {Kind}
     covector: str = "p[{i}]"  # component i of p
     fixed: str = "f[{i}] = {value};"  # the statement that defines fixed value i
     held: str = "f[{i}]"  # that value

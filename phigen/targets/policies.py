@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from phigen.scheme.policies import POLICIES, MeasurePolicy, Policy, PolicyConstant
 from phigen.scheme.program import Program
 
-#: Powers of two below this exponent are written as such: they are bounds on rounding.
+#: Numbers below this power of two are printed as powers of two: they are bounds on rounding errors.
 _LEAST_EXPONENT = -20
 
 

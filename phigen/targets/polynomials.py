@@ -10,7 +10,8 @@ _BLOCK = 4
 
 
 def estrin(coefficients: Sequence[Fraction], variable: str, first: str = "a") -> tuple[list[str], str]:
-    """Statements, and the value of Σ c_k variable^k: Estrin's scheme in blocks of four, these by Horner's rule.
+    """Return statements, and the value of Σ c_k variable^k: Estrin's scheme in blocks of four, each by Horner's
+    rule.
 
     Blocks are named by letters from ``first`` on.
     """

@@ -1,4 +1,4 @@
-"""Trees over symbols as infix text: what C and Python have in common."""
+"""Trees over symbols as infix text: the common part of C and Python."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Printed = tuple[str, int]
 
 
 class Printer:
-    """Prints lowered trees (see `phigen.scheme.lowering`); a target gives names, literals and functions."""
+    """Prints lowered trees (see `phigen.scheme.lowering`); targets define names, literals and functions."""
 
     def __init__(
         self,
@@ -25,20 +25,21 @@ class Printer:
         point: str = ".0",
         real: str = "{0!r}",
     ) -> None:
-        """``point`` follows whole numbers, ``real`` is the text of any other number."""
+        """``point`` follows integers, ``real`` is the text of any other number."""
         self.name, self.functions, self.constants, self.power, self.point = name, functions, constants, power, point
         self.real = real
 
     def __call__(self, e: Expression) -> str:
-        """The tree as text."""
+        """Return the tree as text."""
         return self.bound(e)[0]
 
     def bound(self, e: Expression) -> Printed:
-        """The tree as text, and how strongly it binds."""
+        """Return the tree as text, and its binding strength."""
         return fold([e], self._visit)[0]
 
     def literal(self, value: Fraction) -> Printed:
-        """A rational number: exact where it is, else a quotient or the nearest double, shortest form."""
+        """Return a rational number as text: exact if possible, else as a quotient or the nearest double, in shortest
+        form."""
         if value < 0:
             return "-" + self.literal(-value)[0], SUM
         if value.denominator == 1 and value < 2**53:

@@ -23,5 +23,5 @@ def _environment(target: str) -> jinja2.Environment:
 
 
 def render(target: str, template: str, values: Mapping[str, object]) -> str:
-    """The text of ``templates/TARGET/TEMPLATE.jinja`` with the values put in; a missing value is an error."""
+    """Return the text of ``templates/TARGET/TEMPLATE.jinja`` with the values inserted; a missing value is an error."""
     return _environment(target).get_template(template + ".jinja").render(values)

@@ -39,7 +39,7 @@ virtual wchar_t xor xor_eq fortran far near main size_t ptrdiff_t"""
 _OPENCL = """constant event_t generic global half kernel local pipe quad read_only read_write sampler_t uchar uint ulong
 uniform ushort write_only"""
 
-# Macros of the standard headers, and of those that they include, which belong to no family below.
+# Macros of the standard headers, and of headers that these include, that belong to no family below.
 _C_MACROS = """AIO_PRIO_DELTA_MAX BC_BASE_MAX BC_DIM_MAX BC_SCALE_MAX BC_STRING_MAX BIG_ENDIAN
 BITINT_MAXWIDTH BUFSIZ BYTE_ORDER CHARCLASS_NAME_MAX CHAR_BIT CLOCKS_PER_SEC COLL_WEIGHTS_MAX CPU_SETSIZE CSIGNAL
 DELAYTIMER_MAX DOMAIN EOF EXIT_FAILURE EXIT_SUCCESS EXPR_NEST_MAX FD_SETSIZE FILENAME_MAX FOPEN_MAX F_LOCK F_OK F_TEST
@@ -74,7 +74,7 @@ _SIGINFO = """addr addr_lsb arch band call_addr fd int lower overrun pid pkey pt
 utime value"""
 _ATOMIC = "init|load|store|exchange|compare_exchange_strong|compare_exchange_weak|fetch_(add|and|or|sub|xor)"
 
-#: Families of reserved names: all that begins with an underscore, and macros that differ in a part only.
+#: Families of reserved names: all names with an initial underscore, and macros that differ in a part only.
 _C_FAMILIES = (
     r"_\w*",
     rf"({_INTEGERS}|SIG_ATOMIC|WCHAR|WINT)_(MAX|MIN|WIDTH)",
@@ -88,8 +88,8 @@ _C_FAMILIES = (
     r"(bool|u?(char|short|int|long)|half|float|double)(2|3|4|8|16)",
 )
 
-#: Keywords of C and C++ up to C23 and C++26, and of OpenCL C, and what the standard headers make a macro of, on Linux
-#: and elsewhere.
+#: Keywords of C and C++ up to C23 and C++26, and of OpenCL C, and macros of the standard headers, on Linux and
+#: elsewhere.
 C_RESERVED = Reserved(
     frozenset([*_C.split(), *_OPENCL.split(), *_C_MACROS.split(), *(f"E{e}" for e in _ERRNO.split())]),
     re.compile("|".join(_C_FAMILIES)),
@@ -102,7 +102,7 @@ global if import in is lambda nonlocal not or pass raise return try while with y
 print self DIM ORDER CASIMIRS DEFAULT_PARAMETERS StepError step integrate hamiltonian casimirs vector_field
 OBSERVABLES observables x0 steps stride parameters _filled _sum _values"""
 
-#: Keywords of Python, names that it gives a meaning, and what the generated module calls by name.
+#: Keywords of Python, names with a meaning in Python, and names that the generated module uses.
 PYTHON_RESERVED = Reserved(frozenset(_PYTHON.split()), re.compile(r"__\w*__"))
 
 # -- JavaScript

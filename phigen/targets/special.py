@@ -20,7 +20,7 @@ from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
 
-#: Means after which the arithmetic–geometric mean has converged for any two numbers.
+#: Iterations after which the arithmetic–geometric mean has converged for any two numbers.
 MOST_MEANS = 16
 
 _MEANING = (
@@ -37,14 +37,14 @@ _CLOSED = (
 
 
 def used(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
-    """The functions of `SPECIAL` that the kernels call, in order, but those that are ``unprinted``."""
+    """The functions of `SPECIAL` that the kernels call, in order, except the ``unprinted`` ones."""
     kernels = [kernel for kernel in program.kernels if kernel not in unprinted]
     ops = {e.op for e in topological([e for kernel in kernels for e in kernel.roots])}
     return [name for name in SPECIAL if name in ops]
 
 
 def values(function: str, name: str) -> Mapping[str, object]:
-    """The values of the template for one function, which is called ``name`` in the output."""
+    """The values of the template for one function, named ``name`` in the output."""
     order = order_of(function)
     near, rest = near_coefficients(order), rest_coefficients(order)
     return {
@@ -64,26 +64,28 @@ def values(function: str, name: str) -> Mapping[str, object]:
 
 
 def closed(order: int) -> tuple[str, ...]:
-    """The closed form of a derivative of φ, and what it needs, from c = w cot w, in C and in Python."""
+    """The closed form of a derivative of φ, and the values that it reads, in terms of c = w cot w, in C and in
+    Python."""
     return _CLOSED[: order + 1]
 
 
 class _Calls:
-    """A library whose functions make formulas."""
+    """A math library whose functions occur in formulas."""
 
     def __getattr__(self, name: str) -> Callable[..., Expression]:
         return lambda *arguments: call(name, *arguments)
 
 
 def _closed_forms(function: str) -> list[Expression]:
-    """The closed forms of a function of `ENTIRE`, for s > 0 and for s < 0, or one for both; with √|s| as ``root``."""
+    """The closed forms of a function of `ENTIRE`, for s > 0 and for s < 0, or one for both; ``root`` stands for
+    √|s|."""
     return [form(_Calls(), symbol("s"), symbol("root")) for form in ENTIRE[function].closed]
 
 
 def far(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict[str, object]:
-    """The closed form of a function of `ENTIRE` in a language, and whether it has the ``root`` of |s|.
+    """The closed form of a function of `ENTIRE` in a language, and whether it contains the ``root`` of |s|.
 
-    ``choice`` says {0} for s > 0 and {1} for s < 0.
+    ``choice`` is the spelling of {0} for s > 0 and {1} for s < 0.
     """
     forms = _closed_forms(function)
     texts = [printer(Scope(Reserved()))(expand_powers([form])[0]) for form in forms]
@@ -91,7 +93,7 @@ def far(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict
 
 
 def entire_used(program: Program) -> list[str]:
-    """The functions of `ENTIRE` that the kernels call, and those that these need, in order."""
+    """The functions of `ENTIRE` that the kernels call, and those that these call, in order."""
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     for f in (f for f in ENTIRE if f in ops):
         ops = ops | {e.op for e in topological(_closed_forms(f))}
@@ -104,7 +106,7 @@ def calls_anomaly(program: Program) -> bool:
 
 
 def elliptic_used(program: Program) -> list[str]:
-    """The functions of `ELLIPTIC` that kernels call, and the first of them where others are called."""
+    """The functions of `ELLIPTIC` that kernels call, and the first of them if any other is called."""
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     called = [name for name in ELLIPTIC if name in ops]
     return called if not called or called[0] == ELLIPTIC[0] else [ELLIPTIC[0], *called]
@@ -127,7 +129,7 @@ def elliptic_texts(names: Sequence[str], render: Callable[[str, Mapping[str, obj
         "ratio": repr(elliptic.MEAN_RATIO),
         "most": MOST_MEANS,
         "circle": repr(2 * math.pi),
-        # the error of the last polynomial is below rounding where the spread is this part of the mean
+        # the error of the last polynomial is below rounding if the spread is at most this fraction of the mean
         "spread": repr((2.2e-16 / 4) ** (-1 / 6)),
         "duplications": elliptic.LANE_DUPLICATIONS,
     }
@@ -162,9 +164,9 @@ def stumpff() -> tuple[list[Fraction], list[Fraction]]:
 
 
 def anomaly_values(*, single: bool = False) -> dict[str, object]:
-    """The values of the templates of the anomaly that all languages share; ``single`` is for numbers of 32 bits.
+    """The values of the templates of the anomaly that all languages share; ``single`` is for 32-bit numbers.
 
-    ``unit`` is the unit of rounding, and ``rounding`` a tenth of it: what an iteration may leave of the solution.
+    ``unit`` is the unit of rounding, and ``rounding`` a tenth of it: the remaining error of the iteration.
     """
     if single:
         return {"most": MOST_ITERATIONS, "radial": "1e-12", "unit": "1.2e-7", "rounding": "1e-8"}
@@ -177,7 +179,7 @@ def largest_exponential(program: Program) -> int:
 
 
 def transposes_exponentials(program: Program) -> bool:
-    """Whether cotangents are pulled back through exponentials of matrices, those that parameters enter."""
+    """Whether cotangents are pulled back through matrix exponentials that depend on parameters."""
     return program.step.adjoint is not None and program.step.adjoint.prepare.exponents is not None
 
 

@@ -15,7 +15,7 @@ from phigen.targets.language import Language
 from phigen.targets.names import Scope
 from phigen.targets.printer import ATOM, PRODUCT, SUM
 
-#: Binding strength of operators, as in `phigen.targets.printer`, and of what needs no parentheses.
+#: Binding strength of operators, as in `phigen.targets.printer`, and of values that need no parentheses.
 _STRENGTH = {"or": 1, "and": 1, "+": 3, "-": 3, "*": 4, "/": 4, "%": 4}
 _STRENGTH |= dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), 2)
 _ATOM = 9
@@ -44,7 +44,7 @@ class Spelling:
     """The identifiers of one function, and its values as text."""
 
     def __init__(self, dialect: Dialect, reserved: Iterable[str], body: ir.Block) -> None:
-        """Names of the spec come first, so that they are changed only where they are ``reserved``.
+        """Names of the spec come first, so that they are changed only if they are ``reserved``.
 
         Names that statements fix are reserved, and so are functions that the dialect can call.
         """

@@ -1,8 +1,8 @@
-"""The state of a solver, block by block: what it consists of, and what copies, rollback and a new step size do to it.
+"""The state of a solver, block by block: its members, and how copies, rollback and a new step size treat them.
 
-A block belongs to the solvers for whose switches its condition holds. From the blocks follow, in C, the members of the
-struct, the copies that a step of several stages makes and takes back where a stage fails, and what begins anew with
-another step size; in JavaScript, what a copy of a solver takes over.
+A block belongs to the solvers whose switches satisfy its condition. The blocks determine, in C, the members of the
+struct, the copies by which a step of several stages is undone if a stage fails, and the statements for another step
+size; in JavaScript, the fields that a copy of a solver has.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class StateBlock:
     copied: tuple[str, ...] = ()
 
     def save(self) -> Iterator[str]:
-        """Copies of what a step changes."""
+        """Copies of the members that a step changes."""
         arrays = [f"{member}[{size}]" for member, size in self.saved if size]
         numbers = [f"{member} = s->{member}" for member, size in self.saved if not size]
         yield from [f"double {', '.join(arrays)};"] if arrays else []
@@ -38,7 +38,7 @@ class StateBlock:
         yield from (f"PHI_COPY({member}, s->{member}, {member}, {size});" for member, size in self.saved if size)
 
     def restore(self) -> Iterator[str]:
-        """The state from its copies."""
+        """Restoration of the state from its copies."""
         for member, size in self.saved:
             yield f"PHI_COPY(s->{member}, {member}, {member}, {size});" if size else f"s->{member} = {member};"
 
@@ -105,12 +105,12 @@ STATE = (
     StateBlock(
         "coef",
         "NOISE",
-        (f"{_COEFFICIENTS} /* functions of params and h; behind them, functions of dw and time too */",),
+        (f"{_COEFFICIENTS} /* functions of params and h, then functions of dw and time too */",),
     ),
     StateBlock(
         "coef",
         "RENEWED && !NOISE",
-        (f"{_COEFFICIENTS} /* functions of params and h; behind them, functions of the time too */",),
+        (f"{_COEFFICIENTS} /* functions of params and h, then functions of the time too */",),
     ),
     StateBlock(
         "coef", "!RENEWED && !NOISE", (f"{_COEFFICIENTS} /* functions of params and h, computed when h changes */",)
@@ -202,7 +202,7 @@ STATE = (
 
 
 def copied(switches: Mapping[str, bool]) -> list[str]:
-    """The statements in JavaScript by which a copy of a solver takes over its state."""
+    """The statements in JavaScript that copy the state to another solver."""
     return [line for block in STATE if block.copied and belongs(block, switches) for line in block.copied]
 
 

@@ -168,7 +168,7 @@ def _counted(variable: str, end: ir.Value, body: ir.Block) -> ir.Loop:
 
 
 def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:
-    """Yield the calls that set extremes to what every value replaces; sums are set to 0 by the caller."""
+    """Yield the calls that set extremes to their initial values; callers set sums to 0."""
     for s in loop.body:
         if isinstance(s, ir.Store) and s.extreme:
             ends = _of_field(ir.Constant(0), s.array.number), _of_field(ir.Constant(0), s.array.number + 1)
@@ -183,7 +183,7 @@ def _of_field(site: ir.Value, number: int) -> ir.Value:
 
 
 def _sites_of(selection: ir.Selection) -> ir.Value | None:
-    """Return the list of the sites that a sweep updates; None where it updates all."""
+    """Return the list of the sites that a sweep updates; None if it updates all sites."""
     if selection.window is not None:
         return ir.Member(SITES, "beside")
     if selection.colour is None and not selection.inside:

@@ -1,6 +1,6 @@
-"""Cutting of long straight-line functions, since compilers take quadratic time for these.
+"""Splitting of long straight-line functions, whose compile time is quadratic in their length.
 
-Each store is as early as its value is known. A temporary that a later part reads becomes an entry of a workspace array.
+Each store is moved to the earliest place. A temporary that a later part reads becomes an entry of a workspace array.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ WORKSPACE = ir.fixed("work")
 
 
 def cut(function: ir.Function, size: int) -> list[ir.Function]:
-    """Return a function of kernels in parts of at most ``size`` statements; arrays are cleared in none of them."""
+    """Return a function of kernels in parts of at most ``size`` statements; none of the parts clears arrays."""
     statements = [s for s in function.body if is_temporary(s) or isinstance(s, ir.Assign)]
     if len(statements) <= size:
         return [function]

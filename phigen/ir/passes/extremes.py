@@ -1,4 +1,4 @@
-"""Statements that keep the largest or the least of several values, of which one that is not a number stays."""
+"""Statements that compute the largest or smallest of several values; NaN propagates."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from collections.abc import Iterator
 
 from phigen.ir import nodes as ir
 
-#: The comparison by which a value replaces the one that is kept.
+#: The comparison by which a value replaces the present extreme.
 _COMPARISONS = {"max": ">", "min": "<"}
 
 
 def limit(extreme: str, infinity: str) -> ir.Name:
-    """Return the value that every other one replaces; ``infinity`` is its name in the language."""
+    """Return the initial value of an extreme, which every other value replaces; ``infinity`` is its name in the
+    language."""
     return ir.fixed(infinity if extreme == "min" else f"-{infinity}")
 
 

@@ -19,8 +19,8 @@ from phigen.symbolic.special import SPECIAL
 #: replace those of the library for any argument.
 NEAR, LANE, OWN = "_near", "_lane", "_own"
 
-#: The versions of functions in loops over lanes; those in loops over sites, where functions with a removable
-#: singularity have a version for small arguments only; and those among them that have a value at any argument.
+#: Versions of functions in loops over lanes; versions in loops over sites, where functions with a removable singularity
+#: have a small-argument form only; and those of the latter that are defined for all arguments.
 SIMD = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
 IN_LANES = {f: version for f, version in SIMD.items() if f not in SPECIAL}
 FULL_RANGE = {f: version for f, version in IN_LANES.items() if f in FULL_RANGE_FUNCTIONS}
@@ -49,10 +49,10 @@ def calling(function: ir.Function, versions: Mapping[str, str]) -> ir.Function:
 def forms_of(
     functions: Iterable[ir.Function], small_argument: Iterable[str], limited: Set[str], versions: Mapping[str, str]
 ) -> dict[str, Mapping[str, str]]:
-    """Return the forms that some functions need together, by the ends of their names, with the versions to call.
+    """Return the forms that some functions need together, as suffixes of their names, with the versions to call.
 
     ``small_argument`` are the elementary functions that have a small-argument version. Functions that call no
-    ``limited`` ones, which have no value at large arguments, need one form, without an end.
+    ``limited`` ones (undefined at large arguments) need one form, without a suffix.
     """
     graphs = [v for f in functions for v in values(f.body) if isinstance(v, Expression)]
     if {e.op for e in topological(graphs)}.isdisjoint(limited):

@@ -30,7 +30,7 @@ def _weight(s: ir.Statement) -> str:
 
 
 def _without_weights(body: ir.Block) -> Iterator[ir.Statement]:
-    """Yield the statements with 1 for all weights, without sums to which nothing is added then."""
+    """Yield the statements with 1 for all weights, and without sums that become empty."""
     ones = dict.fromkeys(filter(None, map(_weight, body)), ONE)
     graphs = (s.value for s in body if isinstance(s, ir.Update))
     values = iter(substitute([e for e in graphs if isinstance(e, Expression)], ones))

@@ -57,9 +57,9 @@ class Transpose:
     """A transposed function on the level of sites, and the arrays of its cotangents.
 
     The function reads cotangents of the kind ``seed``: those of the fields with the numbers ``fields``, or else the
-    variation of the row. It stores the cotangents of neighbours as ``handed``, and those of sums over bonds or pairs
-    in arrays from ``sums_from`` on; ``summed`` is the number of these sums. First it adds the cotangents ``received``
-    from the loop before it. The fields ``recomputed`` are written too.
+    variation of the row. It stores contributions to the cotangents of neighbours in the arrays ``handed``, and those
+    of sums over bonds or pairs in arrays from ``sums_from`` on; ``summed`` is the number of these sums. First it
+    adds the cotangents ``received`` from the loop before it. The fields ``recomputed`` are written too.
     """
 
     function: ir.Function

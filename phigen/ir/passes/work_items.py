@@ -11,8 +11,8 @@ from phigen.ir.passes.extremes import keep, limit
 from phigen.ir.passes.row_loops import compensated_sum
 from phigen.symbolic.symbols import Symbol
 
-#: Number of the site of a work item, of the other site of a bond or pair, of the bond among those of a site, and the
-#: number of all sites.
+#: Index of the site of a work item, of the other site of a bond or pair, of the bond among those of a site; the number
+#: of all sites.
 SITE, OTHER, BOND, COUNT = map(ir.fixed, ("i", "j", "b", "count"))
 
 #: The first arguments of all kernels, before the arrays.
@@ -24,7 +24,7 @@ _ARRAYS = ("neighbours", "weights", "on_seams", "at_sites", "dw", "x", "start", 
 _OF_GRAPHS = ("starts", "others", "at_bonds", "colours", "colour")
 _OF_SUMS = ("sums", "adds")
 
-#: Names in a kernel that fields and parameters make way for.
+#: Names used by kernels; fields and parameters with these names are renamed.
 KERNEL_NAMES = (*ARGUMENTS, *_ARRAYS, *_OF_GRAPHS, *_OF_SUMS, "coef", "i", "j", "b", "k")
 
 #: The arrays of outputs, and others, by their kinds.
@@ -60,7 +60,7 @@ def work_items(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
 
 @dataclass
 class _WorkItems:
-    """The lowering of one function; ``declared`` are the neighbours that have a name already."""
+    """The lowering of one function; ``declared`` are the neighbours that already have a name."""
 
     lattice: LatticeLoops
     declared: set[int] = field(default_factory=set)
@@ -84,7 +84,7 @@ class _WorkItems:
         yield from (ir.Assign(self._element(s.array, SITE), total) for s, total in zip(stores, totals, strict=True))
 
     def lowered(self, s: ir.Statement) -> Iterator[ir.Statement]:
-        """Yield the statements on memory for one on the level of sites."""
+        """Yield the statements on the level of memory for one on the level of sites."""
         match s:
             case ir.Store(array, value, adds):
                 yield from self._stored(array, value, adds=adds)
@@ -157,7 +157,7 @@ def _entry(array: str, site: ir.Value, number: int = 0) -> ir.Value:
 
 
 def _of_array(site: ir.Value, number: int) -> ir.Value:
-    """Return the index of a site in one of several arrays that follow one another."""
+    """Return the index of a site in one of several consecutive arrays."""
     if number == 0:
         return site
     return ir.Binary("+", site, COUNT if number == 1 else ir.Binary("*", ir.Constant(number), COUNT))

@@ -1,1 +1,1 @@
-"""Solvers on devices: OpenCL by pyopencl, CUDA by CuPy. Nothing of these packages is imported otherwise."""
+"""Solvers on devices: OpenCL by pyopencl, CUDA by CuPy. Both packages are imported only when a device is opened."""

@@ -1,4 +1,4 @@
-"""NVIDIA's cards, by CuPy."""
+"""CUDA devices (NVIDIA), by CuPy."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
 
-#: Products and sums are rounded one by one, as those of C: results have the same bits.
+#: No fused multiply-adds: results have the same bits as those of C.
 _OPTIONS = ("--fmad=false",)
 
 
 class CUDADevice:
-    """A card of NVIDIA."""
+    """A CUDA device."""
 
     target = "cuda"
     double = True
@@ -64,12 +64,12 @@ class CUDADevice:
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
         """See `phigen.runtime.devices.device.Device`."""
-        group = kernel.max_threads_per_block  # that of the launch bounds
+        group = kernel.max_threads_per_block  # as in the launch bounds of kernels
         passed = tuple(np.uint64(0) if argument is None else argument for argument in arguments)  # a null pointer
         self._tried(lambda: kernel((-(-items // group),), (group,), passed))
 
     def _tried(self, call: Callable[[], Result]) -> Result:
-        """Return the result of a call of CUDA, with its errors as those of the protocol."""
+        """Return the result of a call of CUDA; its errors become those of the device protocol."""
         cuda = self._cupy.cuda
         try:
             with cuda.Device(self._index):

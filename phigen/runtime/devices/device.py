@@ -25,13 +25,13 @@ class Device(Protocol):
 
     target: str
     name: str
-    memory: int  # bytes of its memory
-    largest: int  # bytes of the largest array
+    memory: int  # bytes of device memory
+    largest: int  # bytes of the largest possible array
     units: int  # compute units, each of which runs many work items
-    double: bool  # whether it has numbers in double precision
+    double: bool  # whether double precision is supported
 
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
-        """Return the program of a source text, with macros that are ``defined``.
+        """Return the program of a source text, with ``defined`` macros.
 
         Raises `DeviceError` with the messages of the compiler.
         """
@@ -42,7 +42,7 @@ class Device(Protocol):
         ...
 
     def empty(self, size: int) -> Any:
-        """Return a new buffer of a number of bytes."""
+        """Return a new buffer of the given number of bytes."""
         ...
 
     def write(self, buffer: Any, array: Any) -> None:
@@ -50,11 +50,11 @@ class Device(Protocol):
         ...
 
     def read(self, buffer: Any, array: Any) -> None:
-        """Wait for all that was launched, and copy a buffer into a contiguous array."""
+        """Wait for all launched kernels, and copy a buffer into a contiguous array."""
         ...
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
-        """Run a kernel for at least a number of work items, in groups of the size that it is compiled for."""
+        """Run a kernel for at least the given number of work items, in groups of the size that it was compiled for."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""Arrays on a device with the arithmetic of NumPy, as far as implicit steps of lattices need it."""
+"""Arrays on a device with the arithmetic of NumPy that implicit steps of lattices use."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from phigen.runtime.devices.launching import Launcher
 from phigen.runtime.interface import Floats
 
-#: Numbers of operations in the kernel ``combine``.
+#: Codes of operations in the kernel ``combine``.
 _OPERATIONS = {"add": 0, "subtract": 1, "multiply": 2, "divide": 3, "absolute": 4, "isfinite": 5}
 
 
@@ -29,7 +29,7 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
 
     @property
     def size(self) -> int:
-        """The number of numbers."""
+        """The number of entries."""
         return int(np.prod(self.shape))
 
     def __array_ufunc__(self, ufunc: Any, method: str, *operands: Any, **options: Any) -> Any:
@@ -58,7 +58,7 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
         return DeviceArray(self.launcher, result, self.shape)
 
     def max(self, axis: Any = None) -> Any:
-        """Return the largest number, or that of each field where ``axis`` lists all others."""
+        """Return the largest entry, or that of each field if ``axis`` lists all other axes."""
         return self._reduced("max", axis)
 
     def sum(self, axis: Any = None) -> Any:
@@ -66,7 +66,7 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
         return self._reduced("sum", axis)
 
     def all(self) -> bool:
-        """Return whether no number is 0."""
+        """Return whether all entries differ from 0."""
         return bool(self._reduced("min", None))
 
     def _reduced(self, kind: str, axis: Any) -> Any:
@@ -75,5 +75,5 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
         return float(values[0]) if axis is None else values
 
     def read(self) -> Floats:
-        """Return the numbers on the host."""
+        """Return the entries as an array on the host."""
         return self.launcher.read(self.buffer, self.shape)

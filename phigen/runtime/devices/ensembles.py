@@ -19,22 +19,22 @@ from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface, stat
 from phigen.runtime.members import Members
 from phigen.runtime.session import Session
 
-#: Part of the memory of a device that a batch of members may take; the rest is for other programs and for spills.
+#: Share of the device memory for a batch of members; the rest is for other programs and for register spills.
 _SHARE = 0.5
 
 #: Steps of members in one launch for each compute unit: about a second. Between launches Python delivers keyboard
-#: interrupts, and systems that stop long kernels have no reason to.
+#: interrupts, and systems with a watchdog for kernels do not stop them.
 _STEPS_PER_UNIT = 1 << 24
 
-#: Least members of a launch for each compute unit, so that it has enough to do while others wait for memory.
+#: Smallest number of members in a launch for each compute unit: enough to hide the latency of memory.
 _MEMBERS_PER_UNIT = 2048
 
 
 class DeviceSolver:
     """Back end over a generated header for devices, and over a back end for the host.
 
-    ``defined`` are macros of the generated code: NAME_GROUP, the number of work items in a group, on which results do
-    not depend.
+    ``defined`` are macros of the generated code: NAME_GROUP, the number of work items in a group, which does not
+    affect results.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class DeviceSolver:
         return DeviceSolver(self._files, self.interface, self.target, host, np.ascontiguousarray(gauge), self._index)
 
     def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`; ``threads`` is without effect.
+        """See `phigen.runtime.backend.Backend`; ``threads`` has no effect.
 
         Members are integrated in batches that fit into the memory of the device. Raises `DeviceError` if it fails; the
         ``trajectory`` of the error holds the results so far, NaN for other members.
@@ -79,7 +79,7 @@ class DeviceSolver:
         if turned is not None:
             raise TypeError(f"target {self.target} computes no attitudes of ensembles; compile for target c")
         if not len(members):
-            return self._host.ensemble(members, threads)  # it checks the parameters
+            return self._host.ensemble(members, threads)  # checks the parameters
         frames, final = members.frames() if members.stride else None, np.full(members.x0.shape, np.nan)
         if frames is not None:
             frames[1:] = np.nan
@@ -125,7 +125,7 @@ class DeviceSolver:
     def _integrate(
         self, members: Members, final: Floats, status: NDArray[np.uint8], frames: Floats | None, part: slice
     ) -> None:
-        """Integrate the members of one launch, and put their results in place."""
+        """Integrate the members of one launch, and store their results."""
         device, count, size = self.device, len(members), np.dtype(self._real).itemsize
         x = np.ascontiguousarray(members.x0.T, dtype=self._real)
         rows = members.steps // members.stride if frames is not None else 0
@@ -168,7 +168,7 @@ class DeviceSolver:
         return np.stack([np.broadcast_to(v, (count,)) for v in values], axis=-1)
 
     def _shared_or_each(self, values: Floats) -> list[Any]:
-        """Return a buffer of values for all members, or for each, and 1 if they are for each."""
+        """Return a buffer of values, one for all members or one for each, and 1 if there is one for each."""
         return [self._written(np.ascontiguousarray(values, dtype=self._real)), np.int32(len(values) > 1)]
 
     def _written(self, array: NDArray[Any]) -> Any:
@@ -184,7 +184,7 @@ class DeviceSolver:
         first: Floats | None = None,
         draws: Draws = FIRST_DRAWS,
     ) -> Session:
-        """See `phigen.runtime.backend.Backend`; a trajectory of its own runs on the host."""
+        """See `phigen.runtime.backend.Backend`; single trajectories run on the host."""
         return self._host.start(x0, parameters, t0, first, draws)
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:

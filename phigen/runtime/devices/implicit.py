@@ -1,4 +1,4 @@
-"""Implicit steps of lattices on devices: the module of the host makes them, with arrays that are on the device."""
+"""Implicit steps of lattices on devices: the NumPy module makes them, with arrays on the device."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from phigen.targets.c.real import THRESHOLD, threshold
 
 
 class ImplicitSession(DeviceLatticeSession):
-    """A session of a lattice whose stages are equations."""
+    """A session of a lattice with implicit stages."""
 
     def __init__(self, backend: DeviceLattice, *arguments: Any, timed: bool) -> None:
         super().__init__(backend, *arguments, timed=timed)
@@ -44,7 +44,7 @@ class ImplicitSession(DeviceLatticeSession):
         self._tell_time()
 
     def evaluated(self, name: str, coefficients: Any, start: Any, x: Any, varied: Any = None) -> DeviceArray:
-        """Return the result of a kernel of a stage, at fields ``x`` in its middle."""
+        """Return the result of a kernel of a stage with solution ``x`` (fields)."""
         if self._written is not coefficients:
             self._write_coefficients([coefficients])
             self._written = coefficients
@@ -60,7 +60,7 @@ class ImplicitSession(DeviceLatticeSession):
 def stepping_module(text: str, name: str, *, single: bool) -> Any:
     """Return the NumPy module of a lattice with kernels of stages that run on a device.
 
-    Thresholds are those of C in ``single`` precision.
+    In ``single`` precision, thresholds are those of C.
     """
     module: Any = load_module(text, name)
     module._relax = lambda coef, start, x, sites: sites.on_device.evaluated("relax", coef, start, x)

@@ -1,4 +1,4 @@
-"""Lattices on devices: fields stay there from step to step, and energies and observables come back as numbers."""
+"""Lattices on devices: fields stay on the device; energies and observables are transferred as numbers."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ from phigen.runtime.devices.site_tables import SiteTables
 from phigen.runtime.interface import FIRST_DRAWS, BackendError, Draws, Floats, LatticeInterface
 from phigen.runtime.numpy_lattice import NumpyLattice, NumpyLatticeSession
 
-#: Steps after which it is looked at whether all fields are finite; those of a failing step are made again one by one.
+#: Steps between checks that all fields are finite; after a failed check, these steps are repeated one by one.
 _STEPS_PER_LOOK = 64
 
 
 class DeviceLatticeSession(NumpyLatticeSession):
-    """A session whose state is on a device, and comes back where it is read. The module is that of the host."""
+    """A session whose state is on a device, and is copied to the host when it is read. The module is that of the
+    host."""
 
     def __init__(self, backend: DeviceLattice, *arguments: Any, timed: bool) -> None:
         self._interface, self._device = backend.interface, backend.device
@@ -55,7 +56,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._host, self._on_device = np.ascontiguousarray(value), False
 
     def _upload(self, compensation: Floats | None = None) -> None:
-        """Write a state to the device that was set on the host, with its compensation terms, 0 by default."""
+        """Copy a state that was set on the host to the device, with its compensation terms, 0 by default."""
         if self._on_device:
             return
         state = self._x.ravel()
@@ -109,7 +110,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
                 raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
 
     def _make(self, steps: int) -> None:
-        """Make steps without a look at the results."""
+        """Make steps without a check of the results."""
         self._host = None
         module, rows = self._module, self._rows
         constant = not (hasattr(module, "_renewed") or hasattr(module, "_draw"))
@@ -220,7 +221,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
 
 @contextmanager
 def resumable(steps: int) -> Iterator[None]:
-    """Raise `DeviceError` with a hint, where a device fails after a number of steps."""
+    """Raise `DeviceError` with a hint if a device fails after a number of steps."""
     try:
         yield
     except (DeviceError, OutOfMemoryError) as error:
@@ -229,7 +230,7 @@ def resumable(steps: int) -> Iterator[None]:
 
 
 class DeviceLattice(NumpyLattice):
-    """Back end over a generated header for devices, and over a NumPy module for what is computed on the host.
+    """Back end over a generated header for devices, and over a NumPy module for computations on the host.
 
     ``defined`` are macros of the generated code, see `phigen.runtime.devices.ensembles.DeviceSolver`.
     """

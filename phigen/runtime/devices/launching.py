@@ -12,10 +12,10 @@ from phigen.runtime.devices.device import Device
 from phigen.runtime.devices.site_tables import SiteTables
 from phigen.runtime.interface import Floats
 
-#: Numbers that a work item reduces in one pass. The order of sums depends on it, and on nothing else.
+#: Numbers that a work item reduces in one pass. It alone determines the order of sums.
 _REDUCED = 64
 
-#: Numbers of the kinds of reductions in kernels; a mean is a sum first.
+#: Codes of reductions in kernels; a mean starts as a sum.
 _KINDS = {"sum": 0, "mean": 0, "product": 1, "max": 2, "min": 3}
 
 
@@ -34,7 +34,7 @@ class Kernels:
 
 
 class Launcher:
-    """Launches for one lattice, whose numbers are of the type of its tables."""
+    """Launches for one lattice, in the precision of its tables."""
 
     def __init__(self, kernels: Kernels, tables: SiteTables) -> None:
         self.device, self.kernels, self.tables, self.real = tables.device, kernels, tables, tables.real
@@ -42,7 +42,7 @@ class Launcher:
         self._sums: Any = None
 
     def empty(self, numbers: int) -> Any:
-        """Return a new buffer of a number of reals."""
+        """Return a new buffer for the given number of reals."""
         return self.device.empty(max(1, numbers) * np.dtype(self.real).itemsize)
 
     def write(self, buffer: Any, values: Any) -> None:
@@ -56,7 +56,7 @@ class Launcher:
         return values.astype(np.float64, copy=False)
 
     def run(self, launch: SiteLaunch, coefficients: Any, first: int = 0, colour: int = 0, **buffers: Any) -> None:
-        """Compute the sums that a kernel reads, and launch it; ``buffers`` are its arrays beside the tables."""
+        """Compute the sums that a kernel reads, and launch it; ``buffers`` are its arrays besides the tables."""
         for k, sums in enumerate(launch.sums):
             self._launch(sums, (None, self.tables.count), coefficients, first, colour, adds=np.int32(k > 0), **buffers)
         self._launch(launch, self.tables.selected(launch), coefficients, first, colour, adds=np.int32(0), **buffers)
@@ -92,7 +92,7 @@ class Launcher:
         self.device.launch(self.kernels["copy"], numbers, [np.int32(numbers), source, target])
 
     def reduced(self, buffer: Any, kinds: Sequence[str], length: int) -> Floats:
-        """Return one number for each row of ``length`` numbers, by the kind of each row; what is no number stays.
+        """Return one number for each row of ``length`` numbers, by the kind of each row; NaN propagates.
 
         The order of the operations depends on the length only.
         """

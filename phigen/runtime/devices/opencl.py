@@ -13,8 +13,8 @@ from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
 
-#: Without relaxed arithmetic, results have the same bits as those of C. Kernels are short: warnings of drivers about
-#: unrolled loops say nothing.
+#: Without relaxed arithmetic, results have the same bits as those of C. Warnings of drivers about unrolled loops are
+#: suppressed.
 _OPTIONS = ["-w"]
 
 _MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY", "INVALID_BUFFER_SIZE")
@@ -75,7 +75,7 @@ class OpenCLDevice:
         return self._context.devices[0]
 
     def _tried(self, call: Callable[[], Result]) -> Result:
-        """Return the result of a call of OpenCL, with its errors as those of the protocol."""
+        """Return the result of a call of OpenCL; its errors become those of the device protocol."""
         try:
             return call()
         except self._cl.Error as error:

@@ -21,7 +21,7 @@ from phigen.targets.c.tokens import TokenKind, tokens
 from phigen.targets.c.unused import without_unused
 from phigen.targets.features import holds
 
-#: Names of phrases; those of the model are others (`phigen.targets.c.language`).
+#: Names of phrases; names of the model are in `phigen.targets.c.language`.
 _PHRASES = phrases.names()
 
 
@@ -52,9 +52,9 @@ class Amalgam:
         return left_out(self.switches)
 
     def text(self, file: str, spelt: Callable[[Sequence[str]], Sequence[str]] = lambda lines: lines) -> str:
-        """Return a file with all files that it includes and that were not included before.
+        """Return a file with all files that it includes, except those included before.
 
-        ``spelt`` spells its lines in another dialect of C.
+        ``spelt`` translates its lines to another dialect of C.
         """
         return _spaced(spelt(without_unused(self._expanded(file), f"{self.name}_")))
 
@@ -88,9 +88,9 @@ class Amalgam:
         return [*lines, *self._own(pending)]
 
     def _selected(self, text: str) -> list[str]:
-        """Return the lines of a text that remain for the switches."""
+        """Return the lines of a text that the switches select."""
         chosen: list[str] = []
-        frames: list[list[bool]] = []  # for each open #if: is this branch chosen, was one chosen, is it on a switch
+        frames: list[list[bool]] = []  # of open #ifs: this branch is on, one was on, on a switch
         for line in text.splitlines():
             directive, _, condition = line.partition(" ")
             if directive in ("#if", "#ifdef", "#ifndef"):

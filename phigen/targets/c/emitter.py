@@ -1,7 +1,7 @@
 """A program as C source: `NAME.h` and `NAME.c`.
 
-What depends on the model is printed: sizes, constants, kernels (`printed`). All else is the runtime, C that lies in
-``templates/c/runtime`` and is put together by `amalgamation` for the `features` of the program.
+The parts that depend on the model are printed: sizes, constants, kernels (`printed`). All else is the runtime: C in
+``templates/c/runtime``, assembled by `amalgamation` for the `features` of the program.
 """
 
 from __future__ import annotations
@@ -33,12 +33,11 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: Passes over a block that cost, per step, what an evaluation at one point costs: with loops that are vectorised, and
-#: with loops that are not as they call functions of the library, or with derivatives of paths, of which an evaluation
-#: at one point has no need.
+#: Iterations over a block that cost, per step, as much as one evaluation at one point: for vectorised loops, for loops
+#: that call library functions, and for paths, whose derivatives a single evaluation does not need.
 PASSES, PASSES_OF_CALLS = 2, 1
 
-#: Lines of a file that is read without a table of contents.
+#: Number of lines above which a file gets a table of contents.
 FEW_SCREENS = 240
 
 
@@ -64,7 +63,7 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
 def unrestricted(program: Program, code: str) -> str:
     """Return code that compilers without ``restrict`` accept too.
 
-    Only loops over lanes and sites become faster by it. Other code loses the word.
+    ``restrict`` makes only loops over lanes and sites faster. It is removed from other code.
     """
     if program.profile != "fast" and not program.step.kind.sites and "_EACH_LANE" not in code:
         return without_word(code, "restrict")
@@ -108,7 +107,7 @@ def policies(program: Program) -> dict[str, str]:
 
 
 def _declared_lines(program: Program) -> list[str]:
-    """The header comment of the declarations; that of the code says the rest."""
+    """The header comment of the declarations; the code has the other facts."""
     name = program.name
     return [
         f"The declarations of {name}.c. DO NOT EDIT: the checksum below notices.",

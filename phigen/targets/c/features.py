@@ -39,7 +39,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     stages = lanes if isinstance(lanes, Stages) else None
     yield Feature("BLOCKS", lambda p: blocks, ("RECURRENCES",), "lanes")
     yield Feature("TRACED", lambda p: (blocks or traces) and p.step.kind.implicit, ("ADJOINT",))
-    blocked = blocks or traces  # their reverse pass solves in lanes, and leaves few stages to single steps
+    blocked = blocks or traces  # the reverse pass is vectorised over stages, and rarely scalar
     yield Feature("UNROLLED_TRANSPOSE", lambda p: p.step.eliminate_transposed and not blocked, ("UNROLLED", "ADJOINT"))
     yield Feature("STAGED", lambda p: stages, part="lanes")
     yield Feature("NARROW", lambda p: isinstance(lanes, Stages | Traces) and lanes.narrow)
@@ -51,7 +51,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("ABREAST", lambda p: packs.transposes if packs else True, (together, "ADJOINT", "EACH"))
     yield Feature("UNDONE", lambda p: packs and packs.recomputed, ("ABREAST",))
     yield Feature("SPARSE", lambda p: blocks and blocks.factors, ("BLOCKS",))
-    full = blocks and blocks.factors is None  # whether Newton matrices are inverted, not kept as factors
+    full = blocks and blocks.factors is None  # whether Newton matrices are inverted rather than factorised
     yield Feature("SWEPT", lambda p: full, ("BLOCKS", "COMPOSED"))
     yield Feature("CENTRED", lambda p: p.step.centred, ("SWEPT",))
     yield Feature("INVERSE_UNROLLED", lambda p: p.step.invert, ("BLOCKS",))

@@ -1,8 +1,8 @@
 """The files of the runtime in C that only some solvers have, each with the condition for it.
 
-Other files include these without a condition: of a file that is left out, the include guard counts as defined. They
-call functions of `CALLS` without one too: where these are left out, so are the statements that call them, with the `if`
-or `for` before them on the line.
+Other files include these without a condition: if a file is left out, its include guard counts as defined. Other
+files call the functions of `CALLS` without a condition too: if a function is left out, so are the statements that
+call it, with an `if` or `for` before them on the line.
 """
 
 from __future__ import annotations

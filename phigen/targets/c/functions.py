@@ -1,4 +1,4 @@
-"""Functions of phigen's own in C: polynomials where these suffice, else libm."""
+"""Elementary functions defined by generated C: polynomials for small arguments, else formulas with libm."""
 
 from __future__ import annotations
 
@@ -34,11 +34,12 @@ from phigen.targets.polynomials import estrin
 from phigen.targets.rendering import render
 from phigen.targets.special import entire_used
 
-#: The functions of the library that have a version here, under whose name flows call them.
+#: The functions of the library that have a small-argument version here, under whose name flows call them.
 FLOW_FUNCTIONS = tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f not in (*ENTIRE, ANOMALY, *ELLIPTIC))
 
 
-#: Terms beyond this, relative to the first, are left out of series in single precision: a quarter of a rounding.
+#: Terms of series that are smaller than this, relative to the first, are omitted in single precision: a quarter of a
+#: rounding.
 _SINGLE_NEGLIGIBLE = 2.0**-26
 
 C = TypeVar("C", float, Fraction)
@@ -46,10 +47,11 @@ C = TypeVar("C", float, Fraction)
 
 @dataclass(frozen=True)
 class Small:
-    """A function by its series where the argument t is small: ±1/first!, ±1/(first + step)!, … with alternating signs.
+    """A function by its series for small arguments t: ±1/first!, ±1/(first + step)!, … with alternating signs.
 
-    Its variable z is t², or t where ``step`` is 1. ``far`` is the value elsewhere. ``flows`` have a radius, a number of
-    terms, and the value by their sum P; ``rows``, the loops over sites, the same with the fewest operations.
+    The variable z is t², or t if ``step`` is 1. ``far`` is the full-range formula. ``flows`` have a radius, a number
+    of terms, and the value as a function of the sum P; ``rows``, for loops over sites, has the same with the fewest
+    operations.
     """
 
     meaning: str
@@ -78,9 +80,9 @@ _SMALL = {
 
 
 def called(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
-    """The functions of phigen's own that kernels call, but those ``unprinted``: φ and its derivatives, `ENTIRE`,
-    and for a splitting those that its flows call."""
-    # loops over sites have their own
+    """The special functions that kernels call, except the ``unprinted`` ones: φ and its derivatives, `ENTIRE`, and
+    for a splitting those that its flows call."""
+    # loops over sites have versions of their own
     used = {e.op for e in topological([e for kernel in program.step.flow_kernels for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program, unprinted)]
@@ -92,7 +94,7 @@ def called(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
 
 
 def _exponentials(program: Program) -> list[str]:
-    """The exponential of matrices, if ``prepare`` takes some, for the largest of them."""
+    """The matrix exponential for the largest matrix in ``prepare``, if there is one."""
     rows, adjoint = special.largest_exponential(program), special.transposes_exponentials(program)
     if not rows:
         return []
@@ -101,7 +103,7 @@ def _exponentials(program: Program) -> list[str]:
 
 
 def near(program: Program, names: Iterable[str]) -> list[str]:
-    """Versions for the loops over lanes, of small arguments only, of these functions."""
+    """Versions of these functions for loops over lanes, for small arguments only."""
     listed = list(names)
     others = [f for f in listed if f not in ELLIPTIC]
     texts = [
@@ -130,7 +132,7 @@ def _anomaly(program: Program, *, near: bool = False) -> str:
 
 
 def near_rows(program: Program, names: Iterable[str]) -> list[str]:
-    """Return small-argument functions for the loops over sites, with the fewest operations that give all digits."""
+    """Return small-argument functions for loops over sites, with the fewest operations that give full precision."""
     return [render("c", "row_near.c", _row_values(program, f)) for f in names]
 
 
@@ -159,7 +161,7 @@ def _nested(coefficients: Sequence[float]) -> str:
 
 
 def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
-    """Return φ and its derivatives for the loops over lanes, as far as ``ops`` contain them."""
+    """Return φ and its derivatives for loops over lanes, as far as ``ops`` contain them."""
     texts = []
     for f in (f for f in SPECIAL if f in ops):
         first, *rest = map(repr, lane_coefficients(order_of(f)))
@@ -181,7 +183,7 @@ def _phi(program: Program, f: str) -> Mapping[str, object]:
 
 
 def needed(program: Program, coefficients: Sequence[C], reach: float) -> list[C]:
-    """The first coefficients of a series, as many as the precision needs for arguments up to ``reach``."""
+    """The first coefficients of a series, enough for the precision at arguments up to ``reach``."""
     if not program.single:
         return list(coefficients)
     least = _SINGLE_NEGLIGIBLE * abs(float(coefficients[0]))

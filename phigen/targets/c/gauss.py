@@ -12,18 +12,19 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss
 from phigen.targets.rendering import render
 
-#: In single precision a threshold is written as a power of that of double precision: this one as 1e-9, as small a part
-#: of rounding as 2e-18 is there. With that one, 1e5 steps of Hénon–Heiles have an energy error of 2e-5, not 5e-7.
+#: In single precision, thresholds are powers of those of double precision. This one becomes 1e-9, the same fraction of
+#: a rounding error as 2e-18 in double precision. With the other rule, 1e5 steps of Hénon–Heiles have an energy error of
+#: 2e-5 instead of 5e-7.
 SINGLE_POLICY = GaussPolicy(solved=1.3e-20)
 
 
 def _width(step: Gauss, lanes: Lanes | None) -> int:
-    """Entries of an array over the stages: lanes, or as many as there are stages."""
+    """Number of entries of an array over the stages: the lanes, or the number of stages."""
     return lanes.lanes if isinstance(lanes, Stages) else step.tableau.stages
 
 
 def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
-    """The sizes that the struct of the solver needs."""
+    """The sizes in the struct of the solver."""
     width = _width(step, lanes)
     return [
         ("NODES", step.tableau.stages, "stages of a step"),
@@ -37,13 +38,17 @@ def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
     """The other sizes."""
     return [
         ("PLAIN", step.plain, "unknowns that are offsets of coordinates; others are those of group elements"),
-        ("POINT", program.dimension + bool(program.time), "numbers that say where a step starts"),
-        ("MAX_SWEEPS", step.most_sweeps, "over the stages of a step"),
+        (
+            "POINT",
+            program.dimension + bool(program.time),
+            "numbers that define the start of a step: coordinates, and the time if H depends on it",
+        ),
+        ("MAX_SWEEPS", step.most_sweeps, "largest number of sweeps over the stages of a step"),
     ]
 
 
 def scalar_kernels(step: Gauss, *, staged: bool) -> list[Kernel | None]:
-    """The kernels that are evaluated at one stage; with ``staged`` most are evaluated at all stages at once."""
+    """The kernels that are evaluated at one stage; with ``staged`` most kernels are evaluated at all stages at once."""
     at_stages = [] if staged else [step.slope, step.frame]
     varied = [step.tangent.slope, step.tangent.change] if step.tangent else []
     transposed = step.adjoint.steps if step.adjoint else ()
@@ -52,15 +57,15 @@ def scalar_kernels(step: Gauss, *, staged: bool) -> list[Kernel | None]:
 
 
 def trail(program: Program, step: Gauss, lanes: Lanes | None) -> int:
-    """Numbers of a step that its transpose needs: where it starts, and its moves."""
+    """Numbers on the tape for one step: its start and its stage increments."""
     return program.dimension + step.unknowns * _width(step, lanes)
 
 
 def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
-    """The coefficients, and the function that mixes stages by them."""
+    """The coefficients, and the function that computes unknowns from stage increments."""
     table, width = step.tableau, _width(step, lanes)
     if program.single:
-        table = tableau(table.stages, SINGLE)  # rounded again, their sums would not be 1
+        table = tableau(table.stages, SINGLE)  # rounded to float, their sums would differ from 1
     staged = isinstance(lanes, Stages)
     predictions = predictors(table.stages, SINGLE if program.single else DOUBLE) if staged else (table.prediction,)
     terms = [f"matrix[{j}][lane] * move[{j}]" for j in range(table.stages)]
@@ -79,7 +84,7 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
 
 
 def _in_chains(terms: Sequence[str]) -> str:
-    """Return a sum as two, which processors add up at the same time."""
+    """Return a sum as two partial sums, which processors compute in parallel."""
     return " + ".join(f"({' + '.join(terms[k::2])})" for k in range(min(2, len(terms))))
 
 

@@ -20,7 +20,7 @@ from phigen.targets.c.layout import comment
 from phigen.targets.c.loops import statements
 from phigen.targets.header import plain, sentence
 
-#: Most assignments in one function; longer ones take quadratic time to compile.
+#: Most assignments in one function; compile time is quadratic in the length.
 LONGEST_FUNCTION = 200
 
 #: Longest line that several temporaries share.
@@ -69,10 +69,10 @@ def function(
 ) -> str:
     """The C source of a kernel: one function, or a chain of static ones that share a workspace.
 
-    With ``lanes`` the kernel is evaluated at several points: each value becomes an array over them, but for the inputs
-    that are ``shared``. Of those ``alike`` all lanes read the first where the argument ``own`` is 0; compilers put such
-    a kernel in the place of its calls, where that is known. A ``single`` one is evaluated at one of these points, the
-    argument ``lane``, and its outputs are numbers. What is always zero is not stored if ``sparse``. It calls these
+    With ``lanes`` the kernel is evaluated at several points: each value becomes an array over the lanes, except the
+    inputs that are ``shared``. For those ``alike`` all lanes read the first lane if the argument ``own`` is 0; such
+    a kernel is inlined where ``own`` is known. A ``single`` kernel is evaluated at one lane, the argument ``lane``,
+    and its outputs are numbers. A ``sparse`` one does not store entries that are always zero. It calls these
     ``versions`` of functions, see `phigen.ir.passes.forms`.
     """
     if kernel.exponents:
@@ -122,13 +122,13 @@ def function(
 
 
 def _exponentials(program: Program, kernel: Kernel) -> list[str]:
-    """The statements that put exponentials less 1 in the places of matrices."""
+    """The statements that replace matrices by their exponentials minus 1."""
     array = kernel.outputs[0].name
     return [f"    {program.name}_matrix_exponential({n}, {array} + {start});" for start, n in kernel.exponentials]
 
 
 def _through_exponentials(program: Program, kernel: Kernel) -> str:
-    """The transpose of a kernel with exponentials: the matrices, their cotangents, and what follows from these."""
+    """The transpose of a kernel with exponentials: the matrices, their cotangents, and the kernel of these."""
     assert kernel.exponents is not None
     inner = kernel.exponents
     outer = replace(kernel, name=f"{kernel.name}_of_exponents", exponentials=(), exponents=None)

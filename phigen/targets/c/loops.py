@@ -27,8 +27,8 @@ _TYPES = {
 #: Types of the variables of loops, by their kinds.
 _COUNTERS = {"segments": "size_t", "search": "size_t", "lanes": "int"}
 
-#: The most statements of a case of a switch that are printed on one line, and their most letters: the label, and the
-#: indentation in a loop, have the rest of the line.
+#: Limits of a case of a switch that is printed on one line: statements, and letters, which leave room for the label and
+#: the indentation.
 _SHORT_CASE, _CASE_WIDTH = 2, WIDTH - 24
 
 
@@ -80,7 +80,7 @@ class _StatementPrinter:
 
     def lines(self, body: Iterable[ir.Statement]) -> Iterator[str]:
         """Yield the lines of statements."""
-        if self.shared_line:  # else what is read in place would separate declarations
+        if self.shared_line:  # otherwise, values that are printed in place would separate declarations
             body = sorted(body, key=lambda s: not (isinstance(s, ir.Declare) and s.in_place))
         for kind, group in groupby(body, self._kind):
             if kind == "discards":

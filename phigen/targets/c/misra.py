@@ -1,4 +1,5 @@
-"""C as rules of MISRA C:2012 have it, for the profile certified: the same program with more parentheses and braces.
+"""Rewriting of C for rules of MISRA C:2012, in the profile certified: the same program with more parentheses and
+braces.
 
 - 12.1: operators of different precedence in one expression have parentheses.
 - 15.6: the bodies of loops and conditionals have braces.
@@ -24,7 +25,7 @@ _PRECEDENCE = {
 }  # fmt: skip
 _CONDITIONAL = 2
 
-#: Tokens between which there is an expression of its own.
+#: Tokens that separate expressions.
 _SEPARATORS = {
     ";", ",", "{", "}", "=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>=", "return", "else", "case",
     "do", "goto",
@@ -38,14 +39,14 @@ _BYTES = re.compile(r"memcmp\(&(\w+), &([\w>.-]+), sizeof \w+\) ([!=]=) 0")
 
 
 def compliant(code: str) -> str:
-    """Return C that keeps the rules, from C that compiles."""
+    """Return C that follows the rules, from C that compiles."""
     compared = _BYTES.sub(lambda m: f"{'!' * (m[3] == '!=')}({m[1]} == {m[2]})", code)
     return _Text(_with_void(_Text(compared).braced())).parenthesised()
 
 
 @dataclass
 class _Text:
-    """The tokens of C, and what is inserted before and after each."""
+    """The tokens of C, with text to be inserted before and after each."""
 
     code: str
     tokens: list[str] = field(default_factory=list)
@@ -63,7 +64,7 @@ class _Text:
         return self.tokens[self.significant[place]] if place < len(self.significant) else ""
 
     def text(self) -> str:
-        """The code with what was inserted."""
+        """The code with the inserted text."""
         places = {token: place for place, token in enumerate(self.significant)}
         return "".join(
             self.before.get(places[k], "") + token + self.after.get(places[k], "") if k in places else token
@@ -96,7 +97,7 @@ class _Text:
             self.after[last] = " }" + self.after.get(last, "")
 
     def _end(self, place: int) -> int:
-        """The last token of the statement that begins at a place."""
+        """The last token of the statement that starts at a place."""
         if self[place] in _CONTROLS:
             last = self._end(self.closing(place + 1) + 1)
             while self[place] == "if" and self[last + 1] == "else":
@@ -134,7 +135,7 @@ class _Text:
         self._combine(operands, operators, (operand, end))
 
     def _ended(self, place: int) -> bool:
-        """Whether an operand may end at a place: an operator after it is binary."""
+        """Whether an operand may end at a place, so that an operator after it is binary."""
         token = self[place]
         return token in (")", "]", "++", "--") or token[0].isalnum() or token[0] in "_\"'."
 

@@ -58,7 +58,7 @@ def printed(program: Program, step: Path, slopes: PathSlopes) -> str:
 
 
 class _Show:
-    """Prints what refers to series, in one lane."""
+    """Printer of accesses to series, in one lane."""
 
     def __init__(self, program: Program, path: Recurrences, slopes: PathSlopes) -> None:
         self._base, self.dimension = len(path.series), program.dimension
@@ -86,9 +86,9 @@ class _Show:
 def _rules(
     program: Program, show: _Show, every: Sequence[NodeSeries], numbers: range
 ) -> tuple[list[str], int, list[str], list[str]]:
-    """Coefficient k ≥ 1 of the series of these numbers: the first lines of the function, the count of sums over orders,
-    loops over lanes that add what orders j and k − j contribute to these, and loops for the rest, which may need
-    coefficients of order k."""
+    """Return the code of coefficient k ≥ 1 of the series of these numbers: the first lines of the function, the
+    number of sums over orders, loops over lanes that add the contribution of orders j and k − j to these sums, and
+    loops for the remaining terms, which may need coefficients of order k."""
     between: list[str] = []
     ends: list[str] = []
     for i in numbers:
@@ -109,7 +109,7 @@ def _rules(
 
 
 def _loops(program: Program, statements: Sequence[str]) -> list[str]:
-    """Statements for one lane in loops over all, none of which is too long."""
+    """Statements for one lane, in loops over all lanes of limited length."""
     lines: list[str] = []
     for start in range(0, len(statements), LONGEST_LOOP):
         lines += [f"{program.name}_EACH_LANE", f"for (int lane = 0; lane < {program.name}_LANES; ++lane) {{"]

@@ -1,8 +1,8 @@
 """Phrases of the runtime in C that depend on features: arguments, types and statements of one line.
 
-The runtime names a phrase (``PHI_AND_STAGE``); what it stands for is written here, once for each feature, and put in
-its place in generated code (`phigen.targets.c.macros`). `header` states the same as a header with conditions, for a
-compiler that reads the runtime as it lies there.
+The runtime uses the name of a phrase (``PHI_AND_STAGE``); its text is defined here, once for each feature, and
+replaces the name in generated code (`phigen.targets.c.macros`). `header` prints the same definitions with
+conditions, for a compiler that reads the runtime unassembled.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from phigen.targets.features import holds
 class Choice:
     """Phrases by names, with the parameters that they have, and their texts.
 
-    Each text belongs to one of the ``conditions`` on switches, of which the first that holds counts; the last text is
-    for none.
+    Each text has one of the ``conditions`` on switches; the first condition that holds selects the text. The last
+    text has no condition.
     """
 
     about: str
@@ -100,7 +100,8 @@ VALUES = Choice(
     },
 )
 
-#: The time of a lattice after so many steps: counted from the last change of h, so that no rounding adds up.
+#: The time of a lattice after a number of steps: counted from the last change of h, so that rounding errors do not
+#: accumulate.
 LATTICE_TIME = "s->t_before_h + (double)(steps - s->steps_before_h) * s->h"
 
 TIME = Choice(

@@ -1,8 +1,8 @@
-"""The types of real numbers that C computes in: how types, literals, limits and functions of the library are spelt.
+"""The types of real numbers in C: the spelling of types, literals, limits and library functions.
 
-The runtime and the printers are written for ``double``; `Real.spelt` is the pass that spells their text in another
-type. What is computed stays the same but for the thresholds, small numbers that a ``#define`` names: they say at how
-many digits something counts as rounding.
+The runtime and the printers are written for ``double``; `Real.spelt` is the pass that translates their text to
+another type. Only thresholds change in value: small numbers that are named by a ``#define`` and depend on the
+precision.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from itertools import pairwise
 
 from phigen.targets.c.tokens import CToken, TokenKind, tokens
 
-#: Digits of float in those of double.
+#: Ratio of the numbers of digits of float and double.
 DIGITS = 24 / 53
 
-#: Below this a number that is named by a ``#define`` is a threshold.
+#: A number named by a ``#define`` is a threshold if it is smaller than this.
 THRESHOLD = 1e-5
 
 #: The functions of C's library that have one for each type.
@@ -79,7 +79,7 @@ _LEAST, _MOST = 2.0**-126, (2.0 - 2.0**-23) * 2.0**127
 class Real:
     """A type of real numbers: its ``name``, and the ``words`` for the type and limits of double.
 
-    ``function_suffix`` is behind the names of functions of the library, empty where these are overloaded.
+    ``function_suffix`` is appended to the names of library functions; it is empty if these are overloaded.
     """
 
     name: str
@@ -113,7 +113,7 @@ _FLOAT = {
 
 DOUBLE = Real("double")
 FLOAT = Real("float", _FLOAT, "f")
-#: Single precision in dialects of C whose functions are those of their arguments.
+#: Single precision in dialects of C whose library functions are overloaded.
 OVERLOADED_FLOAT = Real("float", _FLOAT)
 
 

@@ -1,10 +1,10 @@
-"""The state of a lattice and a piece of its rows, block by block: members of structs in C, and what sets them up."""
+"""The state of a lattice and of a row segment, block by block: members of structs in C, and their initialisation."""
 
 from __future__ import annotations
 
 from phigen.targets.state import StateBlock
 
-#: In the order of the members of the struct. What is ``reset`` takes its arrays from the memory of the solver.
+#: In the order of the members of the struct. Members in ``reset`` are arrays in the memory of the solver.
 LATTICE = (
     StateBlock(
         "sizes",
@@ -87,7 +87,7 @@ LATTICE = (
         "!SERIES",
         (
             "int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */",
-            "size_t far; /* steps that use functions for arguments of any size in place of faster ones for small */",
+            "size_t far; /* number of the next steps that use full-range functions */",
         ),
     ),
     StateBlock(
@@ -115,7 +115,7 @@ LATTICE = (
             "double *const *side; /* right-hand side while the equation of the cotangents is solved, else NULL */",
             "double *const *handed, *shares;"
             " /* cotangents for neighbouring sites; for each row segment, its terms of sums */",
-            "int wide;                 /* 1 if the cotangents use functions for arguments of any size */",
+            "int wide;                 /* 1 if the cotangents use full-range functions */",
         ),
         reset=("memcpy(s->y[2], s->x, sizeof s->x);",),
     ),

@@ -36,7 +36,7 @@ def printed(program: Program, step: Splitting) -> str:
     more = f", double element[{program.name}_ELEMENT]" if program.attitude else ""
     for k, flow in enumerate(program.attitude.turns if program.attitude else step.flows, 1):
         kernel, values = _flow(program, flow, k)
-        # With an element compilers would find it too long to be put into its only callers.
+        # With an element the function would be too long for compilers to inline it.
         linkage = "static inline" if more else "static"
         texts.append(function(program, kernel, versions=_VERSIONS, linkage=linkage))
         texts.append(render("c", "flow.c", {**values, "more": more}))

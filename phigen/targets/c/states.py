@@ -12,7 +12,7 @@ from phigen.targets.state import STATE, StateBlock, belongs
 
 @dataclass(frozen=True)
 class Part:
-    """A file that the runtime includes: some ``lines`` of each of the ``blocks``, and how deep they are indented."""
+    """A file that the runtime includes: some ``lines`` of each of the ``blocks``, with their indentation."""
 
     blocks: Sequence[StateBlock]
     indent: int

@@ -32,11 +32,11 @@ _ENTRIES = {"coef": COEFFICIENT, "p": MOMENTUM, "f": FIXED}
 class StepText:
     """The text of one kind of step.
 
-    ``texts`` are the files that the runtime includes of it, ``declared`` the sizes that the struct of the solver needs,
-    ``constants`` and ``last_constants`` the other sizes, before and after those of lanes. ``kernels`` are printed
-    before all others, ``tangents`` after those of the gauge and the monitor, then the ``transposes`` that are not in
-    texts of their own. ``trail`` is the number of values of a step that its transpose needs. ``packed`` prints the
-    kernels of a pack.
+    ``texts`` are the runtime files of the step, ``declared`` the sizes in the struct of the solver, ``constants``
+    and ``last_constants`` the other sizes, before and after those of lanes. ``kernels`` are printed first,
+    ``tangents`` after the kernels of the gauge and the monitor, then the ``transposes`` that are not in separate
+    texts. ``trail`` is the number of doubles on the tape for one step. ``packed`` prints the kernels of a SIMD
+    batch.
     """
 
     texts: Callable[[Program, Any, Lanes | None, Switches], dict[str, str]] = lambda program, step, lanes, has: {}
@@ -110,7 +110,7 @@ def _path(program: Program, path: Recurrences, kind: str) -> str:
     texts = statements(program, path, syntax)
     derived = path.series[program.dimension :]
     firsts, factors = [q.first for q in derived], [factor for q in derived for _, factor in q.linear]
-    defined = ("coef", "p") if path.fixed else ("coef", "p", "f")  # f is written where it has values
+    defined = ("coef", "p") if path.fixed else ("coef", "p", "f")  # f is defined if it has values
     return render(
         "c",
         "path.c",
@@ -129,7 +129,7 @@ def _path(program: Program, path: Recurrences, kind: str) -> str:
 
 
 def _unused(expressions: Sequence[Expression], arrays: Sequence[str]) -> list[str]:
-    """The statements that name those arguments of a function that its expressions do not read."""
+    """The statements that mark the unused arguments of a function."""
     read = {kind_of(s) for s in symbols_of(*expressions)}
     return [f"(void){array};" for array in arrays if _ENTRIES[array] not in read]
 

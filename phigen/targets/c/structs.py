@@ -83,7 +83,7 @@ MEMBERS = (
     ),
 )
 
-#: What the reverse pass carries from step to step: derivatives of a number L.
+#: State of the reverse pass of a step: derivatives of a number L.
 COTANGENT = (
     StateBlock(
         "x",
@@ -122,7 +122,7 @@ PULLED = (
     StateBlock("gauge", "!TIMED && GAUGE", ("const double *gauge; /* see phi_members */",)),
 )
 
-#: What the reverse pass of a batch of members carries from step to step: derivatives of L, as in phi_cotangent.
+#: State of the reverse pass of a batch of members: derivatives of L, as in phi_cotangent.
 BACK_GROUP = (
     StateBlock(
         "x",
@@ -136,7 +136,7 @@ BACK_GROUP = (
     ),
 )
 
-#: The reverse pass of a lattice: derivatives of a number L, and the memory that it shares out.
+#: The reverse pass of a lattice: derivatives of a number L, and the layout of its memory.
 TRANSPOSE = (
     StateBlock(
         "bar",
@@ -174,7 +174,7 @@ TRANSPOSE = (
     StateBlock(
         "last_far",
         "!SERIES",
-        ("size_t last_far;            /* number of these that use functions for arguments of any size */",),
+        ("size_t last_far;            /* number of these that use full-range functions */",),
     ),
     StateBlock("block", members=("size_t block;               /* numbers of one field, in doubles */",)),
     StateBlock("of_step", "!UNDONE", ("size_t of_step;             /* numbers that a step writes to the tape */",)),
@@ -190,8 +190,8 @@ TRANSPOSE = (
             "size_t longest;             /* largest number of steps of a segment */",
             "size_t first_step;          /* number of steps made before the run */",
             "size_t unasked;             /* updates of sites since s->stop was called last */",
-            "int far;                    /* 1 if the reverse pass uses functions for arguments of any size */",
-            "int failed;                 /* 1 if functions for small arguments have given what is not finite */",
+            "int far;                    /* 1 if the reverse pass uses full-range functions */",
+            "int failed;                 /* 1 if small-argument functions were out of range */",
         ),
     ),
 )

@@ -27,7 +27,7 @@ class TokenKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CToken:
-    """A piece of C; the texts of all tokens, one after the other, are the text that was read."""
+    """A piece of C; the texts of all tokens, joined, are the original text."""
 
     kind: TokenKind
     text: str
@@ -82,7 +82,7 @@ def names(text: str) -> set[str]:
 
 
 def without_word(text: str, word: str) -> str:
-    """Return a text without a word and the space behind it."""
+    """Return a text without a word and the space after it."""
     pieces: list[str] = []
     dropped = False
     for token in tokens(text):

@@ -1,5 +1,5 @@
-"""Functions that the runtime in C has and a solver does not: static ones that nothing calls, and declarations of others
-that are not defined."""
+"""Removal of runtime functions that a solver does not use: uncalled static functions, and declarations of undefined
+functions."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 from phigen.targets.c.tokens import CToken, TokenKind, lexemes, names
 
-#: First words of what declares no function, or one of the library.
+#: First words of declarations that declare no function, or a function of the library.
 _TYPES = ("typedef", "enum", "struct", "union")
 _NO_FUNCTIONS = ("extern", *_TYPES)
 
 
 @dataclass(frozen=True)
 class Function:
-    """The lines from ``begin`` to ``end``, the comment above not among them, that declare or define a function."""
+    """Lines from ``begin`` to ``end`` that declare or define a function, without the comment above them."""
 
     name: str
     begin: int
@@ -25,8 +25,9 @@ class Function:
 
 
 def without_unused(lines: Sequence[str], prefix: str) -> list[str]:
-    """The lines without static functions that no other code calls, directly or through such functions, and without
-    declarations of functions that are not among the lines, if their names have the prefix of the solver."""
+    """Return the lines without static functions that no other code calls, directly or through such functions, and
+    without declarations of functions that are not defined in the lines, if their names have the prefix of the
+    solver."""
     functions = [f for f in functions_of(lines) if f.name.startswith(prefix)]
     static = [f for f in functions if f.static]
     inside = {k for f in static for k in range(f.begin, f.end)} | _declared(functions) | _types(lines)
@@ -41,13 +42,13 @@ def _declared(functions: Iterable[Function]) -> set[int]:
 
 
 def _types(lines: Sequence[str]) -> set[int]:
-    """The lines that declare types, whose members may be called as functions are."""
+    """The lines that declare types, whose members may have the names of functions."""
     types = (d for d in declarations_of(lines) if lines[d.begin].startswith(_TYPES))
     return {k for d in types for k in range(d.begin, d.end)}
 
 
 def _used(text: str) -> set[str]:
-    """The names in a text that are not those of members: these follow a point or an arrow."""
+    """The names in a text, without names of members, which follow a point or an arrow."""
     used, before = set[str](), ""
     for _, token in _code(text):
         if token.kind is TokenKind.NAME and before not in (".", "->"):
@@ -57,7 +58,7 @@ def _used(text: str) -> set[str]:
 
 
 def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str]) -> set[str]:
-    """The static functions that are called, also by one another."""
+    """The static functions that other code calls, directly or through each other."""
     words: dict[str, set[str]] = {}
     for f in static:
         words.setdefault(f.name, set()).update(_used("\n".join(lines[f.begin : f.end])) if f.defined else ())
@@ -76,7 +77,7 @@ def functions_of(lines: Sequence[str]) -> Iterator[Function]:
 
 
 def declarations_of(lines: Sequence[str]) -> Iterator[Function]:
-    """Yield what lines declare or define outside of functions; the name of what is no function is empty."""
+    """Yield the declarations and definitions outside of functions; the name is empty if it is not a function."""
     declaration, opened = _Declaration(), 0
     for line, token in _code("\n".join(lines)):
         if token.text == "}" and not opened:
@@ -103,18 +104,18 @@ def _code(text: str) -> Iterator[tuple[int, CToken]]:
 
 @dataclass
 class _Declaration:
-    """Declaration or definition as far as it has been read: its ``first`` word, and the name if it is of a function."""
+    """A declaration or definition that is being read: its ``first`` word, and the name if it is a function."""
 
     first: str = ""
     begin: int = 0
     name: str = ""
     last: str = ""
-    is_plain: bool = False  # whether it is no function
+    is_plain: bool = False  # whether it is certainly not a function
     in_size: bool = False  # whether the last token was in the size of an array
     has_body: bool = False
 
     def take(self, token: CToken, line: int, *, outside: bool) -> None:
-        """Take the next token, which is ``outside`` of braces or not."""
+        """Read the next token, which is ``outside`` of braces or not."""
         if not self.first:
             self.first, self.begin = token.text, line
             self.is_plain = token.text in _NO_FUNCTIONS or not token.text[:1].islower()
@@ -128,17 +129,17 @@ class _Declaration:
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """The marks outside of braces with which it ends."""
+        """The marks outside of braces that end it."""
         return ("}",) if self.has_body else (";",)
 
     @property
     def is_linkage(self) -> bool:
-        """Whether it is the beginning of ``extern "C"``."""
+        """Whether it is the start of ``extern "C"``."""
         return self.first == "extern" and self.last == "{"
 
 
 def _without(lines: Sequence[str], functions: Iterable[Function]) -> list[str]:
-    """The lines without functions, and without comments right above them that are above no other."""
+    """Return the lines without functions, and without comments directly above these."""
     gone = {k for f in functions for k in range(f.begin, f.end)}
     for begin in sorted({f.begin for f in functions}):
         first = begin - 1
@@ -152,12 +153,12 @@ def _without(lines: Sequence[str], functions: Iterable[Function]) -> list[str]:
 
 
 def _is_comment(lines: Sequence[str], last: int) -> bool:
-    """Whether a comment of lines of its own ends on this one, and is not the name of a chapter."""
+    """Whether a comment on lines of its own ends on this line, and is not the title of a chapter."""
     if not lines[last].endswith("*/") or lines[last].startswith("/* ---- "):
         return False
     return lines[_beginning(lines, last)].startswith("/*")
 
 
 def _beginning(lines: Sequence[str], last: int) -> int:
-    """The line on which the comment begins that ends on this one."""
+    """Return the first line of the comment that ends on this line."""
     return next(k for k in range(last, -1, -1) if "/*" in lines[k])

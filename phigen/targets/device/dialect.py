@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from phigen.targets.c.unused import declarations_of
 
-#: The line from which on a file is for devices only.
+#: The line after which a file is for devices only.
 DEVICES_ONLY = "#if defined(__OPENCL_VERSION__) || defined(__CUDACC__) || defined(__HIP__)"
 
 _TABLE = "static const "
@@ -18,9 +18,9 @@ _TYPES = ("typedef", "enum", "struct", "union")
 def qualified(lines: Sequence[str], name: str) -> list[str]:
     """Return the lines of a solver with the qualifiers of devices before functions and tables of the part for devices.
 
-    Functions become `NAME_FUNCTION`, which is static, and tables `NAME_CONSTANT`; kernels are named in the runtime.
-    Raises `ValueError` for objects that would have no address space: those of a file that are not constant, and static
-    ones of functions.
+    Functions become `NAME_FUNCTION`, which is static, and tables `NAME_CONSTANT`; kernels have their qualifiers in
+    the runtime. Raises `ValueError` for objects without an address space: non-constant objects of a file, and static
+    objects of functions.
     """
     begin, linkage = lines.index(DEVICES_ONLY), {"static", "inline", f"{name}_APART"}
     spelt = [*lines]

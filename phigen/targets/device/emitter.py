@@ -1,7 +1,7 @@
 """A program as `NAME_device.h`, one source for OpenCL C, CUDA and HIP.
 
-It is the C of profile small in a dialect: the runtime of ``templates/c/runtime`` with the switch ``DEVICE``, whose
-prelude names what the languages spell differently, and a kernel for ensembles.
+It is the C of the profile small in a dialect: the runtime of ``templates/c/runtime`` with the switch ``DEVICE``, a
+prelude that names the differences of the languages, and a kernel for ensembles.
 """
 
 from __future__ import annotations
@@ -55,11 +55,10 @@ def for_devices(program: Program) -> Program:
     return replace(program, step=step, extras=extras, modified=None, attitude=None, lanes=False, profile="small")
 
 
-#: Bytes of shared memory of a group on all cards, and of predictors for a coordinate of a stage.
+#: Bytes of shared memory of a work group that all cards have; bytes of the predictors for one coordinate of a stage.
 _SHARED, _OF_PREDICTOR = 48 * 1024, 8 * PredictorPolicy().differences
 
-#: Numbers of work items in a group, the largest first: 128 hide the time that memory takes better than 256 do where
-#: each has many registers.
+#: Sizes of work groups, the largest first: 128 hides memory latency better than 256 if work items use many registers.
 _GROUPS = (128, 64, 32, 16, 8, 4, 2, 1)
 
 
@@ -72,7 +71,7 @@ def group_size(program: Program) -> int:
 
 
 def text_of_device(program: Program) -> str:
-    """Return the text of a file but its first comment."""
+    """Return the text of a file without its first comment."""
     language = render(
         "c", "device_language.h", {"NAME": program.name, "double": not program.single, "group": group_size(program)}
     )

@@ -17,7 +17,7 @@ from phigen.targets.c.loops import statements
 from phigen.targets.header import plain, sentence
 from phigen.targets.rendering import render
 
-#: The arrays of kernels: their types, and what their elements are.
+#: The arrays of kernels: their types, and their contents.
 _ARRAYS = {
     "neighbours": ("const int", "neighbours[n * count + i]: the number of neighbour n of site i"),
     "weights": ("const double", "weights[n * count + i]: 0 for terms beyond open ends, else 1"),

@@ -1,8 +1,8 @@
 """The modules of the runtime in JavaScript, and which solvers have them.
 
-Other modules import these without a condition. They call functions of `HOOKS` without one too: where these are left
-out, so are the statements that call them. Modules `members_NAME` hold members of the class Solver, which are put where
-it says ``// #members NAME``.
+Other modules import these without a condition, and call the functions of `HOOKS` without one: if a function is left
+out, so are the statements that call it. Modules `members_NAME` hold members of the class Solver, which replace the
+line ``// #members NAME``.
 """
 
 from __future__ import annotations

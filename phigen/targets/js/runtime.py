@@ -46,7 +46,7 @@ def _module(name: str, lines: list[str]) -> str:
 
 
 def resolved(text: str, features: Mapping[str, bool]) -> list[str]:
-    """Return the lines of a text that remain for the given features. Raises `KeyError` for an unknown feature."""
+    """Return the lines of a text that the features select. Raises `KeyError` for an unknown feature."""
     lines, open_ = list[str](), [True]
     for line in text.splitlines():
         directive = _DIRECTIVE.fullmatch(line)
@@ -63,7 +63,7 @@ def resolved(text: str, features: Mapping[str, bool]) -> list[str]:
 
 
 def _included(line: str, features: Mapping[str, bool]) -> list[str]:
-    """Return the lines that a line stands for, none for a call that the features leave out."""
+    """Return the lines that replace a line; none for a call that the features exclude."""
     indent, word, name = _parts(line)
     if word == "#state":
         return [indent + statement for statement in state.part(name, features)]

@@ -1,4 +1,5 @@
-"""The state of a solver in JavaScript, block by block: its fields, what a failing step restores, its options."""
+"""The state of a solver in JavaScript, block by block: its fields, the fields that a failing step restores, its
+options."""
 
 from __future__ import annotations
 
@@ -132,7 +133,7 @@ def _saved(blocks: list[StateFields], switches: Mapping[str, bool]) -> Iterator[
     yield f"const SAVED = [{names}];"
 
 
-#: What ``#state NAME`` stands for, by NAME.
+#: The text that replaces ``#state NAME``, by NAME.
 PARTS: Mapping[str, Callable[[list[StateFields], Mapping[str, bool]], Iterator[str]]] = {
     "fields": lambda blocks, _: (line for b in blocks for line in b.fields),
     "saved": _saved,

@@ -43,7 +43,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     values["equation"] = step.equation is not None
     values["adjoint"] = step.adjoint is not None
     flows = "(part, _), _ in sites.schedule" if step.by_colour else "part, _ in SCHEDULE"
-    swept = f"sum(len(PARTS[part]) for {flows})" if any(step.parts) else "1"  # where nothing moves, still no 0
+    swept = f"sum(len(PARTS[part]) for {flows})" if any(step.parts) else "1"  # even if no field changes, not 0
     values["kept"] = "2 * len(SCHEDULE)" if step.equation else swept
     values["extremes"] = any(ends.extremes for ends in step.others.observed.ends)
     values["pairs"] = step.partners is not None and not graph
@@ -76,12 +76,12 @@ def _reductions(program: Program) -> dict[str, object]:
 
 def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]], suffix: str = "") -> str:
     rows = [[f"_{sweep.kernel.name}{suffix}, " for sweep in part] for part in parts]
-    listed = ["    (" + "".join(row).rstrip() + ")," for row in rows]  # () for a part in which nothing moves
+    listed = ["    (" + "".join(row).rstrip() + ")," for row in rows]  # () for a part that updates no field
     return "\n".join([f"# {comment}", f"{name} = (", *listed, ")\n"])
 
 
 def _functions(loops: LatticeLoops) -> Iterator[str]:
-    """Yield the functions of all kernels, with what bonds or pairs add first."""
+    """Yield the functions of all kernels, preceded by sums over bonds or pairs."""
     step, lowering = loops.step, WholeArrays(loops)
 
     def summed(gather: Gather) -> ir.Function:

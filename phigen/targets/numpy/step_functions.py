@@ -30,7 +30,7 @@ PATH_SYNTAX = Syntax(
 
 @dataclass(frozen=True)
 class StepPart:
-    """Kernels, the templates that use them, and what these read beside the values of all templates."""
+    """Kernels, the templates that use them, and further values of these templates."""
 
     kernels: Sequence[Kernel | None] = ()
     templates: Sequence[str] = ()

@@ -1,10 +1,11 @@
 """The transpose of a step of a lattice in C: loops that pull cotangents back through its sweeps.
 
-A sweep is gone back through in two goes, so that every site is written by itself alone, whatever the threads. In the
-first, each site finds what it gives to the values that it has read. What is its own it adds at once; what belongs to
-others it puts into arrays, one for each value that is ``handed``. In the second, each site adds what it is handed. On
-grids the second go is made by the same loops as the first one of the flow before, see `layout.takes`.
-So it is with the kernels of the equation of a stage, see `stage_kernels`.
+The reverse pass of a sweep has two traversals, so that every site writes only its own elements, for any number of
+threads. In the first, each site computes its contributions to the cotangents of all values that it has read. It adds
+contributions to its own cotangents at once, and stores contributions to other sites in arrays, one for each
+``handed`` value. In the second, each site adds the contributions stored for it. On grids the second traversal is
+merged with the first one of the flow before, see `layout.takes`. The kernels of the equation of a stage are treated
+alike, see `stage_kernels`.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ class _Pulled:
 
 
 def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str:
-    """The loops, and which of them go back through which part, or kernel of the equation of a stage."""
+    """The loops, and those that make the reverse pass of each part, or kernel of the equation of a stage."""
     layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
     texts = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
     texts += [function(program, adjoint.refresh)] if adjoint.refresh else []
@@ -180,7 +181,8 @@ class _Reverse:
         )
 
     def of_parts(self) -> Iterator[Back]:
-        """Yield the two traversals of all sweeps of each part; one where a flow takes what the flow after it passes."""
+        """Yield the two traversals of all sweeps of each part; one traversal if the next flow adds the
+        contributions."""
         program, layout, step = self.program, self.layout, self.layout.step
         undone, back = can_recompute_fields(program, step), transposes(program, step)
         around = {
@@ -239,7 +241,8 @@ class _Reverse:
             yield self._back(name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
     def _back(self, name: str, whom: str, pulled: Sequence[_Pulled], *, apart: bool = True) -> Back:
-        """Return the traversals of some kernels; the second is ``name``, if it is ``apart`` from the next first one."""
+        """Return the traversals of some kernels; the second is called ``name`` if it is not merged with the next
+        first one (``apart``)."""
         layout, loops = self.layout, list[ir.Function]()
         first, second = list[ir.Statement](), list[ir.Statement]()
         beside, arrays = list[Handed](), 0
@@ -276,14 +279,14 @@ class _Reverse:
         for array in sorted({h.array for h in beside if h.offset[-1]}) if not layout.step.sites.open[-1] else ():
             first.append(self.row_drivers.copied_ends(_HANDED, array, near_ends=near_ends))
         if beside and apart:
-            purpose = f"what sites are handed by those around that {whom}"
+            purpose = f"contributions to the cotangents of sites by those that {whom}"
             loops.append(row_transposes.handing(name, purpose, beside, self.loops.rows))
             second.append(ir.Call(name, (SEGMENT,)))
         undone = sorted({f for one in pulled for f in one.undone})
         return Back(tuple(loops), tuple(first), tuple(second), arrays, tuple(undone))
 
     def _cleared(self, handed: Sequence[Handed]) -> Iterator[ir.Statement]:
-        """Set the arrays that sites pass to others to zero where loops leave these sites out."""
+        """Clear the arrays of contributions to other sites, if loops omit some of the sites."""
         for array in sorted({h.array for h in handed}):
             row = self.row_drivers.first_of_row(_HANDED, array)
             yield ir.Clear(row, BEGIN, ir.Binary("-", STOP, BEGIN))
@@ -294,7 +297,7 @@ class _Reverse:
             yield ends, opposite, replace(self.kernels[first.kernel.name + BACK], name=ends.kernel.name + BACK)
 
     def _gathered(self, sweep: Sweep) -> Iterator[ir.Statement]:
-        """Yield the calls of loops that sum over bonds or pairs; those of equal code are one: the first."""
+        """Yield the calls of loops that sum over bonds or pairs; loops of equal code are called once."""
         names = dict[object, str]()
         for other in (s for part in self.layout.step.parts for s in part):
             for loop in self.loops.sums(other.gather, swept=True):
@@ -342,7 +345,7 @@ def _sums(program: Program, step: Sweeps) -> str:
 
 
 def _added(program: Program, step: Sweeps, layout: Layout) -> str:
-    """The function that adds the derivatives along parameters to those of the caller."""
+    """The function that adds the derivatives by parameters to those of the caller."""
     member = members(program)
     numbers = [(member[p.name], place) for place, p in enumerate(p for p in program.parameters if p.at == "all")]
     sites = [(member[p], layout.bar(p)) for p in step.sites.parameters]

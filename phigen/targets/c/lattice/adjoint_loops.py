@@ -1,4 +1,4 @@
-"""The loops that pull cotangents back through a kernel at sites, in two goes: see `adjoint`."""
+"""The loops of the reverse pass of a kernel at sites, in two traversals: see `adjoint`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from phigen.targets.c.lattice.loops import RowLoops
 
 @dataclass(frozen=True)
 class Seeds:
-    """Where the cotangents of what a kernel computes are read, which are symbols of a ``kind``.
+    """The place of the cotangents of the values of a kernel, which are symbols of a ``kind``.
 
     They are in the arrays of cotangents with the numbers ``bars``, or if these are empty in the variation of the row;
     the sites have the ``colour``.

@@ -1,4 +1,4 @@
-"""Where the values of a lattice are in memory, and what of the runtime it needs."""
+"""The memory layout of a lattice, and the parts of the runtime that it needs."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from phigen.symbolic.symbols import Symbol
 from phigen.targets import lattice
 from phigen.targets.c.language import members
 
-#: Differences that predictions of all stages are extrapolated from: more gain little and are arrays over sites.
+#: Number of differences in the predictors of all stages: more gain little, and each is an array over sites.
 MOST_REMEMBERED = 14
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things are: lines are rows beside a row, by their offsets; halo the sites that are copied beside it."""
+    """The layout. ``lines`` are rows near a row, by their offsets; ``halo`` is the number of sites copied beside it."""
 
     step: Sweeps
     lines: tuple[tuple[int, ...], ...]
     halo: int
     weights: tuple[Symbol, ...]
     arrays: tuple[str, ...]
-    slopes: bool = True  # whether code has how sweeps follow variations, or takes differences of them
+    slopes: bool = True  # whether the code has kernels of variations, or takes differences of sweeps
 
     def loops(self, program: Program) -> LatticeLoops:
         """Return the builder of the loops."""
@@ -53,12 +53,12 @@ class Layout:
         return [*self.arrays, *self.step.sites.at_bonds].index(array)
 
     def leaves_out(self, colour: int | None) -> bool:
-        """Whether what is done at sites of a colour, or without one at all of them, leaves out others."""
+        """Whether loops for the sites of a colour, or for all sites, omit some sites."""
         return self.step.sites.colours > 1 and colour is not None
 
     @property
     def partners(self) -> Partners:
-        """Bonds or pairs, with their variations where these are followed; nothing where there are none."""
+        """Bonds or pairs, with their variations if these are computed; None without bonds or pairs."""
         partners = self.step.others
         return partners if self.slopes else replace(partners, varied=Gather((), ()))
 
@@ -73,7 +73,7 @@ class Layout:
 
     @property
     def sums_up(self) -> bool:
-        """Whether what is seen at a site adds up what bonds add to it by itself: where no stage needs these sums."""
+        """Whether observables at a site sum over bonds in their own loops: if no stage needs these sums."""
         return self.graph and self.step.equation is None
 
 

@@ -30,8 +30,8 @@ from phigen.targets.header import plain, sentence
 #: The name of a part of H.
 _PART = re.compile(r"\bH_\d+")
 
-#: Doubles that the densities of observables take, unless there are more observables: two pages, a quarter of the
-#: nearest cache.
+#: Doubles in the buffer of the densities of observables, unless there are more observables: two pages, a quarter of the
+#: L1 cache.
 _BUFFER = 1024
 
 #: Versions of elementary functions by the forms of a function, see `phigen.ir.passes.forms`.
@@ -64,7 +64,7 @@ def code(loop: ir.Function) -> tuple[tuple[str, ...], ir.Block]:
 
 
 def share(densities: Kernel) -> int:
-    """Return the number of sites whose densities of observables are computed in one go."""
+    """Return the number of sites whose densities of observables are computed in one pass."""
     return max(1, _BUFFER // len(densities.roots))
 
 
@@ -103,7 +103,7 @@ class RowLoops:
 
     def after_passes(self, loop: ir.Function, form: str, versions: Mapping[str, str]) -> Iterator[ir.Function]:
         """Yield the loop after the passes on the level of sites; fast code has another one for sites near open ends."""
-        doc = "the same for large arguments of functions" if form == "_far" else loop.doc
+        doc = "as above, with full-range functions" if form == "_far" else loop.doc
         loop = replace(loop, name=loop.name + form, doc=doc)
         for part in divided_at_ends(loop) if self.fast else [loop]:
             yield calling(simultaneous(temporaries(part)), versions)
@@ -163,10 +163,13 @@ class RowLoops:
         places = self.layout.step.sites.ends
         for end, bonds, transpose in transposed_at_ends(places, ends, oriented, kernel, summed=summed):
             built = calling(temporaries(self.sites.transposed_sums(bonds, transpose)), self.versions)
-            name, purpose = kernel.name, "what a site gets of cotangents of sums, its own and those of others"
+            name, purpose = kernel.name, "contributions to the cotangents of a site by all sums over bonds or pairs"
             if not ends.of_all:
                 receiver = "the site where the sum is" if end == "a" else "the other site"
-                name, purpose = f"{kernel.name}_{end}", f"what {receiver} gets of cotangents of sums"
+                name, purpose = (
+                    f"{kernel.name}_{end}",
+                    f"contributions to the cotangents of {receiver} by sums over bonds or pairs",
+                )
             of_bonds = row_transposes.BondTranspose(
                 replace(built, name=name, doc=purpose), end, first, len(transpose.inputs[HERE]), oriented
             )
@@ -175,7 +178,7 @@ class RowLoops:
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function that fills arrays over the sites with the values of a kernel.
 
-        What bonds or pairs add is summed before, or at each site where nothing else needs these sums.
+        Sums over bonds or pairs are computed before, or at each site if nothing else needs these sums.
         """
         gather, several = self.layout.partners.sums_of(kernel), kernel.role is Role.OBSERVABLES
         apart = ir.Constant(share(kernel)) if several else row_loops.SITES

@@ -1,4 +1,4 @@
-"""Lattices in C: what users see, and the tables that the runtime goes by."""
+"""Lattices in C: the public declarations, and the tables that the runtime reads."""
 
 from __future__ import annotations
 
@@ -74,12 +74,12 @@ def declarations(program: Program, step: Sweeps) -> str:
 
 
 def _differences(program: Program) -> int:
-    """Differences of the y of a stage that its guess is extrapolated from."""
+    """Number of differences of y − x in the predictor of a stage."""
     return max(1, min(LatticeSweepPolicy().differences, MOST_REMEMBERED // len(program.fractions)))
 
 
 def _gathered(layout: Layout) -> int:
-    """Sums over bonds or pairs that are held for each site at once."""
+    """Sums over bonds or pairs that are stored for all sites at once."""
     partners, swept = layout.partners, [sweep.gather for sweep in layout.step.sweeps if sweep.gather]
     seen = () if layout.sums_up else partners.gathers
     return max([1, *(len(g.names) for g in (*swept, *seen))])
@@ -96,7 +96,7 @@ def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> int:
             + (LatticeNewtonPolicy().directions + 1 + (dimension + 1) * has["SITE_BLOCKS"]) * has["KRYLOV"]
         )
         stage = stage * dimension + has["KRYLOV"]  # one for sums over pieces
-    fields = dimension + 2 * dimension * has["COMPENSATED"]  # before a step, and what rounding leaves out
+    fields = dimension + 2 * dimension * has["COMPENSATED"]  # the state before a step, and compensation terms
     fields += bool(layout.step.sites.seams)  # and the kinds of sites
     fields += 2 * has["MONITOR"]  # densities, and the clock
     return len(layout.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage
@@ -109,19 +109,20 @@ def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
 
 
 def rows_of(step: Sweeps) -> int:
-    """Rows of coefficients: of each flow, and of the last and the first of the next step where these are joined."""
+    """Rows of coefficients: one for each flow and, if these are merged, one for the last flow with the first of the
+    next step."""
     return len(step.schedule.times) if step.equation else len(_flows(step))
 
 
 def _flows(step: Sweeps) -> list[tuple[int, int]]:
-    """The flows of a step; and once more the first, for it and the last of the step before together: that is joined to
-    it unless there is noise, of which each flow has its own."""
+    """The flows of a step. Without noise, the first flow occurs once more: merged with the last of the step before.
+    With noise, each flow has its own increments."""
     flows = step.schedule.flows
     return [*flows, *([] if step.sites.increments else flows[:1])]
 
 
 def _by_flow(step: Sweeps, values: Sequence[float], joined: float) -> list[float]:
-    """The values of the rows of the schedule for each flow, the last for those that are joined."""
+    """The values of the rows of the schedule for each flow; the last is for merged flows."""
     by_flow = [values[row] for _, row in _flows(step)]
     return by_flow if step.sites.increments else [*by_flow[:-1], joined]
 
@@ -136,7 +137,7 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
 
 
 def model(program: Program, step: Sweeps) -> str:
-    """Tables, and what is computed before the steps."""
+    """Tables, and functions called before the steps."""
     layout = layout_of(program, step)
     has = switches(program, step, layout)
     values = {
@@ -165,7 +166,7 @@ def model(program: Program, step: Sweeps) -> str:
 def _constants(
     program: Program, step: Sweeps, layout: Layout, has: Mapping[str, bool]
 ) -> Iterator[tuple[str, int, str]]:
-    """Names, values, and what they are."""
+    """Names, values, and comments."""
     sites, several = step.sites, len(step.sites.axes) > 1
     if densities := program.observables.named:
         yield "SHARE", share(densities), "sites whose densities of observables are computed in one go"
@@ -174,19 +175,23 @@ def _constants(
         yield "LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row"
     yield "RESERVED", _reserved(program, layout, has), "arrays over the sites in the memory of a solver"
     if several:
-        yield "LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it"
+        yield "LINES", len(layout.lines), "rows that kernels read: the row itself and its neighbours"
     yield "ROW", max(1, step.row), "coefficients of one flow"
     yield "ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"
     if step.refresh:
         yield "PREPARED", step.prepared, "of a row, before those that depend on the time"
     if program.noise:
         sources = program.noise.sources
-        yield "SOURCES", len(sources), f"of noise at a site: {', '.join(sources)}"
-        yield "DRAWN", program.dimension + len(sites.parameters), "the first of the arrays of increments"
-        yield "PARTS", program.noise.parts, "increments of one source in a step, each of a part of it"
+        yield "SOURCES", len(sources), f"sources of noise at a site: {', '.join(sources)}"
+        yield "DRAWN", program.dimension + len(sites.parameters), "index of the first array of increments of noise"
+        yield "PARTS", program.noise.parts, "increments of one source in a step, one for each part of the step"
     if step.equation:
-        yield "SIDES", 2 if layout.slopes else 3, "y before and after a sweep" + ", and varied" * (not layout.slopes)
-        yield "MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take"
+        yield (
+            "SIDES",
+            2 if layout.slopes else 3,
+            "arrays of y: before and after a sweep" + ", and varied" * (not layout.slopes),
+        )
+        yield "MOST_SWEEPS", step.equation.most_sweeps, "largest number of sweeps of a stage"
         if has["BANDED"]:
             yield "REACH", reach(step), "sites that y at a site depends on, to each side"
             yield "BAND", band(step), "diagonals beside that of the matrix of Newton's method"
@@ -197,12 +202,12 @@ def _constants(
     if has["WAVES"]:
         far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = max(1, *far) if several else 1
-        yield "SPAN", span, "slices beside one that a flow reads: pieces of a row, or of the first axis"
+        yield "SPAN", span, "slices on either side of a slice that a flow reads; see wavefront blocking"
     if layout.weights and several:
         yield "WEIGHTS", len(layout.weights), "kinds of terms that open ends take away"
     if sites.colours > 1:
         yield "COLOUR_COUNT", sites.colours, "colours of sites"
-        yield "COLOUR_STRIDE", sites.weights[-1], "what a step along a row adds to the colour"
+        yield "COLOUR_STRIDE", sites.weights[-1], "change of the colour number from site to site along a row"
 
 
 def _tables_of_sites(program: Program, step: Sweeps, layout: Layout, has: Mapping[str, bool]) -> dict[str, object]:
@@ -225,7 +230,7 @@ def _tables_of_sites(program: Program, step: Sweeps, layout: Layout, has: Mappin
 
 
 def _tables_of_flows(step: Sweeps) -> dict[str, object]:
-    """Tables that differ from flow to flow."""
+    """Tables with an entry for each flow."""
     schedule = step.schedule
     joined = schedule.times[schedule.flows[0][1]] + schedule.times[schedule.flows[-1][1]]
     multiples = _by_flow(step, schedule.multiples, schedule.multiples[0]) if schedule.multiples else ()
@@ -240,7 +245,7 @@ def _tables_of_flows(step: Sweeps) -> dict[str, object]:
 
 
 def _moments(step: Sweeps) -> list[float]:
-    """Where the time stands still, as a fraction of the step: for each row of coefficients."""
+    """The time at which time-dependent coefficients are evaluated, as a fraction of the step, for each row."""
     return _by_flow(step, step.schedule.moments, 0.0)
 
 
@@ -268,7 +273,7 @@ def _allowed(program: Program, *, graph: bool) -> ir.Function:
 
 
 def _reduction(reduction: Reduction) -> tuple[int, int]:
-    """Return how an observable is reduced, and what a mean is over, as the runtime numbers them."""
+    """Return the codes of the runtime for the reduction of an observable, and for the set that a mean is over."""
     return REDUCTIONS.index(reduction.kind), OVER.index(reduction.over)
 
 

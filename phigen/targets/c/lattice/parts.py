@@ -1,4 +1,4 @@
-"""The parts of a step of a lattice in C: which loops over sites make which of them."""
+"""The parts of a step of a lattice in C: the loops over sites of each part."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from phigen.targets.rendering import render
 
 
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
-    """All kernels as loops over sites, and which of them make which part of H."""
+    """All kernels as loops over sites, and the loops of each part of H."""
     layout = layout_of(program, step)
     loops, equation = RowLoops(program, layout), step.equation
     texts = [
@@ -164,7 +164,7 @@ class _PartLoops:
                 cases.append(self._segment(k, forms, names))
                 continue
             for form in sorted(forms):
-                title = f"The flow of H_{k + 1}" + ", for large arguments of functions" * (form == "_far")
+                title = f"The flow of H_{k + 1}" + ", with full-range functions" * (form == "_far")
                 case = self._segment(k, {form: forms[form]}, names)
                 yield driver_text(program, build.driver(f"rows{k + 1}{form}", title, ["coef"], [case]))
             arguments = (S, COEF, ir.fixed("first"), ir.fixed("end"))
@@ -260,7 +260,7 @@ def _alike(calls_of_parts: Sequence[Calls]) -> dict[tuple[tuple[str, ...], ir.Bl
 
 
 def _place(numbered: tuple[int, _Call]) -> tuple[str, bool]:
-    """Return the place of a loop in the code: one for sites near open ends is behind the one for other sites."""
+    """Return the position of a loop in the code: a loop for sites near open ends follows the one for other sites."""
     name = numbered[1].loop.name
     return name.removesuffix(NEAR_ENDS), name.endswith(NEAR_ENDS)
 
