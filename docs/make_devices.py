@@ -22,9 +22,10 @@ PAGE = Path(__file__).resolve().parent / "devices.md"
 BEGIN, END = "<!-- registers -->\n", "<!-- end of registers -->\n"
 #: Systems and orders; None is that of the spec.
 KERNELS = (
-    ("rigid_body", 2), ("rigid_body", 4), ("rigid_body", 6), ("lotka_volterra", 4), ("henon_heiles", 4), ("kepler", 4),
-    ("kepler", 6), ("toda3", 4), ("kepler_eccentric", None), ("pendulum_euler", None), ("satellite", None),
-    ("nambu_pendulum", None), ("kowalevski_gauss", None), ("satellite_wheels", None), ("spin_chain5", None),
+    ("rigid_body", 2), ("rigid_body", 4), ("rigid_body", 6), ("rigid_body", 8), ("lotka_volterra", 4),
+    ("henon_heiles", 4), ("kepler", 4), ("kepler", 6), ("toda3", 4), ("toda3", 6), ("lagrange_top", 2),
+    ("kepler_eccentric", None), ("pendulum_euler", None), ("satellite", None), ("nambu_pendulum", None),
+    ("kowalevski_gauss", None), ("satellite_wheels", None), ("spin_chain5", None),
 )  # fmt: skip
 
 

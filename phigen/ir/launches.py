@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 class SumLaunch:
     """Sums over the bonds of each site, or over pairs; ``end`` and ``chosen`` are those of `phigen.scheme.steps.Ends`.
 
-    ``values`` is the number of sums of a site.
+    ``values`` is the number of sums of a site. Those ``of_parameters`` read parameters in place of coefficients.
     """
 
     kernel: str
     end: str = ""
     chosen: str = ""
     values: int = 1
+    of_parameters: bool = False
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,13 @@ from systems import spec_of
 import phigen
 from phigen import resources
 from phigen.api import compilation_of
-from phigen.errors import DeviceError, MissingPackageError
+from phigen.compiler import emit
+from phigen.errors import DeviceError, MissingPackageError, PhigenWarning
 from phigen.runtime.devices import opencl
 from phigen.runtime.devices.device import OutOfMemoryError
 from phigen.sweeping.devices import own_device, workers_of
 from phigen.symbolic.expression import topological
+from phigen.targets.device.registers import spilling
 
 pytest.importorskip("pyopencl")
 
@@ -167,6 +169,25 @@ def test_a_device_without_double_precision_is_refused(monkeypatch):
     monkeypatch.setattr(opencl.device(), "double", False)
     with pytest.raises(DeviceError, match="real: float"):
         phigen.compile("pendulum_euler", "opencl")
+
+
+def test_an_array_that_exceeds_the_memory_of_the_device_is_one():
+    device = opencl.device()
+    with pytest.raises(OutOfMemoryError):
+        device.empty(2 * device.largest + device.memory)
+
+
+def test_steps_that_a_card_runs_slowly_are_warned_of(monkeypatch):
+    """By what the compiler of CUDA tells: see docs/devices.md."""
+    monkeypatch.setattr(opencl.device(), "is_card", True)
+    slow = compilation_of("kepler", order=6, profile="small")
+    with pytest.warns(PhigenWarning, match=r"4 coordinates, order 6.* take order 5 or lower, or scheme: splitting"):
+        phigen.compile(slow, "opencl", profile="small")
+    (text,) = emit(slow.program, "device", "phigen build").values()
+    assert "more registers than cards have" in " ".join(text.split("*/")[0].split())
+    for name, order in (("rigid_body", 6), ("kepler", 4), ("kepler_eccentric", None)):
+        assert not spilling(compilation_of(name, order=order, profile="small").program)
+    assert "memory of cards" in spilling(compilation_of("nambu_pendulum", profile="small").program)
 
 
 def test_an_unknown_device_is_refused_with_those_there_are(monkeypatch):

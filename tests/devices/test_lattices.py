@@ -12,6 +12,7 @@ from phigen.api import compilation_of
 from phigen.compiler import emit
 from phigen.errors import DeviceError
 from phigen.lattice.states import start_of
+from phigen.runtime.devices.device import OutOfMemoryError
 from phigen.runtime.devices.lattices import DeviceLattice
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.lattice_series import recordable
@@ -172,6 +173,37 @@ def test_a_lost_device_says_where_the_run_can_be_resumed(monkeypatch):
 
     monkeypatch.setattr(device.device, "launch", lost)
     with pytest.raises(DeviceError, match="checkpoints="):
+        device.integrate(x, h, 20)
+
+
+def test_a_run_on_a_device_that_was_lost_is_resumed_with_the_same_bits(monkeypatch, tmp_path):
+    device, _ = both("fput")
+    x, h, _ = beginning("fput", device.interface)
+    expected, launch, launches = device.integrate(x, h, 20, stride=5), device.device.launch, []
+
+    def lost(*arguments):
+        launches.append(arguments)
+        if len(launches) > 150:
+            raise DeviceError("the device was lost")
+        launch(*arguments)
+
+    monkeypatch.setattr(device.device, "launch", lost)
+    with pytest.raises(DeviceError, match=r"after step (5|10|15): "):
+        device.integrate(x, h, 20, stride=5, checkpoints=tmp_path / "run.npz")
+    monkeypatch.undo()
+    resumed = device.integrate(x, h, 20, stride=5, checkpoints=tmp_path / "run.npz")
+    np.testing.assert_array_equal(resumed.x, expected.x)
+
+
+def test_lattices_that_exceed_the_memory_of_the_device_are_refused(monkeypatch):
+    device, _ = both("fput")
+    x, h, _ = beginning("fput", device.interface)
+
+    def full(size):
+        raise OutOfMemoryError("CL_MEM_OBJECT_ALLOCATION_FAILURE")
+
+    monkeypatch.setattr(device.device, "empty", full)
+    with pytest.raises(DeviceError, match=r"fput: too little memory for \(\d+,\) sites: CL_MEM"):
         device.integrate(x, h, 20)
 
 

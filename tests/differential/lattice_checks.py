@@ -479,6 +479,10 @@ def _always(trial: Trial) -> bool:
     return True
 
 
+def _runs_on_devices(trial: Trial) -> bool:
+    return device_checks.applies(trial.system.seed) and trial.compilation.program.monitor is None
+
+
 def _asked_twice(trial: Trial) -> bool:
     """Whether the spec and the call of `compile` ask for something each."""
     return bool(trial.system.asked) and not {"adjoint", "tangent", "real", "without"}.isdisjoint(trial.system.options)
@@ -519,7 +523,7 @@ CHECKS = (
     Check("wrong values are refused", lambda t: malformed(t.system), _always),
     Check("tables of bonds", lambda t: tables(t.system), lambda t: bool(t.system.bonds) and "k" in t.system.parameters),
     Check("C++", lambda t: as_cpp(t.compilation, lattice=True), lambda t: t.system.seed % 20 == 0),
-    Check("devices", device_checks.lattice, lambda t: device_checks.applies(t.system.seed), _RUN),
+    Check("devices", device_checks.lattice, _runs_on_devices, _RUN),
 )  # fmt: skip
 
 

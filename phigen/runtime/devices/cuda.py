@@ -22,7 +22,7 @@ class CUDADevice:
     """A CUDA device."""
 
     target = "cuda"
-    double = True
+    double = is_card = True
 
     def __init__(self, cupy: Any, index: int) -> None:
         self._cupy, self._index = cupy, index

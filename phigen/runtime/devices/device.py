@@ -29,6 +29,7 @@ class Device(Protocol):
     largest: int  # bytes of the largest possible array
     units: int  # compute units, each of which runs many work items
     double: bool  # whether double precision is supported
+    is_card: bool  # whether it is no processor: values beyond its registers lie in slow memory
 
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
         """Return the program of a source text, with ``defined`` macros.

@@ -48,6 +48,7 @@ class ImplicitSession(DeviceLatticeSession):
         if self._written is not coefficients:
             self._write_coefficients([coefficients])
             self._written = coefficients
+        self._write_parameters()
         launch, out = self._interface.launches.others[name], self._launcher.empty(self._size)
         variation = varied.buffer if varied is not None else None
         arrays = {"x": x.buffer, "start": start.buffer, "varied": variation, "dw": self._increments}

@@ -40,7 +40,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._stored = stored
         self._flag = self._device.empty(4)
         self._increments = self._launcher.empty(self._launcher.tables.count * max(1, len(self._interface.noise)))
-        self._numbers = self._launcher.empty(len(self._interface.launches.numbers) + 1)
+        self._parameters: list[float] = []  # those on the device
         self._coefficients: Any = None
         self._row = 0
 
@@ -162,12 +162,18 @@ class DeviceLatticeSession(NumpyLatticeSession):
         if launch is None:
             return None, 0
         self._upload()
-        parameters = self._sites.parameters
-        numbers = [float(parameters[n]) for n in self._interface.launches.numbers]
-        self._launcher.write(self._numbers, [*numbers, self._sites.t if self._timed else 0.0])
+        self._write_parameters()
         out = self._launcher.empty(launch.outputs * self._launcher.tables.count)
-        self._launcher.run(launch, self._numbers, x=self._fields, out=out)
+        self._launcher.run(launch, self._launcher.parameters, x=self._fields, out=out)
         return out, launch.outputs
+
+    def _write_parameters(self) -> None:
+        """Copy the parameters that are numbers, and the time, to the device, if they changed."""
+        values = [float(self._sites.parameters[name]) for name in self._interface.launches.numbers]
+        values.append(float(self._sites.t) if self._timed else 0.0)
+        if values != self._parameters:
+            self._launcher.write(self._launcher.parameters, values)
+            self._parameters = values
 
     def _fields_of(self, name: str) -> Floats:
         """Return the outputs of a kernel (outputs, *sizes)."""

@@ -39,6 +39,7 @@ class Launcher:
     def __init__(self, kernels: Kernels, tables: SiteTables) -> None:
         self.device, self.kernels, self.tables, self.real = tables.device, kernels, tables, tables.real
         self._names = tables.interface.launches.arrays
+        self.parameters = self.empty(len(tables.interface.launches.numbers) + 1)  # numbers, then the time
         self._sums: Any = None
 
     def empty(self, numbers: int) -> Any:
@@ -58,7 +59,8 @@ class Launcher:
     def run(self, launch: SiteLaunch, coefficients: Any, first: int = 0, colour: int = 0, **buffers: Any) -> None:
         """Compute the sums that a kernel reads, and launch it; ``buffers`` are its arrays besides the tables."""
         for k, sums in enumerate(launch.sums):
-            self._launch(sums, (None, self.tables.count), coefficients, first, colour, adds=np.int32(k > 0), **buffers)
+            source = (self.parameters, 0) if sums.of_parameters else (coefficients, first)
+            self._launch(sums, (None, self.tables.count), *source, colour, adds=np.int32(k > 0), **buffers)
         self._launch(launch, self.tables.selected(launch), coefficients, first, colour, adds=np.int32(0), **buffers)
 
     def _launch(

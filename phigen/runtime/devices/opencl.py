@@ -33,6 +33,7 @@ class OpenCLDevice:
         self.name, self.units = f"{device.name.strip()}, {device.platform.name.strip()}", device.max_compute_units
         self.memory, self.largest = device.global_mem_size, device.max_mem_alloc_size
         self.double = bool(device.double_fp_config)
+        self.is_card = not device.type & cl.device_type.CPU
 
     def __repr__(self) -> str:
         return f"<OpenCL device: {self.name}, {self.memory >> 20} MiB>"

@@ -21,6 +21,7 @@ from phigen.targets.c.real import DOUBLE, OVERLOADED_FLOAT
 from phigen.targets.c.step_text import text_of
 from phigen.targets.device import lattice
 from phigen.targets.device.dialect import qualified
+from phigen.targets.device.registers import spilling
 from phigen.targets.header import header_lines, sealed
 from phigen.targets.rendering import render
 
@@ -32,6 +33,8 @@ def emit(program: Program, command: str) -> dict[str, str]:
     """File names and their contents."""
     name = program.name
     lines = [*header_lines(program, command), *_READING]
+    if slow := spilling(program):
+        lines += ["", f"Note: {slow}."]
     return {f"{name}{SUFFIX}": sealed(lines, text_of_device(for_devices(program)))}
 
 

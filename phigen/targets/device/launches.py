@@ -41,4 +41,6 @@ def _colour(colour: int | None, step: Sweeps) -> int | None:
 
 def _sums(gather: Gather | None) -> tuple[SumLaunch, ...]:
     ends = gather.ends if gather else ()
-    return tuple(SumLaunch(e.kernel.name, e.end, e.chosen, len(e.kernel.roots)) for e in ends)
+    return tuple(
+        SumLaunch(e.kernel.name, e.end, e.chosen, len(e.kernel.roots), "params" in e.kernel.inputs) for e in ends
+    )
