@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 89102d9c5d41b64cfbb23b0a891de02c6ee13a610c89bd8c4efd7caeeda2258c
+ * body-sha256: d5a0809be2e6367c049bfa7173350da72a4d0a4e0658b1137e6f6952dc608201
  */
 #include "duffing.h"
 #include <float.h>
@@ -194,7 +194,7 @@ static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[d
 }
 
 /* ---- Predictors ---- */
-#define duffing_REACH 4.0 /* largest distance of a prediction from the last value, relative to that value */
+#define duffing_REACH 4.0 /* largest distance from the last value, relative to it */
 
 /* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
@@ -232,8 +232,7 @@ static void duffing_remember(duffing_history *history, const double value[duffin
     if (history->count < duffing_DIFFERENCES) ++history->count;
 }
 
-/* steps up to this length, relative to state and motion, are accepted */
-#define duffing_PLAUSIBLE 1.5
+#define duffing_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
@@ -259,7 +258,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define duffing_FLOOR 1e-6 /* smaller components of y are measured relative to this fraction of the largest */
+#define duffing_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
 
 #define duffing_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
 #define duffing_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 12ba785d5a37a0d91333765aef8665f50932a2ad43b075b361626c123faa4a85
+ * body-sha256: f84abb67f4c0ff395680e959a42f718da5b90a7dff74d336e851ce05bc016aaf
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -176,7 +176,7 @@ function vectorField(params, t, x, out) {
 /** A step size for which coefficients are finite */
 const PROBE_STEP = 1e-100;
 
-/** Smaller components of y are measured relative to this fraction of the largest */
+/** Smaller components of y count as this fraction of the largest */
 const FLOOR = 1e-6;
 
 /** A correction below this is rounding ... */
@@ -184,12 +184,12 @@ const NEARLY_SOLVED = 1e-8;
 /** ... if it exceeds this fraction of the one before */
 const SHRINKING = 0.25;
 
-/** Steps up to this length, relative to state and motion, are accepted */
+/** Accepted length of steps, relative to state and motion */
 const PLAUSIBLE = 1.5;
 /** Largest relative change of energy in longer steps */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** Largest distance of a prediction from the last value, relative to that value */
+/** Largest distance from the last value, relative to it */
 const REACH = 4.0;
 /** Number of stored differences; higher ones would amplify rounding errors */
 const DIFFERENCES = 9;

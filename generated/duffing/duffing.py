@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: fc219390082869a5aaf001b4c92ff3e30387b906a81553278ba6a650f8569b96
+# body-sha256: 406c1bce4b0c2b5a060910f373a8de0248fbe7fe57f792664ae4f9917eb2af04
 import numpy as np
 
 VERSION = "0.1.0"
@@ -209,7 +209,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this length, relative to state and motion, are accepted
+PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
 MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
@@ -236,7 +236,7 @@ def _solved(stage, x, carry, guess):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # smaller components of y are measured relative to this fraction of the largest
+FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
 SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
 

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 041b4cae915882ff8728b6bd92de8da43442a13c723bf5eee5b25e82f106bd6b
+ * body-sha256: dbc3fcf8ad780ed8854abf4b11e9531bb7991e497c533be0cd9a3b1ff315a3e8
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -176,8 +176,7 @@ static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centr
 }
 
 /* ---- Predictors ---- */
-/* largest distance of a prediction from the last value, relative to that value */
-#define guiding_centre_REACH 4.0
+#define guiding_centre_REACH 4.0 /* largest distance from the last value, relative to it */
 
 /* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
@@ -215,8 +214,7 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
     if (history->count < guiding_centre_DIFFERENCES) ++history->count;
 }
 
-/* steps up to this length, relative to state and motion, are accepted */
-#define guiding_centre_PLAUSIBLE 1.5
+#define guiding_centre_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,

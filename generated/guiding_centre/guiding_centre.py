@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 698d138a4fa0c58dde2d2c9cd849482159dfb0dca57218a578327d9696bf61d9
+# body-sha256: 388cd2371b8ea9c10a105284d3a53499f5121bb623707ddcc978c00bdf2d953f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -460,7 +460,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this length, relative to state and motion, are accepted
+PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
 MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 39b62988cf6e9c2a205e9e7c1579702c92d716bcecb64005d49e4a531ed957be
+ * body-sha256: 2c9324005708aa5cbab368539701940ac313837ff30f7d70ac2cb47c529d234e
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -168,8 +168,7 @@ static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_D
 }
 
 /* ---- Predictors ---- */
-/* largest distance of a prediction from the last value, relative to that value */
-#define predator_prey_REACH 4.0
+#define predator_prey_REACH 4.0 /* largest distance from the last value, relative to it */
 
 /* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
@@ -207,8 +206,7 @@ static void predator_prey_remember(predator_prey_history *history, const double 
     if (history->count < predator_prey_DIFFERENCES) ++history->count;
 }
 
-/* steps up to this length, relative to state and motion, are accepted */
-#define predator_prey_PLAUSIBLE 1.5
+#define predator_prey_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define predator_prey_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
@@ -234,8 +232,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-/* smaller components of y are measured relative to this fraction of the largest */
-#define predator_prey_FLOOR 0.0
+#define predator_prey_FLOOR 0.0 /* smaller components of y count as this fraction of the largest */
 
 #define predator_prey_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
 #define predator_prey_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 066f4efe694170b81d25e95fa954047713de04b84b6c7dbe357c1b3991bde771
+# body-sha256: 91f975a6721ea8f51992890315025728a7747eba344d59c026151ce7bdeae439
 import numpy as np
 
 VERSION = "0.1.0"
@@ -203,7 +203,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this length, relative to state and motion, are accepted
+PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
 MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
@@ -230,7 +230,7 @@ def _solved(stage, x, carry, guess):
     return following, rest, value, status
 
 
-FLOOR = 0.0  # smaller components of y are measured relative to this fraction of the largest
+FLOOR = 0.0  # smaller components of y count as this fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
 SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
 

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 3f6d902c0f32f500808e69bba6cf443560ffbdf57a9b12fdf07ac4b95253ed8d
+ * body-sha256: 7f8c036dd2c59f2a1311c180f2085880d07057b54390f0e8c541f5c7d8a68b8d
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -341,8 +341,7 @@ static int quaternion_top_solve(double matrix[quaternion_top_DIM * quaternion_to
 }
 
 /* ---- Predictors ---- */
-/* largest distance of a prediction from the last value, relative to that value */
-#define quaternion_top_REACH 4.0
+#define quaternion_top_REACH 4.0 /* largest distance from the last value, relative to it */
 
 /* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
@@ -380,8 +379,7 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
     if (history->count < quaternion_top_DIFFERENCES) ++history->count;
 }
 
-/* steps up to this length, relative to state and motion, are accepted */
-#define quaternion_top_PLAUSIBLE 1.5
+#define quaternion_top_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 134acfb29936d0b551042fc0d6aa647bf4204cb552968039d3d294355ba105f9
+# body-sha256: d4d35f921a7755ec66000275b34c877c3962b0bedb48ae88ec7c3d280b48aa92
 import numpy as np
 
 VERSION = "0.1.0"
@@ -811,7 +811,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this length, relative to state and motion, are accepted
+PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
 MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 

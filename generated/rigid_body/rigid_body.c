@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: several steps or members at once; Newton's method in
  *   lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members:
  *   implicit steps; Ensembles
- * body-sha256: c484eb1c5fc29a72eff6229fcb623792767076c96aac13f5b17abc358cd24099
+ * body-sha256: 1f1e85e3ff7b27940141f7492c3297a58c1dcc2de74191c5b92343df9471c998
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -519,8 +519,7 @@ static int rigid_body_train(rigid_body_history *history, int component)
 }
 
 /* ---- Predictors ---- */
-/* largest distance of a prediction from the last value, relative to that value */
-#define rigid_body_REACH 4.0
+#define rigid_body_REACH 4.0 /* largest distance from the last value, relative to it */
 
 /* Whether a prediction is near the state. Far away the equation of a step has solutions unrelated to the
    motion. */
@@ -630,8 +629,7 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
         rigid_body_fit(history);
 }
 
-/* steps up to this length, relative to state and motion, are accepted */
-#define rigid_body_PLAUSIBLE 1.5
+#define rigid_body_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
@@ -657,8 +655,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-/* smaller components of y are measured relative to this fraction of the largest */
-#define rigid_body_FLOOR 1e-6
+#define rigid_body_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
 
 #define rigid_body_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
 #define rigid_body_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b34a58733052c8ff505fe25b0d8a5026495850fa4871739a959450b9d7a51f76
+ * body-sha256: f55b1992b3d0918e1e24be2101a89caa7d07fc5bed60abca9cf936cfaa25bef2
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -455,7 +455,7 @@ function vectorField(params, x, out) {
 /** A step size for which coefficients are finite */
 const PROBE_STEP = 1e-100;
 
-/** Smaller components of y are measured relative to this fraction of the largest */
+/** Smaller components of y count as this fraction of the largest */
 const FLOOR = 1e-6;
 
 /** A correction below this is rounding ... */
@@ -463,12 +463,12 @@ const NEARLY_SOLVED = 1e-8;
 /** ... if it exceeds this fraction of the one before */
 const SHRINKING = 0.25;
 
-/** Steps up to this length, relative to state and motion, are accepted */
+/** Accepted length of steps, relative to state and motion */
 const PLAUSIBLE = 1.5;
 /** Largest relative change of energy in longer steps */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** Largest distance of a prediction from the last value, relative to that value */
+/** Largest distance from the last value, relative to it */
 const REACH = 4.0;
 /** Number of stored differences; higher ones would amplify rounding errors */
 const DIFFERENCES = 9;

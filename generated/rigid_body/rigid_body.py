@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 4c5172fa8e4a0cee226b0243060909384b8c531643df47c835133b1e1d1f635f
+# body-sha256: 3868a028d7c262001c477dcfd17a0771319fba1fe7518944b6b9ef81ddbf2cf8
 import numpy as np
 
 VERSION = "0.1.0"
@@ -455,7 +455,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this length, relative to state and motion, are accepted
+PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
 MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
@@ -482,7 +482,7 @@ def _solved(stage, x, carry, guess):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # smaller components of y are measured relative to this fraction of the largest
+FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
 SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
 

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 01effde402dbfe4ebe7ac35faadff6faff4afacf508cc935a0a4b0524f6640a0
+ * body-sha256: 1b5703adea2ed13c560731fcc7a0869861b8513b8cc64a6cf7ea0a81971d9c96
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -259,8 +259,7 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
     return 1;
 }
 
-/* steps up to this length, relative to state and motion, are accepted */
-#define thermal_spin_PLAUSIBLE 1.5
+#define thermal_spin_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
 /* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
@@ -290,8 +289,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-/* smaller components of y are measured relative to this fraction of the largest */
-#define thermal_spin_FLOOR 1e-6
+#define thermal_spin_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
 
 #define thermal_spin_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
 #define thermal_spin_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */

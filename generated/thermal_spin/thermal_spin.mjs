@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e21268222f3a74f61eebf02a834a4ef26670b1c428af1abbaf705c52f5d8e2e7
+ * body-sha256: 02cab7dfcd07f065dcafe0c3d3c0e58b37eec74f4fc65b2af56582984add4db0
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -271,7 +271,7 @@ function vectorField(params, x, out) {
 /** A step size for which coefficients are finite */
 const PROBE_STEP = 1e-100;
 
-/** Smaller components of y are measured relative to this fraction of the largest */
+/** Smaller components of y count as this fraction of the largest */
 const FLOOR = 1e-6;
 
 /** A correction below this is rounding ... */
@@ -279,12 +279,12 @@ const NEARLY_SOLVED = 1e-8;
 /** ... if it exceeds this fraction of the one before */
 const SHRINKING = 0.25;
 
-/** Steps up to this length, relative to state and motion, are accepted */
+/** Accepted length of steps, relative to state and motion */
 const PLAUSIBLE = 1.5;
 /** Largest relative change of energy in longer steps */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** Largest distance of a prediction from the last value, relative to that value */
+/** Largest distance from the last value, relative to it */
 const REACH = 4.0;
 /** Number of stored differences; higher ones would amplify rounding errors */
 const DIFFERENCES = 9;

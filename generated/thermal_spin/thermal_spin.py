@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 2ea2baa4cadddfc30d9c76c13f1dacb84cd5012472c20c78243b9c2dc6f31069
+# body-sha256: 90a4a4c8ba38730b4393a5ff6122d2a77dedc4612aae35faec772ac21fec727c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -297,7 +297,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this length, relative to state and motion, are accepted
+PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
 MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
@@ -326,7 +326,7 @@ def _solved(stage, x, carry, guess):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # smaller components of y are measured relative to this fraction of the largest
+FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
 SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
 

@@ -50,7 +50,7 @@ class StartPolicy(Policy):
 class MeasurePolicy(Policy):
     """The scale of a correction of y; 0 for coordinates that keep their sign and may have very different sizes."""
 
-    floor: float = number(1e-6, "smaller components of y are measured relative to this fraction of the largest")
+    floor: float = number(1e-6, "smaller components of y count as this fraction of the largest")
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class GaussPolicy(Policy):
 class PredictorPolicy(Policy):
     """Starting values of an inner solve, from those of earlier steps by backward differences."""
 
-    reach: float = number(4.0, "largest distance of a prediction from the last value, relative to that value")
+    reach: float = number(4.0, "largest distance from the last value, relative to it")
     differences: int = count(9, "number of stored differences; higher ones would amplify rounding errors")
 
 
@@ -116,7 +116,7 @@ class PredictorPolicy(Policy):
 class PlausibilityPolicy(Policy):
     """Criteria for solutions of an implicit step far from the motion: distant ones at another energy."""
 
-    plausible: float = number(1.5, "steps up to this length, relative to state and motion, are accepted")
+    plausible: float = number(1.5, "accepted length of steps, relative to state and motion")
     max_energy_change: float = number(0.5, "largest relative change of energy in longer steps")
 
 
