@@ -41,7 +41,7 @@ def write_unit(console: Console, folder: Path, unit: MockupUnit, platforms: Sequ
 
     start, libraries = time.perf_counter(), dict[str, bytes]()
     for platform in platforms or compilers():
-        console.detail(f"{unit.name}: compiling for {platform}")
+        console.note(f"{unit.name}: compiling for {platform}")
         libraries |= binaries(unit, [platform])
     paths = {folder / f"{unit.name}.fmu": 3, folder / f"{unit.name}-fmi2.fmu": 2}
     write_all({path: archive(unit, version, libraries) for path, version in paths.items()})

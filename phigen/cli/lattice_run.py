@@ -119,7 +119,7 @@ def run_lattice(
             **compilation.described,
             "errors": largest,
         }
-        description |= {"observables": described_averages(observables, averages)} if observables else {}
+        description |= {"observables": described_averages(observables, averages, run.average.of)} if observables else {}
         if whole.crossings is not None:
             crossed = {"expression": section_text(run), "crossings": len(whole.crossings)}
             description["section"] = crossed
@@ -129,7 +129,7 @@ def run_lattice(
         named_method = compilation.named(f"{compilation.method}, {target}")
         _print(spec, run, start, named_method, trajectory, largest, units)
         if observables:
-            print_averages(observables, averages)
+            print_averages(observables, averages, run.average.of)
         if whole.crossings is not None:
             out(f"\n  {counted_crossings(run, len(whole.crossings), section_text(run))}")
         if spectrum:

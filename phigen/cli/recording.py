@@ -171,8 +171,8 @@ class Recorder:
         observed = self.solver.observed(piece.x, t, self.experiment.parameters)
         self.averages.see(t, observed)
         rows = np.column_stack([*times, piece.x, energy, casimirs, piece.turned, observed])
-        worked = self.watch.see(t, piece.x)
-        self.sketch.see(np.column_stack([t, piece.x, energy - worked, casimirs, observed]))
+        self.watch.see(t, piece.x)
+        self.sketch.see(np.column_stack([t, piece.x, energy, casimirs, observed]))
         if "output" in self._tables:
             self._tables["output"].append(rows[:, self._places])
         self._cross(piece.crossings)
@@ -207,11 +207,9 @@ class Recorder:
         )
         for start in range(0, len(rows), _ROWS):
             part = rows[start : start + _ROWS]
-            worked = self.watch.see(part[:, 0], part[:, state])
+            self.watch.see(part[:, 0], part[:, state])
             observed = part[:, part.shape[1] - len(names.observables) :]
-            samples = np.column_stack([part[:, 0], part[:, seen], observed])
-            samples[:, 1 + names.dimension] -= worked
-            self.sketch.see(samples)
+            self.sketch.see(np.column_stack([part[:, 0], part[:, seen], observed]))
             if self.files.output and not self._goes_on(self.files.output):
                 self._tables["output"].append(part)
 
@@ -433,9 +431,9 @@ def compared(
         ):
             x = states[:, : len(x0)]
             t = experiment.t0 + h * numbers
-            worked = watch.see(t, x)
+            watch.see(t, x)
             energy, casimirs = solver.energies(x, t, parameters), backend.casimirs(x, parameters)
-            sketch.see(np.column_stack([t, x, energy - worked, casimirs]))
+            sketch.see(np.column_stack([t, x, energy, casimirs]))
             if progress and len(numbers):
                 progress(int(numbers[-1]))
     console.detail(f"{method}: {time.perf_counter() - start:.3f} s")

@@ -210,7 +210,5 @@ def _draw(path: Path, recorder: Recorder, drawn: dict[str, Trajectory], casimirs
 
     sections = {f"{recorder.section_text} = 0": recorder.points.rows[:, 1:]} if recorder.finder else {}
     title = f"{recorder.solver.interface.name}, {recorder.experiment.run.name}"
-    figure = figures.run_figure(
-        drawn, casimirs, sections, title, recorder.spectrum, summary.units, balance=summary.is_balance
-    )
+    figure = figures.run_figure(drawn, casimirs, sections, title, recorder.spectrum, summary.units)
     figures.save(figure, path)

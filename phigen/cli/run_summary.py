@@ -39,7 +39,7 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
         if any(s.off > 0.01 for s in summaries):
             out("  The stored states are too far apart for an accurate integral: use a shorter --every, or stride.")
     if solver.interface.observables:
-        print_averages(solver.interface.observables, recorder.averages)
+        print_averages(solver.interface.observables, recorder.averages, recorder.experiment.run.average.of)
     if recorder.experiment.run.members > 1:
         _print_means(recorder)
     if recorder.finder:
@@ -93,8 +93,8 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
     return rows
 
 
-def print_averages(names: Sequence[str], averages: Averages) -> None:
-    """Print the time averages of the observables over the rows of a run."""
+def print_averages(names: Sequence[str], averages: Averages, of: Sequence[str] = ()) -> None:
+    """Print the time averages of the observables over the rows of a run, ``of`` some of them or of all."""
     if not averages.count:
         out("\n  observables have no means: no stored row is in the time that average: says")
         return
@@ -104,6 +104,7 @@ def print_averages(names: Sequence[str], averages: Averages) -> None:
     rows = [
         [name, f"{a.mean:.6g}", f"{a.error:.1g}", f"{a.least:.6g}", f"{a.largest:.6g}", f"{a.correlation_time:.2g}"]
         for name, a in zip(names, averages.results(), strict=True)
+        if name in (of or names)
     ]
     for line in table([header, *rows], right=range(1, 6)):
         out(f"  {line}")
@@ -145,7 +146,9 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "methods": [asdict(s) for s in summaries],
     }
     if solver.interface.observables:
-        description["observables"] = described_averages(solver.interface.observables, recorder.averages)
+        description["observables"] = described_averages(
+            solver.interface.observables, recorder.averages, experiment.run.average.of
+        )
     if solver.interface.noise:
         description |= {"seed": experiment.run.seed, "members": experiment.run.members}
         if experiment.run.members > 1:
@@ -157,11 +160,12 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
     return description
 
 
-def described_averages(names: Sequence[str], averages: Averages) -> dict[str, Any]:
-    """Return time averages of observables as JSON has them."""
+def described_averages(names: Sequence[str], averages: Averages, of: Sequence[str] = ()) -> dict[str, Any]:
+    """Return time averages of observables as JSON has them, ``of`` some of them or of all."""
     from dataclasses import asdict
 
-    return {name: asdict(average) for name, average in zip(names, averages.results(), strict=True)}
+    listed = zip(names, averages.results(), strict=True)
+    return {name: asdict(average) for name, average in listed if name in (of or names)}
 
 
 def described_spectrum(spectrum: Spectrum) -> dict[str, Any]:

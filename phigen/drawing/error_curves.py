@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Windows in which the largest error is drawn, where there are more rows.
 WINDOWS = 400
+#: The title of the values of an energy that is not conserved.
+HAMILTONIAN = "H(t)"
 #: The height of a row of panels in inches.
 ROW = 2.3
 #: The unit in the last place, drawn as the smallest error that can be expected.
@@ -56,13 +58,11 @@ def draw_errors(
     figure: FigureBase,
     methods: Mapping[str, Trajectory],
     units: Mapping[str, Unit] | None = None,
-    *,
-    balance: bool = False,
 ) -> None:
     """One panel for the energy and each Casimir, one curve for each method; the first method lies on top.
 
     Errors are in the ``units``; without them relative to the value at the start, unless that is 0. A quantity that
-    time, forces or noise change has no error: its values are drawn. ``balance`` says that the energy is its balance.
+    time, forces or noise change has no error: its values are drawn, H(t) for the energy.
     """
     first = next(iter(methods.values()))
     panels = [ENERGY, *first.casimirs]
@@ -75,11 +75,10 @@ def draw_errors(
         unit = (units or {}).get(name) or unit_of(float(next(iter(values.values()))[0]), 0.0)
         if units is None:
             unit = replace(unit, moves=name in first.moving)
-        balanced = balance and index == 1
-        what = "energy balance" if balanced else "energy" if index == 1 else f"Casimir {name}"
-        if unit.moves and not balanced:
+        what = "energy" if index == 1 else f"Casimir {name}"
+        if unit.moves:
             _draw_values(axes, {label: (methods[label].t, column) for label, column in values.items()})
-            axes.set_title(what)
+            axes.set_title(f"change of the energy, {HAMILTONIAN}" if index == 1 else f"change of the {what}")
         else:
             curves = {
                 label: windowed_maxima(methods[label].t, unit.errors(column, float(column[0])))

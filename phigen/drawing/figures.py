@@ -60,16 +60,14 @@ def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]
 
 
 @styled
-def error_figure(
-    methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None, *, balance: bool = False
-) -> Figure:
+def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> Figure:
     """The errors of energy and Casimirs against time, of several methods by their labels; one panel per quantity.
 
     Errors are in the ``units`` of `phigen.geometry.conservation.units_of`. Of long runs the largest error of each of
     some hundred windows is drawn. Zeros have a place of their own, marked 0; a cross marks where a method broke down.
     """
     figure = _figure(error_curves.height(methods))
-    error_curves.draw_errors(figure, methods, units, balance=balance)
+    error_curves.draw_errors(figure, methods, units)
     return figure
 
 
@@ -127,8 +125,6 @@ def run_figure(
     title: str = "",
     spectrum: Spectrum | None = None,
     units: Mapping[str, Unit] | None = None,
-    *,
-    balance: bool = False,
 ) -> Figure:
     """All figures of a run on one page.
 
@@ -149,9 +145,7 @@ def run_figure(
         rows[0][1].append(draw_section)  # a single panel leaves room at its side
     elif sections:
         rows.append((_SECTION, [draw_section]))
-    errors: Callable[[FigureBase], None] = partial(
-        error_curves.draw_errors, methods=methods, units=units, balance=balance
-    )
+    errors: Callable[[FigureBase], None] = partial(error_curves.draw_errors, methods=methods, units=units)
     if first.observables:
         draw_observables = partial(series_panels.draw_observables, t=first.t, observables=first.observables)
         rows.append((series_panels.height(first.observables), [draw_observables]))

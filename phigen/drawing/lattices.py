@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from phigen.drawing.error_curves import HAMILTONIAN
 from phigen.drawing.exponents import draw_exponents
 from phigen.drawing.palette import SERIES, styled
 from phigen.drawing.series_panels import draw_series
@@ -15,6 +16,7 @@ from phigen.drawing.spectra import draw_correlation, draw_spectrum
 from phigen.lattice.placing import placed
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.runtime.lattice_series import LatticeSeries
+from phigen.study.lattice_errors import BALANCE, CHANGE
 from phigen.symbolic.arrays import Floats
 
 if TYPE_CHECKING:
@@ -45,6 +47,8 @@ def lattice_figure(
 ) -> Figure:
     """The coordinates over space and time, and the ``errors`` (frames,) of what is conserved, by name.
 
+    Where time, forces or noise change the energy, H(t) is drawn in place of its error.
+
     Of pairs the paths in the plane of the first two coordinates are drawn.
 
     Sites of graphs and pairs may have names.
@@ -59,7 +63,9 @@ def lattice_figure(
     names = run.coordinates[: 1 if orbits else MOST_PANELS]
     observed = run.solver.interface.observables[:MOST_PANELS]
     transforms = [2.6] * (run.structure_factor is not None) + [1.8] * (run.correlated is not None)
-    below = [1.4] * len(observed) + [1.8] + transforms + [1.8] * (spectrum is not None)
+    moving = not {BALANCE, CHANGE}.isdisjoint(errors)
+    errors = {name: error for name, error in errors.items() if name not in (BALANCE, CHANGE)}
+    below = [1.4] * (len(observed) + moving) + [1.8] * bool(errors) + transforms + [1.8] * (spectrum is not None)
     height = ORBITS_HEIGHT if orbits else 2.2
     figure = Figure(figsize=(8.2, height * len(names) + 0.6 + sum(below)), layout="constrained")
     if title:
@@ -79,8 +85,13 @@ def lattice_figure(
             _draw_snapshots(part, name, run, values)
     for k, name in enumerate(observed):
         draw_series(parts[len(names) + k].add_subplot(), name, run.t, run.observed[:, k])
-    _draw_errors(parts[len(names) + len(observed)].add_subplot(), run, errors)
-    further = len(names) + len(observed) + 1
+    further = len(names) + len(observed)
+    if moving:
+        draw_series(parts[further].add_subplot(), HAMILTONIAN, run.t, run.energy)
+        further += 1
+    if errors:
+        _draw_errors(parts[further].add_subplot(), run, errors)
+        further += 1
     if run.structure_factor is not None:
         draw_spectrum(parts[further], run.structure_factor)
     if run.correlated is not None:

@@ -48,7 +48,7 @@ def error_picture(material: Material) -> Markup:
     if left_out > 0:
         caption += f" {left_out} more Casimirs are in the table above only."
     worst = "; ".join(_described(s) for s in material.summaries)
-    figure = figures.error_figure(methods, material.summaries[0].units, balance=material.summaries[0].is_balance)
+    figure = figures.error_figure(methods, material.summaries[0].units)
     return picture("errors", figure, "Errors of energy and Casimirs over time", f"Largest errors: {worst}.", caption)
 
 

@@ -71,7 +71,7 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "observed_fields": (None, (_POINTER, _POINTER)),
     "set_state": (_INT, (_POINTER, _POINTER)),
     "kick": (_INT, (_POINTER, _POINTER)),
-    "time": (_DOUBLE, (_POINTER,)),
+    "solver_time": (_DOUBLE, (_POINTER,)),
     "saved_clock": (None, (_POINTER, _POINTER)),
     "resume_clock": (_INT, (_POINTER, _POINTER)),
 }
@@ -256,7 +256,7 @@ class CLatticeSession:
 
     def time(self) -> float:
         """Return the physical time since the start, for steps equal in τ."""
-        return float(self._c.time(self._address))
+        return float(self._c.solver_time(self._address))
 
     def hold(self, level: float) -> None:
         """Hold another energy level e, for steps equal in τ."""

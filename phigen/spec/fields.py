@@ -282,6 +282,7 @@ AVERAGE = Record(
     (
         RecordKey("after", CONSTANT, "rows before this time are left out"),
         RecordKey("blocks", Integer(2, 10_000), "blocks of rows for the standard error; 20 if not given"),
+        RecordKey("of", ListOf(NAME, least=1), "the observables whose averages are shown; all if not given"),
     ),
     example="{after: 200, blocks: 20}",
 )

@@ -52,6 +52,16 @@ def label(path: Path) -> str:
     return f"{keys[-1]}: " if keys else ""
 
 
+def list_hint(node: Node) -> str:
+    """Return the hint for a node in place of a list, with its number, its name or the names of its mapping in one."""
+    if isinstance(node, MappingNode):
+        names = [key.text for key, _ in node.entries.values()][:3]
+        return f"{_LISTS}; of names only: [{', '.join(names)}]" if names else _LISTS
+    if isinstance(node, Scalar) and not node.is_null and len(node.text) < 20:
+        return f"{_LISTS}, and a list of one is [{node.text}]"
+    return _LISTS
+
+
 class Kind:
     """A kind of value; ``expected`` names it in messages."""
 
@@ -234,11 +244,11 @@ class ListOf(Kind):
 
     def read(self, node: Node, path: Path, reader: Reader) -> list[Any] | None:
         if isinstance(node, MappingNode) and isinstance(self.item, ShapedText):
-            self.mismatch(node, path, reader, _LISTS)
+            self.mismatch(node, path, reader, list_hint(node))
             # What uses the names is right.
             node = SequenceNode(node.location, [key for key, _ in node.entries.values()])
         if not isinstance(node, SequenceNode):
-            return self.mismatch(node, path, reader, _LISTS)
+            return self.mismatch(node, path, reader, list_hint(node))
         if len(node.items) < self.least:
             least = counted(self.least, "entry", "entries")
             return reader.error(node, f"{label(path)}expected at least {least}, found {len(node.items)}")

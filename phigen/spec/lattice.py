@@ -74,6 +74,12 @@ _ABSENT_IN_RUNS = {
 }
 
 
+def scope_of_states(declared: Declarations, observables: Mapping[str, Expression]) -> AllowedNames:
+    """The names of functions of a state of an ordinary system, with its observables: for sections and stops of runs."""
+    scope = declared.dated_scope()
+    return replace(scope, names={**observables, **scope.names})
+
+
 def scope_of_numbers(declared: Declarations, observables: Iterable[str], fields: Iterable[str]) -> AllowedNames:
     """The names of numbers of a whole lattice: for sections and stops of runs.
 

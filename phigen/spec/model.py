@@ -216,10 +216,14 @@ class Overrides(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class AverageChoice:
-    """``average:`` of a run: rows from the time ``after`` on, None for all, in at least so many ``blocks``."""
+    """``average:`` of a run: rows from the time ``after`` on, None for all, in at least so many ``blocks``.
+
+    The averages are those ``of`` some observables, of all if it is empty.
+    """
 
     after: Fraction | None = None
     blocks: int | None = None
+    of: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -25,12 +25,17 @@ NEAR_INTEGER = Fraction(1, 10**9)
 
 
 def run(
-    name: str, raw: Mapping[str, Any], declared: Declarations, recordable: Mapping[str, str], watched: AllowedNames
+    name: str,
+    raw: Mapping[str, Any],
+    declared: Declarations,
+    recordable: Mapping[str, str],
+    watched: AllowedNames,
+    averaged: Collection[str],
 ) -> Run:
     """The run of that name. After errors, which are reported, some of its values are stand-ins.
 
     ``recordable`` maps what ``record`` may name to "", other names of the spec to why it may not. ``watched`` has the
-    names of what changes along a run, for sections and stops.
+    names of what changes along a run, for sections and stops, ``averaged`` those that ``average`` may name.
     """
     numbers = declared.numbers()
     step_node = raw.get("step")
@@ -81,7 +86,7 @@ def run(
         every=every,
         at=listed,
         stop=_crossed(name, "stop", raw, declared, replace(watched, piecewise=True)),
-        average=_average(raw.get("average"), declared),
+        average=_average(name, raw.get("average"), declared, averaged),
         record=_recorded(name, raw.get("record"), declared, recordable),
         description=raw.get("description", ""),
         lattice=replace(lattice, arrays=arrays) if lattice else None,
@@ -135,11 +140,20 @@ def _recorded(
     return without_repetition(words, ("runs", name, "record"), declared)
 
 
-def _average(raw: Mapping[str, Any] | None, declared: Declarations) -> AverageChoice:
-    """Return ``average`` of a run."""
+def _average(
+    name: str, raw: Mapping[str, Any] | None, declared: Declarations, averaged: Collection[str]
+) -> AverageChoice:
+    """Return ``average`` of a run, ``of`` observables that are one number."""
     if raw is None:
         return AverageChoice()
-    return AverageChoice(declared.number(raw.get("after"), declared.numbers()), raw.get("blocks"))
+    listed = without_repetition(
+        [node and node.text for node in raw.get("of", ())], ("runs", name, "average", "of"), declared
+    )
+    for node in raw.get("of", ()):
+        if node is not None and node.text not in averaged and not declared.incomplete:
+            hint = did_you_mean(node.text, averaged) or f"observables that are one number: {', '.join(averaged)}"
+            declared.reader.error(node, f"average: of: {shown(node.text)} is no observable that is one number", hint)
+    return AverageChoice(declared.number(raw.get("after"), declared.numbers()), raw.get("blocks"), listed)
 
 
 def expect_rows_to_average(run_: Run, declared: Declarations) -> None:

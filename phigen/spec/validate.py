@@ -14,7 +14,7 @@ from phigen.spec.fields import SPEC
 from phigen.spec.grammar import AllowedNames
 from phigen.spec.kinds import Reader
 from phigen.spec.lattice import casimirs as read_casimirs
-from phigen.spec.lattice import densities, scope_of_numbers, with_kinds
+from phigen.spec.lattice import densities, scope_of_numbers, scope_of_states, with_kinds
 from phigen.spec.model import (
     DEFAULT_ORDER,
     NOISY_ORDER,
@@ -85,8 +85,10 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     broken = [name for name in raw.get("observables", {}) if name not in observed]
     columns |= dict.fromkeys(["state", "energy", *summed, *numbers, *broken], "")
     fields = [name for name in observed if name not in numbers]
-    watched = declared.dated_scope() if lattice is None else scope_of_numbers(declared, numbers, fields)
-    runs = {n: run(n, r, declared, columns, watched) for n, (_, r) in raw.get("runs", {}).items() if r is not None}
+    watched = scope_of_states(declared, observed) if lattice is None else scope_of_numbers(declared, numbers, fields)
+    averaged = [*numbers, *broken]
+    listed_runs = {n: r for n, (_, r) in raw.get("runs", {}).items() if r is not None}
+    runs = {n: run(n, r, declared, columns, watched, averaged) for n, r in listed_runs.items()}
     if "monitor" not in raw:
         for run_ in runs.values():
             expect_rows_to_average(run_, declared)

@@ -74,8 +74,9 @@ def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[T
         raise _NoBodiesError(f"distances are along {len(axes)} axes with {', '.join(str(len(a)) for a in axes)} bodies")
     body_of = {c: i for axis in axes for i, c in enumerate(axis)}
     momenta = [[conjugate(ring, c) for c in axis] for axis in axes]
-    if any(j is None for axis in momenta for j in axis):
-        raise _NoBodiesError("a position has no conjugate momentum")
+    if missing := [c for axis in axes for c in axis if conjugate(ring, c) is None]:
+        why = f"{ring.coordinates[missing[0]]} has no canonical momentum p with {{q, p}} = 1, as velocities are none"
+        raise _NoBodiesError(f"{why}; poisson: {{canonical: {{q: […], p: […]}}}} has them")
     coefficients = ring.terms(ring.tower.combine(t.element for t in terms), ring.state)
     known: set[Monomial] = set()
     strengths: dict[tuple[int, int], Expression] = {}

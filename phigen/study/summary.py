@@ -128,18 +128,14 @@ class Watch:
         """The number of rows received, all finite."""
         return int(self.state["good"])
 
-    def see(self, t: Floats, x: Floats) -> Floats:
-        """Take in the next rows, times (rows,) and states (rows, DIM); those after one not finite do not count.
-
-        The work that was done on the system up to each of them, (rows,), which the balance of energy takes from H.
-        """
-        done = np.zeros(len(t))
+    def see(self, t: Floats, x: Floats) -> None:
+        """Take in the next rows, times (rows,) and states (rows, DIM); those after one not finite do not count."""
         state, good = self.state, int(self.state["good"])
         finite = np.isfinite(x).all(axis=1)
         count = 0 if state["broken"] else len(x) if finite.all() else int(np.argmin(finite))
         state["broken"] = np.asarray(state["broken"] or count < len(x))
         if count == 0:
-            return done
+            return
         t, x = t[:count], x[:count]
         if "since" in state and not self.begun:
             state["since"] = np.asarray(t[0])
@@ -147,8 +143,8 @@ class Watch:
         known = {**self._parameters, **columns}
         values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, known)]
         if self._powers:
-            done[:count] = self._work(t, [np.broadcast_to(a, t.shape) for a in evaluate(self._powers, known)])
-            energies, values[0] = values[0], values[0] - done[:count]
+            work = self._work(t, [np.broadcast_to(a, t.shape) for a in evaluate(self._powers, known)])
+            energies, values[0] = values[0], values[0] - work
         if good == 0:
             state |= {"first": x[0].copy(), "start": np.array([v[0] for v in values])}
         state["good"] = np.asarray(good + count)
@@ -164,7 +160,6 @@ class Watch:
             off = _against_exact(self._system, self._run, self._parameters, state["first"], t, x)
             state["exact"] = np.asarray(max(off, float(state["exact"])))
         state["final"] = x[-1].copy()
-        return done
 
     def _work(self, t: Floats, slopes: Sequence[Floats]) -> Floats:
         """∫ ∂_tH dt up to each of the times, which follow those seen before, from the powers there."""

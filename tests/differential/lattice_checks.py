@@ -215,6 +215,10 @@ def functions(trial: Trial) -> None:
         )
         density = np.array(np.sum(solver.density(x, **when, **trial.given)))
         expect_close(density, np.array(energy), part, f"{target}: sum of the density", 1 + abs(energy))
+        seen = solver.observables(x, **when, **trial.given)
+        for name, value in system.seen(trial.values, x.reshape(len(x), -1)).items():
+            size = 1 + float(np.abs(value).max(initial=0.0))
+            expect_close(np.array(seen[name]), value, part, f"{target}: observable {name}", size)
         if system.casimir is not None:
             expect_close(solver.casimirs(x, **trial.given)["C"], (x**2).sum(axis=0), part, f"{target}: Casimir")
 

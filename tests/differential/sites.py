@@ -16,6 +16,8 @@ from differential.formulas import TIME, Expr, gradient, numeric, symbols, text
 from differential.reference import Floats
 from numpy.typing import NDArray
 
+from phigen.spec.names import REDUCTIONS
+
 Places = NDArray[np.int64]
 _INDEXED = re.compile(r"(\w+)(\[[^\]]*\])?$")
 
@@ -109,8 +111,15 @@ class Lattice:
             yield "monitor", "log"
         if self.noise:
             yield "noise", {n: {"hamiltonian": text(g), "amplitude": text(s)} for n, (g, s) in self.noise.items()}
+        observables: dict[str, Any] = {f"o{k}": {kind: self.fields[0]} for k, kind in enumerate(REDUCTIONS)}
+        if not self.axes and self.ends:
+            over = "pairs" if self.pairs else "bonds"
+            observables |= {"apart": {"sum": text(self.ends[0]), "over": over}}
+        yield "observables", observables | {"own": text(self.observed)}
         yield from self.options.items()
         run = {"sizes": list(self.sizes), "initial": self.initial, "step": 0.1, "steps": 4}
+        if not self.axes:
+            run["names"] = [f"site {k}" for k in range(self.count)]
         yield "runs", {"r": run | ({"bonds": [list(b) for b in self.bonds]} if self.graph else {})}
 
     def _relation(self) -> dict[str, Any]:
@@ -207,6 +216,19 @@ class Lattice:
         well = sum(np.sum(self._term(e, edges=True).at(0.0, x, values)) for e in self.ends)
         with np.errstate(divide="ignore"):
             return float(-1 / np.float64(well))
+
+    @property
+    def observed(self) -> Expr:
+        """A field of each site that is observed."""
+        first, last = sympy.Symbol(self.fields[0], real=True), sympy.Symbol(self.fields[-1], real=True)
+        return first * last + 2 * last
+
+    def seen(self, values: Mapping[str, Any], x: Floats) -> dict[str, Floats]:
+        """The observables of a state (fields, sites)."""
+        named = {f"o{k}": np.array(getattr(np, kind)(x[0])) for k, kind in enumerate(REDUCTIONS)}
+        if not self.axes and self.ends:
+            named["apart"] = np.array(np.sum(self._term(self.ends[0], edges=True).at(0.0, x, values)))
+        return named | {"own": (x[0] * x[-1] + 2 * x[-1]).reshape(self.sizes)}
 
     def densities(self, values: Mapping[str, Any], t: float, x: Floats) -> float:
         """The value of H."""

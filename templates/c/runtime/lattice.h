@@ -79,7 +79,7 @@ phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, s
 /* Steps are equal in tau: h is a step in tau, and K = log(A + e) - log(-B) is 0 along the trajectory, where H = A + B.
    phi_init and changes of the state set e = -H, and return PHI_BAD_ARGUMENT where -B is not positive. This is the physical
    time since phi_init, s->t too. */
-double phi_time(const phi_solver *s);
+double phi_solver_time(const phi_solver *s);
 
 /* Save and restore the level e and the physical time, beside phi_saved and phi_resume; restored after the latter. */
 void phi_saved_clock(const phi_solver *s, double clock[5]);

@@ -6,7 +6,7 @@
 #include "lattice.h"
 #include "model.h"
 
-double phi_time(const phi_solver *s) { return s->t; }
+double phi_solver_time(const phi_solver *s) { return s->t; }
 
 void phi_saved_clock(const phi_solver *s, double clock[5])
 {
