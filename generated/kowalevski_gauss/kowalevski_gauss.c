@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
  *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: a565298c8e99eb972ce4b6895c1eaf5f63e402ea84f69362d5997383bddbbdb9
+ * body-sha256: 259f7238e2f5b4c05bd63f376358f0baa31d16bf1ea56c9019228a4e330d81b8
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -571,16 +571,16 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
         { { 0.0 } };
     kowalevski_gauss_progress progress = { HUGE_VAL, 0, 0 };
     for (int i = 0; i < kowalevski_gauss_NODES; ++i) weights[0][i] = s->h * kowalevski_gauss_weights[i];
-    if (past->count > 0 && !memcmp(&s->h, &past->h, sizeof s->h) != 0) {
-        kowalevski_gauss_predict(past, past->count < kowalevski_gauss_EARLIER
-            ? kowalevski_gauss_PREDICTORS - 1 : past->predictor, z);
-    } else {
+    if (past->count == 0 || memcmp(&s->h, &past->h, sizeof s->h) != 0) {
         memset(z, 0, sizeof z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h))
             kowalevski_gauss_predict_at(past, s->h / past->h, z);
         if (past->count > 1) past->count = 1;
         past->rate = 0.5;
         past->sweeps = 2;
+    } else {
+        kowalevski_gauss_predict(past, past->count < kowalevski_gauss_EARLIER
+            ? kowalevski_gauss_PREDICTORS - 1 : past->predictor, z);
     }
     for (int sweep = 1; sweep <= kowalevski_gauss_MAX_SWEEPS; ++sweep) {
         const int tested = sweep >= past->sweeps;

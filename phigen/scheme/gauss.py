@@ -9,6 +9,7 @@ from phigen.errors import SpecError
 from phigen.gauss.realisation import Plain, Realisation, collective, direct
 from phigen.gauss.stage_map import StageMap, at_unknowns, stage_map, vector_field
 from phigen.gauss.tableau import MOST_STAGES, tableau
+from phigen.geometry.shapes import Affine, LiePoisson, coordinate_terms
 from phigen.geometry.system import System
 from phigen.scheme.adjoint import completed, gauss_adjoint, level_adjoint
 from phigen.scheme.discretisation import expect_few
@@ -77,13 +78,24 @@ def realise_gauss(spec: Spec, system: System) -> Realisation:
     if realisation is None:
         message = f"scheme gauss: no exact Poisson map is known for this bracket ({system.shape})"
         place = ("structure",) if ("structure",) in spec.locations else ("scheme",)
-        raise SpecError([spec.diagnostic(place, message, TRUNCATION_HINT)])
+        raise SpecError([spec.diagnostic(place, message, _other_coordinates(system) + TRUNCATION_HINT)])
     bound = [i for part in realisation.parts if not isinstance(part, Plain) for i in part.indices]
     pushed = [system.coordinates[i] for i in bound if _is_pushed(system, i)]
     if pushed:
         message = f"scheme gauss: a vector force on {', '.join(pushed)} leaves the symplectic leaves"
         raise SpecError([spec.diagnostic(("forces",), message, "structure: to truncation, or scheme: series")])
     return realisation
+
+
+def _other_coordinates(system: System) -> str:
+    """Return the hint that linear combinations of the coordinates may have an exact Poisson map; empty for others."""
+    if isinstance(system.shape, LiePoisson | Affine):
+        return "a basis with fewer structure constants, as those of lie_algebra, may have one; otherwise "
+    entries = [entry for row in system.poisson for entry in row]
+    terms = coordinate_terms(system.coordinates, entries)
+    if terms is not None and all(sum(powers) == 2 for monomials in terms for powers in monomials):
+        return "take coordinates with brackets {x_i, x_j} = c x_i x_j, if linear combinations have them; otherwise "
+    return ""
 
 
 def _is_pushed(system: System, i: int) -> bool:

@@ -219,7 +219,15 @@ def test_check_proves_what_a_step_is():
 
 #: A bracket that is neither constant, nor linear, nor so in logarithms.
 CURVED = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: x*y + z**2}}}\nhamiltonian: x**2 + y**2\n"
+#: The brackets {u, v} = uv of u = x + y and v = x − y, which a linear change of coordinates hides.
+HIDDEN = (
+    "coordinates: [x, y]\npoisson: {brackets: {x: {y: (y**2 - x**2)/2}}}\nhamiltonian: x**2 + y**4\nscheme: gauss\n"
+)
+#: A solvable Lie algebra without a star algebra that is known.
+SOLVABLE = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: y + z, z: z}}}\nhamiltonian: x**2 + y\nscheme: gauss\n"
 REFUSED = {
+    "hidden logarithms": (HIDDEN, "no exact Poisson map is known", "take coordinates with brackets"),
+    "solvable": (SOLVABLE, "no exact Poisson map is known", "a basis with fewer structure constants"),
     "structure": (f"{CURVED}scheme: gauss\n", "no exact Poisson map is known", "to truncation"),
     "noise": (f"{BODY}noise: {{w: {{hamiltonian: x1}}}}\nscheme: gauss\n", "not with noise", "series"),
     "monitor": (f"{BODY}monitor: log\nscheme: gauss\n", "log needs H = A + B split in two", "splitting"),

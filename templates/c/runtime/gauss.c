@@ -226,14 +226,14 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
     phi_lanes z[PHI_UNKNOWNS], next[PHI_UNKNOWNS], weights[1] = { { 0.0 } };
     phi_progress progress = { HUGE_VAL, 0, 0 };
     for (int i = 0; i < PHI_NODES; ++i) weights[0][i] = s->h * phi_weights[i];
-    if (past->count > 0 && !PHI_DIFFERS(s->h, past->h)) {
-        phi_predict(past, past->count < PHI_EARLIER ? PHI_PREDICTORS - 1 : past->predictor, z);
-    } else {
+    if (past->count == 0 || PHI_DIFFERS(s->h, past->h)) {
         PHI_CLEAR_STAGES(z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h)) phi_predict_at(past, s->h / past->h, z);
         if (past->count > 1) past->count = 1;
         past->rate = 0.5;
         past->sweeps = 2;
+    } else {
+        phi_predict(past, past->count < PHI_EARLIER ? PHI_PREDICTORS - 1 : past->predictor, z);
     }
     for (int sweep = 1; sweep <= PHI_MAX_SWEEPS; ++sweep) {
         const int tested = sweep >= past->sweeps;
