@@ -86,7 +86,7 @@ class LatticeCourse:
         sites = self.sites  # starts with the previous step size
         if h != self._clock.h:
             self._anchor = {}
-        self._clock.set_step(h, self.steps)
+            self._clock.set_step(h, self.steps)
         sites.advance(h, steps)
 
     def branch(self) -> LatticeCourse:
@@ -94,8 +94,11 @@ class LatticeCourse:
         steps = self.steps
         if not (self._anchor and 0 <= steps - self._anchor_steps < SHARED_STEPS):
             self._anchor, self._anchor_steps = self.saved(), steps
-        twin = LatticeCourse.restored(self.solver, self.at, self._anchor)
-        twin._ahead = steps - self._anchor_steps
+        twin, clock = object.__new__(LatticeCourse), self._clock
+        twin.solver, twin.at, twin._before = self.solver, self.at, clock.counted
+        twin._clock = Clock(clock.t, clock.h, clock.counted)  # the step size is that of the anchor
+        twin._arrays, twin._sites, twin._ahead = self._anchor, None, steps - self._anchor_steps
+        twin._anchor, twin._anchor_steps = {}, 0
         return twin
 
     def place(self, x: Floats) -> None:

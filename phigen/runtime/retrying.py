@@ -44,12 +44,15 @@ class Retrying:
 
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` whole steps; raises `BackendError` if one fails in every number of parts."""
-        target = self.steps + steps
-        while self.steps < target:
+        while steps > 0:
+            begin = self.steps
             try:
-                self.session.advance(h, target - self.steps)
+                self.session.advance(h, steps)
             except BackendError as error:
                 self._make_parts(h, error)
+                steps -= self.steps - begin
+            else:
+                return
 
     def branch(self) -> Self:
         """Return an independent copy."""
