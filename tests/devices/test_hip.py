@@ -13,7 +13,10 @@ HEADERS = Path(__file__).parent / "hip_without_rocm.h"
 
 @pytest.mark.parametrize(
     "name",
-    ["pendulum_euler", *(pytest.param(n, marks=pytest.mark.slow) for n in ("rigid_body", "kepler_eccentric", "toda"))],
+    [
+        "pendulum_euler",
+        *(pytest.param(n, marks=pytest.mark.slow) for n in ("rigid_body", "kepler_eccentric", "kdv")),
+    ],
 )
 def test_code_compiles_for_a_card(name, tmp_path):
     write(tmp_path, emit(compilation_of(name, profile="small").program, "device", COMMAND))

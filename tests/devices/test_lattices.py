@@ -10,7 +10,7 @@ from systems import LATTICES, spec_of
 import phigen
 from phigen.api import compilation_of
 from phigen.compiler import emit
-from phigen.errors import DeviceError
+from phigen.errors import DeviceError, SpecError
 from phigen.lattice.states import start_of
 from phigen.runtime.devices.device import OutOfMemoryError
 from phigen.runtime.devices.lattices import DeviceLattice
@@ -20,11 +20,12 @@ from phigen.spec import loads
 
 pytest.importorskip("pyopencl")
 
+MONITORED = "pythagorean"
 QUICK, LONGER = ("fput",), ("heisenberg", "thermal_heisenberg", "xxz_disorder")
 
 
 def cases():
-    for name in LATTICES:
+    for name in (n for n in LATTICES if n != MONITORED):
         mark = () if name in QUICK else pytest.mark.slow if name in LONGER else pytest.mark.exhaustive
         yield pytest.param(name, marks=mark)
 
@@ -101,10 +102,9 @@ def test_recorded_numbers_are_those_of_c_and_do_not_depend_on_the_size_of_work_g
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "sizes"), [("twisted", (7,)), ("layer", (3, 5))])
-def test_sites_on_seams_are_those_of_c(name, sizes):
-    device, c = both(loads(seamed(name, sizes, "small")))
-    x = 1 + 0.3 * np.random.default_rng(0).standard_normal((3, *sizes))
+def test_sites_on_seams_are_those_of_c():
+    device, c = both(loads(seamed("layer", (3, 5), "small")))
+    x = 1 + 0.3 * np.random.default_rng(0).standard_normal((3, 3, 5))
     ours, theirs = (solver.integrate(x, 0.1, 5) for solver in (device, c))
     np.testing.assert_allclose(ours.x, theirs.x, rtol=0, atol=1e-14)
 
@@ -176,6 +176,12 @@ def test_a_lost_device_says_where_the_run_can_be_resumed(monkeypatch):
         device.integrate(x, h, 20)
 
 
+@pytest.mark.slow
+def test_a_monitor_of_pairs_is_refused():
+    with pytest.raises(SpecError, match=f"{MONITORED} has a monitor, which lattices on devices do not take"):
+        emit(compilation_of(MONITORED, profile="small").program, "device", COMMAND)
+
+
 def test_a_run_on_a_device_that_was_lost_is_resumed_with_the_same_bits(monkeypatch, tmp_path):
     device, _ = both("fput")
     x, h, _ = beginning("fput", device.interface)
@@ -210,8 +216,16 @@ def test_lattices_that_exceed_the_memory_of_the_device_are_refused(monkeypatch):
 @pytest.mark.skipif(not nvrtc.is_installed(), reason="the wheels of NVRTC and ptxas are not installed")
 @pytest.mark.slow
 @pytest.mark.parametrize("architecture", nvrtc.ARCHITECTURES)
-def test_kernels_compile_for_two_generations_of_cards(architecture, tmp_path):
-    (text,) = emit(compilation_of("xxz_disorder", profile="small").program, "device", COMMAND).values()
+@pytest.mark.parametrize(
+    ("name", "kernels"),
+    [
+        ("xxz_disorder", ["sweep1", "sweep2", "sweep3", "energy", "reduce"]),
+        ("kdv", ["relax", "increment", "slope", "combine"]),
+        ("food_web", ["gather1_a", "gather1_b", "sweep1"]),
+    ],
+)
+def test_kernels_compile_for_two_generations_of_cards(name, kernels, architecture, tmp_path):
+    (text,) = emit(compilation_of(name, profile="small").program, "device", COMMAND).values()
     compiled = nvrtc.assembled(nvrtc.ptx(text, architecture), architecture, tmp_path)
-    assert {f"xxz_disorder_sweep{k}_kernel" for k in (1, 2, 3)} < compiled.keys()
+    assert {f"{name}_{kernel}_kernel" for kernel in kernels} < compiled.keys()
     assert all(kernel.spilled == 0 for kernel in compiled.values())
