@@ -12,7 +12,7 @@ from functools import reduce
 
 from phigen import progress
 from phigen.geometry.system import System, hamiltonian_vector_field
-from phigen.splitting import exponential, matrices, scalar, spheres
+from phigen.splitting import exponential, matrices, scalar, small_matrices, spheres
 from phigen.splitting.closure import motion_of
 from phigen.splitting.euler import EulerMotion
 from phigen.splitting.exponential import NoClosedFormError
@@ -22,11 +22,16 @@ from phigen.splitting.matrices import MatrixExponential
 from phigen.splitting.relative import RelativeMotions
 from phigen.splitting.ring import TIME, Ring
 from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, symbol, symbols_of, topological, total
+from phigen.symbolic.remainders import REMAINDERS
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.tower import Poly, Tower
 
 #: Motions with flows of their own, which are proved by identities.
 Motion = KeplerMotion | RelativeMotions | EulerMotion
+
+#: Methods for linear equations, each with those before: closed forms, exponentials of matrices that are computed before
+#: the steps, and exponentials of small matrices that depend on the state.
+CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES = range(3)
 
 #: The manner of a linear motion with a matrix exponential.
 BY_MATRIX = "moved by exp(tA), computed before the steps"
@@ -73,6 +78,11 @@ class Flow:
         return self.force or hamiltonian_vector_field(system.poisson, gradient(self.hamiltonian, system.coordinates))
 
     @property
+    def calls_remainders(self) -> bool:
+        """Whether the flow has exponentials of small matrices that depend on the state."""
+        return any(e.op in REMAINDERS for e in topological(self.increment))
+
+    @property
     def moving(self) -> int:
         """The number of coordinates that move."""
         return sum(not e.is_zero for e in self.increment)
@@ -89,23 +99,25 @@ class NoFlowError(Exception):
 def flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool = True) -> Flow:
     """Return the flow of a sum of commuting terms: in closed form or, if ``numeric``, by matrix exponentials.
 
-    Raises `NoFlowError` for the first term that has neither.
+    These are computed before the steps or, where the matrix depends on the state, by the theorem of Cayley and
+    Hamilton, which is the last resort. Raises `NoFlowError` for the first term that has none of these.
     """
     motions = [_flow_of_motion(ring, term, term.motion) for term in terms if term.motion]
     if motions:
         others = [term for term in terms if not term.motion]
         pieces = [*motions, *([flow_of(ring, others)] if others else [])]
         return pieces[0] if len(pieces) == 1 else replace(composed(ring.coordinates, pieces), pieces=tuple(pieces))
-    try:
-        return _flow_of(ring, terms, numeric=False)
-    except NoFlowError:
-        if numeric:
-            return _flow_of(ring, terms, numeric=True)
-        raise
+    admitted = (CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES) if numeric else (CLOSED_FORMS,)
+    for methods in admitted[:-1]:
+        try:
+            return _flow_of(ring, terms, methods)
+        except NoFlowError:
+            continue
+    return _flow_of(ring, terms, admitted[-1])
 
 
-def _flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool) -> Flow:
-    whole = joint_flow(ring, terms, numeric=numeric)
+def _flow_of(ring: Ring, terms: Sequence[Term], methods: int) -> Flow:
+    whole = joint_flow(ring, terms, methods=methods)
     if isinstance(whole, Flow):
         return whole
     if len(terms) == 1:
@@ -114,11 +126,11 @@ def _flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool) -> Flow:
     with progress.stage("flows of terms", len(terms)) as running:
         for running.done, term in enumerate(terms):
             if steps:
-                joint = joint_flow(ring, [*steps[-1][0], term], numeric=numeric)
+                joint = joint_flow(ring, [*steps[-1][0], term], methods=methods)
                 if isinstance(joint, Flow):
                     steps[-1] = ([*steps[-1][0], term], joint)
                     continue
-            alone = joint_flow(ring, [term], numeric=numeric)
+            alone = joint_flow(ring, [term], methods=methods)
             if not isinstance(alone, Flow):
                 raise NoFlowError(term, alone)
             steps.append(([term], alone))
@@ -147,15 +159,15 @@ def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:
     return Flow(hamiltonian, tuple(so_far), manner, pieces=pieces, exponentials=exponentials)
 
 
-def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, numeric: bool = False) -> Flow | str:
+def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, methods: int = CLOSED_FORMS) -> Flow | str:
     """Return the joint flow of terms, or the reason why there is none; ``linear`` admits only linear equations.
 
     Flows of linear equations resolve small coordinates to their own precision, unlike differences with a constant
-    sum. ``numeric`` admits exponentials of matrices that are computed before the steps.
+    sum. ``methods`` are `CLOSED_FORMS`, and more with `EXPONENTIALS` and `SMALL_MATRICES`.
     """
     g = total(t.expression for t in terms)
     field = ring.field(ring.tower.combine(t.element for t in terms))
-    solution = solved(ring, field, linear=linear, numeric=numeric)
+    solution = solved(ring, field, linear=linear, methods=methods)
     if isinstance(solution, str):
         return solution
     moving = {c for c, e in zip(ring.coordinates, solution.increments, strict=True) if not e.is_zero}
@@ -177,18 +189,18 @@ class Solved:
     exponentials: tuple[MatrixExponential, ...] = ()
 
 
-def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False, numeric: bool = False) -> Solved | str:
+def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False, methods: int = CLOSED_FORMS) -> Solved | str:
     """Return the increments along a vector field, or the reason why there are none.
 
     Linear first integrals are substituted where that helps. The field need not be that of a Hamiltonian. ``linear``
-    and ``numeric`` are those of `joint_flow`.
+    and ``methods`` are those of `joint_flow`.
     """
     direct = _solved(ring, field, linear)
     if not isinstance(direct, str):
         return direct
     alternative = None if linear else _nonlinear(ring, field)
-    if alternative is None and numeric:
-        numerical = _solved(ring, field, linear, numeric=True)
+    if alternative is None and methods > CLOSED_FORMS:
+        numerical = _solved(ring, field, linear, methods)
         alternative = None if isinstance(numerical, str) else numerical
     return alternative or direct
 
@@ -208,7 +220,7 @@ def _on_sphere(ring: Ring, field: Sequence[Poly]) -> Solved | None:
     return Solved([increments.get(i, ZERO) for i in range(len(field))], f"{names} {manner}", ())
 
 
-def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False, *, numeric: bool = False) -> Solved | str:
+def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False, methods: int = CLOSED_FORMS) -> Solved | str:
     """Return the increments along a vector field, or the reason why there are none."""
     motion = motion_of(ring, field)
     increments: list[Expression] = [ZERO] * len(ring.coordinates)
@@ -224,11 +236,16 @@ def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False, *, numeric:
         try:
             solution = exponential.solve(ring, equations)
         except NoClosedFormError as error:
-            static = matrices.solve(ring, equations) if numeric else None
+            static = matrices.solve(ring, equations) if methods >= EXPONENTIALS else None
             if static:
                 increments = _placed(increments, equations.coordinates, static.increments)
                 manners.setdefault(BY_MATRIX, []).extend(equations.coordinates)
                 exponentials.append(static.exponential)
+                continue
+            small = small_matrices.solve(ring, equations) if methods >= SMALL_MATRICES else None
+            if small:
+                increments = _placed(increments, equations.coordinates, small.increments)
+                manners.setdefault(small.manner, []).extend(equations.coordinates)
                 continue
             names = ", ".join(ring.coordinates[i] for i in equations.coordinates)
             return f"phigen has no closed form for the motion of {names} along its flow: {error}"

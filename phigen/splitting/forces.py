@@ -18,7 +18,7 @@ from phigen.geometry.blocks import blocks
 from phigen.geometry.forces import Forces
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.splitting.conflicts import coloured
-from phigen.splitting.flow import Flow, solved
+from phigen.splitting.flow import CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES, Flow, solved
 from phigen.splitting.ring import ring_of
 from phigen.symbolic.expression import ZERO, Expression, gradient, symbols_of, total
 from phigen.symbolic.readable import shortened
@@ -43,11 +43,11 @@ def force_flows(system: System) -> tuple[Flow, ...]:
     try:
         closed = _closed_flows(system, forces)
     except SpecError:
-        whole = _flow(system, field, numeric=True)
+        whole = _flow(system, field, SMALL_MATRICES)
         if isinstance(whole, Flow):
             return (whole,)
         raise
-    whole = closed[0] if len(closed) == 1 else _flow(system, field, numeric=True)
+    whole = closed[0] if len(closed) == 1 else _flow(system, field, EXPONENTIALS)
     return (whole,) if isinstance(whole, Flow) else closed
 
 
@@ -163,10 +163,10 @@ def _pieces(
         yield flow
 
 
-def _flow(system: System, field: Field, *, numeric: bool = False) -> Flow | str:
-    """Return the flow of a vector field, or the reason why there is none; ``numeric`` admits matrix exponentials."""
+def _flow(system: System, field: Field, methods: int = CLOSED_FORMS) -> Flow | str:
+    """Return the flow of a vector field by ``methods`` of `solved`, or the reason why there is none."""
     ring = ring_of(system, field)
-    solution = solved(ring, ring.tower.convert_all(field), numeric=numeric)
+    solution = solved(ring, ring.tower.convert_all(field), methods=methods)
     if isinstance(solution, str):
         return solution
     return Flow(ZERO, tuple(solution.increments), solution.manner, force=field, exponentials=solution.exponentials)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
-from phigen.splitting.flow import Flow, Term, joint_flow
+from phigen.splitting.flow import EXPONENTIALS, Flow, Term, joint_flow
 from phigen.splitting.ring import Monomial, Ring
 from phigen.splitting.terms import monomial_terms
 from phigen.symbolic.expression import total
@@ -55,7 +55,7 @@ def _sum_with_flow(ring: Ring, group: Sequence[Term]) -> list[Term] | None:
     if len(group) == 1:
         return None
     sum_of_terms = Term(total(t.expression for t in group), ring.tower.combine(t.element for t in group))
-    return [sum_of_terms] if isinstance(joint_flow(ring, [sum_of_terms], numeric=True), Flow) else None
+    return [sum_of_terms] if isinstance(joint_flow(ring, [sum_of_terms], methods=EXPONENTIALS), Flow) else None
 
 
 def _field_monomials(ring: Ring, term: Term) -> dict[_Place, Any]:

@@ -10,7 +10,7 @@ from phigen import progress
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
 from phigen.splitting.conflicts import Conflicts
-from phigen.splitting.flow import Flow, NoFlowError, Term, flow_of, joint_flow
+from phigen.splitting.flow import SMALL_MATRICES, Flow, NoFlowError, Term, flow_of, joint_flow
 from phigen.splitting.grouping import groupings
 from phigen.splitting.near_integrable import size_of, small_part, with_motions
 from phigen.splitting.regrouping import by_blocks, with_companions
@@ -51,20 +51,24 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
     invariants = _invariants(system, ring)
     refused: NoFlowError | None = None
     best: SplitHamiltonian | None = None
-    least: tuple[float, ...] = (inf, inf, inf)
+    least: tuple[float, ...] = (inf, inf, inf, inf)
     conflicts = Conflicts(ring)
     for candidate in _candidates(system, conflicts, terms, motions=motions, rigid=rigid):
         parts = conflicts.grouped(candidate)
         small = small_part(system, ring, parts)
         if (small is None, len(parts)) > least[:2]:
             continue
-        rank = (small is None, len(parts), _lost(ring, parts, invariants))
+        rank: tuple[float, ...] = (small is None, len(parts), _lost(ring, parts, invariants), 0)
         if rank >= least:
             continue
         try:
-            best, least = SplitHamiltonian(tuple(flow_of(ring, part) for part in parts), small=small), rank
+            flows = tuple(flow_of(ring, part) for part in parts)
         except NoFlowError as error:
             refused = refused or error
+            continue
+        rank = (*rank[:-1], sum(flow.calls_remainders for flow in flows))
+        if rank < least:
+            best, least = SplitHamiltonian(flows, small=small), rank
         if best and best.small is not None:
             break  # two parts, one of them small: no other grouping is better
     if best is None:
@@ -172,7 +176,7 @@ def _whole(ring: Ring, flows: list[Flow]) -> list[Flow]:
     if len(flows) == 1:
         return flows
     terms = [Term(f.hamiltonian, ring.tower.convert(f.hamiltonian)) for f in flows]
-    joint = joint_flow(ring, terms, linear=True, numeric=True)
+    joint = joint_flow(ring, terms, linear=True, methods=SMALL_MATRICES)
     return [joint] if isinstance(joint, Flow) else flows
 
 

@@ -337,7 +337,7 @@ def call(function: str, *args: Expression) -> Expression:
     if known.arity != len(args):
         raise ValueError(f"{function} takes {known.arity} argument(s), not {len(args)}")
     first = args[0]
-    if first.is_zero and len(args) == 1 and known.at_zero is not None:
+    if first.is_zero and known.at_zero is not None:
         return number(known.at_zero)
     if function == "log" and first is ONE:
         return ZERO

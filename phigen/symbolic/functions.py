@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
-from phigen.symbolic import elliptic, entire, special, universal
+from phigen.symbolic import elliptic, entire, remainders, special, universal
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.special import SPECIAL
 
@@ -366,6 +367,20 @@ FUNCTIONS |= {
         near=True,
     )
     for name, value in zip(elliptic.ELLIPTIC, (elliptic.value, elliptic.squares, elliptic.ratios), strict=True)
+}
+#: Of exponentials of matrices: see `phigen.symbolic.remainders`.
+FUNCTIONS |= {
+    name: Function(
+        name,
+        arity=5,
+        own=True,
+        slopes=remainders.slopes(k) if name in remainders.REMAINDERS else None,
+        value=partial(value, k),
+        cost=160,
+        near=True,
+    )
+    for names, value in ((remainders.REMAINDERS, remainders.value), (remainders.QUOTIENTS, remainders.quotient))
+    for k, name in enumerate(names)
 }
 
 #: Powers with exponents ½ and ⅓: expressions have no such functions, languages do.

@@ -18,6 +18,7 @@ from phigen.symbolic.expression import (
     topological,
 )
 from phigen.symbolic.functions import FUNCTIONS
+from phigen.symbolic.remainders import REMAINDERS
 from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import MOMENTUM, Symbol, kind_of, plain
 from phigen.symbolic.tower import Poly, Tower, rational
@@ -36,6 +37,10 @@ UNFAMILIAR = {
     "anomaly": "anomaly(t, r, η, β, μ, …) = s with r G1 + η G2 + μ G3 = t, Stumpff functions of β and s",
     "amplitude": "amplitude(t, P, Q) = tan(φ/4)/√P, φ = am(√P t) with the modulus √(Q/P)",
     "exprel": "exprel(s) = (e^s − 1)/s",
+    **{
+        name: f"{name}(t, a0, …, a3): the coefficient of x^{k} in e^(tx) - 1 modulo x⁴ - a3 x³ - a2 x² - a1 x - a0"
+        for k, name in enumerate(REMAINDERS)
+    },
     "inv": "inv(s) = 1/s for s > 0",
     "inv0": "inv0(s) = 1/s for s > 0, else 0",
 }

@@ -228,7 +228,7 @@ class Tower(Arithmetic[Poly]):
         known = FUNCTIONS[name]
         if known.known:
             return known.known(lambda f, *a: self.function(f, list(a)), *args)
-        if known.arity == 1 and known.at_zero is not None and first.is_constant() and first == 0:
+        if known.at_zero is not None and first.is_constant() and first == 0:
             return self.constant(known.at_zero)
         if name == "log" and first == 1:
             return self.zero

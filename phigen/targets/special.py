@@ -10,7 +10,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.program import Program
 from phigen.splitting.matrices import MAX_PADE_NORM, PADE
-from phigen.symbolic import elliptic
+from phigen.symbolic import elliptic, remainders
 from phigen.symbolic.elliptic import ELLIPTIC
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression, call, symbol, symbols_of, topological
@@ -19,6 +19,9 @@ from phigen.symbolic.universal import ANOMALY, MOST_ITERATIONS, RADIAL
 from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
+
+#: Halvings of t for exponentials: beyond, these overflow.
+MOST_HALVINGS = 14
 
 #: Iterations after which the arithmetic–geometric mean has converged for any two numbers.
 MOST_MEANS = 16
@@ -110,6 +113,27 @@ def elliptic_used(program: Program) -> list[str]:
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     called = [name for name in ELLIPTIC if name in ops]
     return called if not called or called[0] == ELLIPTIC[0] else [ELLIPTIC[0], *called]
+
+
+def remainders_used(program: Program) -> list[str]:
+    """The functions of `phigen.symbolic.remainders` that kernels call."""
+    ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
+    return [name for name in (*remainders.REMAINDERS, *remainders.QUOTIENTS) if name in ops]
+
+
+def remainder_values(names: Sequence[str]) -> dict[str, object]:
+    """The values of the templates of these functions, with their places among remainders and quotients."""
+    places = {name: k for k, name in enumerate((*remainders.REMAINDERS, *remainders.QUOTIENTS))}
+    reach = remainders.MAX_ROOT
+    return {
+        "names": [(name, places[name]) for name in names],
+        "terms": remainders.TERMS,
+        "reach": repr(reach),
+        **{f"reach{k}": repr(reach**k) for k in (2, 3, 4)},
+        "most": MOST_HALVINGS,
+        "lane_doublings": remainders.LANE_DOUBLINGS,
+        "lane_part": repr(2.0**-remainders.LANE_DOUBLINGS),
+    }
 
 
 #: The integrals of `ELLIPTIC`: their meaning, and the arguments of Carlson's R_D for them and for half a turn, from the

@@ -23,7 +23,7 @@ x, y = symbol("x"), symbol("y")
 @pytest.mark.parametrize("name", sorted({*FUNCTIONS} - {ANOMALY}))
 def test_every_function_agrees_between_floats_and_mpmath(name):
     at = {"x": 1.25, "y": 0.75} if name in ("acosh", "atan2", "power") else {"x": 0.375, "y": 0.75}
-    e = call(name, *[x, y, x - y][: FUNCTIONS[name].arity])
+    e = call(name, *[x, y, x - y, x + y, y][: FUNCTIONS[name].arity])
     (value,) = evaluate([e], at)
     (precise,) = evaluate_precisely([e], {k: Fraction(v) for k, v in at.items()})
     assert value == pytest.approx(float(precise), rel=1e-15)

@@ -16,6 +16,7 @@ from phigen.symbolic.economised import economised
 from phigen.symbolic.elliptic import ELLIPTIC
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import topological
+from phigen.symbolic.remainders import QUOTIENTS, REMAINDERS
 from phigen.symbolic.special import (
     LANE_REACH,
     MIDDLE,
@@ -35,7 +36,9 @@ from phigen.targets.rendering import render
 from phigen.targets.special import entire_used
 
 #: The functions of the library that have a small-argument version here, under whose name flows call them.
-FLOW_FUNCTIONS = tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f not in (*ENTIRE, ANOMALY, *ELLIPTIC))
+FLOW_FUNCTIONS = tuple(
+    f for f in SMALL_ARGUMENT_FUNCTIONS if f not in (*ENTIRE, ANOMALY, *ELLIPTIC, *REMAINDERS, *QUOTIENTS)
+)
 
 
 #: Terms of series that are smaller than this, relative to the first, are omitted in single precision: a quarter of a
@@ -90,6 +93,7 @@ def called(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
     anomaly = [_anomaly(program)] if special.calls_anomaly(program) else []
     functions = [render("c", "small.c", _values(program, f)) for f in small]
     elliptic = _elliptic(program, special.elliptic_used(program), near=False)
+    elliptic += _remainders(program, special.remainders_used(program), near=False)
     return [*polynomial, *phis, *functions, *anomaly, *elliptic, *_exponentials(program)]
 
 
@@ -105,12 +109,19 @@ def _exponentials(program: Program) -> list[str]:
 def near(program: Program, names: Iterable[str]) -> list[str]:
     """Versions of these functions for loops over lanes, for small arguments only."""
     listed = list(names)
-    others = [f for f in listed if f not in ELLIPTIC]
+    others = [f for f in listed if f not in (*ELLIPTIC, *REMAINDERS, *QUOTIENTS)]
     texts = [
         _anomaly(program, near=True) if f == ANOMALY else render("c", "small.c", _values(program, f) | {"near": True})
         for f in others
     ]
-    return texts + _elliptic(program, [f for f in ELLIPTIC if f in listed], near=True)
+    texts += _elliptic(program, [f for f in ELLIPTIC if f in listed], near=True)
+    return texts + _remainders(program, [f for f in (*REMAINDERS, *QUOTIENTS) if f in listed], near=True)
+
+
+def _remainders(program: Program, names: Sequence[str], *, near: bool) -> list[str]:
+    """Return the functions of exponentials of small matrices."""
+    values = {"NAME": program.name, "near": near, **special.remainder_values(names)}
+    return [render("c", "remainders.c", values)] if names else []
 
 
 def _elliptic(program: Program, names: Sequence[str], *, near: bool) -> list[str]:

@@ -64,6 +64,10 @@ def _functions(program: Program) -> list[str]:
     anomaly = special.calls_anomaly(program)
     functions = definitions(special.used(program), special.entire_used(program), LANGUAGE.printer, anomaly=anomaly)
     functions += elliptic_definitions(special.elliptic_used(program))
+    remainders = special.remainders_used(program)
+    functions += (
+        [render("js", "remainders.mjs", special.remainder_values(remainders)).strip("\n")] if remainders else []
+    )
     if special.largest_exponential(program):
         functions.append(render("js", "matrix_exponential.mjs", special.exponential_constants()).strip("\n"))
     return functions

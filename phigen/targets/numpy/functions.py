@@ -19,6 +19,8 @@ def called(program: Program) -> list[str]:
     elliptic = special.elliptic_texts(
         special.elliptic_used(program), lambda template, values: render("numpy", f"{template}.py", values)
     )
+    remainders = special.remainders_used(program)
+    elliptic += [render("numpy", "remainders.py", special.remainder_values(remainders))] if remainders else []
     return [*phis, *entire, *anomaly, *elliptic, *_exponentials(program)]
 
 

@@ -1,0 +1,80 @@
+"""exp(tA)w − w for matrices with at most four rows, by Cayley and Hamilton, where no shorter closed form is known.
+
+The entries of A may depend on coordinates that are constant along the flow. With A⁴ = Σ a_j A^j for j < 4 the
+increments are Σ F_k A^k w, where the F_k are the functions of t and the a_j in `phigen.symbolic.remainders`. A matrix
+with three rows has the a_j of that with zeros beside it. With two rows and B = A − τ/2, where τ is the trace, B² is a
+number −d, and exp(tA) = e^{τt/2}(cos √(dt²) + B sin(√(dt²))/√d).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+
+from phigen.splitting.closure import LinearMotion
+from phigen.splitting.exponential import Solution
+from phigen.splitting.ring import TIME, Ring
+from phigen.symbolic.expression import call, symbol, total
+from phigen.symbolic.remainders import REMAINDERS
+from phigen.symbolic.tower import Poly
+
+#: Rows of the largest matrix.
+MOST_ROWS = 4
+
+#: The manner of the motion.
+BY_CAYLEY_HAMILTON = "moved by exp(tA), by the theorem of Cayley and Hamilton"
+
+Matrix = Sequence[Sequence[Poly]]
+
+
+def solve(ring: Ring, motion: LinearMotion) -> Solution | None:
+    """Return the increments of the coordinates of the motion, or None if the matrix is larger."""
+    rows = len(motion.basis)
+    if rows > MOST_ROWS:
+        return None
+    if rows == 2:
+        return _of_two_rows(ring, motion)
+    coefficients = [ring.tower.zero] * (MOST_ROWS - rows) + list(_relation(ring, motion.matrix))
+    arguments = [symbol(TIME), *map(ring.expression, coefficients)]
+    functions = [call(name, *arguments) for name in REMAINDERS]
+    image = [ring.monomial(m) for m in motion.basis]
+    images = [image]
+    while len(images) < MOST_ROWS:
+        image = [ring.tower.combine(e * v for e, v in zip(row, image, strict=True)) for row in motion.matrix]
+        images.append(image)
+    first = int(coefficients[0] == 0)  # then F_0 is 0
+    increments = [
+        total(f * ring.expression(w[i]) for f, w in zip(functions[first:], images[first:], strict=True))
+        for i in range(len(motion.coordinates))
+    ]
+    return Solution(tuple(increments), BY_CAYLEY_HAMILTON)
+
+
+def _of_two_rows(ring: Ring, motion: LinearMotion) -> Solution:
+    """Return the solution by functions of s = dt²; 1 − cos √s is s sinroot(s/4)²/2."""
+    (a, b), (c, d) = motion.matrix
+    half = ring.tower.constant(Fraction(1, 2)) * (a + d)
+    w = [ring.monomial(m) for m in motion.basis]
+    turned = [ring.expression((a - half) * w[0] + b * w[1]), ring.expression(c * w[0] + (d - half) * w[1])]
+    t = symbol(TIME)
+    s = t**2 * ring.expression(a * d - b * c - half * half)
+    growth, turn = call("expm1", t * ring.expression(half)), call("sinroot", s / 4)
+    sine, loss = t * turn * call("cosroot", s / 4), s * turn**2 / 2
+    increments = [
+        growth * e + (growth + 1) * (sine * v - loss * e) for e, v in zip(map(ring.expression, w), turned, strict=True)
+    ]
+    return Solution(tuple(increments[: len(motion.coordinates)]), BY_CAYLEY_HAMILTON)
+
+
+def _relation(ring: Ring, a: Matrix) -> Iterator[Poly]:
+    """Yield the c_j with Aⁿ = Σ c_j A^j, by the method of Faddeev and Leverrier: from c_0 to c_{n−1}."""
+    n = range(len(a))
+    zero, traces = ring.tower.zero, list[Poly]()
+    power = [[zero] * len(a) for _ in n]
+    for k in n:
+        # M ← AM − c_{n−k}, the last c; then c_{n−k−1} = tr(AM)/(k + 1)
+        last = -ring.tower.constant(1) if k == 0 else traces[-1]
+        power = [[power[i][j] - last if i == j else power[i][j] for j in n] for i in n]
+        power = [[ring.tower.combine(a[i][m] * power[m][j] for m in n) for j in n] for i in n]
+        traces.append(ring.tower.combine(power[i][i] for i in n) * ring.tower.constant(Fraction(1, k + 1)))
+    yield from reversed(traces)
