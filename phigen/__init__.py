@@ -1,14 +1,14 @@
 """phigen: a compiler from specs of Poisson systems ẋ = π(x)∇H(x) to standalone solvers.
 
-The public names are loaded when they are first used, so that ``import phigen`` and ``phigen --help`` pay
-neither for sympy nor for numpy.
+The public names are loaded on first use, so that ``import phigen`` and ``phigen --help`` do not import sympy and
+numpy.
 """
 
 from __future__ import annotations
 
 from phigen._version import __version__
 
-TYPE_CHECKING = False  # not of typing, whose import takes longer than all of this
+TYPE_CHECKING = False  # not from typing, whose import takes longer than all of this
 if TYPE_CHECKING:
     from typing import Any
 

@@ -1,3 +1,3 @@
-"""The version of phigen: the one place where it stands."""
+"""The version of phigen, defined here only."""
 
 __version__ = "0.1.0"

@@ -1,4 +1,4 @@
-"""The Python API: `load` a system, `compile` it to a solver, look at its `formulas`.
+"""The Python API: `load` a system, `compile` it to a solver, print its `formulas`.
 
 import phigen
 system = phigen.load("rigid_body.yaml")
@@ -36,12 +36,13 @@ if TYPE_CHECKING:
     from phigen.runtime.solver import Solver
     from phigen.scheme.program import Program
 
-#: What `compile` takes.
+#: The types that `compile` accepts.
 Source: TypeAlias = "str | PathLike[str] | Spec | System | LatticeSystem | Compilation"
 
 
 def load(path: str | PathLike[str]) -> System | LatticeSystem:
-    """Return the system in a spec file, or in the bundled one of that name; its ``spec`` holds the rest of the file.
+    """Return the system in a spec file, or in the bundled spec of that name; its ``spec`` holds the other parts of
+    the file.
 
     A lattice is a `LatticeSystem`. Raises `SpecError` with all errors of the file.
     """
@@ -93,17 +94,17 @@ def compile(
     profile: str | None = None,
     device: int | None = None,
 ) -> Any:
-    """A solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled one.
+    """Return a solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled spec.
 
     ``target`` is ``c``, ``numpy``, ``opencl``, ``cuda``, or ``auto``: C if there is a compiler, else NumPy with a
-    `PhigenWarning`. On ``opencl`` and ``cuda``, ensembles and lattices run on a device, see `Solver.device`; where
-    there are several, ``device`` is the number of one. ``order`` overrides the order of the spec, ``scheme``
-    (``series``, ``splitting``, ``gauss``, ``auto``) its scheme; ``tangent`` asks for `Solver.step_tangent`, ``adjoint``
-    for `Solver.pullback` and `Solver.jacobian`, beside what the spec asks for. The code is that of the profile
-    ``fast``, or of ``profile``: the one of a spec is about what ``phigen build`` writes. Compiled C is cached by its
-    content. Gives a `Solver`, of a lattice a `LatticeSolver`.
-    Raises `SpecError`, `LimitError`, `CheckError` if the mathematics is refuted, e.g. since π is not Poisson, and
-    `ToolchainError` if C was asked for in vain, or by naming a compiler in CC that does not work.
+    `PhigenWarning`. On ``opencl`` and ``cuda``, ensembles and lattices run on a device, see `Solver.device`;
+    ``device`` selects one by its number. ``order`` overrides the order of the spec, ``scheme`` (``series``,
+    ``splitting``, ``gauss``, ``auto``) its scheme; ``tangent`` adds `Solver.step_tangent`, ``adjoint`` adds
+    `Solver.pullback` and `Solver.jacobian`, in addition to the parts that the spec requests. The code has the
+    profile ``fast``, or ``profile``; the profile in a spec is for ``phigen build``. Compiled C is cached by its
+    content. Returns a `Solver`, for a lattice a `LatticeSolver`. Raises `SpecError`, `LimitError`, `CheckError` if
+    the mathematics is refuted, e.g. if π is not Poisson, and `ToolchainError` if C was requested and there is no
+    working compiler, or the one named in CC does not work.
     """
     if target != "auto" and not registry.find(target).loader:
         runnable = ", ".join(registry.RUNNABLE)
@@ -115,10 +116,11 @@ def compile(
 
 
 def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:
-    """α, β and S_1 … S_k of the method that `compile` makes, and the Hamiltonian it discretises, in sympy.
+    """Return α, β and S_1 … S_k of the method that `compile` uses, and the Hamiltonian that is discretised, in
+    sympy.
 
-    ``terms`` asks for S_1 … S_terms instead of those of the method. Raises as `compile`; `SpecError` for a splitting,
-    which has none of these.
+    ``terms`` requests S_1 … S_terms instead of those of the method. Raises the same as `compile`, and `SpecError`
+    for a splitting, which has none of these.
     """
     from phigen.notation.sympy_formulas import sympy_formulas
 
@@ -148,7 +150,7 @@ def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
 
 
 def _expect_valid(**options: Unpack[Overrides]) -> None:
-    """Raise `ValueError` for options with values that do not exist."""
+    """Raise `ValueError` for unknown values of options."""
     order, scheme, profile = (options.get(name) for name in ("order", "scheme", "profile"))
     if order is not None and not (isinstance(order, int) and 1 <= order <= limits.ORDER):
         raise ValueError(f"order must be an integer from 1 to {limits.ORDER}, not {order!r}")
@@ -159,7 +161,7 @@ def _expect_valid(**options: Unpack[Overrides]) -> None:
 
 
 def solver_of(compilation: Compilation, target: str = "auto", device: int | None = None) -> Solver:
-    """The loaded solver of a compilation. Raises `ToolchainError` if C was asked for and cannot be compiled."""
+    """Return the loaded solver of a compilation. Raises `ToolchainError` if C was requested and cannot be compiled."""
     from phigen.runtime.solver import Solver
 
     if compilation.spec.lattice:
@@ -168,14 +170,14 @@ def solver_of(compilation: Compilation, target: str = "auto", device: int | None
 
 
 def lattice_solver_of(compilation: Compilation, target: str = "auto", device: int | None = None) -> LatticeSolver:
-    """The same for a lattice."""
+    """Return the loaded solver of a lattice."""
     from phigen.runtime.lattice import LatticeSolver
 
     return LatticeSolver(*_loaded(compilation.program, target, device), compilation.spec)
 
 
 def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any]:
-    """The back end of a program, and its interface."""
+    """Return the back end of a program, and its interface."""
     interface = interface_of(program)
     chosen = chosen_target(target, _warn)
     files = files_of(program, chosen, f"phigen build {program.name}.yaml")
@@ -186,7 +188,7 @@ def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any
 
 
 def _warn_of_spills(program: Program, backend: Any) -> None:
-    """Warn of steps that a card runs slowly."""
+    """Warn of steps that are slow on graphics cards."""
     from phigen.targets.device.registers import spilling
 
     if backend.device.is_card and (message := spilling(program)):
@@ -194,7 +196,8 @@ def _warn_of_spills(program: Program, backend: Any) -> None:
 
 
 def files_of(program: Program, target: str, command: str) -> dict[str, str]:
-    """The files that Python runs on a target: for a device, those of another target too, for what the host computes."""
+    """Return the files that Python loads for a target: for a device, also those of another target for computations
+    on the host."""
     if target not in registry.DEVICES:
         return emit(program, target, command)
     host = "numpy" if program.step.kind.sites else chosen_target("auto", _warn)
@@ -206,16 +209,17 @@ def _warn(message: str) -> None:
 
 
 def backend_of(files: Mapping[str, str], interface: Interface, target: str = "", device: int | None = None) -> Backend:
-    """The back end of the files (name → text) of a target, by default of the one they tell. Raises `ToolchainError`.
+    """Return the back end of the files (name → text) of a target, by default the target that the files belong to.
+    Raises `ToolchainError`.
 
-    ``device`` is the number of a device, for targets that have some.
+    ``device`` is the number of a device, for targets that run on devices.
     """
     language = registry.find(target) if target else registry.target_of(files, interface.name)
     return language.load(files, interface, device)
 
 
 def interface_of(program: Program) -> Interface:
-    """The names of a program, as the runtime needs them."""
+    """Return the names and sizes of a program that the runtime needs."""
     from phigen.runtime.interface import Interface, LatticeInterface
 
     about = Interface(
@@ -267,7 +271,7 @@ def interface_of(program: Program) -> Interface:
 
 
 def chosen_target(target: str, tell: Callable[[str], None] = lambda message: None) -> str:
-    """The name of a target; ``auto`` is C where there is a compiler, else NumPy, and ``tell`` hears why.
+    """Return the name of a target; ``auto`` is C if there is a compiler, else NumPy; ``tell`` receives the reason.
 
     Raises `ToolchainError` if a compiler is named in CC that does not work.
     """
@@ -285,7 +289,7 @@ def chosen_target(target: str, tell: Callable[[str], None] = lambda message: Non
 
 
 def _spec_of(system: System) -> Spec:
-    """The spec of a system built in Python; the defaults of a spec file hold for the rest."""
+    """Return the spec of a system built in Python; all other settings have the defaults of a spec file."""
     _expect_names(system)
     return Spec(
         name=system.name,

@@ -59,7 +59,8 @@ class _Compiled(ABC):
     @property
     @abstractmethod
     def exact(self) -> bool:
-        """Whether a step starts and ends at the ends of one p to round-off, or has exact structure; see `poisson`."""
+        """Whether a step starts and ends at the ends of one path to round-off, or has exact structure; see
+        `poisson`."""
 
     @property
     @abstractmethod
@@ -68,7 +69,7 @@ class _Compiled(ABC):
 
     @property
     def symmetric(self) -> bool:
-        """Whether a step of −h undoes one of h."""
+        """Whether a step of −h is the inverse of a step of h."""
         return True
 
     @property
@@ -239,7 +240,7 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def symmetric(self) -> bool:
-        """Whether a step of −h undoes one of h."""
+        """Whether a step of −h is the inverse of a step of h."""
         return self.realisation.symmetric
 
     @property
@@ -302,7 +303,7 @@ class CompiledSplitting(_CompiledSystem):
 
     @property
     def symmetric(self) -> bool:
-        """Whether a step of −h undoes one of h; a corrector of −h is not that of h, but for terms of order ε²."""
+        """Whether a step of −h is the inverse of a step of h; with a corrector only up to terms of order ε²."""
         schedule = self.program.step.flow_schedule
         return schedule is None or len(schedule.end) < 2
 

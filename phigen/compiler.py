@@ -4,10 +4,10 @@
                             │   └─► SplitHamiltonian ───────────────────────────┘  │
                             └───────────────────────► Examination ◄────────────────┘
 
-Each stage is a function from one frozen dataclass to the next; `Compilation` keeps what each of them made and the
-seconds it took. `Gauged` holds the Hamilton–Jacobi series, which is computed once, as far as any stage or proof asks;
-`Discretisation` the generating function. `Examination` holds what was proved, of the system before anything rests on
-it, and of the method that was compiled.
+Each stage is a function from one frozen dataclass to the next; `Compilation` holds the results of all stages and
+their seconds. `Gauged` holds the Hamilton–Jacobi series, whose terms are computed once, on request; `Discretisation`
+holds the generating function. `Examination` holds the proofs: those about the system are made before anything is
+built on it, then those about the method.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: The order of the series whose operations show what those of higher orders take at least.
+#: The order of the series whose number of operations gives a lower bound for higher orders.
 PREVIEW_ORDER = 4
 
-#: Lattices of so many sites are worth a warning where they are typed out.
+#: Number of sites from which a written-out lattice causes a warning.
 SITES = 8
 
 
@@ -66,7 +66,7 @@ def compile_spec(
 ) -> Compilation:
     """Compile a spec with the options that override it; see `Spec.overridden`.
 
-    ``system`` is its system, where the caller has built it already. Nothing is proved: see `compile_proved`. Raises
+    ``system`` is its system, if the caller has already built it. Nothing is proved: see `compile_proved`. Raises
     `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too large).
     """
     spec, clock = spec.overridden(**options), _Clock()
@@ -88,7 +88,7 @@ def examine(
     system: System | None = None,
     **options: Unpack[Overrides],
 ) -> Examination:
-    """Compile a spec, and prove what can be proved about it, as far along the pipeline as it gets.
+    """Compile a spec as far as possible, and prove all statements about it.
 
     Raises `SpecError` if the spec does not even define a system.
     """
@@ -130,7 +130,7 @@ def compile_proved(
     system: System | None = None,
     **options: Unpack[Overrides],
 ) -> Compilation:
-    """`compile_spec`, refusing what is refuted.
+    """Compile as `compile_spec`, and refuse a spec with a refuted statement.
 
     Raises `CheckError` that names what is refuted, with the residual: no π that is not Poisson, no claimed Casimir
     that is none, no wrong bi-realisation reaches the output. Raises `SpecError` and `LimitError` as `compile_spec`.
@@ -152,7 +152,8 @@ def emit(program: Program, target: str, command: str, *, single_file: bool = Fal
 
 
 def _tell_of_lattice(spec: Spec) -> None:
-    """A warning for a lattice that is typed out, before it takes the time that one of any size would not."""
+    """Return a warning for a lattice that is written out, before its slow compilation; one of any size would be
+    fast."""
     if spec.dimension < SITES:
         return
     from phigen.lattice.recognition import recognised_lattice
@@ -192,8 +193,8 @@ def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
 def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation | None:
     """The bi-realisation of a large system, of which nothing is proved yet. LimitError if it makes steps too large.
 
-    None where that cannot be known before the gauge is chosen, and where there is none: for which there may be reasons
-    that the proofs tell better.
+    None if it cannot be decided before the gauge is chosen, and if there is no bi-realisation; the proofs report the
+    reason.
     """
     as_it_is = isinstance(spec.gauge, str) and not (spec.monitor or source.forces or source.noise)
     if spec.scheme != "series" or not as_it_is or not is_large(source):

@@ -1,4 +1,4 @@
-"""Registry of displays: the formulas, tables and figures that systems, compilations and trajectories show to users.
+"""Registry of displays: the formulas, tables and figures of systems, compilations and trajectories.
 
 `phigen.notation` and `phigen.drawing` import systems and trajectories, so these cannot import notation and drawing.
 They call `display` with a name instead, and the module of that display is imported on its first use.

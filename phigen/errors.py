@@ -35,7 +35,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One message about a spec: where, what is wrong (with the value), and how to mend it."""
+    """One message about a spec: the place, the error (with the value), and how to correct it."""
 
     message: str
     location: Location | None = None
@@ -57,9 +57,10 @@ class Diagnostic:
 
 
 def _excerpt(line: str, column: int, width: int = 100) -> tuple[str, int]:
-    """The part of a long line around a column (from 0), and where the column is in it.
+    """Return the part of a long line around a column (from 0), and the column in it.
 
-    Whatever a terminal would not show as one character is replaced by one it does, so that the caret fits.
+    Characters that a terminal would not show as one character are replaced, so that the caret is below its
+    character.
     """
     start = 0 if len(line) <= width else max(0, min(column - width // 2, len(line) - width))
     part = "".join(c if c.isprintable() else " " if c == "\t" else "�" for c in line[start : start + width])
@@ -69,7 +70,7 @@ def _excerpt(line: str, column: int, width: int = 100) -> tuple[str, int]:
 
 
 class PhigenError(Exception):
-    """Base of all errors that are the user's to mend; anything else is a bug of phigen."""
+    """Base class of all errors that the user can correct; any other exception is a bug of phigen."""
 
     exit_code = 4
 
@@ -79,11 +80,11 @@ class PhigenError(Exception):
 
 
 class PhigenWarning(RuntimeWarning):
-    """Something the user should know, although the work goes on; the command line shows it as its own."""
+    """A warning: work continues; the command line shows it like its own warnings."""
 
 
 class SpecError(PhigenError):
-    """The spec is wrong; holds every diagnostic of the run, in the order of the file."""
+    """The spec is wrong; holds all diagnostics of the run, in the order of the file."""
 
     exit_code = 1
 
@@ -129,7 +130,7 @@ class FileError(PhigenError):
 
 
 class StepError(PhigenError):
-    """A step could not be made; the state before it stands.
+    """A step failed; the state is that before it.
 
     Attributes: ``step`` (number of the failing step, from 0), ``status`` (the name of the solver's status,
     e.g. ``NO_CONVERGENCE``), ``trajectory`` (what was computed before it, or ``None``), ``members``
@@ -146,7 +147,7 @@ class StepError(PhigenError):
 
 
 class ParameterError(StepError, ValueError):
-    """Parameters with which no step can be made: what is computed from them alone is not finite."""
+    """Parameters with which no step is possible: values computed from them alone are not finite."""
 
 
 def _restored(kind: type[PhigenError], args: tuple[Any, ...], parts: dict[str, Any]) -> PhigenError:

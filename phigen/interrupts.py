@@ -1,7 +1,8 @@
-"""Ctrl-C of the command line, from its first import to its last breath: exit code 130, one word, no traceback.
+"""Ctrl-C of the command line, from the first import to the end: exit code 130, one word, no traceback.
 
-While a command works, Ctrl-C is a `KeyboardInterrupt`, so that the command tidies up. A second one, and one before or
-after, ends the process at once. Imported before everything else, hence it imports next to nothing.
+While a command runs, Ctrl-C is a `KeyboardInterrupt`, so that the command can clean up. A second Ctrl-C, and one
+before or after the command, ends the process at once. This module is imported before everything else, so it imports
+next to nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from types import FrameType
 
 CODE = 130
 
-#: Whether a command works that tidies up after an interrupt.
+#: Whether a command is running that cleans up after an interrupt.
 working = False
 
 
@@ -33,7 +34,7 @@ def _handle(number: int, frame: FrameType | None) -> None:
 
 
 def _imports(frame: FrameType | None) -> bool:
-    """Whether a module is being imported: compiled ones turn an interrupt into errors of their own."""
+    """Whether a module is being imported: compiled modules convert an interrupt into errors of their own."""
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True
@@ -42,7 +43,7 @@ def _imports(frame: FrameType | None) -> bool:
 
 
 def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
-    """An interrupt may fall into a callback of a weak reference, say, from which Python cannot pass it on."""
+    """An interrupt may occur in a callback of a weak reference, from which Python cannot propagate it."""
     if issubclass(unraisable.exc_type, KeyboardInterrupt):
         _end()
     sys.__unraisablehook__(unraisable)

@@ -1,6 +1,6 @@
 """Checks that arrays over sites fit into memory, before their allocation.
 
-Linux lets a process allocate more than there is, and kills it later, when it writes to the pages.
+Linux lets a process allocate more memory than there is, and kills it later, when it writes to the pages.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from phigen.errors import Diagnostic, LimitError, Location
 
-#: Bytes below which nothing is checked: to read the state of the memory takes longer than a step on such an array.
+#: Bytes below which nothing is checked: reading the state of the memory takes longer than a step on an array of this
+#: size.
 UNASKED = 2**24
 
 _HINT = "fewer sites; frames in a file; real: float, which halves the solver; phigen.mpi on several machines"

@@ -1,4 +1,4 @@
-"""Lattices on several processes: domains of planes along the slowest axis, and what they exchange, by mpi4py.
+"""Lattices on several processes: domains of planes along the slowest axis, which are exchanged by mpi4py.
 
     from phigen.mpi import DistributedLattice
 
@@ -7,9 +7,10 @@
 
     mpirun -n 8 python script.py
 
-A plane is all sites of one place along the first axis. Each process has the C solver of its planes and of copies of
-those beside them, which it gets from its neighbours when a sweep is to read them, while it works at the inner planes.
-States have the bits of `LatticeSolver` for any number of processes. Needs the extra ``mpi``.
+A plane is the set of all sites with one index of the first axis. Each process has the C solver of its planes and of
+copies of the neighbouring planes. It receives these from its neighbours just before a sweep reads them, while it
+works on the inner planes. States have the bits of `LatticeSolver` for any number of processes. Needs the extra
+``mpi``.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ from phigen.writing import replacing
 #: As in the C, whose bits these are: see templates/c/runtime/lattice.c.
 STRETCH, FAR_STEPS = 32, 64
 
-#: Arguments of runs in one process, which make parts of steps or copies of the solver, as processes do not.
+#: Arguments for runs in one process, which make parts of steps or copies of the solver; not offered with several
+#: processes.
 _WHOLE_ONLY = ("until", "every", "at", "stop", "section", "retry")
 
 #: An array over the whole lattice, or a function that gives the planes from one to another, that not among them.
@@ -103,7 +105,7 @@ class DistributedLattice:
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> DistributedRun:
-        """`LatticeSolver.integrate` on all processes together, which all call it with the same arguments.
+        """Integrate as `LatticeSolver.integrate`; all processes call this method with the same arguments.
 
         ``x0`` is an array (coordinates, *sizes), or a function that gives its planes, x0(from, to) of shape
         (coordinates, to - from, …), and then needs ``sizes``; parameters at sites likewise. Frames go to ``output``, a
@@ -166,7 +168,8 @@ class DistributedLattice:
 
 
 class _Domain:
-    """The planes of one process, with the copies beside them; a state that is open lacks the last flow of its step."""
+    """The planes of one process, with copies of neighbouring planes; a state that is open lacks the last flow of its
+    step."""
 
     def __init__(
         self,
@@ -211,7 +214,7 @@ class _Domain:
     # --- who has what
 
     def _share(self, planes: int, reach: int) -> tuple[int, int]:
-        """The planes of this process, as even as periods of colours let them be."""
+        """Return the planes of this process, as evenly distributed as the colour periods allow."""
         period, count, rank = self.lattice.period, self.comm.size, self.comm.rank
         if planes < count * max(reach, period):
             most = planes // max(reach, period)
@@ -221,7 +224,7 @@ class _Domain:
         return first, end
 
     def _neighbours(self) -> list[int | None]:
-        """The processes behind and ahead; none beyond open ends."""
+        """Return the processes behind and ahead; None beyond open ends."""
         rank, count, is_open = self.comm.rank, self.comm.size, self.lattice.solver.interface.first_open
         behind = None if is_open and rank == 0 else (rank - 1) % count
         ahead = None if is_open and rank == count - 1 else (rank + 1) % count
@@ -247,7 +250,7 @@ class _Domain:
     # --- steps
 
     def advance(self, steps: int) -> None:
-        """Make so many steps; the state is closed after that. Raises `StepError`."""
+        """Make a number of steps; the state is closed after that. Raises `StepError`."""
         if steps:
             self._put_all(self.saved)
         end, stretch = self.steps + steps, STRETCH
@@ -271,7 +274,7 @@ class _Domain:
             self.session.passed(self.h, steps)
 
     def _tried(self, steps: int) -> bool:
-        """Some steps; if they lead to what is not finite, none."""
+        """Make some steps, or none if they lead to values that are not finite."""
         for step in range(steps):
             self._tell_time(self.steps + step)
             if self.noisy:  # the flows of two steps are not joined
@@ -291,7 +294,7 @@ class _Domain:
         return True
 
     def _close(self) -> None:
-        """The last flow of a step; the state before it is saved."""
+        """Apply the last flow of a step, after saving the state before it."""
         if not self.open:
             return
         self._tell_time(self.steps - 1)
@@ -301,7 +304,7 @@ class _Domain:
             self._stage(self.joined - 1, far=True)
 
     def _stage(self, number: int, far: bool = False) -> None:
-        """One sweep over all own planes: the inner ones while those beside are on their way."""
+        """Make one sweep over all own planes: the inner ones while the neighbouring planes are being received."""
         stage, (first, end) = self.stages[number], self.own
         way = 1 if far or self.far else 0
         stale = stage.read & self.dirty
@@ -319,7 +322,7 @@ class _Domain:
         self.dirty = (self.dirty & ~stale) | stage.changed
 
     def _asked(self, fields: int) -> list[tuple[Any, int, tuple[int, int], Floats]]:
-        """Send what the neighbours read of some fields, and ask for theirs."""
+        """Send the fields that the neighbours read, and request theirs."""
         (behind, ahead), (first, end), (back, on) = self.beside, self.own, self.reach
         asked, sent = [], []
         for field in (k for k in range(self.fields) if fields >> k & 1):

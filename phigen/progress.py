@@ -1,7 +1,7 @@
-"""Progress of the compiler: stages by name, one within the other, for whoever watches.
+"""Progress of the compiler: named, nested stages, for any observer.
 
-The compiler says where it is by ``with stage("Jacobi identity", total=n) as progress: … progress.done = k``. By default
-nobody watches, and a stage costs a microsecond. The command line shows them, see `phigen.cli.display`.
+The compiler reports its stages by ``with stage("Jacobi identity", total=n) as progress: … progress.done = k``.
+Without an observer a stage costs a microsecond. The command line shows them, see `phigen.cli.display`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 
 class Stage:
-    """Some work: how much of it is done out of ``total`` pieces (0: not known how many), and since when."""
+    """A stage: ``done`` out of ``total`` pieces (0 if the number is unknown), and its start."""
 
     __slots__ = ("_end", "_stack", "began", "done", "name", "total")
 
@@ -45,14 +45,14 @@ class Stage:
         return f"{self.name}, {self.done}" if self.done else self.name
 
 
-#: What is told when a stage begins or ends: the stages that last, the outermost first.
+#: The function that is called at the start and end of a stage, with the active stages, outermost first.
 Watcher = Callable[[tuple[Stage, ...]], None]
 
 stage = Stage
 
 
 class _Here(threading.local):
-    """The stages of one thread, and who watches them."""
+    """The active stages of one thread, and their observer."""
 
     def __init__(self) -> None:
         self.stages: list[Stage] = []
@@ -64,7 +64,7 @@ _here = _Here()
 
 @contextmanager
 def watched(watcher: Watcher) -> Iterator[None]:
-    """While it lasts, ``watcher`` is told of the stages of this thread."""
+    """Within this context, ``watcher`` receives the stages of this thread."""
     before, _here.watcher = _here.watcher, watcher
     try:
         yield

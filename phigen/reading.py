@@ -1,6 +1,6 @@
 """Opening files for reading: regular ones only.
 
-A pipe or a terminal would keep the reader waiting for ever, and devices such as /dev/zero have no end.
+A pipe or a terminal would block the reader, and devices such as /dev/zero have no end.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from typing import BinaryIO
 
 def opened(path: str | Path) -> BinaryIO:
     """Open a regular file. Raises `OSError` naming it for anything else, and `ValueError` for names with zeros."""
-    # Opened without waiting for a writer, and asked what it is afterwards: nothing can be put in its place between.
+    # The file is opened without blocking, and its type is checked after that, so that nothing can replace it in
+    # between.
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):

@@ -1,7 +1,7 @@
 """The targets: the languages that phigen writes solvers in.
 
-Every list of targets derives from this one: the choices of the command line, what a spec may ask for, the suffixes of
-generated files, what can be loaded. It imports what emits and what loads a target when that is asked for.
+Every list of targets derives from this one: choices of the command line, allowed values in specs, suffixes of
+generated files, targets that can be loaded. Emitters and loaders are imported on request.
 """
 
 from __future__ import annotations
@@ -76,13 +76,13 @@ TARGETS: Mapping[str, Target] = {target.name: target for target in _LISTED}
 
 _DEVICE = TARGETS["device"]
 
-#: Where Python runs the files of the target device.
+#: The device on which Python runs the files of the target device.
 DEVICES: Mapping[str, Target] = {
     name: replace(_DEVICE, name=name, title=title, loader=f"phigen.runtime.devices.{name}", device=True)
     for name, title in (("opencl", "OpenCL"), ("cuda", "CUDA"))
 }
 
-#: What a spec gets that asks for none, and what Python can run.
+#: Default targets of specs, and targets that Python can run.
 DEFAULT = tuple(target.name for target in _LISTED if target.default)
 LOADABLE = tuple(target.name for target in _LISTED if target.loader)
 
@@ -105,7 +105,7 @@ def find(name: str) -> Target:
 
 
 def automatic(*, compiler: bool) -> str:
-    """The target that is taken where none is named: the first that Python can run with what there is."""
+    """Return the default target: the first that Python can run on this machine."""
     return next(name for name in LOADABLE if compiler or not TARGETS[name].compiled)
 
 

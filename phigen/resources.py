@@ -1,4 +1,4 @@
-"""Where the files that are not Python live: in a wheel inside the package, in a checkout beside it."""
+"""Locations of the files that are not Python: in a wheel inside the package, in a checkout beside it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def bundled_name(file: str) -> str | None:
 
 
 def file_of(source: str) -> str:
-    """The path itself if there is such a file, or none of the bundled specs has that name; else that of the spec."""
+    """Return the path itself if there is such a file, or if no bundled spec has that name; else the path of the
+    bundled spec."""
     try:
         there = Path(source).is_file()
     except OSError:  # too long for a name
@@ -48,7 +49,7 @@ def file_of(source: str) -> str:
 
 
 def missing(source: str) -> Diagnostic:
-    """The error for a text that names neither a file nor a bundled spec, with what may have been meant."""
+    """Return the error for a text that names neither a file nor a bundled spec, with suggestions."""
     also = "" if set(source) & {"/", "."} else ", and no bundled spec has that name"
     return Diagnostic(f"there is no file {source!r}{also}", hint=suggestion(source))
 
@@ -70,7 +71,7 @@ def suggestion(source: str) -> str:
 
 
 def _find(name: str) -> Path:
-    # The checkout comes second: a wheel must not pick up a stray folder of site-packages.
+    # The checkout is tried second: a wheel must not use an unrelated folder in site-packages.
     for folder in (_PACKAGE / "_data" / name, _PACKAGE.parent / name):
         if folder.is_dir():
             return folder

@@ -1,7 +1,7 @@
-"""Files that appear whole, together, or not at all, and errors that tell the file they are about.
+"""Files that are written completely or not at all, together or not at all, and errors that name their file.
 
-Contents go to temporary files in the same folder first, which take the place of the files when all are on the disk. So
-a reader never sees half a file, and a full disk leaves what was there.
+Contents are first written to temporary files in the same folder, which replace the files when all are on the disk.
+So readers never see incomplete files, and a full disk leaves the old ones.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def write(path: Path, content: str | bytes) -> None:
         with naming(path):
             path.write_bytes(_encoded(content))
         return
-    # Whoever made a link for the file wants to keep it.
+    # A link to the file is kept.
     write_all({path.resolve() if path.is_symlink() else path: content})
 
 
@@ -55,7 +55,7 @@ def write_all(contents: Mapping[Path, str | bytes]) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A file to write to, which takes the place of ``path`` at the end. Raises `OSError` naming that."""
+    """Within this context, a file to write to, which replaces ``path`` at the end. Raises `OSError` naming ``path``."""
     pending = _Pending(path)
     try:
         with naming(path):
@@ -68,7 +68,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 class _Pending:
-    """A temporary file that is to take the place of another."""
+    """A temporary file that will replace another."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -80,19 +80,19 @@ class _Pending:
         self._temporary = Path(temporary)
 
     def settle(self) -> None:
-        """Have everything on the disk, which may turn out to be full only now."""
+        """Write everything to the disk, which may turn out to be full only now."""
         self.file.flush()
         os.fsync(self.file.fileno())
         self.file.close()
         self._temporary.chmod(_mode(self.path))
 
     def take_place(self) -> None:
-        """Be the file from now on."""
+        """Replace the file."""
         with naming(self.path):
             self._temporary.replace(self.path)
 
     def abandon(self) -> None:
-        """Leave nothing."""
+        """Remove the temporary file."""
         with suppress(OSError):
             self.file.close()
         with suppress(OSError):
@@ -110,7 +110,7 @@ def _make_folder(folder: Path, undone: ExitStack) -> None:
 
 
 def _remove_folder(folder: Path) -> None:
-    with suppress(OSError):  # somebody else has put something there
+    with suppress(OSError):  # another process has created a file there
         folder.rmdir()
 
 

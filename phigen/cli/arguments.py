@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have, each said once, and what is wrong with a file that one names."""
+"""Arguments and options that several commands share, and checks of files named on the command line."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from phigen.registry import RUNNABLE
 from phigen.spec import limits
 from phigen.spec.names import PROFILES, SCHEMES
 
-#: What files of figures end in.
+#: Suffixes of files of figures.
 FIGURES = (".png", ".svg", ".pdf")
-#: And of films, of lattices.
+#: Suffixes of files of films, for lattices.
 FILMS = (".gif", ".mp4")
 
 #: The type of ``--order``.
@@ -26,10 +26,10 @@ CORRECTIONS = click.IntRange(0, limits.CORRECTIONS)
 
 order_option = click.option("--order", metavar="K", type=ORDER, help="Order of the method; overrides the spec.")
 
-#: Which random numbers a run with noise takes.
+#: The options that select the random numbers of a run with noise.
 SEED = click.IntRange(0, limits.SEED)
 
-#: What runs are made with.
+#: The options of the solver of a run.
 target_option = click.option(
     "-t", "--target", type=click.Choice(["auto", *RUNNABLE]), default="auto", show_default=True
 )
@@ -38,17 +38,17 @@ settings_option = click.option(
     "--set", "settings", metavar="NAME=VALUE", multiple=True, help="Value of a parameter or of an initial coordinate."
 )
 
-#: How the one-step map is made, instead of the spec's way.
+#: The options of the one-step map, which override the spec.
 scheme_option = click.option("--scheme", type=click.Choice(SCHEMES), help="Scheme of the steps; overrides the spec.")
 
-#: The profile of code that phigen runs itself; ``profile:`` of a spec is about code that ``phigen build`` writes.
+#: The profile of code that phigen itself runs; ``profile:`` of a spec is for code that ``phigen build`` writes.
 profile_option = click.option(
     "--profile",
     type=click.Choice(PROFILES),
     help="Optimisation of the C for speed or for size.  [default: fast]",
 )
 
-#: Which run of a spec; the argument SPEC stands before it.
+#: The option that names a run of a spec; the argument SPEC precedes it.
 run_option = click.option(
     "--run", "name", metavar="NAME", shell_complete=runs, help="The run of the spec to use.  [default: the first]"
 )
@@ -65,7 +65,8 @@ def _one_of(words: Sequence[str]) -> str:
 
 
 def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str | None], Path | None]:
-    """The callback of an option that names a file: checks its suffix and its folder before any work is done."""
+    """Return the callback of an option that names a file: it checks the suffix and the folder before any work is
+    done."""
 
     def checked(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
         if value is None:
@@ -82,7 +83,7 @@ def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str
 
 
 def expect_writable(path: Path, option: str | None = None) -> None:
-    """Raises `click.BadParameter` for a file that could not be written after the work, so far as that can be known."""
+    """Raise `click.BadParameter` for a file that cannot be written after the work, as far as that can be known."""
     device = path.exists() and not path.is_file() and not path.is_dir()
     if path.is_dir():
         raise click.BadParameter(f"{str(path)!r} is a folder", param_hint=option)

@@ -13,16 +13,16 @@ if TYPE_CHECKING:
     from phigen.cli.outputs import Change
     from phigen.compilation import Compilation
 
-#: Those of `phigen.bindings.emitter`, which the command line knows without importing it.
+#: Those of `phigen.bindings.emitter`, repeated here so that the command line does not import it.
 LANGUAGES = ("cpp", "fortran", "julia", "matlab", "rust")
 
 
 def with_bindings(
     planned: Sequence[tuple[Compilation, list[Change]]], options: Options, languages: Sequence[str]
 ) -> list[tuple[Compilation, list[Change]]]:
-    """Return what is to be written with the bindings of all systems, and the C that they call.
+    """Return the files of the bindings of all systems, and the C that they call.
 
-    Raises `SpecError` for all systems that have none.
+    Raises `SpecError` that lists all systems without bindings.
     """
     from phigen.bindings.emitter import binding
     from phigen.cli.outputs import Change, read

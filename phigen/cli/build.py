@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from phigen.compilation import Compilation
     from phigen.spec.model import Spec
 
-#: Beyond the flags of every local library: what phigen promises that its C passes.
+#: Flags in addition to those of every local library: phigen promises that its C compiles under them without warnings.
 STRICT = ("-Wall", "-Wextra", "-Werror")
 
 
@@ -145,9 +145,10 @@ def _compile_all(console: Console, spec_files: Sequence[str], options: Options, 
 def _to_build(
     console: Console, specs: Sequence[Spec], spec_files: Sequence[str], directory: Path, checking: bool
 ) -> list[Spec]:
-    """Leave out the specs of searched folders that the output folder lists; what the user named is built.
+    """Leave out the specs of searched folders that the list in the output folder names; specs named by the user are
+    built.
 
-    A check raises CheckError if the list has names that no spec has.
+    With --check, raises CheckError if the list has names of no spec.
     """
     folders = [file for file in spec_files if Path(found(file)).is_dir()]
     listed = names_left_out(directory) if folders else {}
@@ -176,7 +177,7 @@ def _plan(
 
 
 def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], options: Options) -> Iterator[Change]:
-    """Files whose spec has gone; only a run over a folder can know."""
+    """Return files whose spec no longer exists; only a run over a folder can know."""
     from phigen.cli.outputs import orphans
 
     if any(Path(found(file)).is_dir() for file in spec_files):
@@ -238,7 +239,7 @@ def _write(
 
 
 def _certify(console: Console, compilations: Sequence[Compilation], options: Options) -> None:
-    """Verify what was written; systems that fall short get no certificate, and lose the one they had."""
+    """Verify the written solvers; systems that miss a bound get no certificate, and lose an earlier one."""
     from phigen.cli import certificate
     from phigen.cli.verify import fallen_short, verified, verified_lattice
     from phigen.compiler import compile_proved
@@ -263,7 +264,7 @@ def _certify(console: Console, compilations: Sequence[Compilation], options: Opt
 
 
 def _expect_certificates(planned: Sequence[tuple[Compilation, list[Change]]], options: Options) -> None:
-    """Raise CheckError for a certificate that is there and about other files; there need not be one."""
+    """Raise CheckError for an existing certificate that belongs to other files; it may be absent."""
     from phigen.cli import certificate
 
     complaints = []

@@ -1,18 +1,19 @@
-"""Files by which other build systems take a folder of vendored solvers: CMake, Meson, a Python package."""
+"""Files that add a folder of vendored solvers to other build systems: CMake, Meson, a Python package."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-#: The file of each build system, and the suffix of the sources that it is about.
+#: The file of each build system, and the suffix of its sources.
 FILES = {"cmake": ("CMakeLists.txt", ".c"), "meson": ("meson.build", ".c"), "python": ("__init__.py", ".py")}
 
 
 def build_files(systems: Collection[str], solvers: Mapping[str, Collection[str]]) -> dict[str, str]:
-    """The texts of the files, by name; ``solvers`` maps the names of all that are in the folder to their files.
+    """Return the texts of the files, by name; ``solvers`` maps the names of all solvers in the folder to their
+    files.
 
-    A build system for which there are no sources has a file all the same, which says nothing.
+    A build system without sources still gets a file, which is empty.
     """
     return {FILES[system][0]: _text(system, solvers) for system in sorted(systems)}
 

@@ -1,4 +1,4 @@
-"""Certificates: what `phigen verify` found, tied to the spec and to the files of one build by their hashes."""
+"""Certificates: results of `phigen verify`, tied by hashes to the spec and to the files of one build."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 def path_of(folder: Path, name: str) -> Path:
-    """Where the certificate of a system is."""
+    """Return the path of the certificate of a system."""
     return folder / f"{name}.certificate.json"
 
 
 def identity(compilation: Compilation, files: Mapping[str, str]) -> dict[str, Any]:
-    """Identity that a certificate states: the version, the spec, and the checksum of the body of each file."""
+    """Return the identity in a certificate: the version, the spec, and the checksum of the body of each file."""
     return {
         "phigen": __version__,
         "name": compilation.spec.name,
@@ -39,7 +39,7 @@ def text_of(compilation: Compilation, files: Mapping[str, str], verification: Ve
 
 
 def obsolete(path: Path, compilation: Compilation, files: Mapping[str, str]) -> str:
-    """Why a certificate on disk is not about these files; empty if it is, or if there is none."""
+    """Return why a certificate on disk does not belong to these files; empty if it does, or if there is none."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

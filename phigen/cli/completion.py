@@ -13,7 +13,7 @@ from phigen.errors import PhigenError
 
 
 def specs(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem[str]]:
-    """Bundled specs, and the spec files and folders here; where no bundled one is meant, the shell finds the files."""
+    """Return bundled specs, and the spec files and folders here; if none match, the shell completes file names."""
     named = bundled_names(ctx, parameter, begun)
     if not named:
         return [CompletionItem(begun, type="file")]

@@ -1,4 +1,4 @@
-"""Where messages go: stderr, as many as -q and -v ask for, in colour where somebody can see it."""
+"""Messages: stderr, filtered by -q and -v, in colour on terminals."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ class Console:
         self._display = Display(lambda: not self.quiet and sys.stderr.isatty(), self.detail)
 
     def _say(self, message: str) -> None:
-        with self._display.room(), suppress(OSError):  # nobody can be told that nobody can be told
+        with self._display.room(), suppress(OSError):  # stderr itself cannot be written
             click.echo(message, err=True, color=_colour())
 
     def error(self, message: str) -> None:
-        """A message about what failed; never silenced."""
+        """Report a failure; never silenced."""
         self._say(_coloured(message))
 
     def warn(self, message: str) -> None:
-        """Something the user should know, although the work goes on."""
+        """Report a warning: work continues."""
         if not self.quiet:
             self._say(_coloured(f"warning: {message}"))
 
@@ -56,7 +56,7 @@ class Console:
 
     @contextmanager
     def heeding(self) -> Iterator[None]:
-        """While it lasts, the warnings of phigen's library are messages like those of its commands."""
+        """Within this context, warnings of phigen's library are messages like those of its commands."""
         with warnings.catch_warnings():
             plain = warnings.showwarning
 
@@ -72,12 +72,12 @@ class Console:
             yield
 
     def watching(self) -> AbstractContextManager[None]:
-        """While it lasts, the stages of the compiler are shown: on a terminal, unless -q; with -v as messages."""
+        """Within this context, the stages of the compiler are shown: on a terminal, unless -q; with -v as messages."""
         return self._display.watching()
 
     @contextmanager
     def progress(self, label: str, length: int) -> Iterator[Callable[[int], None] | None]:
-        """A bar on stderr; gives a function of the number of steps done, or None where nobody watches."""
+        """Show a progress bar on stderr; returns a function of the number of steps done, or None without a terminal."""
         if self.quiet or not sys.stderr.isatty():
             yield None
             return
@@ -131,7 +131,7 @@ def indented(lines: Sequence[str]) -> list[str]:
 
 
 def mend(commands: Sequence[str]) -> list[str]:
-    """The end of a message: the commands that mend what it complains of."""
+    """Return the end of a message: the commands that correct the problem."""
     return ["to mend it:", *indented(commands)]
 
 
@@ -159,7 +159,7 @@ def out_json(value: Any) -> None:
 
 
 def out_document(text: str) -> None:
-    """A whole file on stdout: in UTF-8 whatever the encoding of stdout is, and nothing added."""
+    """Write a whole file to stdout: in UTF-8 for any encoding of stdout, without additions."""
     with _stdout():
         click.echo(text.encode("utf-8", "backslashreplace"), nl=False)
 
@@ -178,7 +178,7 @@ def _stdout() -> Iterator[None]:
 
 
 def _colour() -> bool | None:
-    """None lets click look at the stream; https://no-color.org."""
+    """None: click decides by the stream; https://no-color.org."""
     return False if os.environ.get("NO_COLOR") else None
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 SPEC, RUN = "lotka_volterra", "blow_up"
 
-#: The method of the paper, and what one option makes of it.
+#: The method of the paper, and variants by one option.
 ORDERS = (2, 8)
 CLASSICAL = "rk2"
 
@@ -49,7 +49,7 @@ def command(console: Console, target: str) -> None:
     for order in ORDERS:
         compilation = compilation_of(source, order=order)
         solver = loaded(compilation, target, console)
-        target = solver.target  # said once, if it is not what was asked for
+        target = solver.target  # reported once, if it differs from the request
         run = experiment.run
         trajectory = solver.integrate(experiment.initial, experiment.h, run.steps, run.stride)
         solutions[f"phigen {order}"] = trajectory.x

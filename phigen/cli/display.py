@@ -17,7 +17,7 @@ PATIENCE, PERIOD = 1.0, 0.2
 
 
 class Display:
-    """Status line of the stages: ``shows`` tells whether to draw it, ``began`` is called when a stage begins."""
+    """Status line of the stages: ``shows`` returns whether to draw it, ``began`` is called at the start of a stage."""
 
     def __init__(self, shows: Callable[[], bool], began: Callable[[str], None]) -> None:
         self._shows, self._began = shows, began
@@ -28,7 +28,7 @@ class Display:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Show the stages of this thread while it lasts."""
+        """Within this context, show the stages of this thread."""
         try:
             with progress.watched(self._told):
                 yield
@@ -37,13 +37,13 @@ class Display:
             self.erase()
 
     def erase(self) -> None:
-        """Leave no line."""
+        """Clear the line."""
         with self.room():
             pass
 
     @contextmanager
     def room(self) -> Iterator[None]:
-        """Room for a message: no line, and none is drawn while it lasts."""
+        """Within this context, the line is cleared and not drawn, to make room for a message."""
         with self._lock:
             if self._visible:
                 sys.stderr.write("\r\x1b[K")

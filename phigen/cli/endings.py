@@ -1,4 +1,4 @@
-"""Where runs end, and which of their states are stored: the one reading of steps, until, stop, every and stride."""
+"""Ends of runs, and the states that are stored: the interpretation of steps, until, stop, every and stride."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 
-#: How many times may be asked for.
+#: Largest number of requested times.
 _MOST_TIMES = 10_000_000
 
-#: An experiment of either kind, and what integrates it.
+#: An experiment of an ordinary system or a lattice, and its solver.
 E = TypeVar("E", bound=Experiment)
 AnySolver = Solver | LatticeSolver
 
 
 def ended(experiment: E, solver: AnySolver, console: Console) -> E:
-    """The experiment with its end, where that is at a time, or where ``stop`` passes through zero."""
+    """Return the experiment with its end, if that is at a time or at a zero of ``stop``."""
     run, h = experiment.run, experiment.h
     end: End | None = None
     if run.until is not None:
@@ -44,7 +44,7 @@ def ended(experiment: E, solver: AnySolver, console: Console) -> E:
 
 
 def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: End | None) -> End | None:
-    """Where ``stop`` is met, if that is before the end."""
+    """Return the zero of ``stop``, if it is before the end."""
     run, names, h = experiment.run, solver.interface, experiment.h
     assert run.stop is not None
     g = experiment.function(run.stop, solver)
@@ -57,7 +57,7 @@ def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: E
         return zero
     try:
         last = _count(experiment, solver, end)
-    except BackendError:  # the part of a step fails that the run would make without a stop before it
+    except BackendError:  # the final part of a step, which the run would make without a stop, fails
         return zero
     return zero if _count(experiment, solver, zero) < last else None
 
@@ -82,13 +82,13 @@ def length(experiment: Experiment, solver: AnySolver) -> float:
 
 
 def timed(experiment: E, solver: AnySolver, every: float | None = None, at: str | None = None) -> E:
-    """The experiment with the times of the states that are stored: every so often, or those listed, up to the end."""
+    """Return the experiment with the times of stored states: equal distances, or a list, up to the end."""
     if every is None and at is None and experiment.run.every is not None:
         every = float(experiment.run.every)
     listed = _listed(at) if at is not None else [float(t) for t in experiment.run.at] if every is None else []
     if every is None and not listed:
         return experiment
-    if experiment.end is None and solver.interface.monitored:  # how much time its steps take, they tell
+    if experiment.end is None and solver.interface.monitored:  # the session itself measures the time of its steps
         whole = after_steps(experiment.begun(solver), experiment.h, experiment.run.steps)
         experiment = replace(experiment, end=whole)
     times = (
@@ -100,10 +100,10 @@ def timed(experiment: E, solver: AnySolver, every: float | None = None, at: str 
 
 
 def _chosen(experiment: Experiment, solver: AnySolver, times: list[float], asked: bool) -> list[float]:
-    """The times that are listed, in the order in which they come, none of them the start or beyond a stop.
+    """Return the listed times in order, without the start and times beyond a stop.
 
-    Those of the command line, if they are ``asked`` for there, are before the end; those of the spec are left out
-    beyond another end than that of the run.
+    Times ``asked`` for on the command line must be before the end; those of the spec are dropped if the run ends
+    earlier.
     """
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
     beyond = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]
@@ -118,7 +118,7 @@ def _chosen(experiment: Experiment, solver: AnySolver, times: list[float], asked
 
 
 def _regular(experiment: Experiment, solver: AnySolver, every: float) -> list[float]:
-    """Times so far apart, counted from the start."""
+    """Return times with equal distances, counted from the start."""
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
     if not every > 0 or not math.isfinite(every):
         raise click.BadParameter("the time between states must be positive", param_hint="--every")
@@ -131,7 +131,7 @@ def _regular(experiment: Experiment, solver: AnySolver, every: float) -> list[fl
 
 
 def _expect_whole(experiment: Experiment, solver: AnySolver, times: Sequence[float], option: str) -> None:
-    """Check that all times are ends of steps: the path of the noise is known nowhere else."""
+    """Check that all times are ends of steps: the path of the noise is known only there."""
     for time in times if solver.interface.noise else ():
         steps = (time - experiment.begin) / experiment.h
         if abs(steps - round(steps)) > 1e-9 * max(1.0, abs(steps)):

@@ -1,4 +1,4 @@
-"""The warning about a run whose energy error is too large for its states to mean anything."""
+"""The warning about a run whose energy error is too large for meaningful states."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from phigen.spec.model import Spec
 from phigen.study.summary import Summary
 from phigen.tuning.search import rounded_down
 
-#: Energy error that the proposed step aims at: small enough that orbits keep their shape.
+#: Target energy error of the proposed step: small enough that orbits keep their shape.
 AIM = 1e-3
 
 _SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the start", SITES: "Σ |energy of a site|"}
 
 
 def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
-    """The warning about a run of an ordinary system; empty if there is none.
+    """Return the warning about a run of an ordinary system; empty if there is none.
 
-    Where forces act or H depends on the time it is about the balance of energy, unless the integral in the balance is
-    the less certain of the two.
+    With forces or a time-dependent H it is about the energy balance, unless the integral in the balance is less
+    accurate.
     """
     energy = summary.energy
     uncertain = summary.is_balance and not summary.off < energy.error / 2
@@ -55,7 +55,7 @@ def _multiple(error: float) -> str:
 def advised_step(error: float, h: float, order: int) -> float:
     """An estimate of the step whose energy error is `AIM`, since errors are proportional to h^order.
 
-    An error beyond 1 says only that the step is too large: it counts as 1.
+    An error above 1 only shows that the step is too large: it counts as 1.
     """
     step = abs(h) * (AIM / min(error, 1.0)) ** (1 / order)
     return rounded_down(step, 1) * (1 if h > 0 else -1)

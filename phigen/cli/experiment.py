@@ -1,4 +1,4 @@
-"""The run of a spec with the values of the command line put in, and the solver for it."""
+"""The run of a spec with the settings of the command line, and its solver."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Experiment:
-    """A run with the values of the command line put in.
+    """A run with the settings of the command line.
 
-    ``end`` is where it ends between two steps, ``times`` those of the states that are stored in place of a stride,
-    beside the first and the last.
-    ``past`` is a finished run (`phigen.cli.past.StoredRows`) that it goes on with, ``first`` an attitude at its start.
+    ``end`` is an end between two steps, ``times`` are those of stored states, in place of a stride, in addition to
+    the first and the last. ``past`` is a finished run (`phigen.cli.past.StoredRows`) that this run continues,
+    ``first`` an attitude at its start.
     """
 
     run: Run
@@ -54,17 +54,17 @@ class Experiment:
 
     @property
     def begin(self) -> float:
-        """The time where its steps begin: at the start, or where the past ends."""
+        """The time at which its steps start: at the start, or where the past run ends."""
         return self.past.t if self.past else self.t0
 
     @property
     def made(self) -> int:
-        """Number of steps of the noise that the past has used; a part of a step counts as one."""
+        """Number of steps of noise that the past run has used; a part of a step counts as one."""
         steps = (self.begin - self.t0) / self.h
         return math.ceil(steps - 1e-9 * max(1.0, steps))
 
     def begun(self, solver: Any) -> Any:
-        """A session of the solver where the steps begin. Raises `StepError`."""
+        """Return a session of the solver at the start of the steps. Raises `StepError`."""
         from phigen.cli.past import begun
 
         return begun(solver, self)
@@ -160,7 +160,8 @@ def changed(
 
 
 def _expect_room_for_members(spec: Spec, run: Run) -> None:
-    """`LimitError` where the members of a run with noise do not fit into memory: their states, and copies of these."""
+    """Raise `LimitError` if the states of the members of a run with noise, and copies of them, do not fit into
+    memory."""
     from phigen.memory import expect_room
 
     place = spec.diagnostic(("runs", run.name, "members"), "").location

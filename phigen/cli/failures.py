@@ -1,4 +1,4 @@
-"""From exceptions to what the user reads on stderr, and to exit codes."""
+"""Messages on stderr and exit codes for exceptions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from phigen._version import __version__
 from phigen.cli.console import Console
 from phigen.errors import LimitError, PhigenError, SpecError
 
-#: What a shell reports of a process that SIGPIPE ended.
+#: The exit code that shells report for a process ended by SIGPIPE.
 BROKEN_PIPE = 141
 USAGE = 2
 
@@ -31,21 +31,21 @@ class SeveralError(PhigenError):
 
 
 class Collector:
-    """Goes on after the error of one spec, to report those of all; `finish` raises what was met."""
+    """Continues after the error of one spec, to report those of all; `finish` raises the collected errors."""
 
     def __init__(self) -> None:
         self.errors: list[PhigenError] = []
 
     @contextmanager
     def collecting(self) -> Iterator[None]:
-        """Keep an error of phigen's for later."""
+        """Store an error of phigen for later."""
         try:
             yield
         except PhigenError as error:
             self.errors.append(error)
 
     def finish(self) -> None:
-        """Raise what was met, if anything was."""
+        """Raise the collected errors, if there are any."""
         if len(self.errors) == 1:
             raise self.errors[0]
         if self.errors:
@@ -53,7 +53,7 @@ class Collector:
 
 
 def report(error: BaseException, console: Console) -> int:
-    """Say what failed, and return the exit code."""
+    """Report a failure, and return the exit code."""
     if isinstance(error, click.exceptions.Abort) or _is_interrupt(error):
         console.error("interrupted")
         return interrupts.CODE
@@ -63,7 +63,7 @@ def report(error: BaseException, console: Console) -> int:
                 error.show()
             return error.exit_code if isinstance(error, click.UsageError) else USAGE
         case BrokenPipeError():
-            return BROKEN_PIPE  # whoever read our output has gone
+            return BROKEN_PIPE  # the reader of our output has closed it
         case SeveralError():
             for part in error.errors:
                 report(part, console)
@@ -84,7 +84,8 @@ def report(error: BaseException, console: Console) -> int:
 
 
 def drop_unprinted() -> None:
-    """Forget what stdout and stderr did not take, which was told: else Python tells it again and exits with 120."""
+    """Discard output that stdout and stderr did not accept, which was reported: otherwise Python reports it again
+    and exits with 120."""
     for stream in (sys.stdout, sys.stderr):
         try:
             if stream is not None:
@@ -106,7 +107,8 @@ def _place(error: OSError) -> str:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether it all began with Ctrl-C: libraries may turn that into an error of their own, in an import say."""
+    """Whether Ctrl-C caused the exception: libraries may convert it to an error of their own, for instance during an
+    import."""
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
             return True
@@ -116,7 +118,7 @@ def _is_interrupt(error: BaseException | None) -> bool:
 
 def _described(error: PhigenError) -> str:
     text = str(error)
-    # The diagnostics of a spec say "error:" themselves, after the place.
+    # The diagnostics of a spec contain "error:" after the place.
     return text if isinstance(error, SpecError) or ": error:" in text.split("\n")[0] else f"error: {text}"
 
 

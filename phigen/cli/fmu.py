@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from phigen.compilation import Compilation
     from phigen.fmu.archive import MockupUnit
 
-#: The folders of `phigen.fmu.platforms.PLATFORMS`, which the command line knows without importing what makes FMUs.
+#: The folders of `phigen.fmu.platforms.PLATFORMS`, repeated here so that the command line does not import it.
 _SYSTEMS, _MACHINES = ("linux", "windows", "darwin"), ("x86_64", "aarch64")
 PLATFORMS = tuple(f"{machine}-{system}" for system in _SYSTEMS for machine in _MACHINES)
 
 
 def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str, MockupUnit]:
-    """Return the FMU of each system by its name. Raises `SpecError` for all systems of which there is none."""
+    """Return the FMU of each system by its name. Raises `SpecError` that lists all systems without one."""
     from phigen.fmu.archive import unit_of
 
     collector, units, of_c = Collector(), {}, replace(options, single_file=False)

@@ -1,4 +1,4 @@
-"""Ctrl-C in the middle of a long run: the work stops at a good place, and what was computed is kept."""
+"""Ctrl-C in the middle of a long run: the work stops at a consistent state, and results are kept."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ class InterruptedRunError(PhigenError):
 
 @dataclass
 class Stop:
-    """Whether somebody asked for an end."""
+    """Whether the user or the system has requested an end."""
 
     requested: bool = False
 
 
 @contextmanager
 def interruptible() -> Iterator[Stop]:
-    """While it lasts, SIGINT and SIGTERM are requests to stop at a good place; a second one is obeyed at once."""
+    """Within this context, SIGINT and SIGTERM request a stop at a consistent state; a second signal ends the process
+    at once."""
     stop = Stop()
     if threading.current_thread() is not threading.main_thread():
-        yield stop  # signals are the affair of the main thread
+        yield stop  # only the main thread receives signals
         return
 
     def handle(number: int, frame: FrameType | None) -> None:

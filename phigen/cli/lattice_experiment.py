@@ -1,4 +1,4 @@
-"""The run of a lattice with the values of the command line put in, and the runs that it goes on with."""
+"""The run of a lattice with the settings of the command line, and the runs that it continues."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from phigen.spec.model import Run
     from phigen.symbolic.expression import Expression
 
-#: What a file of another run says, or one that is none.
+#: The contents of a file of another run, or the reason why it is not one.
 _UNREADABLE = (OSError, ValueError, KeyError, EOFError, IndexError, zipfile.BadZipFile)
 
 
@@ -39,11 +39,11 @@ class LatticeExperiment(Experiment):
 
     @property
     def begin(self) -> float:
-        """The time where its steps begin."""
+        """The time at which its steps start."""
         return float(self.past.t[-1]) if self.past else self.t0
 
     def beginning(self, solver: LatticeSolver) -> Beginning:
-        """The state where its steps begin, and what they depend on."""
+        """The state at which its steps start, with everything that they depend on."""
         assert self.start is not None
         state = solver.state(self.start.state if self.past is None else self.past.last, "x0")
         values = solver.values(self.parameters, {}, state.shape[1:])
@@ -54,7 +54,7 @@ class LatticeExperiment(Experiment):
         return Beginning(state, self.h, values, self.begin if solver.interface.time else 0.0, draws, level=level)
 
     def begun(self, solver: LatticeSolver) -> ObservedCourse:
-        """A course where the steps begin. Raises `StepError`."""
+        """Return a course at the start of the steps. Raises `StepError`."""
         return ObservedCourse.begun(solver, self.beginning(solver))
 
     def function(self, expression: Expression, solver: LatticeSolver) -> Function:
@@ -62,7 +62,7 @@ class LatticeExperiment(Experiment):
         return solver.function(expression, self.parameters)
 
     def plan(self, solver: LatticeSolver) -> IntegrationPlan:
-        """The integration that it asks for."""
+        """Return the requested integration."""
         at, run = self.beginning(solver), self.run
         if self.times is None:
             rows = strided(at.h, run.steps, run.stride, self.end)
@@ -78,7 +78,7 @@ class LatticeExperiment(Experiment):
 def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) -> tuple[Run, Start]:
     """Return a run that starts at the last state in a file of another run, with its time where there is one.
 
-    Raises `click.BadParameter` for what is no such file, and states of other sizes.
+    Raises `click.BadParameter` for other files, and for states of other sizes.
     """
     try:
         state, t = _last_of(source, solver.interface, start.state.shape)

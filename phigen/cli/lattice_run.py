@@ -46,9 +46,10 @@ def run_lattice(
     every: float | None = None,
     at: str | None = None,
 ) -> None:
-    """Integrate a run, and print what was conserved. Raises `StepError` after that if it did not come to its end.
+    """Integrate a run, and print the errors of conserved quantities. Then raises `StepError` if the run did not
+    reach its end.
 
-    ``lyapunov`` asks for the largest Lyapunov exponent besides, in a second pass with a tangent vector.
+    ``lyapunov`` also requests the largest Lyapunov exponent, by a second pass with a tangent vector.
     """
     import numpy as np
 
@@ -155,7 +156,7 @@ def _integrated(
     *,
     resume: bool,
 ) -> tuple[LatticeTrajectory | LatticeSeries, StepError | None]:
-    """The frames of a run, or what it records, and why it did not come to its end if it did not."""
+    """Return the frames or recorded numbers of a run, and the reason if it did not reach its end."""
     from phigen.runtime.checkpoint import MismatchError, objection
 
     run, first = experiment.run, output or section

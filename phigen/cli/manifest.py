@@ -1,7 +1,7 @@
-"""The manifest of a folder of vendored solvers: from what, by which options and which phigen each was made.
+"""The manifest of a folder of vendored solvers: spec, options and version of phigen of each.
 
-It is a function of the specs, the options and the version: no date, no host, and no path but those of specs relative
-to the folder. The text of each spec is in it, so that a solver can be made again where the spec is not at hand.
+It is a function of the specs, the options and the version: it has no date, no host, and only paths of specs relative
+to the folder. It contains the text of each spec, so that a solver can be generated again without the file.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ _ABOUT = (
 
 @dataclass(frozen=True)
 class ManifestEntry:
-    """One vendored solver. ``spec_file`` is relative to the folder, or names a bundled spec; None if it is far.
+    """One vendored solver. ``spec_file`` is relative to the folder, or names a bundled spec; None if it is
+    elsewhere.
 
     ``files`` maps names to the sha256 of their bytes.
     """

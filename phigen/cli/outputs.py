@@ -1,4 +1,4 @@
-"""Generated files on disk: what differs, what may be overwritten, and writing it whole or not at all."""
+"""Generated files on disk: differences, permission to overwrite, and writing all or nothing."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from phigen.writing import write_all
 
 @dataclass(frozen=True)
 class Change:
-    """One file: what is on disk, and what belongs there; None for a file that is not (or should not be) there."""
+    """One file: its text on disk, and its intended text; None for a file that does not (or should not) exist."""
 
     path: Path
     before: str | None
@@ -33,7 +33,7 @@ class Change:
 
     @property
     def obstacle(self) -> str:
-        """Why the file must not be touched, empty if it may be."""
+        """Return why the file must not be changed, empty if it may be."""
         if self.before is None or self.before == self.after or not is_edited(self.before):
             return ""
         if split(self.before)[0] is None:
@@ -41,7 +41,7 @@ class Change:
         return f"{self.path} was edited by hand after phigen generated it"
 
     def diff(self) -> str:
-        """A unified diff from what is there to what belongs there."""
+        """Return a unified diff from the text on disk to the intended text."""
         old = [] if self.before is None else self.before.splitlines(keepends=True)
         new = [] if self.after is None else self.after.splitlines(keepends=True)
         source, sink = (str(self.path) if text is not None else os.devnull for text in (self.before, self.after))
@@ -83,7 +83,7 @@ def apply(planned: Iterable[Change]) -> None:
 
 
 def read(path: Path) -> str | None:
-    """The text of a file, undecodable bytes replaced: such a file is not ours, which is all that matters."""
+    """Return the text of a file, with undecodable bytes replaced: only files of phigen matter, and these are UTF-8."""
     try:
         return path.read_bytes().decode("utf-8", "replace")
     except (FileNotFoundError, NotADirectoryError):
@@ -93,7 +93,7 @@ def read(path: Path) -> str | None:
 
 
 def _expect_own_folder(folder: Path) -> None:
-    # Through a link the files would land outside the output folder.
+    # Through a link the files would be written outside the output folder.
     if folder.is_symlink():
         raise CheckError(f"{folder} is a symbolic link; phigen writes to folders of its own only")
     if folder.exists() and not folder.is_dir():

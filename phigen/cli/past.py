@@ -1,4 +1,4 @@
-"""Runs that begin where others ended: their files, and the sessions that stand there."""
+"""Runs that start where others ended: their files, and sessions at that state."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Column
 from phigen.runtime.trajectory import element_columns, trajectory_columns
 
-#: Times apart by less of all that has passed are one.
+#: Times that differ by less than this fraction of the passed time are equal.
 _EQUAL = 1e-9
 
 
@@ -33,7 +33,7 @@ class StoredRows:
 
     @property
     def t(self) -> float:
-        """The time where it ended."""
+        """The time at which it ended."""
         return float(self.rows[-1, 0])
 
     def last(self, names: Sequence[str]) -> Floats:
@@ -101,7 +101,7 @@ def _of_npz(path: Path, names: Interface) -> StoredRows:
 
 
 def started_from(experiment: Experiment, past: StoredRows, solver: Solver) -> Experiment:
-    """The experiment from the last state of another run, with its time where there is one, and its attitude."""
+    """Return the experiment from the last state of another run, with its time, if there is one, and its attitude."""
     names = solver.interface
     _, *columns = columns_of(names)
     state = next(past.last(column.names) for column in columns if column.key == "x")
@@ -112,9 +112,9 @@ def started_from(experiment: Experiment, past: StoredRows, solver: Solver) -> Ex
 
 
 def begun(solver: Solver, experiment: Experiment) -> Session:
-    """A session where the steps of an experiment begin.
+    """Return a session at the start of the steps of an experiment.
 
-    One that goes on with a finished run holds the gauge of its start, or its e.
+    If it continues a finished run, it has the gauge of that run's start, or its energy level e.
     """
     backend, past, names = solver.backend, experiment.past, solver.interface
     initial = np.array(experiment.initial)

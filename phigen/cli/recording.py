@@ -40,26 +40,26 @@ _NO_FILES = "--resume continues the files of an interrupted run: name them by --
 
 #: Seconds between two checkpoints.
 CHECKPOINT_SECONDS = 2.0
-#: Rows of a finished run that are taken in at a time.
+#: Rows of a finished run that are read at a time.
 _ROWS = 1 << 14
 
 
 @dataclass(frozen=True)
 class Files:
-    """Where rows and crossings go, None for nowhere."""
+    """Files of rows and crossings; None without files."""
 
     output: Path | None = None
     section: Path | None = None
 
     @property
     def checkpoint(self) -> Path | None:
-        """Beside the first of them; an integration that leaves no files cannot be gone on with."""
+        """Companion of the first file; a run without files cannot be continued."""
         first = self.output or self.section
         return first.with_name(first.name + ".checkpoint") if first else None
 
 
 class Recorder:
-    """One run: the session that makes its steps, and all that takes in what it gives."""
+    """One run: the session that makes its steps, and everything that records its results."""
 
     def __init__(self, compilation: Compilation, solver: Solver, experiment: Experiment, files: Files, lyapunov: bool):
         self.solver, self.experiment, self.files = solver, experiment, files
@@ -136,14 +136,14 @@ class Recorder:
         return replace(self.growth.spectrum(), clock="τ" if self.solver.interface.monitored else "t")
 
     def start(self) -> None:
-        """Stand at the initial state, with new files."""
+        """Start at the initial state, with new files."""
         self.session = begun(self.solver, self.experiment)
         self._open({})
         if self.experiment.past:
             self._take_in(self.experiment.past.rows)
 
     def resume(self, path: Path) -> None:
-        """Stand where the checkpoint stands, with the files as they were then. Raises `MismatchError`."""
+        """Start at the checkpoint, with the files as they were then. Raises `MismatchError`."""
         arrays = checkpoint.load(path, self.identity)
         for prefix, part in self._parts().items():
             part.state = {name: arrays[f"{prefix}.{name}"] for name in part.state}
@@ -159,7 +159,7 @@ class Recorder:
             raise MismatchError(f"cannot resume: {error}") from None
 
     def see(self, piece: Piece) -> None:
-        """Take in what a piece of the integration gave."""
+        """Record the results of a piece of the integration."""
         about, monitored = self.experiment, self.solver.interface.monitored
         if len(piece.numbers):
             self.number = float(piece.numbers[-1])
@@ -178,14 +178,14 @@ class Recorder:
         self._cross(piece.crossings)
 
     def _cross(self, section_points: Sequence[tuple[float, Floats]]) -> None:
-        """Take in crossings, times and states."""
+        """Record crossings: times and states."""
         crossings = np.array([[t, *x] for t, x in section_points]).reshape(-1, 1 + self.solver.interface.dimension)
         self.points.see(crossings)
         if "section" in self._tables:
             self._tables["section"].append(crossings)
 
     def complete(self) -> None:
-        """Make the part of a step at the end; the last row is the last state, whatever rows are stored."""
+        """Make the final part of a step; the last row is the last state, whichever rows are stored."""
         end, number = self.experiment.end, float(self.session.steps)
         if end is not None:
             whole = self.session
@@ -198,7 +198,7 @@ class Recorder:
         self.number = number
 
     def _take_in(self, rows: Floats) -> None:
-        """The rows of a finished run, which the file goes on with."""
+        """Return the rows of a finished run, which the file continues."""
         names = self.solver.interface
         times = 1 + names.monitored
         state, seen = (
@@ -218,7 +218,7 @@ class Recorder:
         return path.suffix.lower() == ".csv"
 
     def save(self, seconds: float = 0.0) -> None:
-        """Hand all files over to the disk with a checkpoint, if the last one is so many seconds old."""
+        """Write all files to the disk with a checkpoint, if the last one is older than a number of seconds."""
         path = self.files.checkpoint
         if path is None or time.monotonic() - self._saved < seconds:
             return
@@ -253,7 +253,7 @@ class Recorder:
         return dict(zip([*names.coordinates, "energy"], pairs, strict=True))
 
     def finish(self, keep: bool) -> None:
-        """Complete the files; ``keep`` what is needed to go on."""
+        """Complete the files; ``keep`` retains the data needed to continue."""
         run, names = self.experiment, np.array(self.solver.coordinates)
         before = 0.0
         if run.past:
@@ -275,12 +275,12 @@ class Recorder:
             self.files.checkpoint.unlink(missing_ok=True)
 
     def discard(self) -> None:
-        """Leave nothing of a run that could not even begin."""
+        """Remove all files of a run that could not start."""
         for table in self._tables.values():
             table.discard()
 
     def trajectory(self, broken: bool) -> Trajectory:
-        """As many rows as a figure can show; ``broken`` marks the end of a run that failed."""
+        """Return as many rows as a figure can show; ``broken`` marks the end of a run that failed."""
         names, about = self.solver.interface, self.experiment
         settings = about.h, self.steps, about.parameters
         return self.sketch.trajectory(names.coordinates, names.casimirs, *settings, broken, names.observables)
@@ -330,7 +330,7 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
 
 @contextmanager
 def _kept(recorder: Recorder) -> Iterator[None]:
-    """A full disk ends a run as an interrupt does: its last checkpoint is there, to go on from."""
+    """A full disk ends a run like an interrupt: the run can be continued from its last checkpoint."""
     try:
         yield
     except OSError as error:
@@ -341,7 +341,7 @@ def _kept(recorder: Recorder) -> Iterator[None]:
 
 
 def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool]:
-    """Integrate to the end, to a step that fails, which is returned, or until interrupted, which is told."""
+    """Integrate to the end, to a failing step, which is returned, or to an interrupt, which is reported."""
     experiment, session, start = recorder.experiment, recorder.session, time.perf_counter()
     run, growth, failure = experiment.run, recorder.growth, None
     label = f"{recorder.solver.interface.name}, order {recorder.solver.order}"

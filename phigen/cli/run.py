@@ -187,7 +187,7 @@ def command(
         raise InterruptedRunError(_told(recorder))
 
 
-#: Options that say different things of one matter, or that nothing is made for.
+#: Options that contradict each other, or that have no effect together.
 _APART = [("--until", "--steps"), ("--every", "--at"), ("--extend", "--from")]
 _APART += [("--extend", "--section"), ("--extend", "--lyapunov")]
 

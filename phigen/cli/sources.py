@@ -1,4 +1,4 @@
-"""Files and folders of specs, found and loaded by what a command line says."""
+"""Files and folders of specs named on a command line: search and loading."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def found(source: str) -> str:
     Raises `SpecError` if there is none of these.
     """
     path = Path(source)
-    # What `phigen build kepler -o .` makes is no reason not to find kepler any more.
+    # A folder that `phigen build kepler -o .` made must not hide the bundled kepler.
     if source in resources.bundled() and (not path.exists() or (path.is_dir() and not any(_below(source)))):
         return str(resources.bundled()[source])
     if path.exists():

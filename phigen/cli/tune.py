@@ -177,7 +177,7 @@ def _of_lattice(
 
 
 def _times(run: Run, horizon: float | None) -> tuple[float, float, float]:
-    """A first guess at the step, the time that a run takes, and its direction."""
+    """Return a first estimate of the step, the time of a run, and its direction."""
     step = float(run.step)
     span = abs(step) * run.steps if horizon is None else horizon
     return min(abs(step), span), span, math.copysign(1.0, step)

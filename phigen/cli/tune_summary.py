@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from phigen.tuning.search import Curve
     from phigen.tuning.study import Finalist, Tuning
 
-#: Other accuracies that are told, as factors.
+#: Other accuracies that are reported, as factors.
 _OTHERS = (1e4, 1e2, 1e-2, 1e-4)
-#: An error so much below the accuracy did not decide the step.
+#: An error smaller than the accuracy by this factor did not decide the step.
 _SLACK = 20
-#: Monitors that are shown, and how many times fewer steps are worth a line.
+#: Number of monitors that are shown, and the smallest reduction of steps that is reported.
 _SHOWN, _GAINING, _LONGEST = 5, 2.0, 60
 #: States that the proposed run stores.
 _ROWS = 1000
@@ -222,7 +222,7 @@ def run_lines_of(tuning: Tuning, run: Run) -> list[str]:
 
 
 def unreached(tuning: Tuning) -> str:
-    """Why nothing reaches the accuracy, and how near to it one came."""
+    """Return why no setting reaches the accuracy, and the smallest error."""
     from phigen.tuning.search import at_floor
 
     curve, point = tuning.closest

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class VendorRequest:
-    """One solver to vendor or to check: its spec, from where, and the options.
+    """One solver to vendor or to check: its spec, its source, and the options.
 
     ``found`` is false if the text of the spec comes from the manifest, because its file is not there.
     """
@@ -245,7 +245,8 @@ def _write(
 
 
 def _obstacle(change: Change, known: ManifestEntry | None) -> str:
-    """Why a file must not be touched. The manifest knows of edits in headers too, which the checksums do not cover."""
+    """Return why a file must not be changed. The manifest also detects edits in headers, which the checksums do not
+    cover."""
     if change.obstacle or change.before is None or change.before == change.after:
         return change.obstacle
     stated = known.files.get(change.path.name) if known else None
@@ -269,7 +270,7 @@ def _done(folder: Path, vendored: VendoredSolver, changes: Sequence[Change]) -> 
 
 @dataclass(frozen=True)
 class VendorProblem:
-    """One file that is not as it should be: its path, what is wrong, and the command that mends it."""
+    """One file with a problem: its path, the problem, and the command that corrects it."""
 
     path: Path
     what: str
@@ -308,7 +309,7 @@ def _complaint(path: Path, known: ManifestEntry | None, vendored: VendoredSolver
 
 
 def _cause(known: ManifestEntry | None, vendored: VendoredSolver) -> str:
-    """Why phigen makes something else now."""
+    """Return why phigen now generates something else."""
     causes = []
     if known and known.spec_text != vendored.order.spec.source:
         causes.append("its spec has changed")
@@ -332,7 +333,7 @@ def _wrong_builds(folder: Path, entries: Mapping[str, ManifestEntry], builds: Se
 
 
 def _extra(folder: Path, entries: Mapping[str, ManifestEntry]) -> Iterator[VendorProblem]:
-    """Generated files that the manifest does not know; others are the user's."""
+    """Return generated files that the manifest does not list; other files belong to the user."""
     from phigen.cli.outputs import read
     from phigen.targets.header import split
 

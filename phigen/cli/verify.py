@@ -1,4 +1,5 @@
-"""``phigen verify``: build every target of specs, measure what the solvers promise, and judge it."""
+"""``phigen verify``: build every target of specs, measure the promised properties of the solvers, and compare with
+bounds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Spec files: from YAML to `Spec` with source positions, and every error a user can make in one.
+"""Spec files: from YAML to `Spec` with source positions, and all errors of users in a spec.
 
 `load` and `loads` read a spec, `schema` describes the format for editors, `starter` writes a first one.
 """

@@ -32,8 +32,8 @@ RENAME = "choose another name"
 class Declarations:
     """The declared names, and parsing with them.
 
-    ``incomplete`` says that some names could not be read: unknown names then go unreported, since they may
-    be the ones that are missing.
+    ``incomplete`` says that some names could not be read: then unknown names are not reported, since they may be
+    among these.
     """
 
     reader: Reader
@@ -47,9 +47,9 @@ class Declarations:
     incomplete: bool = False
     nodes: dict[str, Scalar] = field(default_factory=dict)  # where each name is declared
     within: tuple[Any, ...] = ("poisson",)  # the path of keys to the Poisson structure that is being read
-    refused: dict[str, tuple[str, str]] = field(default_factory=dict)  # names that mean nothing there: message, hint
+    refused: dict[str, tuple[str, str]] = field(default_factory=dict)  # names that are not allowed there: message, hint
     lattice: Lattice | None = None
-    indexed: bool = True  # whether what is read may name neighbours
+    indexed: bool = True  # whether the expression being read may name neighbours
 
     # --- lattices
 
@@ -129,7 +129,7 @@ class Declarations:
     # --- scopes
 
     def scope(self, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
-        """Everything declared but the time: for functions on phase space, of a lattice for densities of sites."""
+        """Return everything declared except the time: for functions on phase space, and for densities of sites."""
         names = {n: symbol(n) for n in (*self.coordinates, *self.parameters)}
         names |= {n: e for n, e in self.definitions.items() if n not in self.dated} | dict(extra or {})
         bonds = self._at_bonds(names)
@@ -154,7 +154,8 @@ class Declarations:
         return refused | ({self.time: (f"this must not depend on the time {self.time!r}", hint)} if self.time else {})
 
     def constants(self, what: str, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
-        """Parameters and what depends on them alone; ``what`` says for what in the message about others."""
+        """Return parameters and definitions of parameters only; ``what`` names the value in messages about other
+        names."""
         names = {n: symbol(n) for n in self.parameters}
         names |= {n: e for n, e in self.definitions.items() if n not in self.varying | self.dated}
         bonds = self._at_bonds(names)
@@ -344,7 +345,7 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
     sources = {name: node for name, (key, node) in entries.items() if declared.declare(key, "definition")}
     uses = {name: names_in(node.text) if node else [] for name, node in sources.items()}
     coordinates = set(declared.coordinates)
-    # Placeholders first: only the members of a cycle, which is an error, meet one.
+    # Placeholders: only the members of a cycle, which is an error, see one.
     known = declared.dated_scope()
     names = {**known.names, **{name: symbol(name) for name in sources}}
     for name in _in_order(uses, entries, declared.reader):
@@ -361,7 +362,7 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
 def _in_order(
     uses: Mapping[str, list[str]], keys: Mapping[str, tuple[Scalar, Node | None]], reader: Reader
 ) -> list[str]:
-    """The definitions, each after those it uses; cycles are reported and broken."""
+    """Return the definitions, each after the ones it uses; cycles are reported and broken."""
     graph = {name: [u for u in used if u in uses] for name, used in uses.items()}
     while True:
         try:

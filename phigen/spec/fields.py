@@ -154,7 +154,7 @@ def _structure(what: str, nested: int, *more: RecordKey) -> Record:
 
 
 BOUNDARY = OneOf(("periodic", "open"))
-#: How deep products and pull-backs may be nested.
+#: Largest depth of nested products and pull-backs.
 NESTED = 2
 POISSON = _structure("poisson", NESTED)
 KIND = OneOf(BIREALISATIONS)
@@ -266,7 +266,7 @@ SOURCE = Record(
     ),
 )
 
-#: Where keys of specs, and the time, belong that are looked for in runs.
+#: Hints for keys of specs, and for the time, in runs.
 _BESIDE_RUNS = {
     key: f"{key}: belongs beside runs, to the whole spec"
     for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")
@@ -363,7 +363,7 @@ RUN = Record(
     elsewhere=_BESIDE_RUNS,
 )
 
-#: What a sweep keeps; which observables there are is known later.
+#: Values that a sweep may store; observables are checked later.
 KEPT_WORD = ShapedText(
     r"\w+|\w+ *\( *\w+ *\)",
     "a result of a sweep",
@@ -408,7 +408,7 @@ def _switch(key: str, *words: str) -> Kind:
     return OneOf(words)
 
 
-#: Keys of runs that are looked for beside them.
+#: Hints for keys of runs outside of runs.
 _IN_RUNS = {f.key: f"{f.key}: belongs to a run, runs: {{NAME: {{{f.key}: …}}}}" for f in RUN.fields}
 _IN_RUNS["step"] += "; monitor: adapts steps to the motion"
 _IN_RUNS["precision"] = "order: sets the order of the error; real: float is single precision"

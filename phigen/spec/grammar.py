@@ -80,7 +80,7 @@ class AllowedNames:
         return CONSTANTS.get(name) or (symbol(name) if self.open and name not in SPEC_FUNCTIONS else None)
 
     def unknown(self, name: str) -> tuple[str, str]:
-        """Message and hint for a name that `lookup` does not find."""
+        """Return message and hint for a name that `lookup` does not find."""
         if name in self.refused:
             return self.refused[name]
         if name.lower() in ("nan", "inf", "infinity"):
@@ -116,7 +116,7 @@ _CHARACTER_HINTS = {
     ":": "expressions are not Python",
 }
 
-#: What is meant by characters that stand for operators: reading goes on with these, so that all errors are told.
+#: Corrections for wrong operator characters: reading continues with these, so that all errors are reported.
 _MEANT = {"^": "**", "−": "-", "–": "-", "·": "*", "×": "*"}
 
 
@@ -130,7 +130,7 @@ class Token:
 
 
 class _AbandonedError(Exception):
-    """The rest of the expression cannot be read; the error is reported."""
+    """The rest of the expression cannot be read; the error has been reported."""
 
 
 def tokens(source: str, report: Report) -> list[Token] | None:
@@ -190,7 +190,7 @@ def parse(source: str, scope: AllowedNames, report: Report) -> Expression | None
 class Parser:
     """Reads tokens to an expression, by a method for each rule of the grammar."""
 
-    nothing = symbol(Symbol("unknown", ""))  # stands for what has an error
+    nothing = symbol(Symbol("unknown", ""))  # placeholder for an expression with an error
 
     def __init__(self, source_tokens: list[Token], scope: AllowedNames, report: Report) -> None:
         self.tokens, self.scope, self.report = source_tokens, scope, report
@@ -211,7 +211,7 @@ class Parser:
         return token
 
     def advance(self) -> Token:
-        """The token here, after which reading goes on; the end is never passed."""
+        """Return the current token and advance; the end is never passed."""
         token = self.here
         self.position += token.kind != "end"
         return token
@@ -348,7 +348,7 @@ class Parser:
 
     def number(self, token: Token) -> Expression:
         mantissa, _, exponent = token.text.lower().partition("e")
-        # Bounded before the conversion: 1e999999999 would fill the memory.
+        # Checked before the conversion: 1e999999999 would fill the memory.
         digits = len(mantissa) + abs(int(exponent or 0)) if len(exponent) < 6 else math.inf
         value = Fraction(token.text) if digits <= 2 * len(str(limits.DENOMINATOR)) else None
         if value is None or not limits.number_is_bounded(value):

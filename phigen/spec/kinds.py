@@ -24,7 +24,7 @@ from phigen.spec.yaml_source import Mapping as MappingNode
 from phigen.spec.yaml_source import Node, Scalar, describe, is_unprintable, kind_of
 from phigen.spec.yaml_source import Sequence as SequenceNode
 
-#: Dates of YAML, which as expressions would be differences: 2026-01-01 is 2024.
+#: Dates of YAML would be read as differences: 2026-01-01 is 2024.
 _DATE = re.compile(r"\s*[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}([Tt\s]|$)")
 
 _LISTS = "lists are written [a, b]"
@@ -76,7 +76,7 @@ class Kind:
         raise NotImplementedError
 
     def mismatch(self, node: Node, path: Path, reader: Reader, hint: str = "") -> None:
-        """Report a node of the wrong kind; without a better hint, with what its key is for."""
+        """Report a node of the wrong kind; without a better hint, with the purpose of its key."""
         message = f"{label(path)}expected {self.expected}, found {kind_of(node)}"
         reader.error(node, message, hint or reader.purposes.get(path, ""))
 
@@ -110,7 +110,7 @@ class Text(Kind):
 
 @dataclass(frozen=True)
 class ShapedText(Kind):
-    """A text of a certain shape; the ``example`` is told where something else stands in its place."""
+    """A text of a certain form; the ``example`` is part of the error message."""
 
     pattern: str
     expected: str = "a name"
@@ -316,9 +316,9 @@ class RecordKey:
 class Record(Kind):
     """A mapping with fixed keys; reads as key → value, keys in error absent.
 
-    ``one`` lists keys of which at most (``exactly``: exactly) one may be given; a key of ``instead`` does where one is
-    needed, and may stand beside it. ``some`` refuses an empty mapping. ``example`` is shown to who writes something
-    else than a mapping; ``elsewhere`` says of keys that are none here where they belong.
+    Of the keys in ``one`` at most (``exactly``: exactly) one may be given; a key of ``instead`` satisfies this too,
+    and may be combined with one of them. ``some`` refuses an empty mapping. ``example`` is part of the error for
+    another kind of value; ``elsewhere`` says where keys that are not allowed here belong.
     """
 
     what: str
@@ -355,7 +355,7 @@ class Record(Kind):
         return values
 
     def _meant(self, name: str, node: MappingNode) -> str:
-        """The key that a name which is none stands for, of those that are like it one that is not there; or ""."""
+        """Return the existing key that an unknown name resembles, if it is not given yet; or ""."""
         known = [f.key for f in self.fields]
         key = intended(name, known, MEANT)
         if key in node.entries and key != MEANT.get(name):
@@ -440,5 +440,5 @@ class Either(Kind):
 
 
 def place(key: Scalar, value: Node) -> Location:
-    """Where to point for a part: at a scalar itself, at the key of a collection."""
+    """Return the place for messages about a part: a scalar itself, or the key of a collection."""
     return value.location if isinstance(value, Scalar) and not value.is_null else key.location

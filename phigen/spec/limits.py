@@ -1,6 +1,6 @@
 """Limits on what a spec may contain, so that no file can hang or exhaust the compiler.
 
-Going over one is a `LimitError`, which has its own exit code.
+Exceeding a limit is a `LimitError`, which has its own exit code.
 """
 
 from __future__ import annotations

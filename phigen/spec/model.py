@@ -17,10 +17,10 @@ from phigen.registry import DEFAULT
 from phigen.spec.names import LEFT_OUT, STATISTICS
 from phigen.symbolic.expression import ZERO, Expression
 
-#: The order of a method that nobody asked an order of.
+#: The default order of a method.
 DEFAULT_ORDER = 4
 
-#: The same where there is noise, which limits the order.
+#: The default order with noise, which limits the order.
 NOISY_ORDER = 2
 
 Matrix = tuple[tuple[Expression, ...], ...]
@@ -48,7 +48,7 @@ class Values:
 class Parameter:
     """A run-time argument of the generated code, with its default.
 
-    ``small`` says that what it multiplies is a small part of H, ``nonnegative`` that it is 0 or positive.
+    ``small`` says that the terms with this factor are a small part of H, ``nonnegative`` that it is 0 or positive.
     ``at`` says of a lattice whether it is one number (``all``), or an array with a value at each of the ``sites`` or
     ``bonds``; ``values`` are its defaults where they are not all ``value``. ``unit`` is text for readers: nothing is
     converted.
@@ -167,8 +167,8 @@ class BirealisationChoice:
 class SolverOptions:
     """The inner solve: ``method`` auto or newton, ``tolerance`` None for auto.
 
-    ``lanes``: whether C code takes steps, and members of ensembles, eight at a time. Without it is shorter, and slower.
-    ``compensated``: whether sums over the steps of lattices are compensated, in C.
+    ``lanes``: whether C makes steps, and members of ensembles, in SIMD lanes; without lanes the code is shorter and
+    slower. ``compensated``: whether C compensates sums over the steps of lattices.
     """
 
     method: str = "auto"
@@ -426,8 +426,8 @@ class SpecNoise:
 class Spec:
     """A spec file, about a cell where there is a ``lattice``.
 
-    `locations` gives the place of a part by its path of keys, e.g. ``("casimirs", "C")``. `written` is the spec as the
-    file has it, where options of a command or a call override that.
+    `locations` gives the place of a part by its path of keys, e.g. ``("casimirs", "C")``. `written` is the spec of
+    the file, if options of a command or a call override it.
     """
 
     name: str
@@ -482,7 +482,7 @@ class Spec:
 
     @property
     def wanted_order(self) -> int:
-        """The order that is asked for; where it is terms, that of a symmetric method with so many."""
+        """The requested order; if terms are requested, the order of a symmetric method with this number of terms."""
         return self.order or (self.terms or DEFAULT_ORDER) + (self.terms or 0) % 2
 
     def overridden(
@@ -499,7 +499,7 @@ class Spec:
     ) -> Spec:
         """Return the spec with the options of a command or a call applied.
 
-        ``tangent``, ``adjoint`` and ``without`` add to what the spec asks for, the others replace it; an ``order``
+        ``tangent``, ``adjoint`` and ``without`` are added to those of the spec, the others replace it; an ``order``
         replaces ``terms`` too. Single precision has the profile small only.
         """
         extras = Extras(
@@ -519,7 +519,8 @@ class Spec:
         )
 
     def for_running(self, **options: Unpack[Overrides]) -> Spec:
-        """Return the spec with options applied, as phigen itself runs it: in the profile fast unless they name one.
+        """Return the spec with options applied, for code that phigen itself runs: in the profile fast unless the
+        options name one.
 
         The ``profile`` of a spec is about the code that ``phigen build`` writes.
         """
@@ -527,7 +528,7 @@ class Spec:
         return self.overridden(**options)
 
     def parameters_of(self, run: Run) -> dict[str, float]:
-        """The values of all parameters in a run: its own, else the defaults."""
+        """Return the values of all parameters in a run: those of the run, else the defaults."""
         return {p.name: float(run.parameters.get(p.name, p.value)) for p in self.parameters}
 
     def diagnostic(self, path: tuple[Any, ...], message: str, hint: str = "") -> Diagnostic:

@@ -1,4 +1,4 @@
-"""Tables of names: what may be called how, and the names phigen knows."""
+"""Tables of names: reserved names, and the values that phigen knows."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ PIECEWISE_FUNCTIONS: dict[str, int] = {"sign": 1, "heaviside": 1, "min": 2, "max
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
 IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
 
-#: Parameters are passed by keyword beside these arguments of the generated functions.
+#: Arguments of the generated functions, with which parameters, passed by keyword, must not clash.
 ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge", "cotangent", "attitude0", "position0"])
-#: The same, where there is a time.
+#: The same arguments if there is a time.
 TIMED_ARGUMENTS = ARGUMENTS | {"t", "t0"}
-#: What these are called where there is noise, beside the others.
+#: Names of these arguments with noise, in addition.
 NOISY_ARGUMENTS = frozenset(["seed", "member", "step0", "increments"])
 ARGUMENT_HINT = "it is the name of an argument of the generated functions"
 
-#: What other programs call it, and users type here.
+#: Names in other programs, which users may type here.
 MEANT = {
     "friction": "damping", "dissipation": "damping", "drag": "damping", "force": "forces", "torque": "forces",
     "forcing": "forces", "drive": "forces", "driving": "forces", "control": "forces",
@@ -87,14 +87,14 @@ BIREALISATIONS = (
     "custom",
 )
 POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu", "product", "pullback")
-#: How much the C does for speed.
+#: Profiles of C.
 PROFILES = ("fast", "small", "certified")
 
-#: The numbers of the C.
+#: Number types of the C.
 REALS = ("double", "float")
 
-#: What can be left out of the code one by one; the profile small leaves out what serves speed, and
-#: members with parameters of their own.
+#: Parts of the code that can be left out one by one; the profile small leaves out parts that serve speed, and members
+#: with parameters of their own.
 PARTS = ("by-hand", "ensemble", "gauge-search", "kicks", "lanes", "members", "recurrences")
 LEFT_OUT = {
     "fast": frozenset[str](),
@@ -102,25 +102,25 @@ LEFT_OUT = {
     "certified": frozenset(PARTS),
 }
 
-#: How a section is crossed.
+#: Directions of crossings of a section.
 DIRECTIONS = ("rising", "falling", "both")
 
-#: What a sweep may vary besides parameters and initial values, and what it may keep.
+#: Quantities that a sweep may vary besides parameters and initial values, and that it may store.
 SWEEP_NAMES = ("step", "start", "seed")
 KEPT = ("final", "energy_error", "casimir_error", "lyapunov", "crossings")
-#: How the density of an observable of a lattice becomes one number; those that add up densities.
+#: Reductions of the density of an observable of a lattice to one number; those that add densities.
 REDUCTIONS = ("mean", "sum", "max", "min")
 ADDITIVE = ("mean", "sum")
-#: What the density of an observable may belong to.
+#: Sets over which the density of an observable is reduced.
 OVER = ("sites", "bonds", "pairs")
 #: What a sweep may keep of an observable M beside M at the end: over the run its mean(M), its standard deviation
 #: std(M), and error(M), the standard error of the mean.
 STATISTICS = ("mean", "std", "error")
 
-#: How attitudes are given.
+#: Representations of attitudes.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 
-#: Compositions of the flows of the parts of a splitting, and all.
+#: Compositions of the flows of the parts of a splitting: for two parts, and for any number.
 CORRECTED = tuple(f"wisdom-holman{order}" for order in ("", "-3", "-5", "-7", "-11", "-17"))
 NEAR_INTEGRABLE = ("saba-4-2", "saba-6-2", "saba-8-2", "saba-10-2", *CORRECTED, "aba-8-4", "aba-8-6-4", "aba-10-6-4")
 FLOW_COMPOSITIONS = ("blanes-moan", "blanes-moan-rkn", "nystrom", "force-gradient", *NEAR_INTEGRABLE)
@@ -137,7 +137,7 @@ COMPOSITIONS = (
 #: The monitor of a splitting in two, K = log(A + e) − log(−B).
 LOGARITHMIC = "log"
 SCHEMES = ("auto", "series", "splitting", "gauss")
-#: What a Gauss method is: an exact Poisson map, or one up to its truncation error.
+#: Structures of a Gauss method: an exact Poisson map, or one up to its truncation error.
 STRUCTURES = ("exact", "to truncation")
 #: Relative coordinates of attracting bodies, in which a splitting finds its parts.
 RELATIVE = ("jacobi", "democratic_heliocentric")

@@ -1,7 +1,8 @@
-"""Names that a spec cannot have.
+"""Names that a spec must not have.
 
-A spec gives its name to files, NAME.h and NAME.py, and its beginning to symbols, NAME_init. So the name must not hide a
-header or a module from whoever puts the folder of a solver on a search path, and symbols must be nobody else's.
+The name of a spec becomes the name of files, NAME.h and NAME.py, and the prefix of symbols, NAME_init. So it must
+not hide a header or a module when the folder of a solver is on a search path, and symbols must not clash with
+others.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ winsock2"""
 _HEADER_FAMILIES = r"\w+intrin|(arm|hexagon|hvx|riscv|wasm)_\w+|ncurses\w*|curses"
 _HEADER = re.compile(rf"{'|'.join(_HEADERS.split())}|{_HEADER_FAMILIES}")
 
-# What is imported beside a generated module; modules of Python that this version does not have any more, or not yet.
+# Modules that are imported together with a generated module; modules of Python that this version no longer or not yet
+# has.
 _MODULES = frozenset(["numpy", "scipy", "sympy", "matplotlib", "pandas", "phigen"])
 _OTHER_VERSIONS = frozenset(["annotationlib", "asynchat", "asyncore", "compression", "distutils", "imp", "smtpd"])
 

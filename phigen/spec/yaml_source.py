@@ -1,4 +1,4 @@
-"""YAML 1.2 into a tree of nodes that know their places.
+"""YAML 1.2 into a tree of nodes with their places.
 
 Built on ruamel's event stream rather than its loaders: anchors, aliases and tags are refused as they come
 by, before anything can expand; nesting is counted before it can exhaust the stack; and a scalar keeps its

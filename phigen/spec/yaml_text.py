@@ -1,4 +1,4 @@
-"""A spec as the text of a file that reads as it: what is made by machine, printed for users."""
+"""A spec as the text of a file that parses to it: specs made by programs, printed for users."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ import { DIM, MAX_SWEEPS, MIXING, PLACES, PLAIN, POINT, PREDICTION, UNKNOWNS, WE
 import { stageChange, stageField } from "./model.mjs";
 import { turnStage } from "./attitude_stages.mjs";
 import { keepMove } from "./gauss_framed.mjs";
-import { pass } from "./level.mjs";
+import { pass } from "./passing.mjs";
 import { timeOfStep } from "./level_gauss.mjs";
 
 // ---- The implicit step, by Gauss collocation ----

@@ -22,7 +22,7 @@ function partEnergy(part, { params, sites, x }) {
 }
 
 /**
- * Set the level e = -H(x0), which a trajectory holds fixed, and the compensation term of t, which is physical time.
+ * Set the energy level e = -H(x0), constant along a trajectory, and the compensation term of the time t.
  * Throws StepError where the physical time does not increase.
  */
 export function beginLevel(solver) {
@@ -30,10 +30,11 @@ export function beginLevel(solver) {
   const energies = [partEnergy(0, solver), partEnergy(1, solver)];
   solver.level = -(energies[0] + energies[1]);
   if (Number.isFinite(solver.level) && energies[NEGATIVE] < 0) return;
-  throw new StepError("BAD_ARGUMENT", 0, `the part of H that has to be negative is ${energies[NEGATIVE]} at x0`);
+  const found = energies[NEGATIVE];
+  throw new StepError("BAD_ARGUMENT", 0, `the part of H that must be negative is ${found} at x0`);
 }
 
-/** A + e or -B: the flow of a part of K is that of the part of H over a time that is smaller by this factor. */
+/** A + e or -B: a part of K has the flow of the part of H over the time divided by this factor. */
 export function rateOf(part, solver) {
   const energy = partEnergy(part, solver);
   return part === NEGATIVE ? -energy : energy + solver.level;

@@ -1,6 +1,6 @@
 import { applyFlow } from "./flow_alone.mjs";
 import { beginElement, turnByFlows } from "./flow_turning.mjs";
-import { pass } from "./level.mjs";
+import { pass } from "./passing.mjs";
 import { DIM, FLOWS, SCHEDULE } from "./model.mjs";
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----
