@@ -28,6 +28,8 @@ ROWS = {
         "35 flows, monitor; box ± 10⁻⁴",
         [f"--box={box}" for box in ("q1=0.0499:0.0501", "q2=-1e-4:1e-4", "p1=-1e-4:1e-4", "p2=6.2449:6.2451")],
     ),
+    "charged_particle": ("path, 6 coordinates", ["--samples=10"]),
+    "guiding_centre": ("path, 5 stages", ["--samples=5"]),
     "kowalevski_gauss": ("Gauss, order 16, step 0.05", ["--step=0.05"]),
 }
 

@@ -55,7 +55,7 @@ runs:
     section: q
     direction: falling
     description: it swings
-  b: {initial: {q: 1, p: 0}, step: 0.1, duration: 1, every: 0.2, compare: [rk4], stop: q + 5}
+  b: {initial: {q: 1, p: 0}, step: 0.1, duration: 1, every: 0.2, compare: [rk4], stop: q + 5, box: {q: [-1, 2]}}
   c: {initial: [1, 0], step: 0.1, until: 0.95}
 sweeps:
   s:

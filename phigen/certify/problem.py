@@ -48,16 +48,10 @@ def problem_of(
 
 
 def _expect_covered(program: Program, spec: Spec) -> None:
-    """Refuse noise, paths, flows that depend on the time, and single precision."""
-    kind, refusals = program.step.kind, list[tuple[tuple[str, ...], str, str]]()
+    """Refuse noise and single precision."""
+    refusals = list[tuple[tuple[str, ...], str, str]]()
     if program.noise:
         refusals.append((("noise",), "certificates do not cover noise", "a spec without it"))
-    if program.step.path:
-        hint = "another bi-realisation or scheme: splitting, if the system has one; phigen compare lists them"
-        refusals.append((("poisson",), "certificates do not cover steps along paths", hint))
-    if kind.flows and program.time:
-        message = "certificates do not cover splittings of an H that depends on the time"
-        refusals.append((("scheme",), message, "scheme: series"))
     if program.single:
         refusals.append((("solver",), "certificates are of C in double precision", "leave out real: float"))
     if refusals:

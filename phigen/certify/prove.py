@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -12,27 +13,46 @@ from typing import Any
 from flint import arb, ctx
 
 from phigen._version import __version__
-from phigen.certify.checker.contraction import gauss
-from phigen.certify.checker.explicit_steps import prepared
-from phigen.certify.checker.krawczyk import newton_stage
-from phigen.certify.checker.reader import read
-from phigen.certify.checker.replay import BITS, KINDS
-from phigen.certify.checker.rounding import BALL, RefusedError, Tape, demand, interval, mag, play
+from phigen.certify.checker import (
+    BALL,
+    BITS,
+    Evaluation,
+    RefusedError,
+    centred,
+    demand,
+    digest,
+    interval,
+    mag,
+    run_of,
+    step,
+)
+from phigen.certify.reader import read
+from phigen.certify.stages import stages_of
 
-#: Passes in which the box of a solution or of the unknowns of stages grows until it is mapped into itself.
+#: Passes in which the box of the unknowns of a stage grows until it is shown to hold the solution.
 PASSES = 8
 
 #: Growth of that box in each pass: less needs more passes, more makes contraction harder to show.
 GROWTH = 1.25
 
+#: Reach of the iterates of moves that hardly change, in sizes of the largest: sweeps mix all of them.
+LEAST_REACH = 0.05
+
+#: Reach of the iterates of steps along paths beside that of their starts: the C may take differences over less.
+DIFFERENCES = arb(2) ** -20
+
 #: Bisections after which a box is given up: its parts have 2^-40 of its volume.
 MAX_DEPTH = 40
 
-#: Contraction by sweeps that a Gauss solver remembers at least, by which it decides when to stop. Certificates hold
-#: while that is so; in runs of the corpus it is between 0.05 and 0.5.
-LEAST_RATE = 0.05
-
 Box = Sequence[Sequence[float]]
+
+
+class NoCertificateError(RefusedError):
+    """Refusal of what cannot be certified; a hint says what to do."""
+
+    def __init__(self, message: str, hint: str) -> None:
+        super().__init__(message)
+        self.hint = hint
 
 
 @dataclass(frozen=True)
@@ -52,24 +72,32 @@ class StepProblem:
     timed: bool = False
 
 
-def described(problem: StepProblem) -> dict[str, Any]:
-    """Return the certificate without its boxes and bounds. Raises `RefusedError` for C that is not covered."""
+def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
+    """Return the certificate without its boxes and bounds. Raises `RefusedError` for C that is not covered.
+
+    For the ``exact`` map paths are expanded as far as the C can.
+    """
     facts = read(problem.text, problem.name)
-    rate = {"rate": LEAST_RATE} if facts["kind"] == "gauss" else {}
+    numbers = {
+        "step": problem.step,
+        "parameters": dict(problem.parameters),
+        "gauge": list(problem.gauge),
+    }
+    box = [interval(d) for d in problem.domain]
+    facts = {**facts, **numbers, "start": sum(problem.time) / 2}
     return {
         "phigen": __version__,
         "name": problem.name,
         "c_sha256": hashlib.sha256(problem.text.encode()).hexdigest(),
-        "step": problem.step,
-        "parameters": dict(problem.parameters),
-        "gauge": list(problem.gauge),
+        **numbers,
         "coordinates": list(problem.coordinates),
         "timed": problem.timed,
         "domain": [list(d) for d in problem.domain],
         "time": list(problem.time),
         "ulps": problem.ulps,
-        **rate,
-        **facts,
+        "kind": facts["kind"],
+        "series": facts["series"],
+        "stages": stages_of(facts, problem.text, problem.name, box, exact),
     }
 
 
@@ -92,7 +120,8 @@ def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
         tree = search.tree([*certificate["domain"], certificate["time"]])
     bound, largest = ([max(column) for column in zip(*parts, strict=True)] for parts in zip(*leaves, strict=True))
     ulps = [b / math.ulp(x) for b, x in zip(bound, largest, strict=True)]
-    return {**certificate, "bound": bound, "bound_in_ulps": ulps, "boxes": len(leaves), "tree": tree}
+    certificate |= {"bound": bound, "bound_in_ulps": ulps, "boxes": len(leaves), "tree": tree}
+    return {**certificate, "sha256": digest(json.loads(json.dumps(certificate)))}
 
 
 @dataclass(frozen=True)
@@ -110,8 +139,8 @@ class _Search:
         c = self.certificate
         *X, T = [interval(d) for d in domain]
         try:
-            leaf = _LEAVES[c["kind"]](c, X, T)
-            bounds, image = KINDS[c["kind"]](c, X, T, leaf)
+            leaf = _leaf(c, X, T)
+            bounds, image = step(c, X, T, leaf)
             bound = [math.nextafter(float(mag(b)), math.inf) for b in bounds]
             largest = [max(float(mag(x)), float(mag(y))) for x, y in zip(X, image, strict=True)]
             ulps = max(b / math.ulp(x) for b, x in zip(bound, largest, strict=True))
@@ -128,12 +157,12 @@ class _Search:
         return {"axis": axis, "at": at, "parts": [self.tree(part, depth + 1) for part in (low, high)]}
 
 
-def _refusal(c: dict[str, Any], domain: Box, failure: Exception, done: int) -> RefusedError:
+def _refusal(c: dict[str, Any], domain: Box, failure: Exception, done: int) -> NoCertificateError:
     names = [*c["coordinates"], "the time"]
     box = ", ".join(f"{n} in [{a:.6g}, {b:.6g}]" for n, (a, b) in zip(names, domain, strict=True) if (a, b) != (0, 0))
     reason = "a matrix may be singular" if isinstance(failure, ZeroDivisionError) else str(failure)
     message = f"no certificate after {done} boxes: {reason}, for {box}"
-    return RefusedError(message, "a smaller box, a smaller step, or more boxes by --boxes")
+    return NoCertificateError(message, "a smaller box, a smaller step, or more boxes by --boxes")
 
 
 def _widest(domain: Box) -> int | None:
@@ -149,60 +178,50 @@ def _ends(x: Any) -> list[float]:
     return [low, high]
 
 
-def _newton_leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """The boxes of the solution y at each stage: y = x - d(y) is iterated, and the box grown until Krawczyk holds."""
-    boxes, image = [], X
-    for stage in range(len(c["fractions"])):
-        Y, refusal = image, None
-        for _ in range(PASSES):
-            tape = Tape(c["series"], c["ulps"])
-            coef = prepared(c, tape, T, stage)
-            out = play(c["kernels"]["linearise"], tape.number, coef=coef, y=[tape.value(v) for v in Y])
-            displacement = [v.x for v in out["displacement"]]
-            Y = [
-                x - d + BALL * (GROWTH * (mag(d) + 0.1 * arb(x.rad())) + arb(2) ** -25 * mag(x - d))
-                for x, d in zip(image, displacement, strict=True)
-            ]
-            try:
-                box = [_ends(v) for v in Y]
-                enclosed = [interval(b) for b in box]
-                _, _, after = newton_stage(c, image, T, enclosed, stage)
-            except (RefusedError, ZeroDivisionError) as failure:
-                refusal = failure
-                continue
-            boxes.append(box)
-            image = [x + BALL * arb(2) ** -40 * mag(x) for x in after]
-            break
-        else:
-            raise refusal or RefusedError("no enclosure of the solution was found")
-    return {"y": boxes}
+def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
+    """The boxes of the unknowns of each stage, how far its iterates may be from the solution, and boxes of paths."""
+    parts, image = list[dict[str, Any]](), X
+    for stage in c["stages"]:
+        parts.append(_implicit_part(c, stage, image, T) if "equation" in stage else {})
+        _, image = step({**c, "stages": [stage]}, image, T, {"stages": parts[-1:]})
+        image = [x + BALL * arb(2) ** -40 * mag(x) for x in image]
+    return {"stages": parts}
 
 
-def _gauss_leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """The box of the unknowns: sums over the stages are taken until the box holds them."""
-    n = len(c["kernels"]["stage_field"]["outputs"]["move"])
-    rows = zip(*c["mixing"], strict=True)
-    Z, spread = [arb(0)] * n, max(sum(abs(m) * w for m, w in zip(row, c["weights"], strict=True)) for row in rows)
+def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
+    """The box of the unknowns of a stage: u = base - d(u) is iterated, and the box grown until the proof holds."""
+    base = X if stage["based"] else [arb(0)] * len(stage["equation"])
+    start = run_of(c, stage, X, T, {}, base, exact=True)
+    box = base if stage["based"] else [start.x[k] for k in stage["start"]]
+    refusal: Exception = RefusedError("no enclosure of the solution was found")
     for _ in range(PASSES):
-        tape = Tape(c["series"], c["ulps"])
-        point = [*(tape.value(x) for x in X), *([tape.value(T)] if c["timed"] else [])]
-        w = [tape.number(c["step"] * spread)]
-        z, coef = [tape.value(v) for v in Z], prepared(c, tape, T, 0)
-        out = play(c["kernels"]["stage_field"], tape.number, coef=coef, x=point, z=z, w=w)["move"]
-        Z = [BALL * (GROWTH * mag(v.x) + arb(2) ** -40) for v in out]
-        leaf = {"z": [_ends(v) for v in Z]}
+        run = run_of(c, stage, X, T, {}, box, exact=True)
+        d = [run.x[k] for k in stage["equation"]]
+        away = [mag(v) for v in centred(c, stage, X, T, {}, box, run, "away").entries()]
+        if not stage["matrix"]:
+            away = [a.max(LEAST_REACH * max(away)) for a in away]
+        away = [a + DIFFERENCES * mag(v) for a, v in zip(away, d, strict=True)] if "difference" in stage else away
+        radii = [GROWTH * (a + 0.1 * arb(b.rad())) for a, b in zip(away, base, strict=True)]
+        box = [b - v + BALL * (r + arb(2) ** -25 * mag(b - v)) for b, v, r in zip(base, d, radii, strict=True)]
+        reach = [float(1.01 * a + arb(2) ** -27 * mag(u)) for a, u in zip(away, box, strict=True)]
+        part: dict[str, Any] = {"u": [_ends(v) for v in box], "reach": reach}
+        box = [interval(v) for v in part["u"]]
         try:
-            gauss(c, X, T, leaf)
-        except RefusedError as failure:
+            if "path" in stage:
+                part["path"] = _path_box(c, stage, X, T, box)
+            step({**c, "stages": [stage]}, X, T, {"stages": [part]})
+        except (RefusedError, ZeroDivisionError) as failure:
             refusal = failure
             continue
-        return leaf
+        return part
     raise refusal
 
 
-_LEAVES: Mapping[str, Callable[[dict[str, Any], list[Any], Any], dict[str, Any]]] = {
-    "explicit": lambda c, X, T: {},
-    "splitting": lambda c, X, T: {},
-    "newton": _newton_leaf,
-    "gauss": _gauss_leaf,
-}
+def _path_box(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any, u: list[Any]) -> list[list[float]]:
+    """A box in which paths from X under u stay, by Picard's iteration."""
+    P = X
+    for _ in range(PASSES):
+        run = Evaluation(c, stage["path"]["operations"], {"m": P, "u": u, "t": [T]})
+        moves = [arb(0).union(run.x[k]) for k in stage["path"]["field"]]
+        P = [x + v + BALL * (0.05 * mag(v) + arb(2) ** -25 * mag(x)) for x, v in zip(X, moves, strict=True)]
+    return [_ends(v) for v in P]

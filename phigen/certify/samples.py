@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import ctypes
 import random
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from flint import arb, arb_mat, ctx
 
-from phigen.certify.checker.explicit_steps import beyond, prepared
-from phigen.certify.checker.rounding import Tape, play
+from phigen.certify.checker import identity, run_of
 
 #: Bits of the exact map.
 BITS = 300
 
-#: Newton's iterations, and sweeps over the stages of a Gauss method, that reach that precision.
-NEWTON_ITERATIONS, SWEEPS = 12, 250
+#: Corrections that reach that precision, with the inverse of a matrix at the centre of the box.
+CORRECTIONS = 400
 
-#: A last correction, or change by a sweep, after which the rest is negligible.
+#: A last correction, after which the rest is negligible.
 SOLVED = 1e-40
 
 Numbers = Sequence[Any]
@@ -34,80 +33,49 @@ def _precise() -> Iterator[None]:
         ctx.prec = before
 
 
-def exact_step(c: Mapping[str, Any], x: Numbers, t: float) -> list[Any]:
-    """Return the exact map of a certificate at a point, as balls of `BITS` bits."""
-    with _precise():
-        tape = Tape(c["series"], c["ulps"], exact=True)
-        return _EXACT[c["kind"]](c, tape, [arb(v) for v in x], arb(t))
+class ExactMap:
+    """The exact map of a certificate: `described` with ``exact``."""
+
+    def __init__(self, c: Mapping[str, Any]) -> None:
+        self._c = c
+        self._inverses: dict[int, Any] = {}
+
+    def __call__(self, x: Numbers, t: float) -> list[Any]:
+        """Return the map at a point, as balls of `BITS` bits."""
+        with _precise():
+            x, t = [arb(v) for v in x], arb(t)
+            for number, stage in enumerate(self._c["stages"]):
+                u = self._solved(number, stage, x, t) if "equation" in stage else []
+                run = run_of(self._c, stage, x, t, {}, u, exact=True)
+                x = [arb((v + run.x[k]).mid()) for v, k in zip(x, stage["change"], strict=True)]
+            return x
+
+    def _solved(self, number: int, stage: Mapping[str, Any], x: Numbers, t: Any) -> list[Any]:
+        """The unknowns of a stage, by corrections."""
+        base = x if stage["based"] else [arb(0)] * len(stage["equation"])
+        start = run_of(self._c, stage, x, t, {}, base, exact=True)
+        u = [arb(start.x[k].mid()) for k in stage["start"]]
+        for _ in range(CORRECTIONS):
+            run = run_of(self._c, stage, x, t, {}, u, exact=True)
+            residual = [[v - b + run.x[k]] for v, b, k in zip(u, base, stage["equation"], strict=True)]
+            if number not in self._inverses:
+                jacobian = run.outputs(stage["equation"], {"u": len(u)})[2]
+                matrix = identity(len(u)) + jacobian
+                self._inverses[number] = arb_mat(len(u), len(u), [arb(v.mid()) for v in matrix.entries()]).inv()
+            delta = (self._inverses[number] * arb_mat(residual)).entries()
+            u = [arb((v - d).mid()) for v, d in zip(u, delta, strict=True)]
+            if all(abs(d.mid()) < SOLVED for d in delta):
+                return u
+        raise RuntimeError(f"the exact map of {self._c['name']} is not found at {[float(v) for v in x]}")
 
 
-def _explicit(c: Mapping[str, Any], tape: Tape, x: list[Any], t: Any) -> list[Any]:
-    state = [tape.value(v) for v in x]
-    out = play(c["kernels"]["explicit"], tape.number, coef=prepared(c, tape, t, 0), state=state)
-    return [v + d.x for v, d in zip(x, out["increment"], strict=True)]
-
-
-def _splitting(c: Mapping[str, Any], tape: Tape, x: list[Any], t: Any) -> list[Any]:
-    state = [tape.value(v) for v in x] + [tape.value(arb(0)) for _ in range(beyond(c))]
-    for flow, row in c["schedule"]:
-        coef = prepared(c, tape, t, row)
-        change = play(c["kernels"][f"change{flow}"], tape.number, coef=coef, state=state)["change"]
-        for i, j in c["moves"][str(flow)]:
-            state[i] = state[i] + change[j]
-    return [v.x for v in state[: len(x)]]
-
-
-def _newton(c: Mapping[str, Any], tape: Tape, x: list[Any], t: Any) -> list[Any]:
-    n = len(x)
-    for stage in range(len(c["fractions"])):
-        y, coef = x, prepared(c, tape, t, stage)
-        for _ in range(NEWTON_ITERATIONS):
-            out = play(c["kernels"]["linearise"], tape.number, coef=coef, y=[tape.value(v) for v in y])
-            residual = [[a - b + d.x] for a, b, d in zip(y, x, out["displacement"], strict=True)]
-            matrix = arb_mat(n, n, [arb(v.x.mid()) for v in out["jacobian"]])
-            delta = matrix.solve(arb_mat(residual)).entries()
-            y = [arb((a - d).mid()) for a, d in zip(y, delta, strict=True)]
-            if all(abs(d) < SOLVED for d in delta):
-                break
-        x = [a + v.x for a, v in zip(x, out["increment"], strict=True)]
-    return x
-
-
-def _gauss(c: Mapping[str, Any], tape: Tape, x: list[Any], t: Any) -> list[Any]:
-    stages, n = range(len(c["weights"])), len(c["kernels"]["stage_field"]["outputs"]["move"])
-    coef = prepared(c, tape, t, 0)
-    point = [*(tape.value(v) for v in x), *([tape.value(t)] if c["timed"] else [])]
-    moves = [[arb(0)] * n for _ in stages]
-    for _ in range(SWEEPS):
-        before, moves = moves, []
-        for i in stages:
-            z = [sum((arb(c["mixing"][j][i]) * before[j][k] for j in stages), arb(0)) for k in range(n)]
-            w = [tape.number(c["step"]) * tape.number(c["weights"][i])]
-            sweep = play(
-                c["kernels"]["stage_field"], tape.number, coef=coef, x=point, z=[tape.value(v) for v in z], w=w
-            )
-            moves.append([arb(v.x.mid()) for v in sweep["move"]])
-        if all(abs(a - b) < SOLVED for m, p in zip(moves, before, strict=True) for a, b in zip(m, p, strict=True)):
-            break
-    ends = [tape.value(sum((m[k] for m in moves), arb(0))) for k in range(n)]
-    out = play(c["kernels"]["stage_change"], tape.number, coef=coef, x=point, z=ends)
-    return [v + d.x for v, d in zip(x, out["change"], strict=True)]
-
-
-_EXACT: Mapping[str, Callable[[Mapping[str, Any], Tape, list[Any], Any], list[Any]]] = {
-    "explicit": _explicit,
-    "splitting": _splitting,
-    "newton": _newton,
-    "gauss": _gauss,
-}
-
-
-def observed(c: Mapping[str, Any], library: Any, count: int, seed: int = 0) -> list[float]:
+def observed(c: Mapping[str, Any], exact: Mapping[str, Any], library: Any, count: int, seed: int = 0) -> list[float]:
     """Return the largest distance of each coordinate from the exact map, of steps from random states in the domain.
 
-    Half of the states have a random compensation term too. ``library`` is the compiled C. Raises `RuntimeError` if a
-    step fails.
+    ``exact`` describes that map, and ``library`` is the compiled C. Half of the states have a random compensation term
+    too. Raises `RuntimeError` if a step fails.
     """
+    exact_step = ExactMap(exact)
     draw, worst = random.Random(seed), [0.0] * len(c["domain"])
     for k in range(count):
         x = [draw.uniform(*d) for d in c["domain"]]
@@ -115,8 +83,8 @@ def observed(c: Mapping[str, Any], library: Any, count: int, seed: int = 0) -> l
         t = draw.uniform(*c["time"])
         after = one_step(c, library, x, carry, t)
         with _precise():
-            exact = exact_step(c, [arb(a) + arb(b) for a, b in zip(x, carry, strict=True)], t)
-            errors = [float(abs(arb(a) + arb(b) - e)) for a, b, e in zip(*after, exact, strict=True)]
+            there = exact_step([arb(a) + arb(b) for a, b in zip(x, carry, strict=True)], t)
+            errors = [float(abs(arb(a) + arb(b) - e)) for a, b, e in zip(*after, there, strict=True)]
         worst = [max(pair) for pair in zip(worst, errors, strict=True)]
     return worst
 

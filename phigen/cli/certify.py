@@ -37,7 +37,7 @@ WIDTH = 0.01
     "boxes",
     multiple=True,
     metavar="NAME=LOW:HIGH",
-    help="Range of a coordinate.  [default: that of the run's start, ± 1 %, or ± 0.01 if it is below 1]",
+    help="Range of a coordinate.  [default: box of the run, else its start ± 1 %, or ± 0.01 if it is below 1]",
 )
 @click.option(
     "--time", "times", metavar="LOW:HIGH", help="Range of the time, if H depends on it.  [default: of the run]"
@@ -105,9 +105,9 @@ def command(
     certificate NAME.bounds.json, and a checker that replays it without phigen. Exit code 5 if there is no certificate
     for the box; the message says what to try.
     """
-    from phigen.certify.checker.rounding import RefusedError
+    from phigen.certify.checker import RefusedError
     from phigen.certify.problem import problem_of
-    from phigen.certify.prove import certified
+    from phigen.certify.prove import NoCertificateError, certified, described
 
     spec = load_one(spec_file)
     experiment = prepared(spec, name, step=step, settings=settings)
@@ -124,10 +124,10 @@ def command(
     try:
         certificate = certified(problem, most)
     except RefusedError as error:
-        hint = f"\n  hint: {error.hint}" if error.hint else ""
+        hint = f"\n  hint: {error.hint}" if isinstance(error, NoCertificateError) else ""
         raise CheckError(f"{spec.file}: {error}{hint}") from None
     seconds = time.perf_counter() - start
-    observed = _observed(certificate, files, samples, console)
+    observed = _observed(certificate, described(problem, exact=True), files, samples, console)
     _write(console, Path(folder) / spec.name, spec.name, files, certificate, seconds)
     summary = {
         **{key: certificate[key] for key in ("name", "kind", "step", "coordinates", "domain", "boxes")},
@@ -144,11 +144,12 @@ def command(
 
 
 def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[list[float]]:
-    """The box of states: that around the start of the run, with the ranges of the command line."""
+    """The box of states: that around the start of the run, with its ranges and those of the command line."""
     domain = {
         name: [value - WIDTH * max(1.0, abs(value)), value + WIDTH * max(1.0, abs(value))]
         for name, value in zip(spec.coordinates, experiment.initial, strict=True)
     }
+    domain |= {name: [float(low), float(high)] for name, (low, high) in experiment.run.box.items()}
     for box in boxes:
         name, _, ends = box.partition("=")
         if name.strip() not in domain:
@@ -179,7 +180,9 @@ def _range(text: str, option: str) -> list[float]:
     return ends
 
 
-def _observed(certificate: dict[str, Any], files: dict[str, str], samples: int, console: Console) -> list[float]:
+def _observed(
+    certificate: dict[str, Any], exact: dict[str, Any], files: dict[str, str], samples: int, console: Console
+) -> list[float]:
     """The largest distances of steps of the C; nothing without a compiler. Raises `CheckError` beyond a bound."""
     from phigen.certify.samples import observed
     from phigen.errors import ToolchainError
@@ -192,7 +195,7 @@ def _observed(certificate: dict[str, Any], files: dict[str, str], samples: int, 
     except ToolchainError as error:
         console.warn(f"no steps are compared: {error}")
         return []
-    worst = observed(certificate, library, samples)
+    worst = observed(certificate, exact, library, samples)
     beyond = [
         name
         for name, distance, bound in zip(certificate["coordinates"], worst, certificate["bound"], strict=True)
@@ -207,17 +210,16 @@ def _observed(certificate: dict[str, Any], files: dict[str, str], samples: int, 
 def _write(
     console: Console, folder: Path, name: str, files: dict[str, str], certificate: dict[str, Any], seconds: float
 ) -> None:
-    """Write the C, the certificate, and the two files of the checker."""
+    """Write the C, the certificate, and the checker."""
     from phigen.certify import checker
     from phigen.writing import write_all
 
     contents: dict[Path, str | bytes] = {folder / file: text for file, text in files.items()}
     contents[folder / f"{name}.bounds.json"] = json.dumps(certificate) + "\n"
-    for path in sorted(Path(str(checker.__file__)).parent.glob("*.py")):
-        contents[folder / "checker" / path.name] = path.read_text(encoding="utf-8")
+    contents[folder / "checker.py"] = Path(str(checker.__file__)).read_text(encoding="utf-8")
     write_all(contents)
     console.note(
-        f"wrote {folder} in {seconds:.2f} s; to check it: cd {folder}; python -m checker {name}.bounds.json {name}.c"
+        f"wrote {folder} in {seconds:.2f} s; to check it: cd {folder}; python checker.py {name}.bounds.json {name}.c"
     )
 
 

@@ -356,6 +356,11 @@ RUN = Record(
         RecordKey("average", AVERAGE, "time averages of the observables: the rows to average over"),
         RecordKey("spectrum", SPECTRUM, "grids: the dynamic structure factor S(q, ω) of fields"),
         RecordKey("correlation", CORRELATION, "grids: the correlation of two fields over distances along an axis"),
+        RecordKey(
+            "box",
+            MapOf(NAME, ListOf(CONSTANT, least=1)),
+            "ranges [LOW, HIGH] of coordinates, for which certify bounds errors",
+        ),
         RecordKey("description", PROSE, "what the run shows"),
     ),
     one=("steps", "duration", "until"),

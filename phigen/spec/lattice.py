@@ -68,6 +68,7 @@ def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapp
 
 #: Keys of runs that lattices do not have: the reasons, and what to do.
 _ABSENT_IN_RUNS = {
+    "box": "certificates are those of ordinary systems; phigen show --expand prints a lattice as one",
     "exact": "closed forms are those of ordinary systems; phigen show --expand prints a lattice as one",
     "compare": "phigen verify and phigen tune set classical methods beside the solver of a lattice",
     "members": "sweeps: integrates many members, each with its own path",

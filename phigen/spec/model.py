@@ -250,6 +250,7 @@ class Run:
     at: tuple[Fraction, ...] = ()  # the times of rows, in place of the stride
     stop: Expression | None = None  # it ends where this passes through 0
     record: tuple[str, ...] = ()  # columns of the output: state, energy, Casimirs, observables; all by default
+    box: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=dict)  # ranges for which certify bounds errors
     description: str = ""
     lattice: LatticeRunSettings | None = None
 

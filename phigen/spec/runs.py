@@ -88,9 +88,28 @@ def run(
         stop=_crossed(name, "stop", raw, declared, replace(watched, piecewise=True)),
         average=_average(name, raw.get("average"), declared, averaged),
         record=_recorded(name, raw.get("record"), declared, recordable),
+        box=_box(raw.get("box", {}), declared),
         description=raw.get("description", ""),
         lattice=replace(lattice, arrays=arrays) if lattice else None,
     )
+
+
+def _box(
+    raw: Mapping[str, tuple[Scalar, Sequence[Scalar | None]]], declared: Declarations
+) -> dict[str, tuple[Fraction, Fraction]]:
+    """The ranges of coordinates of ``box``."""
+    box = {}
+    for name, (key, nodes) in raw.items():
+        ends = [declared.number(node, declared.numbers()) for node in nodes]
+        known = declared.coordinate(key) is not None
+        if len(ends) != 2 or None in ends or ends[0] > ends[1]:  # type: ignore[operator]
+            if None not in ends:
+                texts = ", ".join(node.text for node in nodes if node is not None)
+                message = f"box: [{texts}] is not [LOW, HIGH], two numbers in this order"
+                declared.reader.error(nodes[0] or key, message, f"{name}: [-1, 1]")
+        elif known:
+            box[name] = (ends[0], ends[1])
+    return box  # type: ignore[return-value]
 
 
 def _times(

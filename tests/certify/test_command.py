@@ -32,15 +32,46 @@ def test_json_has_bounds_in_the_order_of_the_coordinates(tmp_path: Path) -> None
     stored = json.loads((tmp_path / "pendulum" / "pendulum.bounds.json").read_text())
     assert stored["parameters"] == {"g": 2.0}
     assert sorted(p.name for p in (tmp_path / "pendulum").iterdir()) == [
-        "checker", "pendulum.bounds.json", "pendulum.c", "pendulum.h",
+        "checker.py", "pendulum.bounds.json", "pendulum.c", "pendulum.h",
     ]  # fmt: skip
+
+
+def test_the_box_of_a_run_is_that_of_the_certificate_and_options_override_it(tmp_path: Path) -> None:
+    text = SPEC.replace("BOX", "{q: [-1, 0.5], p: [-0.5, 1]}")
+    (tmp_path / "s.yaml").write_text(text)
+    done = phigen(tmp_path / "s.yaml", "--json", "-q", "-o", tmp_path / "out", "--samples", 0, "--box", "p=0:1")
+    assert json.loads(done.stdout)["domain"] == [[-1.0, 0.5], [0.0, 1.0]]
+
+
+@pytest.mark.parametrize(
+    ("box", "message"),
+    [
+        ("{q: [0, 1], r: [0, 1]}", "s.yaml:6:72: error: 'r' is not a coordinate"),
+        ("{q: [1, 0]}", "s.yaml:6:65: error: box: [1, 0] is not [LOW, HIGH], two numbers in this order"),
+        ("{q: [1]}", "s.yaml:6:65: error: box: [1] is not [LOW, HIGH]"),
+        ("{q: [0, a]}", "s.yaml:6:68: error: the name 'a' is not declared"),
+    ],
+)
+def test_mistakes_in_a_box_are_reported_at_their_place(tmp_path: Path, box: str, message: str) -> None:
+    (tmp_path / "s.yaml").write_text(SPEC.replace("BOX", box))
+    done = phigen(tmp_path / "s.yaml", "-o", tmp_path / "out")
+    assert (done.exit_code, message in done.stderr) == (1, True), done.stderr
+
+
+SPEC = """phigen: 1
+name: swing
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + q**2/2
+runs: {a: {initial: [0.1, 0.2], step: 0.1, steps: 10, box: BOX}}
+"""
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
         (["pendulum", "--step", "30", "--boxes", "2"], 5, "hint: a smaller box"),
-        (["guiding_centre"], 1, "certificates do not cover steps along paths"),
+        (["double_well"], 1, "certificates do not cover noise"),
         (["heisenberg"], 1, "is a lattice"),
         (["pendulum", "--box", "r=0:1"], 2, "'r' is no coordinate; there are q, p"),
         (["pendulum", "--box", "q=1:0"], 2, "is not LOW:HIGH"),

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from .rounding import LIBM, SERIES, RefusedError
+from phigen.certify.checker import LIBM, SERIES, RefusedError
 
 _OPERATIONS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
 
@@ -20,10 +20,15 @@ _NUMBER = r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)"
 
 
 class GeneratedC:
-    """A generated C file, without comments and without the name of the solver before each name."""
+    """A generated C file, without comments and without the name of the solver before each name.
+
+    Functions of the solver that would then be called like one of libm begin with ``own_``.
+    """
 
     def __init__(self, text: str, name: str) -> None:
-        self.text = re.sub(rf"/\*.*?\*/|\b{re.escape(name)}_(?=[A-Za-z])", "", text, flags=re.DOTALL)
+        prefix, shadows = rf"\b{re.escape(name)}_" if name else r"\b_", "|".join(LIBM)
+        text = re.sub(rf"{prefix}(?=(?:{shadows})\()", "own_", text)
+        self.text = re.sub(rf"/\*.*?\*/|{prefix}(?=[A-Za-z])", "", text, flags=re.DOTALL)
 
     def function(self, name: str) -> tuple[list[str], str] | None:
         """Return the names of the arguments and the body of a function; None if there is none of that name."""
@@ -138,17 +143,80 @@ class KernelReader:
             if name not in LIBM:
                 raise RefusedError(f"the C calls {name}, which certificates do not cover")
             return name
-        if name not in SERIES:
+        series = name.removeprefix("own_")
+        if series not in SERIES:
             raise RefusedError(f"the C calls {name}, which certificates do not cover")
-        if f"series:{name}" not in self._series:
-            self._series[f"series:{name}"] = _polynomial(self._source, name)
-        return f"series:{name}"
+        if f"series:{series}" not in self._series:
+            self._series[f"series:{series}"] = _polynomial(self._source, name)
+        return f"series:{series}"
+
+
+class PathReader(KernelReader):
+    """Taylor series of a path, to some order: operations for given coefficients of the coordinates.
+
+    The coefficients of series i are ``outputs[f"s{i}"]``, by their orders.
+    """
+
+    def __init__(self, source: GeneratedC, series: dict[str, Any], coordinates: int, orders: int) -> None:
+        self._known = [f"s{i}" for i in range(coordinates)]
+        super().__init__(source, "path_begin", series)
+        _, body = _expect(source.function("path_order"), "path_order")
+        matched = re.fullmatch(r"(?:\s*\(void\)\w+;)*\s*if \(k > 0\) \{(.*?)\n    \}\n(.*)", body, re.DOTALL)
+        if not matched:
+            raise RefusedError("the C has recurrences of paths that certificates do not cover")
+        for k in range(orders):
+            text = (matched[1] if k > 0 else "") + matched[2]
+            text = (
+                text.replace("(double)(k + 1)", f"{k + 1}.0").replace("[k + 1]", f"[{k + 1}]").replace("[k]", f"[{k}]")
+            )
+            self._run(re.sub(r", k\)", f", {k})", text))
+
+    @property
+    def described(self) -> dict[str, Any]:
+        outputs = {name: list(self.outputs[name].values()) for name in self._known}
+        return {"operations": self.operations, "outputs": outputs}
+
+    def _run(self, body: str) -> None:
+        super()._run(re.sub(r"\bs\[(\d+)\](?=[\[,)])", r"s\1", body))
+
+    def _index(self, e: ast.expr) -> int:
+        match e:
+            case ast.Call(ast.Name("taylor_product"), [ast.Name(a), ast.Name(b), ast.Constant(int(k))]):
+                return self._sum([self._times(a, j, b, k - j) for j in range(k + 1)])
+            case ast.Call(ast.Name("taylor_chain"), [ast.Name(a), ast.Name(b), ast.Constant(int(k))]):
+                terms = [self._times(a, j, b, k - j, self._operation("number", float(j))) for j in range(1, k + 1)]
+                return self._operation("div", self._sum(terms), self._operation("number", float(k)))
+            case ast.Call(ast.Name("taylor_power"), [ast.Name(a), ast.Name(b), r, ast.Constant(int(k))]):
+                power, order = self._operation("add", self._index(r), self._operation("number", 1.0)), float(k)
+                terms = []
+                for j in range(1, k + 1):
+                    factor = self._operation("mul", power, self._operation("number", float(j)))
+                    factor = self._operation("sub", factor, self._operation("number", order))
+                    terms.append(self._times(a, j, b, k - j, factor))
+                return self._operation("div", self._sum(terms), self._operation("number", order))
+        return super()._index(e)
+
+    def _times(self, a: str, i: int, b: str, j: int, factor: int | None = None) -> int:
+        first, second = (self._coefficient(*entry) for entry in ((a, i), (b, j)))
+        return self._operation("mul", first if factor is None else self._operation("mul", factor, first), second)
+
+    def _coefficient(self, array: str, order: int) -> int:
+        entries = self.outputs.get(array, {})
+        return entries[order] if order in entries else self._input(array, order)
+
+    def _sum(self, terms: list[int]) -> int:
+        total = terms[0]
+        for term in terms[1:]:
+            total = self._operation("add", total, term)
+        return total
 
 
 def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
     """The polynomial by which a function is computed for small arguments, and the radius where it is."""
     (argument,), body = _expect(source.function(name), name)
     branch = re.search(r"if \(fabs\(\w+\) [<>] ([\d.]+)\)", body)
+    plain = name.removeprefix("own_")
+    beyond = re.search(rf"if \(fabs\({argument}\) > [\d.]+\) return {plain}\({argument}\);", body) is not None
     if not branch:
         raise RefusedError(f"{name} of the C has no polynomial for small arguments")
     if "near[" in body:
@@ -160,8 +228,8 @@ def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
         body = re.sub(r"if \(fabs\([^{;]*(?:\{[^\n]*\}|\{.*?\n    \}|;)\n", "", body, count=1, flags=re.DOTALL)
     inner = GeneratedC(f"f({argument})\n{{\n{body}\n}}", "")
     kernel = KernelReader(inner, "f", {})
-    kernel.operations = [["input", "s", 0] if op[0] == "input" else op for op in kernel.operations]
-    return {"radius": float(branch[1]), **kernel.described}
+    operations = [["s", 0] if op[0] == "input" else op for op in kernel.operations]
+    return {"name": plain, "beyond": beyond and plain in LIBM, "radius": float(branch[1]), "operations": operations}
 
 
 def _parsed(text: str, mode: str = "eval") -> Any:
@@ -190,22 +258,34 @@ def read(text: str, name: str) -> dict[str, Any]:
     facts = _FACTS[kind](source)
     names = [f for f in (*_FUNCTIONS[kind][:-1], "at_time") if source.has(f)]
     names += _FUNCTIONS[kind][-1:] if kind != "splitting" else [f"change{flow}" for flow in facts["moves"]]
-    kernels = {name: KernelReader(source, name, series).described for name in names}
+    kernels = {name: KernelReader(source, name, series).described for name in names if name not in _OF_PATHS}
     if "prepare_row" in kernels:
         kernels["prepare"] = kernels.pop("prepare_row")
     kernels["prepare"]["outputs"].setdefault("coef", [])
     fractions = source.numbers("fractions") if re.search(r"\bfractions\[", source.text) else [1.0]
-    middles = source.numbers("middles") if "at_time" in kernels else []
+    moments = {"splitting": "moments"}.get(kind, "middles")
+    middles = source.numbers(moments) if "at_time" in kernels else []
     return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
 
 
 #: Functions of the kinds of steps; the last is there for no other kind.
 _FUNCTIONS = {
+    "path": ("prepare", "generate", "path_begin", "path_order"),
     "newton": ("prepare", "linearise"),
     "gauss": ("prepare", "stage_field", "stage_change"),
     "splitting": ("prepare_row", "flows"),
     "explicit": ("prepare", "explicit"),
 }
+
+
+#: Functions of paths, which `PathReader` reads.
+_OF_PATHS = ("path_begin", "path_order")
+
+
+def _path(source: GeneratedC) -> dict[str, Any]:
+    names = {"negligible": "NEGLIGIBLE", "least_share": "LEAST_SHARE", "difference": "DIFFERENCE", "solved": "SOLVED",
+             "nearly_solved": "NEARLY_SOLVED", "shrinking": "SHRINKING", "most_terms": "TERMS"}  # fmt: skip
+    return {key: source.number(name) for key, name in names.items()}
 
 
 def _newton(source: GeneratedC) -> dict[str, Any]:
@@ -218,20 +298,27 @@ def _gauss(source: GeneratedC) -> dict[str, Any]:
     lanes = len(weights)  # rows may be padded to full lanes
     nodes = len(mixing) // lanes
     rows = [mixing[j * lanes : j * lanes + nodes] for j in range(nodes)]
-    return {"weights": weights[:nodes], "mixing": rows, "plain": int(source.number("PLAIN"))}
+    names = {"solved": "SOLVED", "stalled": "STALLED", "rounding": "ROUNDING", "nearly_rounding": "NEARLY_ROUNDING"}
+    numbers = {key: source.number(name) for key, name in names.items()}
+    return {"weights": weights[:nodes], "mixing": rows, "plain": int(source.number("PLAIN")), **numbers}
 
 
 def _splitting(source: GeneratedC) -> dict[str, Any]:
-    """The times of flows, the flows of a step with their coefficients, and the coordinates that each changes."""
+    """The times of flows; the flows of a step, between those of correctors; the coordinates that each changes."""
+    row = int(source.number("ROW"))
+    schedules = [_schedule(source, "flows", {"coef": 0, "ROW": row})]
     if source.has("corrector"):
-        message = "runs begin and end with a corrector, so that a step alone is not what the solver makes"
-        raise RefusedError(message, "another composition, without a corrector")
-    _, body = _expect(source.function("flows"), "flows")
-    statements = _block(iter(map(str.strip, body.splitlines())))
-    called = _called(statements, {"coef": 0, "ROW": int(source.number("ROW"))}, [])
-    moves = {str(flow): _moves(source, flow) for flow in sorted({flow for flow, _ in called})}
+        ends = [_schedule(source, "corrector", {"coef": 0, "ROW": row, "after": after}) for after in (0, 1)]
+        schedules = [ends[0], *schedules, ends[1]]
+    moves = {str(flow): _moves(source, flow) for flow in sorted({flow for called in schedules for flow, _ in called})}
     multiples = source.numbers("multiples") if re.search(r"\bmultiples\[", source.text) else []
-    return {"fractions": source.numbers("times"), "multiples": multiples, "schedule": called, "moves": moves}
+    return {"fractions": source.numbers("times"), "multiples": multiples, "schedules": schedules, "moves": moves}
+
+
+def _schedule(source: GeneratedC, function: str, names: dict[str, int]) -> list[list[int]]:
+    """The flows that a function calls, each with its row of coefficients."""
+    _, body = _expect(source.function(function), function)
+    return _called(_block(iter(map(str.strip, body.splitlines()))), names, [])
 
 
 #: Flows of a step at most, in all rounds of its loops.
@@ -285,9 +372,12 @@ def _whole(text: str, names: Mapping[str, int]) -> int:
                 return value(left) + value(right)
             case ast.BinOp(left, ast.Mult(), right):
                 return value(left) * value(right)
+            case ast.IfExp(condition, then, otherwise):
+                return value(then) if value(condition) else value(otherwise)
         raise RefusedError(f"the C has {text!r} where whole numbers are expected")
 
     try:
+        text = re.sub(r"\((\w+) \? (\w+) : (\w+)\)", r"(\2 if \1 else \3)", text)
         return value(ast.parse(text, mode="eval").body)
     except (SyntaxError, ValueError, RecursionError):
         raise RefusedError(f"the C has {text!r} where whole numbers are expected") from None
@@ -303,6 +393,7 @@ def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
 
 
 _FACTS: dict[str, Callable[[GeneratedC], dict[str, Any]]] = {
+    "path": _path,
     "newton": _newton,
     "gauss": _gauss,
     "splitting": _splitting,

@@ -1,0 +1,375 @@
+"""Checker of certificates: python checker.py NAME.bounds.json NAME.c. It needs python-flint and nothing else."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import operator
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache, reduce
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from flint import arb, arb_mat, ctx, fmpq, fmpq_poly
+
+Ball: TypeAlias = Any  # flint.arb; and sequences of these, and flint.arb_mat
+Balls: TypeAlias = Any
+Matrix: TypeAlias = Any
+BITS = 80  # precision of the balls, whose own rounding is far below that of doubles
+U, TINY, BALL, ZERO, ONE, HALF = arb(2) ** -53, arb(2) ** -1074, arb(0, 1), arb(0), arb(1), arb(0.5)
+CARRY = U * arb("1.01")  # largest compensation term of a coordinate of size 1
+ROUNDED = arb("1.000001")  # of a size that the C computes and compares
+KRAWCZYK = "Krawczyk's test does not show that the equation of a step has one solution"
+POINTS = (0.318309886, 0.577215665, 0.869604401)  # where derivatives are compared with printed ones
+LESS_ACCURATE = ("sinh", "cosh", "tanh")  # twice the error of the other functions, as glibc documents
+LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {  # functions with their derivatives
+    "sqrt": (arb.sqrt, lambda x: 1 / (2 * x.sqrt())), "exp": (arb.exp, arb.exp), "expm1": (arb.expm1, arb.exp),
+    "log": (arb.log, lambda x: 1 / x), "log1p": (arb.log1p, lambda x: 1 / (1 + x)), "sin": (arb.sin, arb.cos),
+    "cos": (arb.cos, lambda x: -x.sin()), "tan": (arb.tan, lambda x: 1 + square(x.tan())), "sinh": (arb.sinh, arb.cosh),
+    "cosh": (arb.cosh, arb.sinh), "tanh": (arb.tanh, lambda x: 1 - square(x.tanh())),
+}  # fmt: skip
+EXACT = {"add": operator.add, "sub": operator.sub, "mul": operator.mul}
+OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # with derivatives by their operands
+    "add": lambda x, y: (x + y, ONE, ONE), "sub": lambda x, y: (x - y, ONE, -ONE), "neg": lambda x: (-x, -ONE),
+    "mul": lambda x, y: (x * y, y, x), "square": lambda x, _: (square(x), x, x), "max": lambda x, y: (x.max(y),),
+    "div": lambda x, y: (x / y, 1 / y, -x / (y * y)), "abs": lambda x: (x.abs_lower().union(x.abs_upper()),),
+}  # fmt: skip
+TERMS = 90  # the coefficients of all series are at most 2^(1-n), so for |s| <= 1 the rest is at most 2^(2-TERMS)
+SERIES: Mapping[str, Callable[[int], fmpq]] = {  # coefficient n of functions that the C computes by polynomials
+    "cosroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n)),
+    "sinroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n + 1)),
+    "arcroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n + 3)),
+    "exprel": lambda n: fmpq(1, math.factorial(n + 1)),
+    "expm1": lambda n: fmpq(min(n, 1), math.factorial(n)),
+    "sin": lambda n: fmpq((-1) ** (n // 2) * (n % 2), math.factorial(n)),
+    "versin": lambda n: fmpq((-1) ** (n // 2 + 1) * (n > 0 and 1 - n % 2), math.factorial(n)),
+    "phi0": lambda n: abs(fmpq.bernoulli(2 * n + 2)) / math.factorial(2 * n + 2),
+    "phi1": lambda n: (n + 1) * SERIES["phi0"](n + 1),
+    "phi2": lambda n: (n + 1) * SERIES["phi1"](n + 1),
+}
+
+
+class RefusedError(Exception):
+    """Refusal of a certificate, or of what cannot be certified."""
+
+
+def demand(condition: bool, message: str) -> None:
+    """Raise `RefusedError` unless a condition holds."""
+    if not condition:
+        raise RefusedError(message)
+
+
+def mag(x: Ball) -> Ball:
+    """The largest absolute value in a ball."""
+    demand(x.is_finite(), "a value is not bounded")
+    return x.abs_upper()
+
+
+def square(x: Ball) -> Ball:
+    """The square of a ball, which is not negative."""
+    return (x.abs_lower() * x.abs_lower()).union(x.abs_upper() * x.abs_upper())
+
+
+def top(values: Iterable[Ball]) -> Ball:
+    """The largest of some balls, or a ball that contains it."""
+    return reduce(arb.max, values)
+
+
+def gap(a: Ball, b: Ball) -> Ball:
+    """The largest distance of numbers in two balls."""
+    return mag(a - b)
+
+
+def middle(x: Ball) -> Ball:
+    """The middle of a ball."""
+    return arb(x.mid())
+
+
+def below(a: Matrix, b: Matrix) -> bool:
+    """Whether all entries of a matrix are below those of another one."""
+    return all(v < w for v, w in zip(a.entries(), b.entries(), strict=True))
+
+
+def interval(ends: Sequence[float]) -> Ball:
+    """The ball around an interval."""
+    return arb(ends[0]).union(arb(ends[1]))
+
+
+def column(values: Iterable[Ball]) -> Matrix:
+    """A matrix of one column."""
+    return arb_mat([[v] for v in values])
+
+
+def each(f: Callable[..., Ball], *matrices: Matrix) -> Matrix:
+    """A matrix of a function of the entries of matrices of one shape."""
+    entries = [f(*v) for v in zip(*(m.entries() for m in matrices), strict=True)]
+    return arb_mat(matrices[0].nrows(), matrices[0].ncols(), entries)
+
+
+def identity(n: int) -> Matrix:
+    """The identity matrix."""
+    return arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+
+
+@cache
+def coefficients(name: str) -> list[fmpq]:
+    """The first coefficients of a function of `SERIES`."""
+    return [SERIES[name](n) for n in range(TERMS)]
+
+
+class Evaluation:
+    """Operations at balls: enclosures, derivatives by the operands, and a bound for the error of each alone.
+
+    Enclosures contain the exact and the computed values. ``inputs`` are the balls of operations that read values.
+    """
+
+    def __init__(self, c: Any, operations: Any, inputs: Mapping[str, Any], exact: bool = False) -> None:
+        self.x: list[Ball] = []
+        self.inputs = dict[tuple[str, int], int]()
+        self.error, self.slopes = list[Ball](), list[list[tuple[int, Ball]]]()
+        powers, v = set[int](), self.x
+        for k, (op, *a) in enumerate(operations):
+            error, slopes = ZERO, list[tuple[int, Ball]]()
+            if op in ("number", "exact", "constant"):  # literals, of which long ones are rounded; numbers of the C
+                value = a[0] if op != "constant" else c[a[0]] if len(a) == 1 else c[a[0]][a[1]]
+                x, error = arb(value), U * abs(value) if op == "number" and len(repr(value)) > 15 else ZERO
+                powers |= {k} if abs(math.frexp(value)[0]) == 0.5 else set()  # which multiply exactly
+            elif op in inputs:
+                x, self.inputs[op, a[0]] = inputs[op][a[0]], k
+                error = CARRY * mag(x) if op == "x" else ZERO  # the C reads x without its compensation term
+            elif op in OPERATIONS:
+                x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
+                rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
+                error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
+            elif op == "rest":  # of a Taylor series: three times its terms, since this error is one of derivatives too
+                x, slopes = v[a[0]], [(a[0], ONE)]
+                error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]
+            elif op in LIBM:
+                x, slopes = LIBM[op][0](v[a[0]]), [(a[0], LIBM[op][1](v[a[0]]))]
+                ulps = 0.5 if op == "sqrt" else c["ulps"] * (2 if op in LESS_ACCURATE else 1) * (1 + 9 * U)
+                error = U * mag(x) * 2 * ulps + TINY
+            else:
+                x, slope, error = polynomial(c, c["series"][op], v[a[0]])
+                slopes = [(a[0], slope)]
+            self.slopes.append(slopes)
+            self.error.append(ZERO if exact else error)
+            v.append(x if exact else x + BALL * error)
+
+    def outputs(self, indices: Sequence[int], by: Mapping[str, int]) -> tuple[Matrix, ...]:
+        """Values of outputs, bounds for their errors, by the mean value theorem, and derivatives by some inputs."""
+        errors, rows = list[Ball](), list[list[Ball]]()
+        for output in indices:  # reverse differentiation
+            row = [ZERO] * output + [arb(1)] + [ZERO] * (len(self.x) - output)
+            for k in range(output, -1, -1):
+                for i, slope in self.slopes[k] if not row[k].is_zero() else ():
+                    row[i] += row[k] * slope
+            rows.append(row)
+            errors.append(sum((mag(d) * e for d, e in zip(row, self.error, strict=False) if not e.is_zero()), ZERO))
+        read = [[self.inputs.get((name, i), len(self.x)) for i in range(count)] for name, count in by.items()]
+        jacobians = [arb_mat([[row[k] for k in inputs] for row in rows]) for inputs in read]
+        return column(self.x[i] for i in indices), column(errors), *jacobians
+
+
+def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
+    """The function that a polynomial stands for, its derivative, and rounding and truncation of the polynomial."""
+    name, beyond = series["name"], series["beyond"]
+    if beyond and mag(s) >= series["radius"]:  # where the C calls the function of libm
+        x, slope, ulps = LIBM[name][0](s), LIBM[name][1](s), c["ulps"] * (1 + 9 * U)
+        inside = s.intersection(BALL * arb(series["radius"])) if s.overlaps(BALL * arb(series["radius"])) else None
+        error = polynomial(c, {**series, "beyond": False}, inside)[2] if inside is not None else ZERO
+        return x, slope, error.max(2 * U * ulps * mag(x) + TINY)
+    r, exact, rest, v = mag(s), coefficients(series["name"]), arb(2) ** (2 - TERMS), list[Any]()
+    demand(r < min(series["radius"], 1) * ROUNDED, f"the argument of {series['name']} reaches {float(r):.3g}")
+    for op, *a in series["operations"]:
+        literal = [0, 1] if op == "s" else [fmpq(*a[0].as_integer_ratio())] if op == "number" else None
+        v.append(fmpq_poly(literal) if literal else -v[a[0]] if op == "neg" else EXACT[op](v[a[0]], v[a[1]]))
+    _, rounding = Evaluation(c, series["operations"], {"s": {0: s}}).outputs([len(v) - 1], {})
+    sums = [ZERO] * 3
+    for n in reversed(range(TERMS)):
+        terms = (arb(exact[n]), arb((n + 1) * exact[n + 1]) if n + 1 < TERMS else ZERO, arb(abs(v[-1][n] - exact[n])))
+        sums = [total * at + term for total, at, term in zip(sums, (s, s, r), terms, strict=True)]
+    return sums[0] + BALL * rest, sums[1] + BALL * TERMS * rest, rounding[0, 0] + sums[2] + rest
+
+
+def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exact: bool = False) -> Evaluation:
+    """The operations of a stage for states in X, times in T and unknowns u, with the rests of Taylor series."""
+    carry, tail, along = [BALL * CARRY * mag(x) for x in X], [ZERO] * len(X), "path" in stage and not exact
+    if along:  # the path dm/dt = field from x stays in the box P
+        P, path = [interval(p) for p in leaf["path"]], stage["path"]
+        run = Evaluation(c, path["operations"], {"m": P, "u": u, "t": [T]})
+        reached = [x + r + ZERO.union(run.x[k]) for x, r, k in zip(X, carry, path["field"], strict=True)]
+        demand(all(p.contains_interior(v) for p, v in zip(P, reached, strict=True)), "a path may leave its box")
+        tail = [mag(run.x[k]) for k in path["next"]]
+    run = Evaluation(
+        c, stage["operations"], {"x": X, "start": X, "carry": carry, "t": [T], "u": u, "tail": tail}, exact
+    )
+    hidden = [(mag(run.x[a]), run.x[b].abs_lower() / ROUNDED) for a, b in stage["hidden"]] if along else []
+    demand(all(a < b for a, b in hidden), "a Taylor series may end late")  # it ends after two hidden by rounding
+    return run
+
+
+def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, of: str) -> Matrix:
+    """Outputs of a stage by the mean value theorem, with their errors: narrower than in a run over small boxes."""
+    _, error, by_u, by_x = run.outputs(stage[of], {"u": len(box), "x": len(X)})
+    x, u = ([arb(v.mid()) for v in values] for values in (X, box))
+    at = run_of(c, stage, x, T, leaf, u, exact=True)
+    values = column(at.x[k] for k in stage[of]) + by_u * (column(box) - column(u)) + by_x * (column(X) - column(x))
+    return each(lambda v, e: v + BALL * e, values, error)
+
+
+def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls) -> None:
+    """Matrices that the C computes as derivatives are those, to 20 digits at some points."""
+    precision, ctx.prec = ctx.prec, 300
+    for point in POINTS:
+        at = [arb((v.lower() + (v.upper() - v.lower()) * point).mid()) for v in box]
+        run = run_of(c, stage, X, arb(T.mid()), leaf, at, exact=True)
+        A, S = (run.outputs(stage[name], {"u": len(box)})[2] for name in ("equation", "change"))
+        printed = [run.x[k] for k in (*stage["matrix"], *stage["gain"])]
+        pairs = zip((identity(len(box)) + A).entries() + S.entries(), printed, strict=True)
+        demand(all(abs(a - b) < 1e-20 * (1 + abs(a)) for a, b in pairs), "a Jacobian is not the derivative")
+    ctx.prec = precision
+
+
+def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ...]:
+    """Change by an implicit stage, its error and derivative: u - base + d(u) = 0, solved by corrections M^-1 residual.
+
+    The last result is a bound for the part of the change that the C adds to the compensation term.
+    """
+    box = [interval(v) for v in leaf["u"]]
+    m, n, Y, centre = len(box), len(X), column(map(mag, box)), column(arb(v.mid()) for v in box)
+    run, based, matrix, derived = run_of(c, stage, X, T, leaf, box), stage["based"], stage["matrix"], stage["derived"]
+    d, d_error, d_u, d_x = run.outputs(stage["equation"], {"u": m, "x": n})
+    change, error, change_u, change_x = run.outputs(stage["change"], {"u": m, "x": n})
+    A, scale, solves = identity(m) + d_u, column(run.x[k] for k in stage["scale"]), bool(matrix)
+    A_size, size, high, M, M_error = each(mag, A), each(mag, d), each(mag, scale), identity(m), arb_mat(m, m)
+    bends, reach, low = arb_mat(m * m, m), column(map(arb, leaf["reach"])), each(arb.abs_lower, scale)
+    if solves:
+        J, errors, bends = run.outputs(matrix, {"u": m})
+        pivots = top(map(mag, J.entries())) * 4 * m * m * 2 ** (m - 1) * U  # backward error of elimination
+        M, M_error = arb_mat(m, m, J.entries()), each(lambda e: e + pivots, arb_mat(m, m, errors.entries()))
+    if derived:
+        expect_derivatives(c, stage, X, T, leaf, box)
+    elif solves:  # so the C may take differences of residuals in place of the matrix
+        least = -top(-v for v in low.entries())
+        demand(least > 0, "the unknowns, in whose sizes residuals are measured, may be 0")
+        noise = (d_error + U * Y) * (2 / (stage["difference"] * least))
+        M_error += each(gap, M, A) + arb_mat([[v] * m for v in noise.entries()])
+    M = each(lambda v, e: v + BALL * e, M, M_error)
+    inverse, measured = each(mag, M.inv()), each(mag, M) * high if derived else high
+    first_order = each(gap, M, A)
+
+    def residual_error(e: Matrix) -> Matrix:
+        """Rounding errors of the residual, at a distance e from the solution."""
+        first = d_error + U * (size + e + CARRY * Y) * based
+        return first + 2 * U * (A_size * e + first + U * size + CARRY * Y * based) if solves else first
+
+    def missed(e: Matrix) -> Matrix:
+        """The rest that a correction leaves of an error e of u."""
+        bent = arb_mat(m, m, (each(mag, bends) * e * HALF).entries()) + M_error if derived else first_order
+        return inverse * (bent * e + residual_error(e))
+
+    def worst_of(size: Ball) -> Matrix:
+        """The largest error where the C measures corrections or residuals as at most a size."""
+        return each(mag, A.inv()) * (measured * (size * ROUNDED) + residual_error(reach))
+
+    C = each(middle, each(middle, A).inv())
+    at = column(run_of(c, stage, X, T, leaf, centre.entries()).x[k] for k in stage["equation"])
+    base = column(x + BALL * CARRY * mag(x) for x in X) if based else column([ZERO] * m)
+    K = centre - C * (centre - base + at) + (identity(m) - C * A) * (column(box) - centre)
+    away = each(mag, centred(c, stage, X, T, leaf, box, run, "away")) + (2 * CARRY + arb(2) ** -30) * Y
+    demand(below(away, reach), "a start is out of reach")
+    beyond = reach + each(mag, C) * d_error + high * stage.get("difference", 0)
+    inside = zip(box, K.entries(), beyond.entries(), strict=True)
+    demand(all(v.contains_interior(k + BALL * r) for v, k, r in inside), KRAWCZYK)
+    demand(below(missed(reach) + U * Y * solves, reach), "the iteration may diverge")
+    if stage.get("seen"):  # two terms after one that is seen series may end
+        (seen,) = centred(c, stage, X, T, leaf, box, run, "seen").entries()
+        demand(seen.abs_lower() > ROUNDED * mag(run.x[stage["seen_above"]]), "a Taylor series may end early")
+
+    noise = 2 * (residual_error(reach) + A_size * Y * U * solves)
+    q, shaken, share = stalling(stage, each(mag, identity(m) - A * M.inv()), noise, low, high)
+    e, rest = column([ZERO] * m), column([ZERO] * m)
+    for stop in stage["stops"]:  # by a size, by that of the correction before, or where sizes hardly shrink
+        errors = [worst_of(share * stop["now"] / stop.get("rate", 1))] if "now" in stop else []
+        before = [share * stop["before"]] if "before" in stop else []
+        before += [share * shaken / (stop["part"] - q)] if q < arb(stop.get("part", 0)) else []
+        errors += [missed(worst_of(v)) + U * Y * solves for v in before]
+        e = each(arb.max, e, reduce(lambda a, b: each(arb.min, a, b), errors))
+    rest, small, x_u = missed(e), column([ZERO] * n), A.inv() * (d_x - based * identity(m) if based else d_x)
+    if stage["gain"]:
+        S, S_error, S_bends = run.outputs(stage["gain"], {"u": m})
+        S, small = each(mag, arb_mat(n, m, S.entries())), each(mag, arb_mat(n, m, S.entries())) * (e + rest)
+        error += arb_mat(n, m, (each(mag, S_bends) * e * HALF).entries()) * e + S * rest + (m + 2) * U * small
+        error += arb_mat(n, m, S_error.entries()) * (e + rest)
+    else:
+        error += each(mag, change_u) * (rest if stage["last"] else e)
+    return change, error, identity(n) + change_x - change_u * x_u, small
+
+
+def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matrix) -> tuple[Ball, Ball, Ball]:
+    """Contraction and noise of sizes as the C measures them: means of squares over stages, or the largest."""
+    m, share = len(stage["equation"]), arb(stage["share"] or 1).sqrt()
+    scaled = [[factor[i, j] * high[j, 0] / high[i, 0] for j in range(m)] for i in range(m)]
+    across, down = (top(sum(r, ZERO) for r in rows) for rows in (scaled, zip(*scaled, strict=True)))
+    q = top(b / a for a, b in zip(low.entries(), high.entries(), strict=True)) * ROUNDED
+    noises = [v / s for v, s in zip(noise.entries(), low.entries(), strict=True)]
+    if stage["share"]:
+        return q * (across * down).sqrt(), sum((v * v for v in noises), ZERO).sqrt() / share, share
+    return q * across, top(noises), share
+
+
+def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
+    """Bounds and image of a step, one stage after the other."""
+    total, n = column([ZERO] * len(X)), len(X)
+    for stage, part in zip(c["stages"], leaf["stages"], strict=True):
+        if "equation" in stage:
+            change, error, slope, small = solved(c, stage, X, T, part)
+        else:
+            change, error, slope = run_of(c, stage, X, T, part).outputs(stage["change"], {"x": n})
+            slope, small = identity(n) + slope, column([ZERO] * n)
+        parts = [*zip(X, change.entries(), small.entries(), strict=True)]
+        lost = column(8 * U * (U * mag(x + v) + w + CARRY * mag(x)) for x, v, w in parts)  # by the compensated sum
+        total = error + lost + each(mag, slope) * total
+        X = [x + v + BALL * (e + CARRY * mag(x)) for (x, v, _), e in zip(parts, total.entries(), strict=True)]
+    return total.entries(), X
+
+
+def check(c: Any, domain: Sequence[Sequence[float]], node: Any) -> tuple[int, list[float]]:
+    """Check the boxes below a node of the tree; return their number, and the largest values of coordinates."""
+    if "at" in node:
+        low, high = [list(d) for d in domain], [list(d) for d in domain]
+        demand(domain[node["axis"]][0] < node["at"] < domain[node["axis"]][1], "a box is divided outside")
+        low[node["axis"]][1] = high[node["axis"]][0] = node["at"]
+        (m, a), (n, b) = (check(c, part, below) for part, below in zip((low, high), node["parts"], strict=True))
+        return m + n, [max(pair) for pair in zip(a, b, strict=True)]
+    *X, T = [interval(d) for d in domain]
+    bounds, image = step(c, X, T, node)
+    for bound, claim in zip(bounds, c["bound"], strict=True):
+        demand(bound <= arb(claim), f"the bound is {float(bound):.4g} where {claim:.4g} is claimed")
+    return 1, [max(float(mag(x)), float(mag(y))) for x, y in zip(X, image, strict=True)]
+
+
+def digest(c: Mapping[str, Any]) -> str:
+    """The digest of a certificate without its digest."""
+    return hashlib.sha256(
+        json.dumps({k: v for k, v in c.items() if k != "sha256"}, sort_keys=True).encode()
+    ).hexdigest()
+
+
+def replayed(c: Any, text: bytes) -> str:
+    """Check a certificate of a C file; return what it says. Raises `RefusedError`."""
+    demand(digest(c) == c["sha256"], "the certificate was changed")
+    demand(hashlib.sha256(text).hexdigest() == c["c_sha256"], "the certificate is about another C file")
+    boxes, largest = check(c, [*c["domain"], c["time"]], c["tree"])
+    ulps = [b / math.ulp(x) for b, x in zip(c["bound"], largest, strict=True)]
+    return f"{c['name']}: {boxes} boxes; a step is within {max(ulps):.3g} ulp of the exact map in each coordinate"
+
+
+if __name__ == "__main__":
+    ctx.prec = BITS
+    try:
+        print(replayed(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")), Path(sys.argv[2]).read_bytes()))
+    except RefusedError as refusal:
+        sys.exit(f"refused: {refusal}")

@@ -1,4 +1,0 @@
-"""Checker of the certificates of `phigen certify`.
-
-It needs python-flint and nothing of phigen: the folder can be copied.
-"""

@@ -1,0 +1,337 @@
+"""Stages of a certified step: flat lists of operations, from the kernels and tables of the C."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from flint import arb
+
+from phigen.certify.checker import Evaluation, RefusedError, column
+from phigen.certify.reader import GeneratedC, PathReader
+
+#: Contraction by sweeps that a Gauss solver remembers at least, by which it decides when to stop. Certificates hold
+#: while that is so; in runs of the corpus it is between 0.05 and 0.5.
+LEAST_RATE = 0.05
+
+Stage = dict[str, Any]
+
+
+class Listing:
+    """A flat list of operations, into which kernels are copied; inputs are listed once."""
+
+    def __init__(self) -> None:
+        self.operations: list[list[Any]] = []
+        self._inputs: dict[tuple[Any, ...], int] = {}
+
+    def add(self, *operation: Any) -> int:
+        """Append an operation, and return its index."""
+        self.operations.append(list(operation))
+        return len(self.operations) - 1
+
+    def input(self, *operation: Any) -> int:
+        """Return the index of an operation that reads a value."""
+        if operation not in self._inputs:
+            self._inputs[operation] = self.add(*operation)
+        return self._inputs[operation]
+
+    def inputs(self, name: str, count: int) -> list[int]:
+        """Return the indices of operations that read an array."""
+        return [self.input(name, i) for i in range(count)]
+
+    def sum(self, terms: Sequence[int]) -> int:
+        """Append a sum from the first term on."""
+        total = terms[0]
+        for term in terms[1:]:
+            total = self.add("add", total, term)
+        return total
+
+    def copy(self, kernel: Mapping[str, Any], **inputs: Any) -> dict[str, list[int]]:
+        """Append the operations of a kernel with these indices as inputs; return the indices of its outputs."""
+        at: list[int] = []
+        for op, *a in kernel["operations"]:
+            if op == "input":
+                at.append(inputs[a[0]][a[1]])
+            else:
+                at.append(self.add(op, *a) if op == "number" else self.add(op, *(at[i] for i in a)))
+        return {name: [at[i] for i in indices] for name, indices in kernel["outputs"].items()}
+
+
+class _Parameters(dict[str, int]):
+    """Indices of parameters in a listing, which are listed when they are read."""
+
+    def __init__(self, listing: Listing) -> None:
+        self._listing = listing
+
+    def __missing__(self, name: str) -> int:
+        return self._listing.input("constant", "parameters", name)
+
+
+class _Gauge(_Parameters):
+    def __missing__(self, index: int) -> int:  # type: ignore[override]
+        return self._listing.input("constant", "gauge", index)
+
+
+def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int]:
+    """Append the coefficients of a stage or row, from parameters, step and time."""
+    step = listing.input("constant", "step")
+    h = step
+    if len(facts["fractions"]) > 1:
+        h = listing.add("mul", listing.input("exact", facts["fractions"][stage]), step)
+    kick = []
+    if facts.get("multiples"):  # of the modified potential, in units of the square of the whole step
+        square = listing.add("mul", step, step)
+        kick = [listing.add("mul", listing.input("exact", facts["multiples"][stage]), square)]
+    kernels, inputs = facts["kernels"], {"params": _Parameters(listing), "gauge": _Gauge(listing)}
+    coef = listing.copy(kernels["prepare"], **inputs, h=[h], kick=kick)["coef"]
+    if "at_time" in kernels:
+        moment = listing.add("mul", listing.input("exact", facts["middles"][stage]), step)
+        t = listing.add("add", listing.input("t", 0), moment)
+        coef = coef + listing.copy(kernels["at_time"], coef=coef, t=[t])["now"]
+    return coef
+
+
+def stages_of(
+    facts: Mapping[str, Any], text: str, name: str, centre: Sequence[Any], exact: bool = False
+) -> list[Stage]:
+    """Return the stages of a step from the facts about its C; paths are expanded in a box, or ``exact``-ly."""
+    source, n = GeneratedC(text, name), len(centre)
+    if facts["kind"] == "path":
+        return _path(facts, source, n, centre, exact)
+    return _STAGES[facts["kind"]](facts, n)
+
+
+def _explicit(facts: Mapping[str, Any], n: int) -> list[Stage]:
+    listing = Listing()
+    coef = prepared(facts, listing, 0)
+    change = listing.copy(facts["kernels"]["explicit"], coef=coef, state=listing.inputs("x", n))["increment"]
+    return [{"operations": listing.operations, "change": change}]
+
+
+def _splitting(facts: Mapping[str, Any], n: int) -> list[Stage]:
+    """Flows, which add their changes to a sum that begins with the compensation term."""
+    return [_flows(facts, schedule, n) for schedule in facts["schedules"]]
+
+
+def _flows(facts: Mapping[str, Any], schedule: Sequence[Sequence[int]], n: int) -> Stage:
+    listing, rows = Listing(), dict[int, list[int]]()
+    beyond = max(0, 1 + max(i for pairs in facts["moves"].values() for i, _ in pairs) - n)  # with a monitor
+    zeros = [listing.input("exact", 0.0)] * beyond
+    state, start = listing.inputs("x", n) + zeros, listing.inputs("start", n) + zeros
+    moved = listing.inputs("carry", n) + zeros
+    for flow, row in schedule:
+        if row not in rows:
+            rows[row] = prepared(facts, listing, row)
+        change = listing.copy(facts["kernels"][f"change{flow}"], coef=rows[row], state=state)["change"]
+        for i, j in facts["moves"][str(flow)]:
+            moved[i] = listing.add("add", moved[i], change[j])
+            state[i] = listing.add("add", start[i], moved[i])
+    return {"operations": listing.operations, "change": moved[:n]}
+
+
+def _newton(facts: Mapping[str, Any], n: int) -> list[Stage]:
+    """Newton's method for y, with the last correction of the increment to first order."""
+    stages = []
+    for k in range(len(facts["fractions"])):
+        listing = Listing()
+        y = listing.inputs("u", n)
+        out = listing.copy(facts["kernels"]["linearise"], coef=prepared(facts, listing, k), y=y)
+        sizes = [listing.add("abs", i) for i in y]
+        floor = listing.add("mul", listing.add("exact", facts["floor"]), _largest(listing, sizes))
+        floor = listing.add("add", floor, listing.add("exact", 2.0**-1022))
+        stages.append(
+            {
+                "operations": listing.operations,
+                "change": out["increment"],
+                "equation": out["displacement"],
+                "matrix": out["jacobian"],
+                "gain": out["increment_jacobian"],
+                "start": y,
+                "away": out["displacement"],
+                "scale": [listing.add("add", size, floor) for size in sizes],
+                "stops": [{"now": math.sqrt(facts["tolerance"])}, {"before": facts["nearly_solved"]}],
+                "share": 0,
+                "based": 1,
+                "derived": 1,
+                "last": 0,
+            }
+        )
+    return stages
+
+
+def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
+    """Sweeps over all stages of a Gauss method: the unknowns are the moves of all stages."""
+    listing, kernels, nodes = Listing(), facts["kernels"], len(facts["weights"])
+    width = len(kernels["stage_field"]["outputs"]["move"])
+    coef = prepared(facts, listing, 0)
+    point = [*listing.inputs("x", n), listing.input("t", 0)]
+    moves = [[listing.input("u", i * width + k) for k in range(width)] for i in range(nodes)]
+    swept, step = list[int](), listing.input("constant", "step")
+    for i in range(nodes):
+        w = listing.add("mul", step, listing.add("exact", facts["weights"][i]))
+        mixing = [listing.add("exact", row[i]) for row in facts["mixing"]]
+        products = [[listing.add("mul", mixing[j], moves[j][k]) for j in range(nodes)] for k in range(width)]
+        z = [listing.sum(terms) for terms in products]
+        swept += listing.copy(kernels["stage_field"], coef=coef, x=point, z=z, w=[w])["move"]
+    ends = []
+    for k in range(width):
+        parts = [listing.sum([moves[i][k] for i in range(first, nodes, 2)]) for first in range(min(2, nodes))]
+        ends.append(listing.sum(parts))
+    change = listing.copy(kernels["stage_change"], coef=coef, x=point, z=ends)["change"]
+    squares = [listing.add("mul", x, x) for x in point[:n]]
+    size, one = listing.add("sqrt", listing.sum(squares)), listing.add("exact", 1.0)
+    stalled = {"part": facts["stalled"], "now": facts["rounding"]}
+    return [
+        {
+            "operations": listing.operations,
+            "change": change,
+            "equation": [listing.add("neg", i) for i in swept],
+            "matrix": [],
+            "gain": [],
+            "start": [listing.input("exact", 0.0)] * (nodes * width),
+            "away": swept,
+            "scale": [size if k < facts["plain"] else one for k in range(width)] * nodes,
+            "stops": [
+                {"now": facts["solved"], "rate": LEAST_RATE},
+                stalled,
+                {"part": 1.0, "now": facts["nearly_rounding"]},
+            ],
+            "share": nodes,
+            "based": 0,
+            "derived": 0,
+            "last": 1,
+        }
+    ]
+
+
+#: Margin of the sizes of terms of Taylor series by which their numbers are chosen, since boxes of p are wider then.
+MARGIN = 4.0
+
+
+def _path(
+    facts: Mapping[str, Any], source: GeneratedC, n: int, centre: Sequence[Any], exact: bool = False
+) -> list[Stage]:
+    """Iterations for p, the mean gradient of S_h along a path, which is expanded in one piece."""
+    limit = int(facts["most_terms"])
+    longest, stages = PathReader(source, facts["series"], n, limit).described, []
+    for k in range(len(facts["fractions"])):
+        orders = (limit, limit, 0) if exact else _orders(facts, longest, n, k, centre)
+        stages.append(_along_path(facts, source, n, k, *orders))
+    return stages
+
+
+def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: Sequence[int], u: Sequence[int]) -> Any:
+    """Append Taylor series of a path from x under p = u, and return the terms of the coordinates, from order 1."""
+    starts = {f"s{i}": [j] for i, j in enumerate(x)}
+    out = listing.copy(kernel, coef=prepared(facts, listing, k), p=u, **starts)
+    return [out[f"s{i}"] for i in range(len(x))]
+
+
+def _along_path(
+    facts: Mapping[str, Any], source: GeneratedC, n: int, k: int, least: int, most: int, coordinate: int
+) -> Stage:
+    """Stage k whose series have between ``least`` and ``most`` terms, as that of one coordinate shows."""
+    listing, kernels = Listing(), facts["kernels"]
+    x, u, coef = listing.inputs("x", n), listing.inputs("u", n), prepared(facts, listing, k)
+    terms = _series(facts, PathReader(source, facts["series"], n, most).described, listing, k, x, u)
+    change, y = [], []
+    for i, row in enumerate(terms):
+        shares = [listing.add("div", t, listing.add("number", float(j + 2))) for j, t in enumerate(row)]
+        change.append(listing.add("rest", listing.sum(row[:least]), i, 1, *row[least:]))
+        mean = listing.add("rest", listing.sum(shares[:least]), i, least + 2, *row[least:])
+        y.append(listing.add("add", x[i], mean))
+    out = listing.copy(kernels["generate"], coef=coef, y=y)
+    first = listing.copy(kernels["generate"], coef=coef, y=x)["slope"]
+    largest = [_largest(listing, [listing.add("abs", i) for i in u])] * n
+    tail = Listing()
+    below = _series(facts, PathReader(source, facts["series"], n, least + 1).described, tail, k, tail.inputs("m", n),
+                    tail.inputs("u", n))  # fmt: skip
+    seen = _measured(facts, listing, x, terms, [max(least - 2, 1)])[coordinate]
+    return {
+        "change": change,
+        "equation": [listing.add("neg", i) for i in out["slope"]],
+        "matrix": out["jacobian"],
+        "gain": [],
+        "start": first,
+        "away": [listing.add("sub", a, b) for a, b in zip(first, out["slope"], strict=True)],
+        "scale": largest,
+        "stops": [{"now": facts["solved"]}, {"before": facts["nearly_solved"], "part": facts["shrinking"]}],
+        "share": 0,
+        "based": 0,
+        "derived": 0,
+        "last": 0,
+        "difference": facts["difference"],
+        "seen": [seen[0]] if least > 2 else [],
+        "seen_above": seen[1],
+        "hidden": _measured(facts, listing, x, terms, [most - 1, most]),
+        "path": {
+            "operations": tail.operations,
+            "field": [row[0] for row in below],
+            "next": [row[least] for row in below],
+        },
+        "operations": listing.operations,
+    }
+
+
+def _largest(listing: Listing, sizes: Sequence[int]) -> int:
+    largest = sizes[0]
+    for size in sizes[1:]:
+        largest = listing.add("max", largest, size)
+    return largest
+
+
+def _measured(
+    facts: Mapping[str, Any], listing: Listing, x: Sequence[int], terms: Sequence[Sequence[int]], orders: Sequence[int]
+) -> list[list[int]]:
+    """Append the sizes of terms that count as rounding; return pairs of terms of some orders and these sizes."""
+    starts = [listing.add("abs", i) for i in x]
+    least = listing.add("mul", listing.add("exact", facts["least_share"]), listing.sum(starts))
+    negligible, pairs = listing.add("exact", facts["negligible"]), []
+    for order in orders:
+        for start, row in zip(starts, terms, strict=True):
+            sums = listing.sum([start, listing.add("abs", listing.sum(row[:order])), least])
+            pairs.append([row[order - 1], listing.add("mul", negligible, sums)])
+    return pairs
+
+
+def _orders(facts: Mapping[str, Any], kernel: Any, n: int, k: int, box: Sequence[Any]) -> tuple[int, int, int]:
+    """The least and the largest number of terms of series of paths from a box; the coordinate that shows the least."""
+    listing = Listing()
+    x = listing.inputs("x", n)
+    p = listing.copy(facts["kernels"]["generate"], coef=prepared(facts, listing, k), y=x)["slope"]
+    terms = _series(facts, kernel, listing, k, x, p)
+    limit = len(terms[0])
+    pairs = _measured(facts, listing, x, terms, range(1, limit + 1))
+    c = {"step": facts["step"], "parameters": facts["parameters"], "gauge": facts["gauge"], "ulps": 1.0,
+         "series": facts["series"]}  # fmt: skip
+    time = [arb(facts["start"])]
+    run = Evaluation(c, listing.operations, {"x": list(box), "t": time}, exact=True)
+    centre = [arb(v.mid()) for v in box]
+    at = Evaluation(c, listing.operations, {"x": centre, "t": time}, exact=True)
+    radius = column(box) - column(centre)
+    least, coordinate = 2, 0
+    for order in range(1, limit + 1):
+        at_order = pairs[(order - 1) * n : order * n]
+        slopes = run.outputs([a for a, _ in at_order], {"x": n})[2]
+        values = column(at.x[a] for a, _ in at_order) + slopes * radius
+        ratios = [
+            float(v.abs_lower() / run.x[b].abs_upper()) for v, (_, b) in zip(values.entries(), at_order, strict=True)
+        ]
+        if max(ratios) < MARGIN:
+            break
+        least, coordinate = order + 2, ratios.index(max(ratios))
+    rows = [[(run.x[a], run.x[b]) for a, b in pairs[i * n : i * n + n]] for i in range(limit)]
+    small = [i + 1 for i, row in enumerate(rows) if all(a.abs_upper() * MARGIN < b.abs_lower() for a, b in row)]
+    hidden = [i for i in small if i >= least and i - 1 in small]
+    if not hidden:
+        raise RefusedError(f"the Taylor series of paths take more than {limit} terms")
+    return least, min(hidden), coordinate
+
+
+_STAGES: Mapping[str, Callable[..., list[Stage]]] = {
+    "explicit": _explicit,
+    "splitting": _splitting,
+    "newton": _newton,
+    "gauss": _gauss,
+}
