@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
  *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 259f7238e2f5b4c05bd63f376358f0baa31d16bf1ea56c9019228a4e330d81b8
+ * body-sha256: ee9752a65b0c487a063c14801fb606a404555d992e600509e64a32fc480cc5ea
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -104,20 +104,24 @@ static int kowalevski_gauss_finite(const double *values, int count)
 
 /* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
    rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
-static int kowalevski_gauss_advance(kowalevski_gauss_solver *s, const double *change, const double *small)
+static inline int kowalevski_gauss_advance(kowalevski_gauss_solver *s, const double *change,
+    const double *small)
 {
-    double x[kowalevski_gauss_DIM], carry[kowalevski_gauss_DIM];
+    /* a number less itself is 0, if it is finite */
+    double x[kowalevski_gauss_DIM], carry[kowalevski_gauss_DIM], zero = 0.0;
     /* x is available after two additions; the others are off the critical path */
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) {
         const double moved = change[i] + small[i], more = moved - change[i];
         const double sum = s->x[i] + moved, added = sum - s->x[i];
         x[i] = sum;
+        zero += sum - sum;
         carry[i] = ((s->x[i] - (sum - added)) + (moved - added)) + ((change[i] - (moved - more))
             + (small[i] - more));
     }
-    if (!kowalevski_gauss_finite(x, kowalevski_gauss_DIM)) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
+    if (!(zero == 0.0)) return 0;
+    /* One by one, as they are read next: a load of several numbers would wait until all have been stored. */
+    for (int i = 0; i < kowalevski_gauss_DIM; ++i) s->x[i] = x[i];
+    for (int i = 0; i < kowalevski_gauss_DIM; ++i) s->carry[i] = carry[i];
     return 1;
 }
 
@@ -263,39 +267,53 @@ static const double kowalevski_gauss_prediction[kowalevski_gauss_PREDICTORS][kow
     }
 };
 
+/* The sum of values at all stages. */
+static inline double kowalevski_gauss_total(const double values[kowalevski_gauss_WIDTH])
+{
+    return (((values[0] + values[4]) + (values[2] + values[6])) + ((values[1] + values[5])
+        + (values[3] + values[7])));
+}
+
+/* A value at each stage, each a weighted sum of the increments of one unknown at all stages. */
+static inline void kowalevski_gauss_mix(const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH],
+    const double move[kowalevski_gauss_WIDTH], double at[kowalevski_gauss_WIDTH])
+{
+    kowalevski_gauss_EACH_LANE
+    for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
+        at[lane] = (matrix[0][lane] * move[0] + matrix[2][lane] * move[2] + matrix[4][lane] * move[4]
+        + matrix[6][lane] * move[6]) + (matrix[1][lane] * move[1] + matrix[3][lane] * move[3]
+        + matrix[5][lane] * move[5] + matrix[7][lane] * move[7]);
+}
+
 /* Unknowns of all stages: weighted sums of the stage increments. */
 static inline void kowalevski_gauss_mixed(const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH],
     double moves[][kowalevski_gauss_WIDTH], kowalevski_gauss_lanes *z)
 {
     for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
-        const double *move = moves[k];
-        double *at = z[k];
-        kowalevski_gauss_EACH_LANE
-        for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
-            at[lane] = (matrix[0][lane] * move[0] + matrix[2][lane] * move[2] + matrix[4][lane] * move[4]
-            + matrix[6][lane] * move[6]) + (matrix[1][lane] * move[1] + matrix[3][lane] * move[3]
-            + matrix[5][lane] * move[5] + matrix[7][lane] * move[7]);
+        kowalevski_gauss_mix(matrix, moves[k], z[k]);
     }
 }
 
-/* As kowalevski_gauss_mixed, with the stage increments of two steps. */
-static void kowalevski_gauss_mixed_twice(const double matrix[kowalevski_gauss_EARLIER
-    * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], double last[][kowalevski_gauss_WIDTH],
-    double older[][kowalevski_gauss_WIDTH], kowalevski_gauss_lanes *z)
+/* As kowalevski_gauss_mix, with the increments of two steps. */
+static inline void kowalevski_gauss_mix_twice(const double matrix[kowalevski_gauss_EARLIER
+    * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], const double move[kowalevski_gauss_WIDTH],
+    const double before[kowalevski_gauss_WIDTH], double at[kowalevski_gauss_WIDTH])
 {
-    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
-        const double *move = last[k], *before = older[k];
-        double *at = z[k];
-        kowalevski_gauss_EACH_LANE
-        for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
-            at[lane] = (matrix[0][lane] * move[0] + matrix[2][lane] * move[2] + matrix[4][lane] * move[4]
-            + matrix[6][lane] * move[6] + matrix[8][lane] * before[0] + matrix[10][lane] * before[2]
-            + matrix[12][lane] * before[4] + matrix[14][lane] * before[6]) + (matrix[1][lane] * move[1]
-            + matrix[3][lane] * move[3] + matrix[5][lane] * move[5] + matrix[7][lane] * move[7]
-            + matrix[9][lane] * before[1] + matrix[11][lane] * before[3] + matrix[13][lane] * before[5]
-            + matrix[15][lane] * before[7]);
-    }
+    kowalevski_gauss_EACH_LANE
+    for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
+        at[lane] = (matrix[0][lane] * move[0] + matrix[2][lane] * move[2] + matrix[4][lane] * move[4]
+        + matrix[6][lane] * move[6] + matrix[8][lane] * before[0] + matrix[10][lane] * before[2]
+        + matrix[12][lane] * before[4] + matrix[14][lane] * before[6]) + (matrix[1][lane] * move[1]
+        + matrix[3][lane] * move[3] + matrix[5][lane] * move[5] + matrix[7][lane] * move[7] + matrix[9][lane]
+        * before[1] + matrix[11][lane] * before[3] + matrix[13][lane] * before[5] + matrix[15][lane]
+        * before[7]);
 }
+
+enum {
+    kowalevski_gauss_ITERATED = kowalevski_gauss_UNKNOWNS, /* unknowns that sweeps iterate */
+    kowalevski_gauss_READS = kowalevski_gauss_UNKNOWNS,    /* values that they read */
+    kowalevski_gauss_FACTORS = 1                           /* of a stage: its weight */
+};
 
 /* kowalevski_gauss_stage_field in all lanes. */
 static void kowalevski_gauss_stage_field_lanes(const double coef[1], const double x[6],
@@ -378,12 +396,7 @@ static void kowalevski_gauss_start(const kowalevski_gauss_solver *s, double poin
 /* Sum of the increments of all stages. */
 static void kowalevski_gauss_end(kowalevski_gauss_lanes *moves, double end[kowalevski_gauss_UNKNOWNS])
 {
-    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
-        double even = 0.0, odd = 0.0; /* partial sums, which do not depend on each other */
-        for (int i = 0; i < kowalevski_gauss_NODES; i += 2) even += moves[k][i];
-        for (int i = 1; i < kowalevski_gauss_NODES; i += 2) odd += moves[k][i];
-        end[k] = even + odd;
-    }
+    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) end[k] = kowalevski_gauss_total(moves[k]);
 }
 
 /* h b_j times the vector field at each stage, for unknowns z; the weights are h b_j. */
@@ -392,35 +405,6 @@ static inline void kowalevski_gauss_slopes(const kowalevski_gauss_solver *s,
     kowalevski_gauss_lanes *moves)
 {
     kowalevski_gauss_stage_field_lanes(s->coef, point, z, weights, moves);
-}
-
-/* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
-static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowalevski_gauss_lanes *moves)
-{
-    double square = DBL_MIN;
-    for (int i = 0; i < kowalevski_gauss_DIM; ++i) square += x[i] * x[i];
-    if (square <= DBL_MIN)
-        for (int k = 0; k < kowalevski_gauss_PLAIN; ++k)
-            for (int i = 0; i < kowalevski_gauss_NODES; ++i) square += moves[k][i] * moves[k][i];
-    return 1.0 / square;
-}
-
-/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, 1 for
-   group elements. */
-static inline double kowalevski_gauss_change_of(double scale, kowalevski_gauss_lanes *before,
-    kowalevski_gauss_lanes *after)
-{
-    kowalevski_gauss_lanes sum = { 0.0 };
-    double even = 0.0, odd = 0.0;
-    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
-        const double *old = before[k], *now = after[k], factor = k < kowalevski_gauss_PLAIN ? scale : 1.0;
-        kowalevski_gauss_EACH_LANE
-        for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
-            sum[lane] += (now[lane] - old[lane]) * ((now[lane] - old[lane]) * factor);
-    }
-    for (int i = 0; i < kowalevski_gauss_NODES; i += 2) even += sum[i];
-    for (int i = 1; i < kowalevski_gauss_NODES; i += 2) odd += sum[i];
-    return (even + odd) / (double)kowalevski_gauss_NODES;
 }
 
 /* Collocation polynomial: factors of the stage increments in the offsets of the unknowns from the end of a
@@ -449,6 +433,16 @@ static void kowalevski_gauss_factors_at(double fraction, double factor[kowalevsk
     }
 }
 
+/* Sweeps iterate all unknowns, and read them. */
+#define kowalevski_gauss_READ(r) (r)
+
+/* The factors of a stage that a sweep reads. */
+static inline void kowalevski_gauss_set_factors(double h,
+    kowalevski_gauss_lanes factors[kowalevski_gauss_FACTORS])
+{
+    for (int i = 0; i < kowalevski_gauss_NODES; ++i) factors[0][i] = h * kowalevski_gauss_weights[i];
+}
+
 /* Values of the unknowns in a step of another size, the last one times a ratio, by the collocation
    polynomial. */
 static void kowalevski_gauss_predict_at(kowalevski_gauss_history *past, double ratio,
@@ -463,27 +457,82 @@ static void kowalevski_gauss_predict_at(kowalevski_gauss_history *past, double r
     }
 }
 
-/* Values of the unknowns that a predictor derives from the increments of the last steps. */
-static void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predictor, kowalevski_gauss_lanes *z)
+/* The array that sweeps write. */
+static inline kowalevski_gauss_lanes *kowalevski_gauss_iterates(kowalevski_gauss_lanes *moves,
+    kowalevski_gauss_lanes *apart)
 {
-    if (predictor + 1 < kowalevski_gauss_PREDICTORS) { /* the last predictor reads the last step only */
-        kowalevski_gauss_mixed_twice(kowalevski_gauss_prediction[predictor], past->moves[past->latest],
-            past->moves[1 - past->latest], z);
-        return;
-    }
-    kowalevski_gauss_mixed(kowalevski_gauss_prediction[predictor], past->moves[past->latest], z);
+    (void)apart;
+    return moves;
 }
 
-/* Index of the predictor that would have been nearest to the values z of the unknowns. */
-static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale,
-    kowalevski_gauss_lanes *z)
+/* A sweep: the increments of the unknowns, by what it reads. */
+static inline void kowalevski_gauss_sweep(const kowalevski_gauss_solver *s,
+    double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *factors, kowalevski_gauss_lanes *reads,
+    kowalevski_gauss_lanes *now)
 {
-    kowalevski_gauss_lanes predicted[kowalevski_gauss_UNKNOWNS];
+    kowalevski_gauss_slopes(s, point, factors, reads, now);
+}
+
+/* What the next sweep reads, by these increments. */
+static inline void kowalevski_gauss_read(kowalevski_gauss_lanes *now, kowalevski_gauss_lanes *reads)
+{
+    kowalevski_gauss_mixed(kowalevski_gauss_mixing, now, reads);
+}
+
+/* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
+static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowalevski_gauss_lanes *moves)
+{
+    double square = DBL_MIN;
+    for (int i = 0; i < kowalevski_gauss_DIM; ++i) square += x[i] * x[i];
+    if (square <= DBL_MIN)
+        for (int k = 0; k < kowalevski_gauss_PLAIN && k < kowalevski_gauss_ITERATED; ++k)
+            for (int i = 0; i < kowalevski_gauss_NODES; ++i) square += moves[k][i] * moves[k][i];
+    return 1.0 / square;
+}
+
+/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, 1 for
+   group elements. */
+static inline double kowalevski_gauss_change_of(double scale, int count, kowalevski_gauss_lanes *before,
+    kowalevski_gauss_lanes *after)
+{
+    kowalevski_gauss_lanes sum = { 0.0 };
+    for (int k = 0; k < count; ++k) {
+        const double *old = before[k], *now = after[k];
+        kowalevski_gauss_EACH_LANE
+        for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
+            sum[lane] += (now[lane] - old[lane]) * (now[lane] - old[lane]);
+        if (k + 1 == (count < kowalevski_gauss_PLAIN ? count : kowalevski_gauss_PLAIN))
+            for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane) sum[lane] *= scale;
+    }
+    return kowalevski_gauss_total(sum) / (double)kowalevski_gauss_NODES;
+}
+
+/* What sweeps read, as a predictor derives it from the increments of the last steps. */
+static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predictor,
+    kowalevski_gauss_lanes reads[kowalevski_gauss_READS])
+{
+    double(*last)[kowalevski_gauss_WIDTH] = past->moves[past->latest], (*older)[kowalevski_gauss_WIDTH] =
+        past->moves[1 - past->latest];
+    if (predictor + 1 < kowalevski_gauss_PREDICTORS)
+        for (int r = 0; r < kowalevski_gauss_READS; ++r)
+            kowalevski_gauss_mix_twice(kowalevski_gauss_prediction[predictor], last[kowalevski_gauss_READ(r)],
+            older[kowalevski_gauss_READ(r)], reads[r]);
+    else /* the last one reads the last step only */
+        for (int r = 0; r < kowalevski_gauss_READS; ++r)
+            kowalevski_gauss_mix(kowalevski_gauss_prediction[predictor], last[kowalevski_gauss_READ(r)],
+            reads[r]);
+}
+
+/* The predictor that would have come nearest to what the sweeps of a step have read in the end. */
+static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale,
+    kowalevski_gauss_lanes *reads)
+{
+    kowalevski_gauss_lanes predicted[kowalevski_gauss_READS];
     double least = HUGE_VAL;
     int best = kowalevski_gauss_PREDICTORS - 1;
     for (int predictor = 0; predictor < kowalevski_gauss_PREDICTORS; ++predictor) {
         kowalevski_gauss_predict(past, predictor, predicted);
-        const double change = kowalevski_gauss_change_of(scale, predicted, z);
+        const double change = kowalevski_gauss_change_of(scale, kowalevski_gauss_READS, predicted, reads);
         if (change < least) {
             least = change;
             best = predictor;
@@ -567,10 +616,11 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
     double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *moves)
 {
     kowalevski_gauss_history *past = &s->history;
-    kowalevski_gauss_lanes z[kowalevski_gauss_UNKNOWNS], next[kowalevski_gauss_UNKNOWNS], weights[1] =
-        { { 0.0 } };
+    kowalevski_gauss_lanes z[kowalevski_gauss_READS], apart[kowalevski_gauss_ITERATED],
+        next[kowalevski_gauss_ITERATED], factors[kowalevski_gauss_FACTORS] = { { 0.0 } };
+    kowalevski_gauss_lanes *now = kowalevski_gauss_iterates(moves, apart);
     kowalevski_gauss_progress progress = { HUGE_VAL, 0, 0 };
-    for (int i = 0; i < kowalevski_gauss_NODES; ++i) weights[0][i] = s->h * kowalevski_gauss_weights[i];
+    kowalevski_gauss_set_factors(s->h, factors);
     if (past->count == 0 || memcmp(&s->h, &past->h, sizeof s->h) != 0) {
         memset(z, 0, sizeof z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h))
@@ -584,14 +634,14 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
     }
     for (int sweep = 1; sweep <= kowalevski_gauss_MAX_SWEEPS; ++sweep) {
         const int tested = sweep >= past->sweeps;
-        kowalevski_gauss_slopes(s, point, weights, z, tested ? next : moves);
+        kowalevski_gauss_sweep(s, point, factors, z, tested ? next : now);
         if (tested) {
             const double scale = kowalevski_gauss_scale(s->x, next),
-                square = kowalevski_gauss_change_of(scale, moves, next);
+                square = kowalevski_gauss_change_of(scale, kowalevski_gauss_ITERATED, now, next);
             const int solved = square * (past->rate * past->rate) <= kowalevski_gauss_SOLVED
                 * kowalevski_gauss_SOLVED;
             const int judgement = solved ? 1 : kowalevski_gauss_judge(past, &progress, sweep, sqrt(square));
-            memcpy(moves, next, sizeof next);
+            memcpy(now, next, sizeof next);
             if (!isfinite(square)) return kowalevski_gauss_NOT_FINITE;
             if (judgement < 0) return kowalevski_gauss_NO_CONVERGENCE;
             if (judgement > 0) {
@@ -606,7 +656,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
                 return kowalevski_gauss_OK;
             }
         }
-        kowalevski_gauss_mixed(kowalevski_gauss_mixing, moves, z);
+        kowalevski_gauss_read(now, z);
     }
     return kowalevski_gauss_NO_CONVERGENCE;
 }

@@ -56,13 +56,17 @@ class Tableau:
     """Coefficients of a method: ``nodes`` c_i, ``weights`` b_i, and the matrix ``mixing`` μ.
 
     μ_ij + μ_ji = 1 holds exactly. Nodes and weights are rounded to floating-point numbers. ``prediction`` gives the
-    offsets Z_i − z of the next step as Σ_j prediction[i][j]·L_j of the last one.
+    offsets Z_i − z of the next step as Σ_j prediction[i][j]·L_j of the last one. ``doubled`` is
+    ν = μ diag(b) μ, which gives their integrals up to the stages by the L_j of the same step, and ``times`` are nodes τ
+    with ν_ij − ν_ji = τ_i − τ_j, exactly.
     """
 
     nodes: tuple[float, ...]
     weights: tuple[float, ...]
     mixing: tuple[tuple[float, ...], ...]
     prediction: tuple[tuple[float, ...], ...]
+    doubled: tuple[tuple[float, ...], ...]
+    times: tuple[float, ...]
 
     @property
     def stages(self) -> int:
@@ -81,23 +85,41 @@ def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
     """Return the coefficients of the method with this number of stages."""
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)
+    times = [_nearest(c, precision.spacing / 2) for c in nodes]
+    doubled = _skew_by(times, _integrated(weights, exact, exact), precision.spacing / 2)
     return Tableau(
         tuple(map(float, nodes)),
         tuple(map(float, weights)),
         tuple(map(tuple, _rounded(exact, precision.spacing))),
-        tuple(map(tuple, _prediction(nodes, weights, exact, (BAND, 1), precision.noise))),
+        tuple(map(tuple, _floats(_prediction(nodes, weights, exact, (BAND, 1), precision.noise)))),
+        tuple(map(tuple, _floats(doubled))),
+        tuple(map(float, times)),
     )
 
 
 @cache
-def predictors(stages: int, precision: Precision = DOUBLE) -> list[list[list[float]]]:
-    """Return matrices like ``prediction`` of `Tableau`, one for each of `BANDS`.
+def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool = False) -> list[list[list[float]]]:
+    """Return matrices like ``prediction`` of `Tableau`, one for each of `BANDS`; ``integrated``, of integrals.
 
     Columns belong to the stages of the last step, then to those of the step before.
     """
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)
-    return [_prediction(nodes, weights, exact, band, precision.fine_noise) for band in BANDS]
+    matrices = [_prediction(nodes, weights, exact, band, precision.fine_noise) for band in BANDS]
+    return [_floats(_integrated(weights, exact, m) if integrated else m) for m in matrices]
+
+
+def _integrated(
+    weights: Sequence[Fraction], mixing: Sequence[Sequence[Fraction]], values: Sequence[Sequence[Fraction]]
+) -> list[list[Fraction]]:
+    """Return μ diag(b) V: the integrals up to the stages of what a matrix V gives at the stages, in steps."""
+    columns = list(zip(*values, strict=True))
+    return [[sum((m * w * v for m, w, v in zip(row, weights, column, strict=True)), Fraction(0)) for column in columns]
+            for row in mixing]  # fmt: skip
+
+
+def _floats(rows: Sequence[Sequence[Fraction]]) -> list[list[float]]:
+    return [[float(v) for v in row] for row in rows]
 
 
 @cache
@@ -157,20 +179,31 @@ def _rounded(exact: Sequence[Sequence[Fraction]], spacing: Fraction) -> list[lis
     return [[float(v) for v in row] for row in mu]
 
 
+def _nearest(value: Fraction, spacing: Fraction) -> Fraction:
+    return round(value / spacing) * spacing
+
+
+def _skew_by(times: Sequence[Fraction], exact: Sequence[Sequence[Fraction]], spacing: Fraction) -> list[list[Fraction]]:
+    """Return ν as multiples of the spacing with ν_ij − ν_ji = τ_i − τ_j; all are floating-point numbers."""
+    nu = [[_nearest(v, spacing) for v in row] for row in exact]
+    for i in range(len(nu)):
+        for j in range(i):
+            nu[j][i] = nu[i][j] - (times[i] - times[j])
+    return nu
+
+
 def _prediction(
     nodes: Sequence[Fraction],
     weights: Sequence[Fraction],
     mixing: Sequence[Sequence[Fraction]],
     band: tuple[Fraction, int],
     noise: Fraction,
-) -> list[list[float]]:
+) -> list[list[Fraction]]:
     """Return μ diag(b) W diag(1/b), where W extrapolates f from the stages of some last steps to those of the next."""
     n, (width, past) = len(nodes), band
     known = [c - back for back in range(1, past + 1) for c in nodes]
     extrapolation = _extrapolation(known, nodes, width * n, noise)
-    extrapolated = [[sum(m * w * e for m, w, e in zip(row, weights, column, strict=True)) for row in mixing]
-                    for column in zip(*extrapolation, strict=True)]  # fmt: skip
-    return [[float(column[i] / weights[j % n]) for j, column in enumerate(extrapolated)] for i in range(n)]
+    return [[v / weights[j % n] for j, v in enumerate(row)] for row in _integrated(weights, mixing, extrapolation)]
 
 
 def _extrapolation(

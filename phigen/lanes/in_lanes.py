@@ -252,6 +252,8 @@ def _stages(program: Program, step: Gauss) -> Stages:
     """
     kernels = [LaneKernel(step.slope, ("coef", "x"))]
     kernels += [LaneKernel(step.frame, ("coef", "z"))] if step.frame else []
+    reduced = [step.reduced.slope, step.reduced.follow] if step.reduced else []
+    kernels += [LaneKernel(kernel, ("coef", "x")) for kernel in reduced]
     others = [*step.stage_transposes, *(k.kernel for k in _elapsed(program))]
     kernels += [LaneKernel(kernel, ("coef", "x")) for kernel in others]
     called = with_formulas(operations([step.slope, *others]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from phigen.errors import SpecError
@@ -16,6 +17,7 @@ from phigen.scheme.discretisation import expect_few
 from phigen.scheme.forces import force_facts
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.gauss_kernels import change_kernel, elapsed_kernel, field_kernel, frame_kernel
+from phigen.scheme.gauss_reduction import reduced_sweeps
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import observables
 from phigen.scheme.lowering import operation_counts
@@ -23,7 +25,7 @@ from phigen.scheme.monitor import monitor_facts, rate_kernel
 from phigen.scheme.order import Order
 from phigen.scheme.program import About, Monitor, Program
 from phigen.scheme.staging import Coefficients
-from phigen.scheme.steps import Gauss, GaussTangent
+from phigen.scheme.steps import Gauss, GaussTangent, ReducedSweeps
 from phigen.spec.model import Spec
 from phigen.symbolic.expression import derivatives
 from phigen.symbolic.symbols import STEP
@@ -110,6 +112,7 @@ def build_gauss(
     points = stage_map(discretised, realisation, gauge.pace(system))
     coefficients = Coefficients((*system.parameter_names, *gauge.symbols))
     slope, change = field_kernel(points, coefficients), change_kernel(points, coefficients)
+    reduced = reduced_sweeps(points, coefficients)
     frame = frame_kernel(points, coefficients)
     tangent = _tangent(points, coefficients) if spec.extras.tangent else None
     elapsed = elapsed_kernel(points, gauge.monitor, coefficients) if gauge.monitor else None
@@ -139,6 +142,7 @@ def build_gauss(
         spec.solver.max_iterations if ("solver", "max_iterations") in spec.locations else MAX_SWEEPS,
         tangent,
         adjoint=adjoint,
+        reduced=reduced and _with_all_coefficients(reduced, coefficients),
     )
     for kernel in step.kernels:
         expect_few(system, kernel, other="")
@@ -178,6 +182,10 @@ def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
     return Kernel(
         kernel.name, kernel.purpose, {**kernel.inputs, "coef": coefficients.slots}, kernel.outputs, kernel.named
     )
+
+
+def _with_all_coefficients(reduced: ReducedSweeps, coefficients: Coefficients) -> ReducedSweeps:
+    return replace(reduced, slope=_full(reduced.slope, coefficients), follow=_full(reduced.follow, coefficients))
 
 
 def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:

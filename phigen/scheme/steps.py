@@ -105,6 +105,11 @@ class _Staged:
         return None
 
     @property
+    def reduced(self) -> ReducedSweeps | None:
+        """Sweeps over some of the unknowns of a step, if the others follow from these."""
+        return None
+
+    @property
     def path(self) -> Recurrences | None:
         """The recurrences of the path that a step follows, if it follows one."""
         return None
@@ -328,6 +333,21 @@ class GaussTangent:
 
 
 @dataclass(frozen=True)
+class ReducedSweeps:
+    """Sweeps over the ``iterated`` unknowns of a Gauss method; all entries are indices of unknowns.
+
+    These depend on the ``followers`` only, and the followers are linear in the ``integrated`` ones among them. Both
+    kernels read integrals of the moves of the latter: ``slope`` gives the moves, ``follow`` the followers.
+    """
+
+    slope: Kernel
+    follow: Kernel
+    iterated: tuple[int, ...]
+    followers: tuple[int, ...]
+    integrated: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class Gauss(_Staged):
     """Gauss collocation: Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j), by fixed-point sweeps; then x + D(x, Σ_j L_j).
 
@@ -344,6 +364,7 @@ class Gauss(_Staged):
     frame: Kernel | None = None
     most_sweeps: int = 100
     tangent: GaussTangent | None = None
+    reduced: ReducedSweeps | None = None
 
     kind = GAUSS
 
@@ -366,7 +387,8 @@ class Gauss(_Staged):
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         varied = (self.tangent.slope, self.tangent.change) if self.tangent else ()
-        return _present((self.prepare, self.slope, self.change, self.frame, *varied, *self.transposed))
+        reduced = (self.reduced.slope, self.reduced.follow) if self.reduced else ()
+        return _present((self.prepare, self.slope, *reduced, self.change, self.frame, *varied, *self.transposed))
 
 
 class _Scheduled(_Staged):

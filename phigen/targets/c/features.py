@@ -42,6 +42,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     blocked = blocks or traces  # the reverse pass is vectorised over stages, and rarely scalar
     yield Feature("UNROLLED_TRANSPOSE", lambda p: p.step.eliminate_transposed and not blocked, ("UNROLLED", "ADJOINT"))
     yield Feature("STAGED", lambda p: stages, part="lanes")
+    yield Feature("REDUCED", lambda p: p.step.reduced, ("STAGED",))
     yield Feature("NARROW", lambda p: isinstance(lanes, Stages | Traces) and lanes.narrow)
     yield Feature("ALONG", lambda p: p.step.back and p.step.back.used, ("TRACED",))
     yield Feature("PACKS", lambda p: packs, ("ENSEMBLE",), "lanes")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from phigen.gauss.tableau import DOUBLE, EARLIER, SINGLE, predictors, tableau
+from phigen.gauss.tableau import DOUBLE, EARLIER, SINGLE, Tableau, predictors, tableau
 from phigen.lanes.in_lanes import Lanes, Stages
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.policies import GaussPolicy
@@ -50,6 +50,7 @@ def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
 def scalar_kernels(step: Gauss, *, staged: bool) -> list[Kernel | None]:
     """The kernels that are evaluated at one stage; with ``staged`` most kernels are evaluated at all stages at once."""
     at_stages = [] if staged else [step.slope, step.frame]
+    at_stages += [step.reduced.follow] if staged and step.reduced else []
     varied = [step.tangent.slope, step.tangent.change] if step.tangent else []
     transposed = step.adjoint.steps if step.adjoint else ()
     back = [k for k in transposed if not (staged and k in step.stage_transposes)]
@@ -64,10 +65,11 @@ def trail(program: Program, step: Gauss, lanes: Lanes | None) -> int:
 def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
     """The coefficients, and the function that computes unknowns from stage increments."""
     table, width = step.tableau, _width(step, lanes)
+    precision = SINGLE if program.single else DOUBLE
     if program.single:
         table = tableau(table.stages, SINGLE)  # rounded to float, their sums would differ from 1
     staged = isinstance(lanes, Stages)
-    predictions = predictors(table.stages, SINGLE if program.single else DOUBLE) if staged else (table.prediction,)
+    predictions = predictors(table.stages, precision, integrated=bool(step.reduced)) if staged else (table.prediction,)
     terms = [f"matrix[{j}][lane] * move[{j}]" for j in range(table.stages)]
     older = [f"matrix[{table.stages + j}][lane] * before[{j}]" for j in range(table.stages)]
     values = {
@@ -79,13 +81,37 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
         "predictions": [_columns(rows, width) for rows in predictions],
         "terms": _in_chains(terms) if staged else "",
         "terms_of_two": _in_chains([*terms, *older]) if staged else "",
+        "total": _halved([f"values[{j}]" for j in range(table.stages)]),
+        "reduced": None,
+        **(_reduced(step, table, width) if staged and step.reduced else {}),
     }
     return render("c", "gauss.c", values)
+
+
+def _reduced(step: Gauss, table: Tableau, width: int) -> dict[str, object]:
+    """Return the values of the template for reduced sweeps."""
+    reduced = step.reduced
+    assert reduced is not None
+    return {
+        "reduced": reduced,
+        "doubled": _columns(table.doubled, width),
+        "times": _row(table.times, width),
+        "places": [reduced.iterated.index(k) for k in reduced.integrated],
+    }
 
 
 def _in_chains(terms: Sequence[str]) -> str:
     """Return a sum as two partial sums, which processors compute in parallel."""
     return " + ".join(f"({' + '.join(terms[k::2])})" for k in range(min(2, len(terms))))
+
+
+def _halved(terms: Sequence[str]) -> str:
+    """Return a sum as that of the sums of two halves, and so on: few additions wait for one another."""
+    if len(terms) == 1:
+        return terms[0]
+    half = (len(terms) + 1) // 2
+    pairs = [f"({a} + {b})" for a, b in zip(terms, terms[half:], strict=False)]
+    return _halved([*pairs, *terms[len(pairs) : half]])
 
 
 def _columns(rows: Sequence[Sequence[float]], width: int) -> list[str]:

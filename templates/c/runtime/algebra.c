@@ -9,32 +9,8 @@ PHI_CHAPTER_OF_ALGEBRA
 #include "finite.c"
 #include "device_finite.c"
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms: rounded
-   together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
-static int phi_advance(phi_solver *s, const double *change, const double *small)
-{
-    double x[PHI_DIM], carry[PHI_DIM];
-#if PHI_GAUSS
-    for (int i = 0; i < PHI_DIM; ++i) { /* x is available after two additions; the others are off the critical path */
-        const double moved = change[i] + small[i], more = moved - change[i];
-        const double sum = s->x[i] + moved, added = sum - s->x[i];
-        x[i] = sum;
-        carry[i] = ((s->x[i] - (sum - added)) + (moved - added)) + ((change[i] - (moved - more)) + (small[i] - more));
-    }
-    if (!phi_finite(x, PHI_DIM)) return 0;
-#else
-    for (int i = 0; i < PHI_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
-        x[i] = sum + lost;
-        carry[i] = lost - (x[i] - sum);
-        if (!isfinite(x[i])) return 0;
-    }
-#endif
-    PHI_COPY(s->x, x, x, PHI_DIM);
-    PHI_COPY(s->carry, carry, carry, PHI_DIM);
-    return 1;
-}
+#include "advance.c"
+#include "advance_gauss.c"
 
 #include "elapsed.c"
 

@@ -32,12 +32,7 @@ static void phi_start(const phi_solver *s, double point[PHI_POINT])
 /* Sum of the increments of all stages. */
 static void phi_end(phi_lanes *moves, double end[PHI_UNKNOWNS])
 {
-    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        double even = 0.0, odd = 0.0; /* partial sums, which do not depend on each other */
-        for (int i = 0; i < PHI_NODES; i += 2) even += moves[k][i];
-        for (int i = 1; i < PHI_NODES; i += 2) odd += moves[k][i];
-        end[k] = even + odd;
-    }
+    for (int k = 0; k < PHI_UNKNOWNS; ++k) end[k] = phi_total(moves[k]);
 }
 
 /* h b_j times the vector field at each stage, for unknowns z; the weights are h b_j. */
@@ -53,33 +48,6 @@ static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_
         for (int k = 0; k < PHI_UNKNOWNS; ++k) moves[k][i] = move[k];
     }
 #endif
-}
-
-/* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
-static double phi_scale(const double x[PHI_DIM], phi_lanes *moves)
-{
-    double square = DBL_MIN;
-    for (int i = 0; i < PHI_DIM; ++i) square += x[i] * x[i];
-    if (square <= DBL_MIN)
-        for (int k = 0; k < PHI_PLAIN; ++k)
-            for (int i = 0; i < PHI_NODES; ++i) square += moves[k][i] * moves[k][i];
-    return 1.0 / square;
-}
-
-/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, 1 for group
-   elements. */
-static inline double phi_change_of(double scale, phi_lanes *before, phi_lanes *after)
-{
-    phi_lanes sum = { 0.0 };
-    double even = 0.0, odd = 0.0;
-    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        const double *old = before[k], *now = after[k], factor = k < PHI_PLAIN ? scale : 1.0;
-        PHI_EACH_LANE
-        for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] += (now[lane] - old[lane]) * ((now[lane] - old[lane]) * factor);
-    }
-    for (int i = 0; i < PHI_NODES; i += 2) even += sum[i];
-    for (int i = 1; i < PHI_NODES; i += 2) odd += sum[i];
-    return (even + odd) / (double)PHI_NODES;
 }
 
 /* Collocation polynomial: factors of the stage increments in the offsets of the unknowns from the end of a step, at a
@@ -106,45 +74,68 @@ static void phi_factors_at(double fraction, double factor[PHI_NODES])
     }
 }
 
-/* Values of the unknowns in a step of another size, the last one times a ratio, by the collocation polynomial. */
-static void phi_predict_at(phi_history *past, double ratio, phi_lanes *z)
+#include "gauss_reduced.c"
+#include "gauss_whole.c"
+
+/* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
+static double phi_scale(const double x[PHI_DIM], phi_lanes *moves)
 {
-    double factor[PHI_NODES];
-    for (int i = 0; i < PHI_NODES; ++i) {
-        phi_factors_at(1.0 + ratio * phi_nodes[i], factor);
-        for (int k = 0; k < PHI_UNKNOWNS; ++k)
-            for (int j = 0; j < PHI_NODES; ++j) z[k][i] += factor[j] * past->moves[past->latest][k][j];
-    }
+    double square = DBL_MIN;
+    for (int i = 0; i < PHI_DIM; ++i) square += x[i] * x[i];
+    if (square <= DBL_MIN)
+        for (int k = 0; k < PHI_PLAIN && k < PHI_ITERATED; ++k)
+            for (int i = 0; i < PHI_NODES; ++i) square += moves[k][i] * moves[k][i];
+    return 1.0 / square;
 }
 
-/* Values of the unknowns that a predictor derives from the increments of the last steps. */
-static void phi_predict(phi_history *past, int predictor, phi_lanes *z)
+/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, 1 for group
+   elements. */
+static inline double phi_change_of(double scale, int count, phi_lanes *before, phi_lanes *after)
 {
-#if PHI_STAGED
-    if (predictor + 1 < PHI_PREDICTORS) { /* the last predictor reads the last step only */
-        phi_mixed_twice(phi_prediction[predictor], past->moves[past->latest], past->moves[1 - past->latest], z);
-        return;
+    phi_lanes sum = { 0.0 };
+    for (int k = 0; k < count; ++k) {
+        const double *old = before[k], *now = after[k];
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] += (now[lane] - old[lane]) * (now[lane] - old[lane]);
+        if (k + 1 == (count < PHI_PLAIN ? count : PHI_PLAIN))
+            for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] *= scale;
     }
-#endif
-    phi_mixed(phi_prediction[predictor], past->moves[past->latest], z);
+    return phi_total(sum) / (double)PHI_NODES;
 }
 
 #if PHI_STAGED
-/* Index of the predictor that would have been nearest to the values z of the unknowns. */
-static int phi_best_predictor(phi_history *past, double scale, phi_lanes *z)
+/* What sweeps read, as a predictor derives it from the increments of the last steps. */
+static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads[PHI_READS])
 {
-    phi_lanes predicted[PHI_UNKNOWNS];
+    double(*last)[PHI_WIDTH] = past->moves[past->latest], (*older)[PHI_WIDTH] = past->moves[1 - past->latest];
+    if (predictor + 1 < PHI_PREDICTORS)
+        for (int r = 0; r < PHI_READS; ++r) phi_mix_twice(phi_prediction[predictor], last[PHI_READ(r)], older[PHI_READ(r)], reads[r]);
+    else /* the last one reads the last step only */
+        for (int r = 0; r < PHI_READS; ++r) phi_mix(phi_prediction[predictor], last[PHI_READ(r)], reads[r]);
+}
+
+/* The predictor that would have come nearest to what the sweeps of a step have read in the end. */
+static int phi_best_predictor(phi_history *past, double scale, phi_lanes *reads)
+{
+    phi_lanes predicted[PHI_READS];
     double least = HUGE_VAL;
     int best = PHI_PREDICTORS - 1;
     for (int predictor = 0; predictor < PHI_PREDICTORS; ++predictor) {
         phi_predict(past, predictor, predicted);
-        const double change = phi_change_of(scale, predicted, z);
+        const double change = phi_change_of(scale, PHI_READS, predicted, reads);
         if (change < least) {
             least = change;
             best = predictor;
         }
     }
     return best;
+}
+
+#else
+/* The values of the unknowns that the predictor derives from the moves of the last step. */
+static void phi_predict(phi_history *past, int predictor, phi_lanes *z)
+{
+    phi_mixed(phi_prediction[predictor], past->moves[past->latest], z);
 }
 
 #endif
@@ -223,9 +214,10 @@ static int phi_judge(phi_history *past, phi_progress *sweeps, int sweep, double 
 static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lanes *moves)
 {
     phi_history *past = &s->history;
-    phi_lanes z[PHI_UNKNOWNS], next[PHI_UNKNOWNS], weights[1] = { { 0.0 } };
+    phi_lanes z[PHI_READS], apart[PHI_ITERATED], next[PHI_ITERATED], factors[PHI_FACTORS] = { { 0.0 } };
+    phi_lanes *now = phi_iterates(moves, apart);
     phi_progress progress = { HUGE_VAL, 0, 0 };
-    for (int i = 0; i < PHI_NODES; ++i) weights[0][i] = s->h * phi_weights[i];
+    phi_set_factors(s->h, factors);
     if (past->count == 0 || PHI_DIFFERS(s->h, past->h)) {
         PHI_CLEAR_STAGES(z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h)) phi_predict_at(past, s->h / past->h, z);
@@ -237,12 +229,12 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
     }
     for (int sweep = 1; sweep <= PHI_MAX_SWEEPS; ++sweep) {
         const int tested = sweep >= past->sweeps;
-        phi_slopes(s, point, weights, z, tested ? next : moves);
+        phi_sweep(s, point, factors, z, tested ? next : now);
         if (tested) {
-            const double scale = phi_scale(s->x, next), square = phi_change_of(scale, moves, next);
+            const double scale = phi_scale(s->x, next), square = phi_change_of(scale, PHI_ITERATED, now, next);
             const int solved = square * (past->rate * past->rate) <= PHI_SOLVED * PHI_SOLVED;
             const int judgement = solved ? 1 : phi_judge(past, &progress, sweep, sqrt(square));
-            PHI_COPY_STAGES(moves, next, next);
+            PHI_COPY_STAGES(now, next, next);
             if (!isfinite(square)) return PHI_NOT_FINITE;
             if (judgement < 0) return PHI_NO_CONVERGENCE;
             if (judgement > 0) {
@@ -253,10 +245,11 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
                 if (past->count == PHI_EARLIER && past->age++ % PHI_TRIALS == 0) past->predictor = phi_best_predictor(past, scale, z);
 #endif
                 s->evaluations += (size_t)sweep;
+                phi_complete_stages(s, point, factors, now, z, moves);
                 return PHI_OK;
             }
         }
-        phi_mixed(phi_mixing, moves, z);
+        phi_read(now, z);
     }
     return PHI_NO_CONVERGENCE;
 }
@@ -294,6 +287,7 @@ static phi_status phi_attempt(phi_solver *s)
     const phi_status status = phi_collocate(s, point, moves);
     if (status != PHI_OK) return status;
     phi_end(moves, end);
+    phi_end_followers(s, point, moves, end);
     phi_stage_change(s->coef, point, end, change);
 #if PHI_MONITOR
     const double elapsed = phi_time_of(s, point, moves);

@@ -9,6 +9,13 @@ static const double phi_mixing[PHI_NODES][PHI_WIDTH] = { { 0.5 } };
 enum { PHI_PREDICTORS = 1 };
 static const double phi_prediction[PHI_PREDICTORS][PHI_EARLIER * PHI_NODES][PHI_WIDTH] = { { { 0.5 } } };
 
+enum { PHI_ITERATED = PHI_UNKNOWNS, PHI_READS = PHI_UNKNOWNS, PHI_FACTORS = 1 };
+
+static double phi_total(const double values[PHI_WIDTH])
+{
+    return values[0];
+}
+
 static void phi_mixed(const double matrix[PHI_NODES][PHI_WIDTH], double moves[][PHI_WIDTH], phi_lanes *z)
 {
     for (int k = 0; k < PHI_UNKNOWNS; ++k) z[k][0] = matrix[0][0] * moves[k][0];

@@ -1,0 +1,100 @@
+"""Elimination of unknowns whose derivatives are linear in others, as positions are where q̇ = M⁻¹p.
+
+If ḟ = r₀ + Σ_k c_k z_k with constant c_k, the stages of f follow from the moves of the z_k by the squared matrix of the
+method, and so does its end: Z_f = h (τ_i r₀ + Σ_k c_k Σ_j ν_ij L_k,j), f' = f + h (r₀ + Σ_k c_k Σ_j (1 − τ_j) L_k,j),
+where τ are the nodes, and ν = Aμ. If all other unknowns depend on such f only, as momenta on positions, sweeps iterate
+them alone, and one of these contracts as two over all unknowns. If ν_ij − ν_ji = τ_i − τ_j, and brackets of two f or of
+two other unknowns are 0, the step is symplectic, as Suris showed. Unknowns that no other depends on, such as
+quadratures, are computed after the last sweep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from phigen.gauss.stage_map import OFFSET, StageMap, at_unknowns, vector_field
+from phigen.scheme.gauss_kernels import WEIGHT
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.staging import Coefficients
+from phigen.scheme.steps import ReducedSweeps
+from phigen.symbolic.expression import ZERO, Expression, sparse_derivatives, substitute, symbol, symbols_of, total
+from phigen.symbolic.symbols import Symbol, kind_of
+
+#: The kind of symbols of what reduced sweeps read: integrals of moves.
+READ = "u"
+
+#: The time of a stage after the start of the step, in steps, and the step.
+TIME, LENGTH = Symbol("stage_time"), Symbol("stage_step")
+
+
+def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweeps | None:
+    """Return the sweeps over some of the unknowns, or None where these do not depend on unknowns that follow only."""
+    if points.realisation.groups or points.realisation.logarithms:
+        return None
+    rates = vector_field(points, at_unknowns(points))
+    reads = [{k for k, z in enumerate(points.unknowns) if z in names} for names in map(symbols_of, rates)]
+    rows = sparse_derivatives(rates, points.unknowns)
+    linear = [k for k, row in enumerate(rows) if all(coefficients.is_static(slope) for slope in row.values())]
+    needed = _needed(reads)
+    followers = [k for k in _followers(linear, reads) if k in needed]
+    iterated = [k for k in needed if k not in followers]
+    integrated = sorted({k for f in followers for k in reads[f]})
+    if not integrated or any(not reads[i] <= set(followers) for i in iterated):
+        return None
+    if points.realisation.exact and not _are_conjugate(points, iterated, followers):
+        return None
+    symbols = [Symbol(READ, k) for k in range(len(integrated))]
+    integrals = {points.unknowns[k]: symbol(s) for k, s in zip(integrated, symbols, strict=True)}
+    offsets = [_followed(rates[f], rows[f], integrals) for f in followers]
+    at = dict(zip((points.unknowns[f] for f in followers), offsets, strict=True))
+    values = [symbol(WEIGHT) * value for value in substitute([rates[i] for i in iterated], at)]
+    read = {"coef": coefficients.slots, "x": points.start, "u": tuple(symbols)}
+    slope = Kernel(
+        "reduced_field",
+        "w times the derivatives of the iterated unknowns of a stage, by integrals u of moves",
+        {**read, "w": (WEIGHT,), "time": (TIME, LENGTH)},
+        (Output("move", tuple(coefficients.hoist(values))),),
+    )
+    follow = Kernel(
+        "followers",
+        "the unknowns of a stage that follow from others, by integrals u of moves",
+        {**read, "time": (TIME, LENGTH)},
+        (Output("offsets", tuple(coefficients.hoist(offsets))),),
+    )
+    return ReducedSweeps(slope, follow, tuple(iterated), tuple(followers), tuple(integrated))
+
+
+def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequence[int]) -> bool:
+    """Whether these are all unknowns but the time, and only brackets of one kind with the other are not zero."""
+    places = [{points.moved[k] for k in group if k < len(points.moved)} for group in (iterated, followers)]
+    within = ((i, j) for group in places for i in group for j in group)
+    complete = sum(map(len, places)) == len(points.moved)
+    return complete and all(points.system.poisson[i][j].is_zero for i, j in within)
+
+
+def _needed(reads: Sequence[set[int]]) -> list[int]:
+    """Return the unknowns that others depend on, directly or through others, or that depend on themselves."""
+    needed = set(range(len(reads)))
+    while True:
+        read = {k for i in needed for k in reads[i]}
+        if needed <= read:
+            return sorted(needed)
+        needed &= read
+
+
+def _followers(linear: Sequence[int], reads: Sequence[set[int]]) -> list[int]:
+    """Return unknowns among the linear ones of which none depends on itself or on another."""
+    followers: list[int] = []
+    for k in linear:
+        others = {*followers, k}
+        if not reads[k] & others and all(k not in reads[f] for f in followers):
+            followers.append(k)
+    return followers
+
+
+def _followed(rate: Expression, row: Mapping[str, Expression], integrals: Mapping[str, Expression]) -> Expression:
+    """Return a follower at a stage: the time of the stage times the rate at the start, and integrals of the others."""
+    (start,) = substitute([rate], {z: ZERO for z in symbols_of(rate) if kind_of(z) == OFFSET})
+    terms = [symbol(TIME) * start, *(slope * integrals[z] for z, slope in row.items())]
+    # the times are exact, and their products with the step would not be
+    return symbol(LENGTH) * total(terms)

@@ -1,0 +1,24 @@
+#ifndef PHI_FILE_ADVANCE
+#define PHI_FILE_ADVANCE
+#include <math.h>
+#include <string.h>
+
+#include "model.h"
+
+/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms: rounded
+   together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+static int phi_advance(phi_solver *s, const double *change, const double *small)
+{
+    double x[PHI_DIM], carry[PHI_DIM];
+    for (int i = 0; i < PHI_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
+        if (!isfinite(x[i])) return 0;
+    }
+    PHI_COPY(s->x, x, x, PHI_DIM);
+    PHI_COPY(s->carry, carry, carry, PHI_DIM);
+    return 1;
+}
+#endif
