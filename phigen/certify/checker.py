@@ -275,7 +275,8 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
         return each(mag, A.inv()) * (measured * (size * ROUNDED) + residual_error(reach))
 
     C = each(middle, each(middle, A).inv())
-    at = column(run_of(c, stage, X, T, leaf, centre.entries()).x[k] for k in stage["equation"])
+    values = run_of(c, stage, X, T, leaf, centre.entries()).x
+    at = column(values[k] for k in stage["equation"])
     base = column(x + BALL * CARRY * mag(x) for x in X) if based else column([ZERO] * m)
     K = centre - C * (centre - base + at) + (identity(m) - C * A) * (column(box) - centre)
     away = each(mag, centred(c, stage, X, T, leaf, box, run, "away")) + (2 * CARRY + arb(2) ** -30) * Y

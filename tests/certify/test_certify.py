@@ -579,7 +579,7 @@ def test_schedules_of_endless_loops_are_refused() -> None:
 
 
 def expect_phrases(name: str, phrases: dict[str, tuple[str, ...]]) -> None:
-    source = GeneratedC(certificate(name)[1][f"{name}.c"], name)
+    source = GeneratedC(problem(name)[1][f"{name}.c"], name)
     for function, texts in phrases.items():
         matched = source.function(function)
         assert matched
@@ -587,7 +587,7 @@ def expect_phrases(name: str, phrases: dict[str, tuple[str, ...]]) -> None:
 
 
 def test_a_rate_that_gauss_solvers_remember_is_above_the_one_assumed() -> None:
-    _, files = certificate("kowalevski_gauss")
+    _, files = problem("kowalevski_gauss")
     code = f"""#include <stdio.h>
 #include "kowalevski_gauss.h"
 int main(void) {{
