@@ -1,4 +1,4 @@
-"""Building candidates beside each other, each in a process of its own, so that one that takes too long can be ended.
+"""Parallel builds of candidates, each in its own process, so that a build that takes too long can be ended.
 
 A process generates the code and compiles it into the cache of solvers, where the calling process finds it.
 """
@@ -32,13 +32,13 @@ from phigen.tuning.settings import Setting
 LATE = "there was no time to build it"
 #: Processes at a time, at most.
 WORKERS = 4
-#: Seconds that a process has to end after it was told to.
+#: Seconds that a process has to end after it was asked to.
 _GRACE = 2.0
 
 
 @dataclass(frozen=True)
 class Built:
-    """A candidate, compiled: its files, what it turned out to be, and the seconds that making it took.
+    """A compiled candidate: its files, its resolved setting, and the seconds that the build took.
 
     ``order`` may exceed that of the setting, since symmetric methods have even order. ``fingerprint`` is the same for
     two settings that mean the same code.
@@ -69,7 +69,7 @@ class Built:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why there is no such candidate; ``inapplicable`` if that lies in the system, not in size or time."""
+    """The reason why a candidate cannot be built; ``inapplicable`` if it is the system, not size or time."""
 
     reason: str
     inapplicable: bool = False
@@ -86,7 +86,7 @@ def build(spec: Spec, system: System | None, setting: Setting) -> Built:
 
 
 def built(compilation: Compilation, setting: Setting, start: float) -> Built:
-    """A compilation, compiled as C where there is a compiler; ``start`` is when the work on it began."""
+    """Compile the code of a compilation, as C where there is a compiler; ``start`` is the time when its build began."""
     program, target = compilation.program, chosen_target("auto")
     files = emit(program, target, f"phigen build {program.name}.yaml")
     step = program.step
@@ -104,7 +104,7 @@ def built(compilation: Compilation, setting: Setting, start: float) -> Built:
 def build_all(
     spec: Spec, system: System | None, settings: Sequence[Setting], deadline: float
 ) -> Iterator[tuple[Setting, Outcome]]:
-    """The outcome of each setting, in the order in which they are done; what is not done at the deadline is ended.
+    """Yield the outcome of each setting in order of completion; builds that are unfinished at the deadline are ended.
 
     ``deadline`` is a time of `time.perf_counter`.
     """
@@ -146,14 +146,14 @@ def _received(pipe: Connection, seconds: float) -> Outcome:
 
 
 def _work(spec: Spec, system: System | None, setting: Setting, pipe: Connection) -> None:
-    """The body of a process. Ended from outside it still unwinds: that ends the C compiler it may be waiting for."""
+    """The body of a process. A process that is terminated still unwinds, which also ends its C compiler."""
 
     def leave(*_: Any) -> None:
         raise SystemExit(1)
 
     for name in (signal.SIGTERM, signal.SIGINT):
         signal.signal(name, leave)
-    # Whatever is to be told goes through the pipe; an interpreter that is ended may complain of it.
+    # Results go through the pipe; what a terminated interpreter prints on stderr is of no use.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     start, outcome = time.perf_counter(), Refusal("building it failed")
     try:

@@ -1,6 +1,6 @@
 """Realisations, schemes and classical methods side by side on one run: cost, errors, and the Poisson defect.
 
-`tune` looks for the cheapest setting; a comparison shows what each of them does at one step, or for one cost.
+`tune` searches for the cheapest setting; a comparison measures all of them at one step size, or at one cost.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from phigen.tuning.trials import MARKS, marks
 
 #: States at which the Poisson defect is measured; the largest counts.
 STATES = 5
-#: Rows at which errors are looked at, at most.
+#: The largest number of rows at which errors are measured.
 ROWS = 2000
-#: Classical methods that stand beside, by their names in tables.
+#: Classical methods of the comparison, by their names in tables.
 PEERS = {"rk4": "RK4", "dop853": "DOP853"}
 #: Shares of the budget of time: for building, and for the reference of one orbit.
 BUILDING, REFERRING = 0.6, 0.05
@@ -78,7 +78,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A method before it is measured: as it runs, and as a one-step map where its derivative can be had."""
+    """A method before it is measured: its runner, and its one-step map if that can be differentiated."""
 
     title: str
     order: int
@@ -190,7 +190,7 @@ def _measured(
 
 
 def _defect(step: Step | None, problem: Problem, states: Floats, h: float) -> float | None:
-    """Return the largest Poisson defect at some states of the run; None where the derivative is not to be had."""
+    """Return the largest Poisson defect at some states of the run; None if the step cannot be differentiated."""
     if step is None:
         return None
     chosen = states[np.linspace(0, len(states) - 1, STATES, dtype=int)]

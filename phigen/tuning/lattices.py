@@ -1,4 +1,4 @@
-"""Lattices of one size as problems like any other: states are flat, and methods are those of their solvers."""
+"""Tuning problems for lattices of one size: states are flat arrays, methods are those of lattice solvers."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from phigen.tuning.settings import CHOICES, FORMULAS, OWN, SPLITTING, Setting, d
 
 #: Sites above which a smaller grid of the same kind is measured.
 MOST_SITES = 10_000
-#: The most numbers in the states of one run, and in those of a run that is compared with a reference.
+#: Limits on the numbers stored of one run, and of a run that is compared with a reference.
 MOST_NUMBERS, MOST_COMPARED = 2**24, 2**13
 
 
 @dataclass
 class FlatSession:
-    """A lattice on its way whose states are flat. See `phigen.runtime.session.Course`."""
+    """A run of a lattice in progress, with flat states. See `phigen.runtime.session.Course`."""
 
     session: LatticeSession
 
     @property
     def steps(self) -> int:
-        """Good steps since the start."""
+        """The number of successful steps since the start."""
         return self.session.steps
 
     def state(self) -> Floats:
@@ -44,17 +44,17 @@ class FlatSession:
         return self.session.state().reshape(-1)
 
     def advance(self, h: float, steps: int) -> None:
-        """Make so many steps."""
+        """Make ``steps`` steps."""
         self.session.advance(h, steps)
 
     def branch(self) -> FlatSession:
-        """Nobody asks a lattice for that."""
+        """Not available for lattices."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class FlatLattice:
-    """The solver of a lattice of one size as one of so many numbers. See `phigen.runtime.backend.Backend`."""
+    """The solver of a lattice of one size, with flat states (DIM,). See `phigen.runtime.backend.Backend`."""
 
     backend: LatticeBackend
     shape: tuple[int, ...]
@@ -77,7 +77,7 @@ class FlatLattice:
         return float(np.abs(self._at(x, parameters).density()).sum())
 
     def _at(self, x: Floats, parameters: Mapping[str, Any]) -> LatticeSession:
-        """One session for all that is looked at, of one problem."""
+        """Return the session in which the functions of one problem are evaluated."""
         state = x.reshape(self.shape)
         if not self._seen:
             self._seen.append(self.backend.start(state, parameters))
@@ -91,9 +91,9 @@ class FlatLattice:
 
 @dataclass(frozen=True)
 class LatticeProblem(Problem):
-    """A lattice of some sizes, whose parameters have arrays over sites and bonds; ``seer`` knows its energies.
+    """The tuning problem of a lattice of given sizes and parameter arrays; ``seer`` evaluates its energies.
 
-    ``whole`` are the sizes of the run, where a smaller one stands for it.
+    ``whole`` are the sizes of the run if a smaller lattice is measured in its place.
     """
 
     cell: Cell = field(kw_only=True)
@@ -113,16 +113,16 @@ class LatticeProblem(Problem):
 
     @property
     def most_rows(self) -> int:
-        """Their energies need them in memory."""
+        """The largest number of rows whose energies fit into memory."""
         return min(super().most_rows, max(64, MOST_NUMBERS // len(self.start)))
 
     @property
     def evens_out(self) -> bool:
-        """Monitors are not for lattices."""
+        """False: monitors are not searched for lattices."""
         return False
 
     def energies(self, states: Floats) -> Floats:
-        """H of states (rows, DIM); those that are not finite have none."""
+        """Return H of states (rows, DIM), NaN for states that are not finite."""
         finite = np.isfinite(states).all(axis=1)
         energies = np.full(len(states), np.nan)
         energies[finite] = self.seer.energies(states[finite], self.parameters)
@@ -134,7 +134,7 @@ class LatticeProblem(Problem):
         return Candidate(flat, self)
 
     def guesses(self, current: Setting) -> list[Setting]:
-        """Splittings, and the series with each bi-realisation that might apply at a site."""
+        """The first settings: splittings, and the series with each bi-realisation that might apply at a site."""
         local = self.cell.is_local
         kinds = [k for k in BIREALISATIONS if k not in (*FORMULAS, *CHOICES, "karasev")] if local else ["auto"]
         split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
@@ -163,9 +163,10 @@ class LatticeProblem(Problem):
 def lattice_problem(
     compilation: Compilation, run: Run, settings: Mapping[str, float], step: float, span: float, direction: float
 ) -> LatticeProblem:
-    """The problem of a run with some parameters changed; of one with many sites on a smaller grid, where one can begin.
+    """Return the problem of a run with changed parameters; a run with many sites is measured on a smaller grid if
+    possible.
 
-    Raises `SpecError` where the run cannot begin at all.
+    Raises `SpecError` if the run cannot start.
     """
     spec, cell = compilation.spec, compilation.by_sweeps().cell
     solver = lattice_solver_of(compilation)
@@ -182,7 +183,7 @@ def lattice_problem(
 
 
 def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -> tuple[int, ...]:
-    """The sizes of the run with the largest halved repeatedly, until there are few enough sites."""
+    """Halve the largest size of the run until the number of sites is small enough."""
     reduced = list(sizes)
     while np.prod(reduced) > MOST_SITES:
         axis = int(np.argmax(reduced))
@@ -194,7 +195,7 @@ def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -
 
 
 def _begun(spec: Spec, run: Run, sizes: tuple[int, ...]) -> Start | None:
-    """A run with other sizes; None where its arrays are those of its own."""
+    """Return the start of the run with other sizes; None if its arrays have fixed sizes."""
     assert run.lattice is not None
     try:
         return start_of(spec, replace(run, lattice=replace(run.lattice, sizes=sizes)))

@@ -1,8 +1,8 @@
-"""Monitors for a spec without one: which there might be, and how many steps each takes for the same error.
+"""Search for a monitor of a spec without one: candidates, and the number of steps of each for the same error.
 
-Tried are powers of the distances that H has in denominators, roots and logarithms, powers of the speed |π∇H|, and
-``log`` where H splits in two. What each gains is counted in steps over the same time, at the same order, for the same
-error of the energy; a step in τ is found by halving, and by the order between two halves.
+Candidates are powers of the distances in denominators, roots and logarithms of H, powers of the speed |π∇H|, and
+``log`` if H splits into two parts. The gain is the ratio of the numbers of steps over the same time, at the same order
+and energy error; a step in τ is found by halving, and by interpolation with the order between two halves.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ from phigen.tuning.trials import ROUNDING
 
 #: Monitors are tried where the largest speed is at least this multiple of the median.
 UNEVEN = 3.0
-#: Distances that are looked at, at most; the quarters of powers of their squares that are tried, the likeliest first;
-#: and of 1 + the square of the speed.
+#: The largest number of distances; the exponents, in quarters, of their squares, the likeliest first; the exponents
+#: of 1 + the square of the speed.
 MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
-#: Letters of a monitor, at most: what a user can read and vary. Two distances in space have room.
+#: The longest monitor in characters, which a user can still read and vary: two distances in space.
 MOST_LETTERS = 160
 #: The order at which monitors are compared, at most; the fewest steps, and the seconds of one run.
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
-#: The share of the time that is left for runs when all is built.
+#: The share of the time that is reserved for runs after all builds.
 MEASURING = 0.25
-#: How often a step is halved, and how many times the steps of the method without a monitor are too many.
+#: The largest number of halvings of a step; the largest number of steps, in multiples of those without a monitor.
 HALVINGS, MOST = 30, 64
 
 
@@ -69,7 +69,8 @@ class Trial:
 
 @dataclass(frozen=True)
 class Monitors:
-    """Gains of monitors over a ``span`` of time: steps equal in t, and all monitors that were tried, the fastest first.
+    """Gains of monitors over a ``span`` of time: the trial with steps equal in t, and those of all monitors, the
+    fastest first.
 
     Steps of different schemes differ in cost.
     """
@@ -85,13 +86,13 @@ class Monitors:
 
 
 def is_uneven(rates: Callable[[Floats], Floats], states: Floats) -> bool:
-    """Whether the motion by a vector field is much faster at times; ``states`` (rows, DIM) are at equal times."""
+    """Whether the speed of the motion varies much; ``states`` (rows, DIM) are at equidistant times."""
     speeds = np.linalg.norm(rates(states), axis=1)
     return bool(np.isfinite(speeds).all() and speeds.max() > UNEVEN * np.median(speeds))
 
 
 def candidates(system: System, parameters: Mapping[str, float], states: Floats) -> Iterator[Expression]:
-    """Positive functions that are small where the motion is fast, none longer than `MOST_LETTERS`."""
+    """Candidate monitors: positive functions that are small in fast motion, not longer than `MOST_LETTERS`."""
     return (g for g in _candidates(system, parameters, states) if _is_short(g))
 
 
@@ -120,7 +121,7 @@ def _candidates(system: System, parameters: Mapping[str, float], states: Floats)
 
 
 def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expression]:
-    """(1 + Σ 1/b)^exponent over as many of the first bases as a line has room for, if these are two or more."""
+    """(1 + Σ 1/b)^exponent over as many of the first bases as fit in a line; None if fewer than two fit."""
     for count in range(len(bases), 1, -1):
         monitor = power(ONE + total(power(b, -1) for b in bases[:count]), number(exponent))
         if _is_short(monitor):
@@ -129,7 +130,7 @@ def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expre
 
 
 def _least_share(b: Expression, columns: Mapping[str, Floats | float]) -> float:
-    """The smallest value beside the median: of distances it is smallest for those of close encounters."""
+    """The smallest value divided by the median: smallest for the distances of close encounters."""
     (values,) = evaluate([b], columns)
     return float(np.min(values) / np.median(values))
 
@@ -148,7 +149,7 @@ def _bases(system: System) -> list[Expression]:
 
 
 def _is_square(b: Expression) -> bool:
-    """Whether the expression is a sum: the square of a distance, not a distance."""
+    """Whether the expression is a sum, and so the square of a distance rather than a distance."""
     return b.op in ("add", "sub")
 
 
@@ -161,7 +162,7 @@ def _is_positive(b: Expression, columns: Mapping[str, Floats | float]) -> bool:
 
 
 def settings(current: Setting, order: int, monitors: Sequence[Expression]) -> list[Setting]:
-    """The settings to be built: steps equal in t, and each monitor, by the series and by Gauss, at the same order."""
+    """The settings to build, of the same order: without a monitor, and each monitor with the series and with Gauss."""
     order = min(order + order % 2, HIGHEST)
     series = (
         Setting("auto", order, "none") if current.scheme != "series" else replace(current, order=order, gauge="none")
@@ -183,9 +184,9 @@ def compare(
     accuracy: float,
     deadline: float,
 ) -> Monitors | None:
-    """Each setting at the step that reaches the accuracy; the first is without a monitor, None if it cannot be built.
+    """Find the step of each setting that reaches the accuracy. The first has no monitor; None if it cannot be built.
 
-    ``states`` (rows, DIM) are some along the motion.
+    ``states`` (rows, DIM) are samples of the motion.
     """
     building = deadline - MEASURING * max(deadline - time.perf_counter(), 0.0)
     outcomes = dict(build_all(spec, system, requested, building))
@@ -208,7 +209,9 @@ def compare(
 def _trial(
     built: Built, problem: Problem, states: Floats, span: float, accuracy: float, most: float, deadline: float
 ) -> Trial:
-    """The fewest steps with that error: their number is doubled until they have it, then taken by the order."""
+    """Find the fewest steps with that error: their number is doubled until the error is reached, then interpolated by
+    the order.
+    """
     solver = Solver(built.solver(), built.interface)
     h, before = _largest(solver, problem, states), (math.nan, math.inf)
     for _ in range(HALVINGS):
@@ -227,14 +230,14 @@ def _trial(
 
 
 def _largest(solver: Solver, problem: Problem, states: Floats) -> float:
-    """The largest step that shows the motion, in whose fastest turn it is."""
+    """The largest step that resolves the fastest turn of the motion."""
     moving = motion(solver.backend, problem.parameters, monitored=solver.interface.monitored)
     return MOST_TURN / max(fastest_rate(moving, states[:: max(1, len(states) // 64)]), 1e-300)
 
 
 @dataclass(frozen=True)
 class _Run:
-    """A run with one step: its largest error of the energy, inf if a step failed, and the seconds of CPU time."""
+    """A run with one step size: its largest energy error, inf if a step failed, and its CPU seconds."""
 
     h: float
     steps: float
@@ -243,7 +246,7 @@ class _Run:
 
 
 def _run(solver: Solver, problem: Problem, span: float, h: float, most: float) -> _Run:
-    """A run to the end of the span; none if it needs more than ``most`` steps, or takes too long."""
+    """Make a run to the end of the span; None if it needs more than ``most`` steps, or takes too long."""
     begun, states = time.thread_time(), [problem.start]
     session, done, passed = solver.backend.start(problem.start, problem.parameters), 0, 0.0
     try:

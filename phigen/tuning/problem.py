@@ -28,10 +28,10 @@ ROWS = 8_000
 
 @dataclass(frozen=True)
 class Problem(ABC):
-    """The problem: the numbers of a run and its time. ``step`` is that of the run, a first guess.
+    """A tuning problem: the values of a run and its time span. ``step`` is that of the run, the first guess.
 
     Steps and times are positive here; ``direction`` is −1 for a run back in time. ``sizes`` are those of a lattice. All
-    times are those of the ``clock``: of τ where there is a monitor, which all methods have then.
+    times are in units of the ``clock``: τ if the spec has a monitor, which all methods use then, else t.
     """
 
     start: Floats
@@ -60,7 +60,7 @@ class Problem(ABC):
     @property
     @abstractmethod
     def evens_out(self) -> bool:
-        """Whether monitors may be tried, which make uneven motion even."""
+        """Whether monitors, which even out the speed of the motion, may be tried."""
 
     def method(self, solver: Backend) -> Candidate:
         """A solver as a method."""
@@ -106,7 +106,7 @@ class SystemProblem(Problem):
 
     @property
     def evens_out(self) -> bool:
-        """Whether monitors may be tried: where nothing drives the system."""
+        """Whether monitors may be tried: only systems without explicit time, forces and noise."""
         return not self.system.driven
 
     def guesses(self, current: Setting) -> list[Setting]:
@@ -127,7 +127,7 @@ class SystemProblem(Problem):
         return np.broadcast_to(energies, (len(states),))
 
     def casimir_error(self, states: Floats) -> float | None:
-        """Return the largest error of any Casimir, relative to what its value is the sum of; None without Casimirs."""
+        """Return the largest error of any Casimir, relative to the magnitudes of its terms; None without Casimirs."""
         system, casimirs = self.system, self.system.casimirs
         if not casimirs:
             return None
@@ -153,11 +153,11 @@ class CompiledMethod(Protocol):
     """A compiled method, started from the problem's initial state."""
 
     def rows(self, h: float, steps: int, stride: int) -> Floats | None:
-        """States (rows, DIM) after 0, stride, 2·stride, … and all steps; None if one cannot be made."""
+        """Return the states (rows, DIM) after 0, stride, 2·stride, … and all steps; None if a step fails."""
         ...
 
     def walk(self, h: float) -> Callable[[int], object]:
-        """A function to be timed: from the start, it makes so many steps, and with each call so many more."""
+        """Return a function to be timed: each call makes ``steps`` more steps, the first from the start."""
         ...
 
 
@@ -178,7 +178,7 @@ class Candidate:
         return rows if np.isfinite(rows).all() else None
 
     def reach(self, h: float, steps: int) -> tuple[float, str]:
-        """The time of the last step that can be made, and the status of the next, of so many."""
+        """Return the time of the last successful step of ``steps``, and the status of the next."""
         try:
             session = self.solver.start(self.problem.start, self.problem.parameters)
             session.advance(self.problem.direction * h, steps)
@@ -193,7 +193,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Classical:
-    """A classical method in compiled C as a method; ``state`` is where its runner starts."""
+    """A classical method in compiled C; ``state`` is the start of its runner."""
 
     runner: race.Runner
     state: Floats
@@ -212,7 +212,7 @@ class Classical:
         return states
 
     def walk(self, h: float) -> Callable[[int], object]:
-        # Its steps take the same time everywhere: all calls start where the problem does.
+        # Its steps take the same time everywhere, so all calls start at the initial state of the problem.
         self.state[:] = self.problem.start
         return lambda steps: self.runner(self.problem.direction * h, steps, 1)
 

@@ -1,4 +1,4 @@
-"""The solution to compare orbits with: by two methods of different kinds, trusted as far as these agree."""
+"""Reference solutions of orbits, by two methods of different kinds; their difference is the uncertainty."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import CompiledMethod
 from phigen.tuning.trials import MARKS
 
-#: Steps are halved until that changes no more than this part of the accuracy.
+#: Steps are halved until the solution changes by less than this fraction of the accuracy.
 CONVERGED = 0.02
-#: The two may differ by this part of the accuracy.
+#: The largest difference of the two methods, as a fraction of the accuracy.
 AGREED = 0.2
 _HALVINGS = 16
 #: For orbits without a requested accuracy: an error below this is accurate enough.
@@ -26,7 +26,7 @@ KNOWN = 1e-12
 class Reference:
     """The solution by one method at a step of at most ``step``: states (count + 1, DIM) at multiples of any spacing.
 
-    ``uncertainty`` is the distance of the other method, relative to the largest coordinate.
+    ``uncertainty`` is the distance from the second method, relative to the largest coordinate.
     """
 
     method: CompiledMethod
@@ -55,10 +55,10 @@ def agreed(
     seconds: float,
     clock: str = "t",
 ) -> Reference:
-    """The reference over a time span by the first method, confirmed by the second.
+    """Return the reference over a time span by the first method, confirmed by the second.
 
-    ``accuracy`` is the error that is to be measured, relative to the largest coordinate; each method may take so many
-    ``seconds``. Raises `CheckError` if the two do not agree well enough to measure that error.
+    ``accuracy`` is the error to be measured, relative to the largest coordinate; ``seconds`` is the time limit of each
+    method. Raises `CheckError` if the two do not agree well enough to measure that error.
     """
     spacing = span / MARKS
     orbits = []
@@ -84,7 +84,7 @@ def agreed(
 def orbit_error(states: Floats, spacing: float, other: CompiledMethod, step: float, seconds: float) -> float | None:
     """The distance of states (rows, DIM) at multiples of a spacing from those of another method at small steps.
 
-    Relative to the largest coordinate; None if the other method does not know the orbit that well in so many seconds.
+    Relative to the largest coordinate; None if the other method does not reach this accuracy in ``seconds``.
     """
     count, until = len(states) - 1, time.perf_counter() + seconds
     orbit = _converged(other, min(step, spacing), spacing, count, KNOWN, until)
@@ -102,7 +102,7 @@ def distance(states: Floats, others: Floats) -> float:
 def _converged(
     method: CompiledMethod, step: float, spacing: float, count: int, accuracy: float, until: float
 ) -> tuple[Floats, float, float] | None:
-    """States at a step where halving it changes nothing that counts, or no less than before; the step; that change."""
+    """Halve the step until the change is small or no longer decreases. Return the states, the step and the change."""
     last: Floats | None = None
     best: tuple[Floats, float, float] | None = None
     change = math.inf

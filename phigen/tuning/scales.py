@@ -1,4 +1,4 @@
-"""The scales of a search: over what time a method is measured, and which steps are too large to be of use."""
+"""The scales of a search: the time over which methods are measured, and the largest useful step."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from phigen.tuning.timing import nanoseconds_per_step
 
 #: Limits of a scan: steps of the run's size, and seconds of CPU time.
 PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
-#: A step turns the fastest motion by this angle at most: fewer than three steps in a turn show no motion. And there
-#: are at least so many.
+#: The largest angle by which a step may turn the fastest motion: fewer than three steps a turn do not resolve it. The
+#: least number of steps.
 MOST_TURN, LEAST_STEPS = 2.0, 24
-#: Coordinates up to which all eigenvalues are computed; of more the growth of one vector, from the one to the other of
-#: these times that the derivative is applied to it, which lies somewhat below the largest.
+#: The largest dimension at which all eigenvalues are computed. Above it, the growth of one vector is measured between
+#: these two numbers of applications of the derivative; that lies somewhat below the largest eigenvalue.
 DENSE, SETTLING, FOLLOWED = 256, 8, 16
 
 
 def scales(problem: Problem, method: Candidate) -> tuple[float, float]:
-    """The time over which candidates are scanned, and the largest step that shows the motion."""
+    """Return the time over which candidates are scanned, and the largest step that resolves the motion."""
     h = problem.step
     few = steps_in(min(problem.horizon, 500 * h), h)
     states = method.rows(h, few, max(1, few // 16))
@@ -37,7 +37,7 @@ def scales(problem: Problem, method: Candidate) -> tuple[float, float]:
 
 
 def motion(solver: Backend, parameters: Mapping[str, Any], *, monitored: bool) -> Callable[[Floats], Floats]:
-    """The vector field at states (rows, DIM), in what steps are equal in: in τ, or in t."""
+    """Return the vector field at states (rows, DIM), per unit of the time in which steps are equal: τ or t."""
 
     def slope(x: Floats) -> Floats:
         velocity: Floats = solver.vector_field(x, parameters)

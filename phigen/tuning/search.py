@@ -1,7 +1,4 @@
-"""The choice: which step reaches an accuracy, which candidates to try next, which of them is the cheapest.
-
-Nothing here measures anything: all are functions of measured points.
-"""
+"""Choice of steps and candidates from measured points: the step for an accuracy, the next candidates, the cheapest."""
 
 from __future__ import annotations
 
@@ -13,19 +10,19 @@ from itertools import pairwise
 from phigen.tuning.settings import Setting, direct, variants
 from phigen.tuning.trials import ROUNDING, Point
 
-#: The factor between step sizes of a scan, and how many there are at most.
+#: The factor between step sizes of a scan, and their largest number.
 FINER, MOST_POINTS = math.sqrt(2.0), 48
 #: Steps below the first guess that may fail.
 FAILURES = 16
-#: A scan goes on to this part of the accuracy, for the picture.
+#: A scan continues to this fraction of the accuracy, for the figure.
 BEYOND = 1 / 30
-#: The step aims at this part of the accuracy, since the largest error of a longer run is a little larger.
+#: The step is chosen for this fraction of the accuracy, since the largest error of a longer run is a little larger.
 AIM = 0.8
-#: Smaller steps are tried until one costs so much more than the cheapest: their iterations may be fewer.
+#: Smaller steps, which may need fewer iterations, are tried until one costs this many times as much as the cheapest.
 DEARER = 1.25
 #: Bi-realisations this many times as expensive as the best are not followed to other orders.
 KEEP = 3.0
-#: Halving the step twice gains at least this factor, unless errors are rounding.
+#: Halving the step twice reduces errors at least by this factor, unless they are rounding errors.
 GAIN = 1.5
 
 
@@ -33,7 +30,7 @@ GAIN = 1.5
 class Curve:
     """Measurements of one method: points from coarse to fine. ``setting`` is None for a classical method.
 
-    ``bounded`` says whether its energy error is: of Poisson maps, not of truncated ones and classical methods.
+    ``bounded`` tells whether its energy error is bounded: true of Poisson maps only.
     """
 
     label: str
@@ -59,16 +56,20 @@ class Curve:
 
     @property
     def largest(self) -> float:
-        """The largest step that could be made over the whole time, 0 if none."""
+        """The largest step with which the whole time was integrated, 0 if none."""
         return max((p.step for p in self.points), default=0.0)
 
     def cost(self, accuracy: float) -> float:
-        """Nanoseconds of a unit of time at an accuracy: measured, or by the order from the finest step; else inf."""
+        """Nanoseconds per unit of time at an accuracy: measured, or extrapolated by the order from the finest step;
+        else inf.
+        """
         return cheapest_step(self.points, accuracy, self.order)[1]
 
 
 def _floor(points: Sequence[Point]) -> int:
-    """The index of the point with the smallest error, beyond which rounding grows; the last of all without rounding."""
+    """The index of the point with the smallest error: finer steps have more rounding. The last point if there is none
+    such.
+    """
     least = min((p.error for p in points), default=0.0)
     return next(
         (i for i, p in enumerate(points) if p.error <= 2 * least and at_floor(points[: i + 1])), len(points) - 1
@@ -76,7 +77,7 @@ def _floor(points: Sequence[Point]) -> int:
 
 
 def at_floor(points: Sequence[Point]) -> bool:
-    """Whether the last points show rounding only: halving the step has gained next to nothing, at small errors."""
+    """Whether the last points show rounding errors only: errors are small, and halving the step hardly reduced them."""
     if points and points[-1].rounding > points[-1].error / 2:
         return True
     if len(points) < 3:
@@ -86,7 +87,7 @@ def at_floor(points: Sequence[Point]) -> bool:
 
 
 def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | None:
-    """The largest step whose error is the accuracy: between two measured ones, or by the order beyond the finest.
+    """The largest step whose error is the accuracy: interpolated, or extrapolated by the order below the finest step.
 
     None if no step reaches it, as far as can be told.
     """
@@ -99,7 +100,7 @@ def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | No
     first = len(points)
     while first > 0 and points[first - 1].error <= accuracy:
         first -= 1
-    if first == len(points):  # a coarse step meets it by chance, the finest does not
+    if first == len(points):  # a coarse step meets the accuracy by chance, the finest does not
         return _beyond(points, accuracy, order)
     if first == 0:
         return points[0].step
@@ -107,7 +108,7 @@ def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | No
 
 
 def _beyond(points: Sequence[Point], accuracy: float, order: int) -> float | None:
-    """The step below the finest at which the error should be the accuracy; None if rounding is in the way."""
+    """The step below the finest at which the error should be the accuracy; None if rounding errors exceed it."""
     last = points[-1]
     if at_floor(points) or accuracy < max(ROUNDING, last.rounding):
         return None
@@ -117,7 +118,7 @@ def _beyond(points: Sequence[Point], accuracy: float, order: int) -> float | Non
 def cheapest_step(points: Sequence[Point], accuracy: float, order: int) -> tuple[float, float]:
     """The step that meets the accuracy at the least cost, and that cost in nanoseconds per unit of time; or 0 and inf.
 
-    That need not be the largest: at a smaller one the predicted solution may be so good that an iteration less does.
+    The cheapest step need not be the largest: smaller steps have better predictors, and may save an iteration.
     """
     largest = step_for(points, accuracy, order)
     if largest is None:
@@ -137,7 +138,7 @@ def _between(coarse: Point, fine: Point, accuracy: float) -> float:
 
 
 def nanoseconds_at(points: Sequence[Point], step: float) -> float:
-    """The time of one step, between measured ones; that of the nearest outside."""
+    """The time of one step: interpolated between measured steps, that of the nearest one outside them."""
     listed = sorted(points, key=lambda p: p.step)
     for low, high in pairwise(listed):
         if low.step <= step <= high.step:
@@ -155,7 +156,7 @@ def scan(
     worth: float = math.inf,
     patience: Callable[[], bool] = lambda: True,
 ) -> tuple[Point, ...]:
-    """Points from the largest step that can be made, at most ``most``, down to the accuracy and to the cheapest step.
+    """Measure points from the largest possible step, at most ``most``, down to the accuracy and to the cheapest step.
 
     Ends early where the accuracy would cost more than ``worth`` nanoseconds per unit of time, where rounding is all
     that is left, and when ``patience`` is gone.
@@ -177,7 +178,9 @@ def scan(
 
 
 def _enough(points: Sequence[Point], accuracy: float) -> bool:
-    """Whether steps are fine enough for the accuracy, and finer ones cost more; or rounding is all that is left."""
+    """Whether the scan is complete: the accuracy is reached and finer steps cost more, or only rounding errors are
+    left.
+    """
     last = points[-1]
     costs = [p.cost for p in points if p.error <= accuracy]
     if at_floor(points) and not costs:
@@ -189,7 +192,7 @@ def _enough(points: Sequence[Point], accuracy: float) -> bool:
 def _refined(
     points: list[Point], measure: Callable[[float], Point | None], step: float | None, patience: Callable[[], bool]
 ) -> list[Point]:
-    """The points with one more between them, unless one is there already."""
+    """Insert one point between the points, unless it is there already."""
     if not points or not step or not points[-1].step < step < points[0].step or not patience():
         return points
     if any(abs(math.log(p.step / step)) < 0.02 for p in points):
@@ -201,7 +204,7 @@ def _refined(
 def _coarsest(
     measure: Callable[[float], Point | None], first: float, most: float, patience: Callable[[], bool]
 ) -> list[Point]:
-    """The largest step that can be made, to a factor `FINER`, from a first guess; empty if there is none near it."""
+    """Find the largest possible step, to a factor `FINER`, from a first guess; empty if there is none near it."""
     step, point = first, measure(first)
     for _ in range(FAILURES):
         if point is not None or not patience():
@@ -232,10 +235,10 @@ def _hopeless(points: Sequence[Point], accuracy: float, order: int, worth: float
 
 
 def proposals(tried: Mapping[Setting, Curve], refused: Sequence[Setting], accuracy: float) -> list[Setting]:
-    """The settings to try next, the most promising first; empty when none is.
+    """Return the settings to try next, the most promising first; empty if none is promising.
 
-    A bi-realisation that is not far behind the best goes to the next higher order while that pays, then to the next
-    lower one; the best is also tried without gauge and composed.
+    A bi-realisation whose cost is near the best is tried at the next higher order while that pays, then at the next
+    lower one; the best is also tried without gauge and as a composition.
     """
     costs = {setting: curve.cost(accuracy) for setting, curve in tried.items()}
     families: dict[Setting, dict[int, float]] = {}
@@ -262,7 +265,7 @@ def proposals(tried: Mapping[Setting, Curve], refused: Sequence[Setting], accura
 
 
 def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Setting]) -> list[Setting]:
-    """The next higher order, if it was not tried and not refused; else the next lower one."""
+    """Return the next higher order if it was neither tried nor refused, else the next lower one."""
     above = [k for k in best.orders if k > best.order]
     below = [k for k in best.orders if k < best.order]
     closed = {s.order for s in refused if s.family == best.family}
@@ -274,7 +277,7 @@ def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Se
 
 
 def rounded_down(step: float, digits: int = 3) -> float:
-    """The step with so few digits that it can be read, never larger."""
+    """Round a step down to few digits."""
     exponent = math.floor(math.log10(step)) - digits + 1
     rounded = float(f"{math.floor(step / 10.0**exponent + 1e-9)}e{exponent}")
     return rounded if rounded <= step else step

@@ -17,27 +17,27 @@ from phigen.spec.names import BIREALISATIONS, LOGARITHMIC
 from phigen.splitting.parts import split as split_in_parts
 from phigen.symbolic.expression import Expression, symbol
 
-#: Stands for the choice of the spec where it has no name: formulas, or options of a kind.
+#: The name of a choice of the spec that has no name of its own: formulas, or options of a kind.
 OWN = "as in the spec"
 
 #: Orders of direct series; canonical-euler is also explicit at order 1, for separable H.
 ORDERS = tuple(range(2, limits.ORDER + 1, 2))
 
-#: The scheme that needs no bi-realisation, which stands in the place of its kind.
+#: Splitting needs no bi-realisation; this name takes the place of its kind.
 SPLITTING = "splitting"
 
-#: So does this; the orders that are tried of it.
+#: The same for Gauss collocation; the orders that are tried.
 GAUSS = "gauss"
 GAUSS_ORDERS = (4, 8, 12, 16)
 
-#: So does the choice among the schemes by their expected cost.
+#: The same for the choice among all schemes by their expected cost.
 AUTO = "auto scheme"
 
-#: Methods for near-integrable systems that are tried, with their orders: the best of each set of errors, by powers of
-#: ε and h, and the one with a corrector, whose steps are the cheapest.
+#: Candidate methods for near-integrable systems, with their orders: the best for each set of error terms in ε and h,
+#: and the method with a corrector, whose steps are the cheapest.
 NEAR_INTEGRABLE = (("saba-8-2", 2), ("wisdom-holman-17", 2), ("aba-8-4", 4), ("aba-10-6-4", 4))
 
-#: Kinds that need formulas of the user, and those with choices of their own.
+#: Kinds that need formulas of the user, and kinds with options.
 FORMULAS = ("custom", "group-map", "spray")
 CHOICES = ("auto", "canonical-euler", "product", "pullback")
 _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("pullback", "cayley"))
@@ -45,10 +45,11 @@ _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("p
 
 @dataclass(frozen=True, order=True)
 class Setting:
-    """One way to solve a system; ``kind`` and ``gauge`` may be `OWN`. ``of`` is that of products and pull-backs.
+    """A bi-realisation, order, gauge, composition and scheme; ``kind`` and ``gauge`` may be `OWN`. ``of`` is the inner
+    kind of products and pull-backs.
 
     A splitting has the kind `SPLITTING`, no gauge, and the composition ``auto``; Gauss collocation the kind `GAUSS`.
-    ``monitor`` is that of the spec if it is empty.
+    An empty ``monitor`` stands for that of the spec.
     """
 
     kind: str
@@ -70,7 +71,7 @@ class Setting:
 
     @property
     def orders(self) -> tuple[int, ...]:
-        """The orders there are in its family."""
+        """The orders that its family has."""
         if self.is_splitting:
             return tuple(choosing.orders(self.composition))
         if self.is_gauss:
@@ -102,7 +103,7 @@ class Setting:
         return "auto" if self.kind == AUTO else self.kind if self.kind in (SPLITTING, GAUSS) else "series"
 
     def lines(self) -> list[str]:
-        """The top-level lines of a spec that ask for it; what is `OWN` stays as it is there."""
+        """The top-level lines of a spec that request the setting; `OWN` leaves the lines of the spec as they are."""
         kind = "auto" if self.scheme != "series" else self.kind
         named = kind if self.of == "auto" else f"{{kind: {kind}, of: {self.of}}}"
         lines = [f"scheme: {self.scheme}"]
@@ -150,16 +151,17 @@ def own_setting(compilation: Compilation) -> Setting:
 
 
 def charts(system: System, current: Setting) -> list[Setting]:
-    """Settings to begin with: one of order 4 for each bi-realisation that might apply, the spec's own at more orders.
+    """The first settings: one of order 4 for each bi-realisation that might apply, and the spec's own at several
+    orders.
 
-    Left out are those that need formulas of the user, and Karasev's paths where π is linear or constant: there its
-    maps are those of a closed form. Which of the others apply, building them shows.
+    Kinds that need formulas of the user are omitted, and Karasev's paths for constant or linear π, for which the same
+    maps have closed forms. Building the others shows which of them apply.
     """
     linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
     plain = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]
     named = [Setting(kind, 4) for kind in plain if not (kind == "karasev" and linear)]
     nested = [Setting(kind, 4, of=of) for kind, of in _NESTED]
-    # The other side is the adjoint, whose errors are the same in reversed time.
+    # The other side is the adjoint, with the same errors in reversed time.
     euler = [Setting("canonical-euler", order) for order in (1, 4)]
     composed = _near_integrable(system)
     split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
@@ -170,7 +172,7 @@ def charts(system: System, current: Setting) -> list[Setting]:
 
 
 def _near_integrable(system: System) -> list[Setting]:
-    """Splittings of H = A + εB with the methods for these; none if H is no such sum."""
+    """Splittings of H = A + εB with methods for near-integrable systems; empty if H is no such sum."""
     try:
         small = split_in_parts(system).small
     except PhigenError:
@@ -179,12 +181,12 @@ def _near_integrable(system: System) -> list[Setting]:
 
 
 def direct(setting: Setting) -> str:
-    """The composition of the plain methods of its kind."""
+    """The composition that the plain methods of its kind use."""
     return "auto" if setting.is_splitting or setting.composition == "auto" else "none"
 
 
 def variants(best: Setting, gauged: bool, symmetric: bool) -> list[Setting]:
-    """The same bi-realisation at about the same order otherwise: without gauge, or composed."""
+    """Variants of a bi-realisation at about the same order: without gauge, or as a composition."""
     variations = [replace(best, gauge="none")] if gauged else []
     if symmetric and direct(best) == "none":
         recommended = {c.order: c.name for c in reversed(COMPOSITIONS)}

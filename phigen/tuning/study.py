@@ -1,4 +1,4 @@
-"""The whole of tuning one run of a spec: search, confirm, compare."""
+"""Tuning of one run of a spec: search, confirmation, comparison."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import Point
 from phigen.tuning.tuner import Notify, TimeBudget, Tuner
 
-#: The share of the budget that one confirming run may take, how many times as much if it must, the attempts at a step.
+#: The share of the budget for one confirming run, the factor by which it may be exceeded, the attempts at a step.
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
-#: Finalists, how far behind the best they may be, and the rounds in which all are timed in turn.
+#: The number of finalists, their largest cost relative to the best, and the rounds in which all are timed in turn.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
-#: The share of the budget that monitors are tried for, beyond it.
+#: The time for monitors, as a share of the budget and in addition to it.
 MONITORS = 0.5
-#: Costs this close are equal: then the lower order wins.
+#: Costs within this factor count as equal: then the lower order wins.
 EQUAL = 1.1
 
 
 @dataclass(frozen=True)
 class Finalist:
-    """A method at the step proposed for it: confirmed over ``point.time``, and timed beside the others.
+    """A method at its proposed step, confirmed over ``point.time``, and timed together with the others.
 
     ``seconds`` are the CPU seconds of a unit of time, one for each round.
     """
@@ -56,8 +56,8 @@ class Tuning:
     step; ``peers`` are classical methods at the accuracy, those that reach it. Scans were made over ``piece`` of the
     ``horizon``. ``refused`` tells why other candidates were not measured; ``finished`` whether no more seemed worth
     trying; ``orbit_error`` that of the best over the piece where the energy was measured, None if that is unknown.
-    ``unit`` is what errors of the energy are counted in; ``monitors`` what monitors would gain, where the spec has none
-    and the motion is fast at times. ``sizes`` are those of the lattice that was measured, nothing of other systems.
+    ``unit`` is the unit of energy errors; ``monitors`` are the gains of monitors, if the spec has none and the speed of
+    the motion varies much. ``sizes`` are those of the measured lattice, empty for other systems.
     Times are those of the ``clock``, t or τ.
     """
 
@@ -81,7 +81,7 @@ class Tuning:
 
     @property
     def automatic_ratio(self) -> float:
-        """The time of the best method by that scheme, in times of the proposal; infinite if none has the accuracy."""
+        """Time of the best method of that scheme relative to the proposal; infinite if none reaches the accuracy."""
         costs = [c.cost(self.accuracy) for c in self.curves if c.setting and c.setting.scheme == self.automatic]
         best = min((c.cost(self.accuracy) for c in self.curves if c.setting), default=math.inf)
         return min(costs, default=math.inf) / best
@@ -129,7 +129,7 @@ def tune(
 
 
 def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
-    """Gains of monitors over the time of a scan; None where the speed of the motion varies little."""
+    """Measure the gains of monitors over the time of a scan; None if the speed of the motion varies little."""
     compilation, problem = tuner.compilation, tuner.problem
     spec, setting = compilation.spec, current.setting
     if spec.monitor is not None or not problem.evens_out or setting is None:
@@ -168,7 +168,7 @@ def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
 
 
 def final(tuner: Tuner, current: Curve) -> list[Finalist]:
-    """The best candidates and the spec's own setting, each at a step that was confirmed over a longer run."""
+    """Return the best candidates and the spec's own setting, each at a step that a longer run confirmed."""
     accuracy = tuner.accuracy
     finalists: list[Finalist] = []
     for curve in sorted(tuner.tried.values(), key=lambda c: c.cost(accuracy)):
@@ -183,9 +183,9 @@ def final(tuner: Tuner, current: Curve) -> list[Finalist]:
 
 
 def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
-    """The cheapest step, with few digits, measured over the horizon or as much of it as there is time for.
+    """Measure the cheapest step, rounded to few digits, over the horizon or the part for which there is time.
 
-    One that misses the accuracy is reduced, some times. None if that does not help.
+    A step that misses the accuracy is reduced a few times; None if none of them reaches it.
     """
     accuracy = tuner.accuracy
     method, measure = tuner.methods[curve.key], tuner.measures[curve.bounded]
@@ -219,7 +219,7 @@ def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
 
 
 def _present(tuner: Tuner, current: Curve) -> Finalist | None:
-    """The spec as it is, with the step of the run."""
+    """The spec's own setting at the step of the run."""
     h = tuner.problem.step
     span = confirming_span(tuner, current, h)
     point = tuner.measures[current.bounded](tuner.methods[current.key], h, span) if span else None
@@ -227,7 +227,7 @@ def _present(tuner: Tuner, current: Curve) -> Finalist | None:
 
 
 def time_all(finalists: Sequence[Finalist], tuner: Tuner) -> list[Finalist]:
-    """All timed in turn, round after round, so that a disturbance meets all alike."""
+    """Time all methods in turn, in several rounds, so that disturbances affect all of them alike."""
     seconds: list[list[float]] = [[] for _ in finalists]
     for _ in range(ROUNDS):
         for finalist, listed in zip(finalists, seconds, strict=True):

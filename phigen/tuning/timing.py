@@ -1,4 +1,4 @@
-"""Time of a step in a run of many."""
+"""The time of a step in a long run."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from phigen.tuning.problem import CompiledMethod
 
 #: The least duration of a measurement of time, in seconds.
 LEAST_SECONDS = 2e-3
-#: Steps that are timed: in the first part, in the largest first part of those that double, and in all.
+#: Numbers of steps that are timed: in the first part, in the largest of the doubled first parts, and in total.
 FEW_STEPS, PART_STEPS, TIMED_STEPS = 64, 4096, 32_768
 
 
 def nanoseconds_per_step(method: CompiledMethod, h: float, steps: int) -> float:
     """CPU time on this thread of one of the steps of a run, the fastest of some; NaN if they cannot be made.
 
-    Without what is done once, such as choosing a gauge, and without the call from Python.
+    Excludes setup that happens once, such as the choice of a gauge, and the call from Python.
     """
     fastest = call = math.inf
     spent = 0.0
@@ -37,8 +37,8 @@ def nanoseconds_per_step(method: CompiledMethod, h: float, steps: int) -> float:
 def _run_seconds(walk: Callable[[int], object], steps: int) -> tuple[float, float]:
     """The seconds that were taken, and those that all steps of a run would take.
 
-    Of a long run only so many are made that the rest should be as fast as the last of them: a solver in C first learns
-    the motion, then foresees it, and goes on in blocks of steps, several times as fast.
+    Long runs are timed in part, until their steps are as fast as the rest will be: a solver in C first fits its
+    predictor, then goes on in blocks of steps, several times as fast.
     """
     seconds, done, part = 0.0, 0, min(FEW_STEPS, steps)
     while True:

@@ -1,4 +1,4 @@
-"""Errors of a method at one step size, over a piece of a run, and what they mean for all of it."""
+"""Errors of a method at one step size over a part of a run, extrapolated to the whole run."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from phigen.tuning.timing import nanoseconds_per_step
 
 #: Times at which an orbit is compared.
 MARKS = 256
-#: One rounding moves the energy by about this much, relatively; over n steps they add up like a random walk.
+#: The relative change of the energy by one rounding; over n steps roundings add up like a random walk.
 ROUNDING = 1.1e-16
-#: Errors that grow faster than this power of time are those of chaotic motion; and slower than that they are linear,
-#: but for oscillations.
+#: Errors that grow faster than this power of time are those of chaotic motion; slower than the second power, they are
+#: taken as linear apart from oscillations.
 LINEAR, STEADY = 1.8, 1.3
 
 
 @dataclass(frozen=True)
 class Point:
-    """One step size: the error measured over ``time``, what it means for the horizon, and the cost of a step.
+    """Measurements at one step size: the error over ``time``, the expected error at the horizon, and the cost of a
+    step.
 
     ``error`` is at the horizon, ``measured`` over the time. ``growth`` is the power of time with which it grows, NaN
-    where that cannot be told; ``rounding`` the part of the error that smaller steps do not reduce, as far as is known.
+    if that is unknown; ``rounding`` is the known part of the error that smaller steps do not reduce.
     """
 
     step: float
@@ -51,16 +52,16 @@ Measure = Callable[[CompiledMethod, float, float], Point | None]
 
 
 def marks(span: float, h: float) -> tuple[int, int]:
-    """A stride in steps, and how many of it fill a span with about `MARKS`: not more, since the solution may end."""
+    """Return a stride in steps, and the number of strides, about `MARKS`, that fill a span without exceeding it."""
     stride = max(1, round(span / h / MARKS))
     return stride, max(1, int(span / h / stride + 1e-9))
 
 
 def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
-    """The largest error of the energy on the way, in its unit.
+    """The largest energy error during the run, in its unit.
 
-    That of Poisson maps is ``bounded``: the same over the horizon, but for rounding. That of others grows with time
-    wherever it was seen to grow.
+    Energy errors of Poisson maps are ``bounded``: the same over the horizon, apart from rounding. Those of other
+    methods are extrapolated if they were seen to grow with time.
     """
     unit = problem.unit
 
@@ -75,7 +76,7 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
         largest = float(np.max(errors))
         if not math.isfinite(largest):
             return None
-        # A method that does not drift still shows what rounding does.
+        # Rounding errors remain even if a method does not drift.
         largest, time = max(largest, ROUNDING), steps * h
         growth = _growth(errors)
         ratio = max(problem.horizon / time, 1.0)
@@ -91,8 +92,8 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
 def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True) -> Measure:
     """The largest distance from a reference at about `MARKS` times, relative to the largest coordinate there is.
 
-    Up to the horizon the error of Poisson maps is taken to grow linearly in time, since that of their energy is
-    ``bounded``, unless it was seen to grow faster, as rounding does; that of others at least linearly.
+    Orbit errors of Poisson maps are extrapolated linearly in time, since their energy errors are ``bounded``, unless
+    they were seen to grow faster, as rounding errors do; orbit errors of other methods at least linearly.
     """
 
     def measure(method: CompiledMethod, h: float, span: float) -> Point | None:
@@ -114,7 +115,7 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
 
 
 def _growth(errors: Floats) -> float:
-    """The power of time with which errors at equidistant times grow: from their maxima over halves of the run."""
+    """The power of time with which errors at equidistant times grow, from their maxima over the halves of the run."""
     if len(errors) < 5:
         return math.nan
     half = len(errors) // 2 + 1

@@ -19,12 +19,12 @@ from phigen.tuning.search import Curve
 from phigen.tuning.settings import SPLITTING, Setting, direct, own_setting
 from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, orbit_measure
 
-#: The share of the budget after which nothing more is built, that which one round of building may take, that which a
-#: first guess may be expected to take, and that of one scan and of one reference solution.
+#: Shares of the budget: after which no build starts; for one round of builds; for the expected time of a first guess;
+#: for one scan; and for one reference solution.
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
 #: The largest cost of a candidate relative to the best so far, and that of a classical method.
 WORTH, WORTH_KNOWING = 4.0, 100.0
-#: Classical methods beside which the result is shown: their names in tables, and orders.
+#: Classical methods that the result is compared with: their names in tables, and orders.
 PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
 
 Notify = Callable[[str], object]
@@ -37,7 +37,7 @@ class TimeBudget:
         self.budget, self.start = budget, time.perf_counter()
 
     def at(self, share: float) -> float:
-        """The time of `time.perf_counter` at which this share is used up."""
+        """The time, as of `time.perf_counter`, at which a share of the budget is used up."""
         return self.start + share * self.budget
 
     def left(self, share: float) -> float:
@@ -46,9 +46,10 @@ class TimeBudget:
 
 
 class Tuner:
-    """The state of a search. ``measures`` maps True to the measure of Poisson maps, False to that of other methods.
+    """The state of a search. ``measures`` maps True to the error measure of Poisson maps, False to that of other
+    methods.
 
-    ``piece`` is the time over which candidates are scanned, ``most`` the largest step that is of use, ``referring``
+    ``piece`` is the time over which candidates are scanned, ``most`` the largest useful step, ``referring`` tells
     whether orbits are compared with a reference.
     """
 
@@ -75,7 +76,7 @@ class Tuner:
         self._state = problem.start.copy()
 
     def start(self, measure: str) -> Curve:
-        """Scan the spec's own setting: it gives the scales of the search, and what to compare with.
+        """Scan the spec's own setting, which sets the scales of the search and the cost to beat.
 
         ``measure`` is ``energy`` or ``orbit``. Raises `CheckError` if there is no reference for the orbit, and
         `StepError` if no step can be made at all.
@@ -93,7 +94,7 @@ class Tuner:
         return curve
 
     def search(self, current: Curve) -> bool:
-        """Try candidates until none promises more, True, or the time is up."""
+        """Try candidates; true if none promises more, false if the time is up."""
         assert current.setting is not None
         guesses = self.problem.guesses(current.setting)
         limit = GUESSING * self.clock.budget
@@ -131,7 +132,7 @@ class Tuner:
         return curves
 
     def try_all(self, settings: Sequence[Setting]) -> None:
-        """Build settings side by side; when all is still, measure them."""
+        """Build settings in parallel; measure them when all builds have ended."""
         outcomes: dict[Setting, Outcome] = {s: self._made[s] for s in settings if s in self._made}
         until = min(self.clock.at(SEARCHING), time.perf_counter() + BUILDING * self.clock.budget)
         affordable = self._affordable([s for s in settings if s not in self._made])
@@ -167,7 +168,7 @@ class Tuner:
         return orbit_error(states, stride * h, self._classical("dop853"), self.problem.step, seconds)
 
     def _affordable(self, settings: Sequence[Setting]) -> list[Setting]:
-        """Without those that would not be built in time, as orders below let expect."""
+        """Drop the settings whose builds would take too long, as estimated from lower orders."""
         affordable = []
         for setting in settings:
             expected = expected_seconds(setting, self.tried.values())
@@ -187,7 +188,7 @@ class Tuner:
 
     @property
     def _raced(self) -> race.Race:
-        """The classical methods, made when they are first asked for."""
+        """The classical methods, compiled at the first use."""
         if self._race is None:
             self._race = self.problem.classical(self.compilation, list(PEERS), self._state)
         return self._race
@@ -196,7 +197,7 @@ class Tuner:
         return Classical(self._raced.runners[name], self._state, self.problem)
 
     def _refer(self, setting: Setting, method: Candidate) -> None:
-        """Measure orbits from now on: against a solver of higher order, where there is one, confirmed by DOP853."""
+        """Measure orbit errors from now on, against a solver of higher order if there is one, confirmed by DOP853."""
         problem, until = self.problem, time.perf_counter() + BUILDING * self.clock.budget
         high = replace(setting, order=max(setting.order, 8), composition=direct(setting))
         others = [s for s in (Setting(SPLITTING, 8, "none", "auto"), high) if s != setting]
@@ -216,7 +217,7 @@ class Tuner:
             _expect_linear(self.measures[True], method, problem, self.piece)
 
     def _reference(self, method: CompiledMethod) -> Reference:
-        """The reference over the piece, which becomes shorter where rounding or chaos do not allow so much."""
+        """Compute the reference over the piece, which is shortened if rounding or chaos prevent it."""
         problem, other, seconds = self.problem, self._classical("dop853"), REFERRING * self.clock.budget
         step, clock = problem.step, problem.clock
         for shorter in (1, 4, 16):
@@ -232,7 +233,7 @@ class Tuner:
 
 
 def _unreachable(method: Candidate, problem: Problem) -> StepError:
-    """The error about a run that no step of the spec's own setting follows to its end."""
+    """The error for a run that the spec's own setting cannot complete at any step."""
     h = problem.step / 16
     until, status = method.reach(h, steps_in(problem.horizon, h))
     clock = problem.clock
@@ -244,7 +245,7 @@ def _unreachable(method: Candidate, problem: Problem) -> StepError:
 
 
 def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, piece: float) -> None:
-    """Raise CheckError if the error of the orbit grows too fast to say anything about a longer run."""
+    """Raise CheckError if the orbit error grows too fast to be extrapolated to a longer run."""
     h, clock = problem.step, problem.clock
     for _ in range(12):
         point = measure(method, h, piece)
@@ -262,7 +263,7 @@ def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, p
 def expected_seconds(setting: Setting, tried: Iterable[Curve]) -> float:
     """Estimated seconds of building, from lower orders of the same family, by a power of the order; else 0.
 
-    The code of compositions is of one length, but for the table of their stages.
+    The code of compositions has the same length at all orders, apart from the table of stages.
     """
     known = sorted((c.order, c.seconds) for c in tried if c.setting and c.setting.family == setting.family)
     below = [(order, seconds) for order, seconds in known if order < setting.order]
