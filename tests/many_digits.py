@@ -111,6 +111,46 @@ def _anomaly(t: Any, r: Any, eta: Any, beta: Any, mu: Any, _spin: Any) -> Any:
     return mpmath.findroot(residual, (high / 10**9, high), solver="anderson")
 
 
+def _amplitude(t: Any, p: Any, q: Any) -> Any:
+    """tan(φ/4)/√P for the amplitude φ of √P t, from Jacobi's functions."""
+    sn, cn = (mpmath.ellipfun(name, mpmath.sqrt(p) * t, m=q / p) for name in ("sn", "cn"))
+    return mpmath.tan(mpmath.atan2(sn, cn) / 4) / mpmath.sqrt(p)
+
+
+def _amplitude_integral(kind: str, t: Any, p: Any, q: Any) -> Any:
+    """The integral of S² from 0 to t, with ``kind`` sn, or of S²/D², with ``kind`` sd."""
+    return mpmath.quad(lambda u: mpmath.ellipfun(kind, mpmath.sqrt(p) * u, m=q / p) ** 2 / p, mpmath.linspace(0, t, 9))
+
+
+def _companion(coefficients: Any) -> Any:
+    """The matrix of the multiplication by x modulo xⁿ − Σ c_k x^k."""
+    matrix = mpmath.matrix(len(coefficients))
+    for k, c in enumerate(coefficients):
+        matrix[k, len(coefficients) - 1] = c
+        if k:
+            matrix[k, k - 1] = 1
+    return matrix
+
+
+def _remainder(k: int, t: Any, *a: Any) -> Any:
+    """The coefficient of x^k in the remainder of e^{tx} − 1 at division by p = x⁴ − Σ a_j x^j."""
+    return mpmath.expm(t * _companion(a))[k, 0] - (k == 0)
+
+
+def _quotient(k: int, t: Any, *a: Any) -> Any:
+    """The coefficient of x^k in g, where the remainder of e^{tx} at division by p² is that by p, and p·g."""
+    square = [
+        -sum((p[i] * p[n - i] for i in range(5) if 0 <= n - i < 5), mpmath.mpf(0))
+        for p in [[*(-c for c in a), mpmath.mpf(1)]]
+        for n in range(8)
+    ]
+    column = mpmath.expm(t * _companion(square))[:, 0]
+    g = [mpmath.mpf(0)] * 4
+    for n in (3, 2, 1, 0):
+        g[n] = column[4 + n] + sum((a[4 + n - m] * g[m] for m in range(n + 1, 4)), mpmath.mpf(0))
+    return g[k]
+
+
 _RULES: dict[str, Callable[..., Any]] = {
     "add": operator.add,
     "sub": operator.sub,
@@ -127,6 +167,11 @@ _RULES: dict[str, Callable[..., Any]] = {
     "inv0": lambda s: 1 / s if s > 0 else mpmath.mpf(0),
     **{f"phi{order}": partial(_phi, order) for order in range(3)},
     "anomaly": _anomaly,
+    "amplitude": _amplitude,
+    "amplitude1": partial(_amplitude_integral, "sn"),
+    "amplitude2": partial(_amplitude_integral, "sd"),
+    **{f"exprem{k}": partial(_remainder, k) for k in range(4)},
+    **{f"expquo{k}": partial(_quotient, k) for k in range(4)},
     **{
         name: partial(_entire, name)
         for name in ("cosroot", "sinroot", "sinroot1", "arcroot", "arcroot1", "exprel", "exprel1")

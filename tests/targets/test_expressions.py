@@ -36,6 +36,8 @@ ARGUMENTS |= {
 }
 ARGUMENTS |= {"atan2": (-x, y - z), "power": (z, y - 3 * x), "tanhalf": (call("sin", y), call("versin", y))}
 ARGUMENTS |= {"choose": (x - y, x * z, y - z), "anomaly": (x + y, z, x - y, y / 2 - x, y, x)}
+ARGUMENTS |= dict.fromkeys(("amplitude", "amplitude1", "amplitude2"), (z / 4, x + y, x))
+ARGUMENTS |= {f"{name}{k}": (z / 4, x, -y, x - y, x) for name in ("exprem", "expquo") for k in range(4)}
 
 #: Arguments of φ and its derivatives: near 0, farther, and beyond 16, of either sign.
 SPECIAL_ARGUMENTS = {"near": x / 5, "near-": -x / 5, "far": 9 * z - 20 * y, "far-": 17 * x - 20 * z}
@@ -49,6 +51,8 @@ NUMBERS += [Fraction(1, 10**39), Fraction(-1, 10**17), Fraction("0.1"), Fraction
 
 #: Relative to the value. φ' and φ'' occur in Newton matrices and in what multiplies a last correction, nowhere else.
 BOUNDS = {"phi1": 1e-13, "phi2": 1e-13, "sinroot1": 1e-14, "arcroot1": 1e-14, "exprel1": 1e-14}
+#: Those of elliptic integrals occur in derivatives; exponentials of matrices round at each doubling of t.
+BOUNDS |= {"amplitude1": 1e-14, "amplitude2": 1e-14, **{f"exprem{k}": 3e-15 for k in range(4)}}
 
 
 def binary(op, a, b):
