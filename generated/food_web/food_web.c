@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: bfd367c6af4047976861568ff13424908ce4ea36e8d369b159bcb78ea5859195
+ * body-sha256: cc830eb88ba31f528f7999771387dc8bbf36780699e222c8208a99270659439d
  */
 #include "food_web.h"
 #include <limits.h>
@@ -356,7 +356,7 @@ static void food_web_put_parameter(const food_web_solver *s, double *rows, const
 static void food_web_put_parameters(food_web_solver *s, const food_web_params *params)
 {
     food_web_put_parameter(s, s->x[1], params->k, 1.0);
-s->params.k = NULL;
+    s->params.k = NULL;
 }
 
 /* Copy the parameters at bonds, in the order of the bonds of each site. */
@@ -365,7 +365,7 @@ static void food_web_put_at_bonds(food_web_solver *s, const food_web_params *par
     for (int k = 0; k < s->bonds[s->sites]; ++k) {
         s->at_bonds[0][k] = params->A != NULL ? params->A[s->number[k]] : 1.0;
     }
-s->params.A = NULL;
+    s->params.A = NULL;
 }
 
 /* ---- The solver ---- */

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 8118d2425f9c16d5abdd79f868c08b5dc241de240885f9ef508fc2e1d460417b
+ * body-sha256: 3ecde85c000162724f93fcf2f4a6ee1d41b1eebc4bcdffc65086f3e2f0504190
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -599,7 +599,7 @@ static void heisenberg_put_parameter(const heisenberg_solver *s, double *rows, c
 static void heisenberg_put_parameters(heisenberg_solver *s, const heisenberg_params *params)
 {
     heisenberg_put_parameter(s, s->x[3], params->B, 0.2);
-s->params.B = NULL;
+    s->params.B = NULL;
 }
 
 /* ---- The solver ---- */

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: ad89e3d628d300d0f5f4263084990c08f335dff4ccedaf68c38879d733f43ca6
+ * body-sha256: edc7bfbd30ac9c4fe550ca176ee3e18c65afa2f56b83d9ad2559e9d8bf772f6e
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -330,7 +330,7 @@ static void point_vortices_put_parameter(const point_vortices_solver *s, double 
 static void point_vortices_put_parameters(point_vortices_solver *s, const point_vortices_params *params)
 {
     point_vortices_put_parameter(s, s->x[2], params->G, 1.0);
-s->params.G = NULL;
+    s->params.G = NULL;
 }
 
 /* ---- The solver ---- */

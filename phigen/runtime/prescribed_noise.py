@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+from phigen.runtime.forwarding import Forwarding
 from phigen.runtime.interface import Floats
 from phigen.runtime.session import Session
 
 
-class PrescribedNoise:
-    """A `phigen.runtime.session.Followed` whose k-th step takes row k of the increments (steps, draws)."""
+class PrescribedNoise(Forwarding[Session]):
+    """Session whose k-th step takes row k of the increments (steps, draws)."""
 
     def __init__(self, session: Session, increments: Floats) -> None:
-        self.session, self.increments = session, increments
-
-    @property
-    def steps(self) -> int:
-        """The number of successful steps since the start."""
-        return self.session.steps
+        super().__init__(session)
+        self.increments = increments
 
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps."""
@@ -25,20 +22,3 @@ class PrescribedNoise:
     def branch(self) -> PrescribedNoise:
         """Return an independent copy."""
         return PrescribedNoise(self.session.branch(), self.increments)
-
-    def state(self) -> Floats:
-        """See `Followed`."""
-        return self.session.state()
-
-    @property
-    def rounding(self) -> float:
-        """See `Followed`."""
-        return self.session.rounding
-
-    def time(self) -> float:
-        """See `Followed`."""
-        return self.session.time()
-
-    def element(self) -> Floats:
-        """See `Followed`."""
-        return self.session.element()

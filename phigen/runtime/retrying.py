@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from typing import Self
 
-from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.forwarding import Forwarding
+from phigen.runtime.interface import BackendError
 from phigen.runtime.session import Followed
 
 
-class Retrying:
-    """A `phigen.runtime.session.Followed` that repeats a failing step in 2, 4, …, 2^``most`` equal parts.
+class Retrying(Forwarding[Followed]):
+    """Session that repeats a failing step in 2, 4, …, 2^``most`` equal parts.
 
     Each part is a step of the method: a Poisson map that stays on the leaf. The product of the parts is a different
     map from a whole step; ``retried`` lists the numbers of the steps made in parts. ``steps`` counts whole steps.
     """
 
     def __init__(self, session: Followed, most: int) -> None:
-        self.session, self.most = session, most
+        super().__init__(session)
+        self.most = most
         self.retried: list[int] = []
         self._extra = 0  # steps of the session minus whole steps: a step in n parts adds n - 1
 
@@ -24,23 +26,6 @@ class Retrying:
     def steps(self) -> int:
         """The number of successful whole steps since the start."""
         return self.session.steps - self._extra
-
-    def state(self) -> Floats:
-        """A copy of the state (DIM,)."""
-        return self.session.state()
-
-    @property
-    def rounding(self) -> float:
-        """See `Followed`."""
-        return self.session.rounding
-
-    def time(self) -> float:
-        """See `Followed`."""
-        return self.session.time()
-
-    def element(self) -> Floats:
-        """See `Followed`."""
-        return self.session.element()
 
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` whole steps; raises `BackendError` if one fails in every number of parts."""

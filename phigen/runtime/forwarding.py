@@ -1,0 +1,39 @@
+"""Sessions that make the steps of another session in a manner of their own."""
+
+from __future__ import annotations
+
+from typing import Generic, TypeVar
+
+from phigen.runtime.interface import Floats
+from phigen.runtime.session import Followed
+
+Inner = TypeVar("Inner", bound=Followed)
+
+
+class Forwarding(Generic[Inner]):
+    """A `phigen.runtime.session.Followed` with the state, the time and the attitude of its ``session``."""
+
+    def __init__(self, session: Inner) -> None:
+        self.session = session
+
+    @property
+    def steps(self) -> int:
+        """The number of successful steps since the start."""
+        return self.session.steps
+
+    @property
+    def rounding(self) -> float:
+        """See `Followed`."""
+        return self.session.rounding
+
+    def state(self) -> Floats:
+        """See `Followed`."""
+        return self.session.state()
+
+    def time(self) -> float:
+        """See `Followed`."""
+        return self.session.time()
+
+    def element(self) -> Floats:
+        """See `Followed`."""
+        return self.session.element()
