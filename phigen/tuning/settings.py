@@ -155,7 +155,7 @@ def charts(system: System, current: Setting) -> list[Setting]:
     orders.
 
     Kinds that need formulas of the user are omitted, and Karasev's paths for constant or linear π, for which the same
-    maps have closed forms. Building the others shows which of them apply.
+    maps have closed forms. Building the others shows which of them apply. Splittings and Gauss steps come first.
     """
     linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
     plain = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]
@@ -167,8 +167,9 @@ def charts(system: System, current: Setting) -> list[Setting]:
     split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
     split += [Setting(GAUSS, order, "none") for order in (8, 16)]
     first = [replace(current, order=order, composition=direct(current)) for order in (4, 8)]
-    others = [s for s in (*split, *named, *nested, *euler) if s.chart != current.chart]
-    return [s for s in (*first, *composed, *others) if s != current]
+    quick = [s for s in split if s.chart != current.chart]  # seconds to build, where series of order 8 may take minutes
+    others = [s for s in (*named, *nested, *euler) if s.chart != current.chart]
+    return [s for s in (*quick, *first, *composed, *others) if s != current]
 
 
 def _near_integrable(system: System) -> list[Setting]:
