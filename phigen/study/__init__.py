@@ -1,1 +1,1 @@
-"""Studies of runs: errors, orders, invariants, exponents, classical methods to compare with."""
+"""Studies of runs: errors, orders, invariants, Lyapunov exponents, and comparisons with classical methods."""

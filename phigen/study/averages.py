@@ -1,8 +1,8 @@
 """Time averages of observables along a run, with standard errors from block averages.
 
 Successive rows of a run are correlated, so the standard error of their mean is estimated from means of blocks that are
-longer than the correlation time. Blocks are doubled in length whenever there are twice as many as asked for (Flyvbjerg
-and Petersen, J. Chem. Phys. 91 (1989) 461), so the memory does not depend on the length of the run.
+longer than the correlation time. The length of the blocks is doubled whenever their number reaches twice the requested
+one (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461), so the memory does not depend on the length of the run.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from phigen.runtime.interface import Floats
 from phigen.spec.model import Run
 
-#: Blocks of rows for the standard error, where a run does not say how many. With 20 the standard error has itself a
+#: Default number of blocks for the standard error. With 20 blocks, the standard error itself has a
 #: relative standard deviation of 1/sqrt(2·19) = 0.16.
 BLOCKS = 20
 
@@ -25,8 +25,8 @@ BLOCKS = 20
 class Average:
     """Statistics of one observable over the rows of a run.
 
-    ``error`` is the standard error of the mean, NaN with fewer than two blocks, ``correlation_time`` the integrated
-    autocorrelation time in the time of the run, both estimated from blocks.
+    ``error`` is the standard error of the mean, NaN with fewer than two blocks. ``correlation_time`` is the integrated
+    autocorrelation time in the time unit of the run. Both are estimated from blocks.
     """
 
     mean: float
@@ -38,10 +38,10 @@ class Average:
 
 
 class Averages:
-    """Running averages of ``width`` observables; ``state`` has all of it, as arrays.
+    """Running averages of ``width`` observables; ``state`` is the complete state of the accumulation, as arrays.
 
-    Rows before the time ``after``, in the direction of the run, are left out. At least ``blocks`` blocks, and fewer
-    than twice as many, give the standard errors once there are so many rows.
+    Rows before the time ``after``, in the direction of the run, are left out. The standard errors come from ``blocks``
+    to 2·``blocks`` − 1 blocks as soon as there are at least ``blocks`` rows.
     """
 
     def __init__(
@@ -52,28 +52,28 @@ class Averages:
         self.state: dict[str, Any] = {
             "count": np.zeros((), dtype=np.int64),
             "mean": np.zeros(width),
-            "squares": np.zeros(width),  # the sum of squared deviations from the mean
+            "squares": np.zeros(width),  # sum of squared deviations from the mean
             "least": np.full(width, math.inf),
             "largest": np.full(width, -math.inf),
-            "sums": np.empty((0, width)),  # over the rows of each block
-            "open": np.zeros(width),  # the sum over the block that is not yet full
-            "size": np.ones((), dtype=np.int64),  # rows of a block
-            "times": np.full(2, math.nan),  # of the first and the last row
+            "sums": np.empty((0, width)),  # sums over the rows of each block
+            "open": np.zeros(width),  # sum over the block that is not yet full
+            "size": np.ones((), dtype=np.int64),  # rows per block
+            "times": np.full(2, math.nan),  # times of the first and the last row
         }
 
     @property
     def count(self) -> int:
-        """Number of rows taken in."""
+        """Number of rows accumulated."""
         return int(self.state["count"])
 
     @property
     def times(self) -> tuple[float, float]:
-        """The times of the first and the last row, NaN if there is none."""
+        """Times of the first and the last row; NaN if there are no rows."""
         first, last = self.state["times"].tolist()
         return first, last
 
     def see(self, t: Floats, rows: Floats) -> None:
-        """Take in rows (rows, width) at the times t (rows,), in the order of the run."""
+        """Accumulate rows (rows, width) at the times t (rows,), in the order of the run."""
         used = self._sign * t >= self._sign * self._after if math.isfinite(self._after) else np.full(len(t), True)
         t, rows = t[used], rows[used]
         if not len(rows) or not rows.shape[1]:
@@ -84,7 +84,7 @@ class Averages:
         self._block(rows, self.count - len(rows))
 
     def _moments(self, rows: Floats) -> None:
-        """Merge mean and variance of rows into those so far (Chan, Golub and LeVeque, 1979)."""
+        """Merge mean and variance of new rows into the accumulated ones (Chan, Golub and LeVeque, 1979)."""
         state, before = self.state, self.count
         after = before + len(rows)
         mean = rows.mean(axis=0)
@@ -99,7 +99,7 @@ class Averages:
         }
 
     def _block(self, rows: Floats, before: int) -> None:
-        """Add rows to the blocks; ``before`` rows were there already."""
+        """Add rows to the blocks, which already contain ``before`` rows."""
         while len(rows):
             size = int(self.state["size"])
             room = size - before % size
@@ -133,7 +133,7 @@ class Averages:
 
 
 def averages_of(run: Run, width: int) -> Averages:
-    """Return empty averages of ``width`` observables over the rows that the run says."""
+    """Return empty averages of ``width`` observables, over the rows that the run selects."""
     choice = run.average
     after = None if choice.after is None else float(choice.after)
     return Averages(width, after=after, backwards=run.step < 0, blocks=choice.blocks)

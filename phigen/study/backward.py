@@ -1,7 +1,8 @@
-"""Backward error analysis, measured: the modified Hamiltonian along trajectories of a solver.
+"""Measurement of the modified Hamiltonian (backward error analysis) along trajectories of a solver.
 
 A step is the exact flow of H̃ = H + h^p H_p + … . With m corrections, H̃ is constant along the numerical solution up to
-O(h^q), where q is the power of the first term left out: one order higher for each correction, two if it is symmetric.
+O(h^q), where q is the power of the first omitted term. Each correction raises q by one, or by two for a symmetric
+method.
 """
 
 from __future__ import annotations
@@ -21,24 +22,26 @@ from phigen.study.methods import Method
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
-#: Corrections of the modified Hamiltonian, and the largest order of a method for which they are computed.
+#: Number of corrections of the modified Hamiltonian, and the largest order of a method for which they are computed.
 CORRECTIONS, MOST_ORDER = 2, 6
-#: Steps at the largest step size; doublings of the run's step and halvings of the largest one that are tried.
+#: Steps made at the largest step size; number of doublings of the run's step and of halvings of the largest step that
+#: are tried.
 STEPS, DOUBLINGS, HALVINGS = 16, 8, 6
-#: Changes of H̃ below this part of the terms of H are of rounding; and those of H above that, of steps too large to
-#: tell an order.
+#: Changes of H̃ below the first fraction of the terms of H are rounding errors. Changes of H above the second fraction
+#: show that the steps are too large to determine an order.
 ROUNDING, ASYMPTOTIC = 1e-13, 1e-3
 
 
 class NotOfferedError(ValueError):
-    """There is no modified Hamiltonian of this method; the message says why."""
+    """Refusal: no modified Hamiltonian is offered for this method; the message says why."""
 
 
 @dataclass(frozen=True)
 class ModifiedHamiltonian:
-    """The terms of H̃ = Σ h^j terms[j], with values of all symbols but coordinates.
+    """Terms of H̃ = Σ h^j terms[j], in which all symbols except the coordinates have numerical values.
 
-    With m corrections these are the first powers[m] terms. ``hamiltonian`` is H, whose unit errors are in.
+    With m corrections, H̃ consists of the first powers[m] terms. ``hamiltonian`` is H, whose unit is that of the
+    errors.
     """
 
     terms: tuple[Expression, ...]
@@ -48,7 +51,7 @@ class ModifiedHamiltonian:
     values: Mapping[str, float]
 
     def errors(self, rows: Floats, h: float) -> Floats:
-        """|H̃(x_n) − H̃(x_0)| with 0, 1, … corrections along steps of size h, (corrections + 1, rows)."""
+        """Return |H̃(x_n) − H̃(x_0)| with 0, 1, … corrections along steps of size h, (corrections + 1, rows)."""
         values = {**self.values, **{c: rows[:, i] for i, c in enumerate(self.coordinates)}}
         terms = [np.broadcast_to(t, len(rows)) for t in evaluate(list(self.terms), values)]
         sums: Floats = np.array([sum(h**j * t for j, t in enumerate(terms[:power])) for power in self.powers])
@@ -56,12 +59,12 @@ class ModifiedHamiltonian:
         return errors
 
     def unit(self, x: Floats) -> Unit:
-        """The unit of the energy along trajectories from a state (DIM,)."""
+        """Return the unit of the energy along trajectories from a state (DIM,)."""
         (unit,) = units([self.hamiltonian], self.coordinates, self.values, x)
         return unit
 
     def changes(self, method: Method, x: Floats, h: float, steps: int) -> Floats:
-        """The largest of these errors within ``steps`` steps from x, (corrections + 1,). Raises `StepError`."""
+        """Return the largest of the `errors` within ``steps`` steps from x, (corrections + 1,). Raises `StepError`."""
         changes: Floats = self.errors(method.rows(x, h, steps, 1), h).max(axis=1)
         if not np.isfinite(changes).all():
             raise StepError("H̃ left the finite numbers", step=0, status="NOT_FINITE")
@@ -69,7 +72,7 @@ class ModifiedHamiltonian:
 
 
 def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: Floats | None) -> ModifiedHamiltonian:
-    """The modified Hamiltonian of a method with `CORRECTIONS` corrections. Raises `NotOfferedError`."""
+    """Return the modified Hamiltonian of a method with `CORRECTIONS` corrections. Raises `NotOfferedError`."""
     system, order = compilation.system, compilation.order
     if compilation.is_composed:
         raise NotOfferedError("a step is composed of several maps")
@@ -85,7 +88,7 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
         raise NotOfferedError("with forces a step is not the flow of a Hamiltonian")
     if order.order > MOST_ORDER:
         raise NotOfferedError(f"it is computed for orders up to {MOST_ORDER}")
-    # With numbers for the parameters there are fewer terms; but the series may have no place for their roots.
+    # Numerical parameters give fewer terms, but the series may not be able to represent their roots.
     chart = compilation.by_series().realisation
     exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
     for known in (exact, {}):
@@ -109,9 +112,9 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
 
 
 def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> list[float]:
-    """The powers of the step that the changes of H̃ with 0, 1, … corrections shrink like; infinity at rounding.
+    """Return the powers of h by which the changes of H̃ with 0, 1, … corrections shrink; infinity at rounding level.
 
-    Steps are doubled from the run's step ``h`` until the changes stand out from rounding.
+    The run's step ``h`` is doubled until the changes exceed the rounding errors.
     """
     observed, rounding = [math.inf] * len(hamiltonian.powers), ROUNDING * hamiltonian.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):
@@ -124,7 +127,7 @@ def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats,
         if doubling > 1 and coarse[0] > ASYMPTOTIC:
             break
         if fine[0] <= rounding:
-            continue  # what a solver conserves exactly tells nothing
+            continue  # an exactly conserved energy shows no order
         for m, (large, small) in enumerate(zip(coarse.tolist(), fine.tolist(), strict=True)):
             if math.isinf(observed[m]) and small > rounding:
                 observed[m] = math.log2(large / small)
@@ -133,10 +136,11 @@ def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats,
 
 @dataclass(frozen=True, eq=False)
 class Constancy:
-    """Changes of H̃ with 0, 1, … corrections: ``powers[m]`` is the power of the step expected of them.
+    """Changes of H̃ with 0, 1, … corrections; ``powers[m]`` is the expected power of the step with m corrections.
 
-    ``errors`` (corrections + 1, rows) are those at ``times`` (rows,), up to ``end``, of steps of size ``step``;
-    ``changes`` (sizes, corrections + 1) are the largest ones at the step sizes ``sizes``, the largest first.
+    ``errors`` (corrections + 1, rows) are the changes at ``times`` (rows,), up to ``end``, with steps of size ``step``.
+    ``changes`` (sizes, corrections + 1) are the largest changes for each of the step sizes ``sizes``, in descending
+    order.
     """
 
     powers: tuple[int, ...]
@@ -150,9 +154,9 @@ class Constancy:
 
 
 def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> Constancy:
-    """Measure the changes of H̃ at the largest steps that show an order, which may be larger than the run's.
+    """Measure the changes of H̃ at the largest steps that show an order. These steps may be larger than the run's step.
 
-    Raises `StepError`, and `NotOfferedError` if H itself changes by rounding only.
+    Raises `StepError`, and `NotOfferedError` if H itself changes only by rounding errors.
     """
     largest, most, rounding = h, 0.0, ROUNDING * hamiltonian.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):
@@ -167,7 +171,7 @@ def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: fl
         raise NotOfferedError("H itself changes by no more than rounding")
     sizes: Floats = largest / 2.0 ** np.arange(HALVINGS + 1, dtype=np.float64)
     changes = np.array([hamiltonian.changes(method, x, size, STEPS * 2**k) for k, size in enumerate(sizes.tolist())])
-    # The finest step at which even the last correction leaves more than rounding.
+    # The finest step at which the change of H̃ with all corrections still exceeds the rounding errors.
     telling = np.flatnonzero(changes[:, -1] > rounding)
     shown = float(sizes[telling[-1] if len(telling) else 0])
     rows = method.rows(x, shown, round(STEPS * largest / shown), 1)
@@ -179,5 +183,5 @@ def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: fl
 
 
 def truncation(m: int) -> str:
-    """H̃ with m corrections, in words."""
+    """Return the name of H̃ with m corrections."""
     return "H itself" if m == 0 else f"H̃ with {m} correction{'s' * (m > 1)}"

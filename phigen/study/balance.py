@@ -1,9 +1,9 @@
-"""The balance of energy where H depends on the time or forces act: H − ∫ P dt is constant along the motion, H is not.
+"""Energy balance where H depends on the time or forces act: H − ∫ P dt is constant along the motion, H is not.
 
-P = ∂_tH + ∇H·(πζ + f) is the power of the time and of the forces. The integral is taken along the stored states, from
-one to the next by Hermite's rule of order 8, which needs P and its first three derivatives along the motion at both
-ends, and nothing else: so it can be added up as states come, whatever they are apart. How much the rule of order 6
-differs tells how far the sum may be off.
+P = ∂_tH + ∇H·(πζ + f) is the power supplied by the explicit time dependence and by the forces. The integral is
+evaluated between successive stored states by Hermite's rule of order 8. The rule needs only P and its first three
+derivatives along the motion at both ends of an interval, so the integral accumulates as states arrive, at any spacing.
+The difference from the rule of order 6 estimates the error.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from phigen.geometry.system import System
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import ONE, Expression, gradient, total
 
-#: Weights of f, f′, … at both ends of an interval, in units of powers of its length: order 8, and order 6.
+#: Weights of f, f′, … at both ends of an interval of length 1, for the rules of order 8 and of order 6.
 FINE, COARSE = (1 / 2, 3 / 28, 1 / 84, 1 / 1680), (1 / 2, 1 / 10, 1 / 120, 0.0)
 
 
 def powers(system: System) -> list[Expression]:
-    """P and its derivatives along the motion; empty where H is an invariant, or noise works on it too."""
+    """Return P and its derivatives along the motion; empty where H is an invariant or noise changes H as well."""
     if not system.driven or system.noise:
         return []
     time_derivatives, field = [], [*system.vector_field(), *(ONE for _ in system.times)]
@@ -32,7 +32,9 @@ def powers(system: System) -> list[Expression]:
 
 
 def works(t: Floats, f: Floats) -> tuple[Floats, Floats]:
-    """∫ f dt over each interval between times (rows,), from f and derivatives (4, rows); and its possible error."""
+    """Return ∫ f dt over each interval between times (rows,), from f and its derivatives (4, rows), and the estimated
+    error.
+    """
     h = np.diff(t)
 
     def by(weights: tuple[float, ...]) -> Floats:

@@ -1,4 +1,4 @@
-"""Classical one-step methods of fixed step size, to compare with: they use the vector field only."""
+"""Classical one-step methods of fixed step size, for comparison; they use only the vector field."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Floats = NDArray[np.float64]
 Field = Callable[[Floats], Floats]
 Step = Callable[[Field, Floats, float], Floats]
 
-#: The largest number of iterations of the implicit midpoint rule; each gains a factor of order h.
+#: Largest number of fixed-point iterations of the implicit midpoint rule; each reduces the error by a factor O(h).
 _ITERATIONS = 100
 _TOLERANCE = 4e-16
-#: Steps between two pieces of a long run.
+#: Steps in one part of a long run.
 _PIECE = 500
 
 
@@ -48,7 +48,7 @@ def implicit_midpoint(f: Field, x: Floats, h: float) -> Floats:
         last, size = size, float(np.max(np.abs(following - change)))
         change = following
         floor = _TOLERANCE * float(np.max(np.abs(x)))
-        # At the level of rounding the corrections no longer shrink.
+        # At rounding level the corrections no longer shrink.
         if size <= floor or (size <= 100 * floor and size >= last):
             return x + change
         if not np.isfinite(size):
@@ -68,7 +68,7 @@ def _combination(stages: list[Floats], weights: Mapping[int, float]) -> Floats |
     return sum((w * stages[j] for j, w in weights.items()), 0.0)
 
 
-#: The methods by their name in a spec, and their order.
+#: Methods by their name in a spec, with their order.
 METHODS: Mapping[str, tuple[Step, int]] = {
     "euler": (euler, 1),
     "rk2": (rk2, 2),
@@ -79,7 +79,9 @@ METHODS: Mapping[str, tuple[Step, int]] = {
 
 
 def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, stride: int = 1) -> Floats:
-    """States (rows, DIM) of the steps 0, stride, 2·stride, … and the last; rows after a failure are NaN."""
+    """Return the states (rows, DIM) after 0, stride, 2·stride, … steps and after the last; rows after a failure are
+    NaN.
+    """
     rows = row_steps(steps, stride)
     pieces = [x for _, x in pieces_of(method, field, x0, h, rows.tolist())]
     states = np.full((len(rows), len(x0)), np.nan)
@@ -91,10 +93,10 @@ def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, strid
 def pieces_of(
     method: str, field: Field, x0: Floats, h: float, rows: Iterable[float]
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Numbers (rows,) of steps, from 0 on and increasing, and the states (rows, DIM) after these, in pieces.
+    """Yield parts of a run: increasing step numbers (rows,), from 0 on, and the states (rows, DIM) at these.
 
-    Those between two steps are reached by part of one, which the steps after it do not go on from. Ends with the last
-    finite row if the method fails.
+    A fractional step number is reached from the step before it by a shorter step, from which the run does not continue.
+    The run ends with the last finite row if the method fails.
     """
     step, _ = METHODS[method]
     x = np.array(x0, dtype=np.float64)
@@ -106,7 +108,7 @@ def pieces_of(
         whole = round(number) if abs(number - round(number)) <= 1e-12 * max(1.0, number) else int(number)
         while done < whole:
             with np.errstate(all="ignore"):
-                # Compensated, as phigen's solvers are: the comparison is about the methods.
+                # Compensated summation, as in phigen's solvers, so that the comparison concerns the methods only.
                 change = (step(field, x, h) - x) + carry
                 following = x + change
                 carry = change - (following - x)

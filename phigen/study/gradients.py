@@ -1,4 +1,4 @@
-"""Verification of gradients of runs: against tangent maps, and against differences of the runs."""
+"""Verification of gradients of runs against tangent maps and against finite differences of the runs."""
 
 from __future__ import annotations
 
@@ -15,31 +15,35 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 from phigen.symbolic.arrays import Floats
 
-#: The runs: they have rows within a block of eight steps, at its end, and after a last stride that is shorter.
+#: Length and stride of the runs: rows lie within a block of eight steps, at its end, and after a shorter last stride.
 STEPS, STRIDE = 11, 4
-#: A gradient and the transposed tangent maps are both exact to rounding, relative to their terms.
+#: Limit for the difference between a gradient and the transposed tangent maps, relative to their terms: both are exact
+#: to rounding.
 TRANSPOSED = 1e-12
-#: Differences of order 6, whose own error this bounds, are taken at two distances, in units of what is moved.
+#: Limit for the difference between a gradient and finite differences of order 6: the error of the latter. They are
+#: taken at two displacements, in units of the displaced quantity.
 DIFFERENCES = 1e-7
 _DISTANCES = (2e-3, 2e-3 / 256)
 _WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60), (-1, -3 / 4), (-2, 3 / 20), (-3, -1 / 60))
 _FORWARD_WEIGHTS = ((1, 6.0), (2, -15 / 2), (3, 20 / 3), (4, -15 / 4), (5, 6 / 5), (6, -1 / 6))
-#: Derivatives below this part of the function itself are compared with that: differences cannot resolve them.
+#: Derivatives below this fraction of the function value are measured relative to that fraction, as differences cannot
+#: resolve them.
 _LEAST = 1e-3
-#: Random directions along which a start is moved, and the most numbers that each have a tangent vector.
+#: Number of random directions in which a start is displaced, and the largest number of coordinates of which each has
+#: its own tangent vector.
 _DIRECTIONS, _MOST_COLUMNS = 3, 64
 
-#: Name, value, the largest value allowed, and what is wrong where it is larger.
+#: Name, value, limit, and the cause where the value exceeds the limit.
 Measured = tuple[str, float, float, str]
 
 
 @dataclass(frozen=True)
 class GradedRun:
-    """A short run of one target from ``x`` (numbers,), whose rows can be derived.
+    """Short differentiable run of one target from the state ``x`` (numbers,).
 
     ``rows(x, parameters)`` are the states (rows, numbers), ``pullback(bars)`` the cotangents of x and of the parameters
-    by name, ``carried(vectors)`` where tangent vectors (count, numbers) are at each row after the first. Numbers have
-    the ``units`` of what is usual of them.
+    by name. ``carried(vectors)`` are tangent vectors (count, numbers) propagated to each row after the first. ``units``
+    are typical magnitudes of the numbers of a state.
     """
 
     x: Floats
@@ -83,7 +87,7 @@ def of_solver(
 def of_lattice(
     solver: LatticeSolver, x: Floats, units: Floats, h: float, parameters: Mapping[str, Any], t0: float | None
 ) -> GradedRun:
-    """Return a run of a lattice from ``x`` (coordinates, *sizes); ``units`` are those of its numbers in this order."""
+    """Return a run of a lattice from ``x`` (coordinates, *sizes); ``units`` are typical magnitudes in this order."""
     about: dict[str, Any] = {"t0": t0}
 
     def carried(vectors: Floats) -> Floats:
@@ -104,9 +108,11 @@ def of_lattice(
 
 
 def measured(held: Sequence[GradedRun], free: Sequence[GradedRun], where: str = "") -> Iterator[Measured]:
-    """Yield how far the gradients of runs, one or more of each target, are from their tangent maps and differences.
+    """Yield the differences of gradients from tangent maps and from finite differences, for one or more runs of each
+    target.
 
-    ``held`` are runs that hold what tangent maps hold; ``free`` those whose gradient is that of the whole run.
+    The runs ``held`` keep constant the quantities that tangent maps keep constant; the gradient of the runs ``free``
+    covers the whole run.
     """
     apart = _largest(held, transposition_error)
     reason = f"the gradient is not the transpose of the tangent maps, {apart:.1e} off"
@@ -116,7 +122,7 @@ def measured(held: Sequence[GradedRun], free: Sequence[GradedRun], where: str = 
 
 
 def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> float:
-    """Return the largest error of all runs; infinite where one fails, or is not finite."""
+    """Return the largest error of all runs; infinity if a run fails or an error is not finite."""
     largest = 0.0
     for run in runs:
         try:
@@ -128,9 +134,9 @@ def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> 
 
 
 def transposition_error(run: GradedRun) -> float:
-    """Return how far ⟨bar, DΦ v⟩ is from ⟨DΦᵀ bar, v⟩, relative to the terms of the first.
+    """Return the difference between ⟨bar, DΦ v⟩ and ⟨DΦᵀ bar, v⟩, relative to the terms of the former.
 
-    The v are unit vectors, of many numbers some random ones.
+    The v are all unit vectors or, for states of many numbers, random vectors.
     """
     count = len(run.x)
     vectors = run.units * (np.eye(count) if count <= _MOST_COLUMNS else _directions(count, _DIRECTIONS))
@@ -144,9 +150,11 @@ def transposition_error(run: GradedRun) -> float:
 
 
 def difference_error(run: GradedRun) -> float:
-    """Return how far the gradient is from differences of the run, along random directions and each parameter.
+    """Return the error of the gradient against finite differences of the run, in random directions and for each
+    parameter.
 
-    Each derivative is taken relative to itself, or to a part of what is derived where it is small beside that.
+    The error of each derivative is relative to the derivative or, where it is small, to a fraction of the function
+    value.
     """
     x_bar, parameters_bar = run.pullback(run.bars)
     least = _LEAST * float(np.sum(np.abs(run.bars * run.rows(run.x, run.parameters))))
@@ -157,18 +165,18 @@ def difference_error(run: GradedRun) -> float:
     return worst
 
 
-#: The start and the parameters after a displacement.
+#: Displaced start and parameters as a function of the displacement.
 _Moved = Callable[[float], tuple[Floats, Mapping[str, Any]]]
 
 
 def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any]) -> Iterator[tuple[float, _Moved]]:
-    """Yield the derivatives that the gradient states, each with the motion that it is taken along."""
+    """Yield the directional derivatives that the gradient implies, each with its displacement."""
     for v in _directions(len(run.x), _DIRECTIONS) * run.units:
         yield float(x_bar @ v), lambda e, v=v: (run.x + e * v, run.parameters)  # type: ignore[misc]
     for name, bar in parameters_bar.items():
         value = np.asarray(run.parameters[name], dtype=np.float64)
         largest = float(np.max(np.abs(value), initial=0.0)) or 1.0
-        # Entries that must be positive may differ by powers of ten: each is moved by its own size.
+        # Entries that must be positive may differ by powers of ten, so each is displaced in proportion to its size.
         units = np.where(value != 0, np.abs(value), largest)
         v = units * (_directions(value.size, 1).reshape(value.shape) if value.ndim else np.ones(()))
         v = np.where(value != 0, v, np.abs(v))  # a parameter may have to be 0 or positive
@@ -179,16 +187,16 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
 
 
 def _differences(run: GradedRun, moved: _Moved) -> Iterator[float]:
-    """Yield the derivative along a motion by differences, at each distance where all runs can be made.
+    """Yield the derivative along a displacement by finite differences, for each distance at which all runs succeed.
 
-    Differences are central, or forward where runs on the other side fail.
+    Differences are central, or one-sided where runs on the other side fail.
     """
     middle = run.rows(run.x, run.parameters)
     for apart in _DISTANCES:
         for weights in (_WEIGHTS, _FORWARD_WEIGHTS):
             try:
                 changes = [(w, run.rows(*moved(k * apart)) - middle) for k, w in weights]
-            except (StepError, ValueError):  # past a singularity, or a parameter past its bound
+            except (StepError, ValueError):  # beyond a singularity or the bound of a parameter
                 continue
             yield float(sum(w * np.sum(run.bars * change) for w, change in changes)) / apart
             break
@@ -197,7 +205,7 @@ def _differences(run: GradedRun, moved: _Moved) -> Iterator[float]:
 def members_error(
     solver: Solver, states: Floats, units: Floats, h: float, parameters: Mapping[str, float], t0: float
 ) -> float:
-    """Return how far gradients of members side by side are from those of runs one by one, relative to the largest."""
+    """Return the relative difference between gradients of members run as one batch and gradients of single runs."""
     about: dict[str, Any] = {"t0": t0 if solver.interface.time else None, "parameters": parameters}
     bars = _directions(states.shape[1], len(states)) / units
     try:

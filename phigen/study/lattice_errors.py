@@ -18,18 +18,18 @@ from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
-#: Names of the energy error: of a conserved energy; of energy minus work; of an energy that changes.
+#: Names of the energy quantity: conserved energy; energy minus work; change of an energy that is not conserved.
 ENERGY, BALANCE, CHANGE = "energy", "energy balance", "change of the energy"
-#: Steps times sites up to which the work is integrated: it takes a second run, step by step.
+#: Largest number of steps times sites for which the work is integrated, as this takes a second run, step by step.
 MAX_BALANCED_SITE_STEPS = 20_000_000
 
 
 def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
-    """Return the distances of energy, Casimirs and invariants from their initial values, by name, each (frames,).
+    """Return the deviations of energy, Casimirs and invariants from their initial values, by name, each (frames,).
 
-    Energy and invariants are in the units of `units_of`. A Casimir of sites is reported at the site where it changed
-    most. If H depends on the time, or forces act, the work done is subtracted from the energy, unless the run is too
-    long, continues another, or has steps made in parts.
+    Energy and invariants are in the units of `units_of`. A Casimir of sites is reported at the site with the largest
+    change. If H depends on the time, or forces act, the work done is subtracted from the energy, unless the run is too
+    long, continues an earlier run, or contains steps split into parts.
     """
     errors = _of_energy(cell, run) | run.casimir_changes()
     for name, density in cell.invariants.items():
@@ -83,13 +83,13 @@ def _relative(values: Floats, unit: Unit) -> Floats:
 
 
 def summed(cell: Cell, density: Expression, x: Floats, parameters: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the sum of a density over the sites, and the sum of the magnitudes of its terms."""
+    """Return the sum of a density over the sites and the sum of the magnitudes of its terms."""
     sums = [_term(cell, term, x, parameters) for term in cell.additive_terms(density)]
     return float(sum(values.sum() for values in sums)), float(sum(np.abs(values).sum() for values in sums))
 
 
 def _term(cell: Cell, term: Expression, x: Floats, parameters: Mapping[str, Any]) -> Floats:
-    """Return the values of a term at all sites, 0 where it reaches beyond an open end."""
+    """Return the values of a term at all sites, 0 where its stencil reaches beyond an open end."""
     sizes = x.shape[1:]
     values: dict[str, Any] = {n: v for n, v in parameters.items() if np.ndim(v) == 0}
     for name, (base, offset) in cell.places(term).items():

@@ -1,4 +1,4 @@
-"""Strong orders of steps of lattices with noise, along common paths; each site follows a path of its own."""
+"""Strong orders of steps of lattices with noise, along common Wiener paths, with an independent path for each site."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from phigen.study.stochastic import BEYOND, LEVELS, SEED, SIGNS
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import ZERO
 
-#: Coarsest steps of a path.
+#: Number of the coarsest steps along a path.
 STEPS = 2
 
 
@@ -32,9 +32,10 @@ def strong_order(
     h: float,
     paths: int,
 ) -> float:
-    """The strong order: the slope of the errors of steps of h, h/2, h/4, … of the NumPy along some paths of all sites.
+    """Return the strong order: the slope of the errors of the NumPy solver with steps h, h/2, h/4, … along common
+    paths.
 
-    Errors are against the motion along each path joined by straight lines, which knows the vector fields only. ``x0``
+    Reference solutions follow the piecewise linear interpolation of each path and use only the vector fields. ``x0``
     has the shape (fields, *sizes), ``parameters`` are those of a solver. NaN where a step fails.
     """
     solver = lattice_solver_of(compilation, "numpy")
@@ -45,7 +46,7 @@ def strong_order(
     finest = STEPS << (LEVELS + BEYOND)
     random, errors = np.random.default_rng(SEED), np.zeros(LEVELS)
     for _ in range(paths):
-        # of each finest step as many increments as a step has parts
+        # one increment for each part of each finest step
         size = np.sqrt(abs(h) * STEPS / finest / parts)
         path = random.normal(size=(finest * parts, kinds, *x0.shape[1:])) * size
         end = _along_lines(solver, fields, x0, parameters, t0, h * STEPS / finest, path, parts)
@@ -62,7 +63,7 @@ def strong_order(
 
 
 def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any], t0: float | None, h: float) -> int:
-    """The number of steps from a state that fail with the largest possible increments."""
+    """Return the number of steps from a state that fail with the largest possible increments."""
     solver, noise = lattice_solver_of(compilation, "numpy"), compilation.program.noise
     assert noise is not None
     random, failed = np.random.default_rng(SEED), 0
@@ -78,7 +79,7 @@ def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any]
 
 
 def _field(spec: Spec, name: str) -> LatticeSolver:
-    """σ π∇g of a source as the vector field of a lattice."""
+    """Return the vector field σ π∇g of a noise source as a solver of a lattice."""
     source = spec.noise[name]
     quiet = replace(spec, hamiltonian=source.amplitude * source.hamiltonian, noise={}, forces=SpecForces(), order=2)
     quiet = replace(quiet, casimirs={}, invariants={}, runs={}, terms=None, composition="auto", scheme="auto")
@@ -97,7 +98,9 @@ def _along_lines(
     path: Floats,
     parts: int,
 ) -> Floats:
-    """The end of a path of increments (steps·parts, sources, *sizes) from x, by RK4 along each piece."""
+    """Return the end of a path with increments (steps·parts, sources, *sizes) from x, by one RK4 step for each
+    increment.
+    """
     drift, *spread = (_slope(s, x, parameters, t0) for s in (solver, *sources))
     begin = t0 or 0.0
     for k, dw in enumerate(path.reshape(-1, parts, *path.shape[1:]).sum(axis=1)):
@@ -116,7 +119,7 @@ def _along_lines(
 def _slope(
     solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any], t0: float | None
 ) -> Callable[[Floats, float], Floats]:
-    """The vector field of a solver in NumPy, without what is checked each time."""
+    """Return the vector field of a NumPy solver as a function that skips the argument checks of the public method."""
     session = _session(solver, x, parameters, t0)
 
     def slope(at: Floats, t: float) -> Floats:
@@ -129,5 +132,5 @@ def _slope(
 
 
 def _session(solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any], t0: float | None) -> Any:
-    """The NumPy of a lattice at a state."""
+    """Return a session of a NumPy solver at a state."""
     return solver.started(Beginning(x, 1.0, solver.values(parameters, {}, x.shape[1:]), t0 or 0.0))

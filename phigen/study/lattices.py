@@ -1,7 +1,7 @@
 """Verification of lattices: properties of their solvers, measured on a run and on small lattices.
 
-The Poisson identity is that of a lattice of a few sites: the statement about any size is proved, and this would show a
-sweep that is printed wrongly. Its sites start as some of the run.
+The Poisson identity is measured on a lattice of a few sites, which start with states of sites of the run. For all sizes
+the identity is proved; the measurement detects errors of the generated code.
 """
 
 from __future__ import annotations
@@ -29,25 +29,26 @@ from phigen.study.lattice_errors import BALANCE, CHANGE, ENERGY, MAX_BALANCED_SI
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification
 from phigen.symbolic.arrays import Floats, evaluate
 
-#: Steps times sites that a run is shortened to, and with ``quick``; frames of it.
+#: Largest number of steps times sites of a run, without and with ``quick``; longer runs are shortened. Number of
+#: frames.
 MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
-#: The largest error of energy in the last quarter of a run may be this many times that before.
+#: Limit for the ratio of the largest energy error in the last quarter of a run to that in the first three quarters.
 GROWTH = 4.0
-#: The Poisson identity on a small lattice, with exact tangent maps; and these against differences of order 6.
+#: Limits for the Poisson identity on a small lattice, and for exact tangent maps against differences of order 6.
 IDENTITY, DIFFERENCES = 1e-12, 1e-9
-#: Sites of runs up to which gradients are measured on all of them.
+#: Largest number of sites for which gradients are measured on the whole lattice.
 MOST_GRADED = 16384
-#: Sites along each axis where paths of a noise are followed, with one, two and three axes.
+#: Sites along each axis in measurements of the strong order, for lattices with one, two and three axes.
 SOME = (32, 6, 4)
-#: Paths of single sites that are followed, with ``quick`` and without.
+#: Number of Wiener paths of single sites in these measurements, with ``quick`` and without.
 FEW_PATHS, MANY_PATHS = 32, 96
-#: The part of the sentence about the units of errors that concerns Casimirs of sites.
+#: Sentence about the errors of Casimirs of sites.
 WORST_SITE = "Casimirs of sites are those of the site where they changed most."
 
 
 @dataclass(frozen=True)
 class _Subject:
-    """The subject of a verification: the compiled lattice, its solvers and its run."""
+    """Subject of a verification: the compiled lattice, its solvers and its run."""
 
     compilation: CompiledLattice
     solvers: Mapping[str, LatticeSolver]
@@ -58,17 +59,19 @@ class _Subject:
 
     @property
     def solver(self) -> LatticeSolver:
-        """The target that is measured where one suffices: C, if it is there."""
+        """The solver for measurements that need only one target: C if available."""
         return next(iter(self.solvers.values()))
 
     def time(self, trajectory: LatticeTrajectory, frame: int) -> float | None:
-        """The time of a frame, None where there is none."""
+        """Return the time of a frame; None if the system has no time."""
         return None if self.t0 is None else float(trajectory.t[frame])
 
     def stepped(
         self, x: Floats, h: float, steps: int = 1, t0: float | None = None, held: Mapping[str, float] | None = None
     ) -> Floats:
-        """The state after some steps, from the time t0 on, or that of the run, where ``held`` is a level e, if any."""
+        """Return the state after some steps from the time t0 on (by default that of the run); ``held`` fixes the energy
+        level e.
+        """
         t0 = self.t0 if t0 is None else t0
         options: dict[str, Any] = {"t0": t0, "seed": self.seed, "parameters": self.start.arguments, **(held or {})}
         trajectory = self.solver.integrate(x, h, steps, max(1, steps), **options)
@@ -91,10 +94,9 @@ def verify_lattice(
 ) -> Verification:
     """Measure and judge the solvers of a lattice, by target, on the numbers of a run, which is shortened if it is long.
 
-    The solvers carry tangent vectors. ``t0`` is the time of its start, None where there is no time, ``seed`` that of
-    the noise, None where there is none. ``single`` is the same solver in single precision, if there is one: it is
-    measured against the others.
-    Raises `StepError` where a step of the run fails.
+    The solvers have tangent maps. ``t0`` is the start time of the run, None for systems without time; ``seed`` is that
+    of the noise, None for systems without noise. ``single`` is the same solver in single precision, if there is one: it
+    is measured against the others. Raises `StepError` where a step of the run fails.
     """
     cell = compilation.cell
     subject = _Subject(compilation, solvers, start, h, t0, seed)
@@ -124,7 +126,7 @@ def verify_lattice(
 
 
 def _without_noise(subject: _Subject) -> _Subject:
-    """The same without noise, in NumPy."""
+    """Return the same subject without noise, with the NumPy solver only."""
     from phigen.api import lattice_solver_of
     from phigen.compiler import compile_spec
 
@@ -136,7 +138,7 @@ def _without_noise(subject: _Subject) -> _Subject:
 
 
 def _order(subject: _Subject, *, quiet: bool = False) -> Check:
-    """The observed order, from the pair of steps with the smallest errors above rounding."""
+    """Return the check of the observed order, from the two step sizes with the smallest errors above rounding."""
     name = "observed order, without the noise" if quiet else "observed order"
     step = subject.compilation.program.step.swept
     if step and len(step.parts) == 1 and not step.by_colour:
@@ -157,7 +159,9 @@ def _order(subject: _Subject, *, quiet: bool = False) -> Check:
 
 
 def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) -> Iterator[Check]:
-    """Energy, Casimirs and invariants along the run; numbers have units of the last place so much ``coarser``."""
+    """Yield the checks of Casimirs and invariants along the run, and of the energy; ``coarser`` scales the rounding
+    unit.
+    """
     errors = errors_of(cell, trajectory)
     least = coarser * rounding(trajectory.steps)
     yield from _energy(cell, trajectory, errors, least)
@@ -166,7 +170,7 @@ def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) 
             yield Check(f"Casimir {name}: largest change", float(errors[name].max()))
             continue
         value = float(np.max(np.abs(trajectory.casimirs[name][0])))
-        # the worst of many sites; a sum of their logarithms
+        # the limit allows for the worst of many sites, by the logarithm of their number
         limit = {"sites": 8.0, "sum": 1.0, "product": max(1.0, math.sqrt(trajectory.x[0][0].size))}[kind] * least
         error = float(errors[name].max()) / (value if kind == "product" and value else max(1.0, value))
         yield Check(
@@ -180,7 +184,7 @@ def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) 
 
 
 def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
-    """Energy without drift, or its balance."""
+    """Return the check that the energy, or the energy balance, does not drift."""
     what = next(name for name in (ENERGY, BALANCE, CHANGE) if name in errors)
     energy = errors[what]
     if what == CHANGE:
@@ -191,7 +195,7 @@ def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floa
     quarter = max(1, 3 * len(energy) // 4)
     before, after = float(energy[:quarter].max()), float(energy[quarter:].max())
     grown = after / before if before > 10 * least else math.nan
-    judged = not cell.forces  # with them a step is no Poisson map
+    judged = not cell.forces  # with forces a step is not a Poisson map
     passed = not (judged and grown > GROWTH)
     limit = f"≤ {GROWTH:g}" if judged else ""
     yield Check(f"{what}: last quarter/before", grown, limit, passed, f"grows by a factor of {grown:.1f}")
@@ -210,12 +214,12 @@ def _reversal(subject: _Subject, trajectory: LatticeTrajectory) -> Check:
 
 
 def _held(solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any]) -> dict[str, float]:
-    """The argument by which steps that are equal in τ hold the level e of a state; {} for others."""
+    """Return the argument that fixes the energy level e in steps uniform in τ; {} for other steps."""
     return {"gauge": -solver.hamiltonian(x, parameters=parameters)} if solver.interface.monitored else {}
 
 
 def _agreement(subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """The difference between one step of the other targets and that of the first."""
+    """Yield the differences between one step of the first target and one of each other target."""
     first, *others = subject.solvers.items()
     for target, solver in others:
         worst = 0.0
@@ -229,7 +233,7 @@ def _agreement(subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Che
 
 
 def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """Errors of single precision: of a step, and of the Casimirs along a run."""
+    """Yield the errors of single precision: of a step, and of the Casimirs along a run."""
     single = replace(subject, solvers={"c": solver})
     worst = single_precision.farthest(single.stepped, subject.stepped, [trajectory.x[0], trajectory.x[-1]], subject.h)
     limit = single_precision.ONE_STEP
@@ -248,10 +252,10 @@ def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, trajectory: La
 
 
 def _noise(cell: Cell, subject: _Subject, *, quick: bool) -> Iterator[Check]:
-    """The strong order along given paths, and that the largest increments leave steps possible, on some sites."""
+    """Yield the checks, on a few sites, of the strong order and that steps with the largest increments succeed."""
     about, start = subject.solver.interface, subject.start
     some = [SOME[len(start.sizes) - 1]] * len(start.sizes)
-    if cell.relation == PAIRS:  # none may be picked twice
+    if cell.relation == PAIRS:  # each site may be picked once
         some = [min(some[0], *start.sizes)]
     sizes = [-(-max(size, least) // p) * p for size, least, p in zip(some, about.least, about.periods, strict=True)]
     bonds = ring(sizes[0]) if about.graph else ()
@@ -271,9 +275,9 @@ def _noise(cell: Cell, subject: _Subject, *, quick: bool) -> Iterator[Check]:
 
 
 def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """The Poisson identity, with the exact tangent maps of all targets; and that these are derivatives of steps.
+    """Yield the checks of the Poisson identity, with the exact tangent maps of all targets, and of these tangent maps.
 
-    The largest entry of DΦ π DΦᵀ − π∘Φ is relative to that of |DΦ| |π| |DΦ|ᵀ, in what is usual of each field.
+    The largest entry of DΦ π DΦᵀ − π∘Φ is relative to that of |DΦ| |π| |DΦ|ᵀ, with each field in its typical magnitude.
     """
     about, sizes = subject.solver.interface, _few_sizes(subject)
     whole, site_count = expand(cell, sizes, ring(sizes[0]) if about.graph else ()), int(np.prod(sizes))
@@ -288,8 +292,8 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
         defect = max(finite.defect(solver, f * subject.h, fields) for solver in solvers for f in (1, -1))
         name, limit = f"Poisson identity {where}{replaced}", f"≤ {IDENTITY:.0e}"
         yield Check(name, defect, limit, defect <= IDENTITY, f"is off by {defect:.1e}")
-    # differences are taken in what is usual of each field and at each site, and with two distances; the better, the
-    # less their own errors say
+    # differences are taken in units of each field and in units of each site, and with two displacements; the
+    # smallest deviation counts, as the larger ones contain the error of the differences
     near = usual[:, _picked(subject.start, sizes).reshape(-1)]
     each = _units(np.maximum(near, 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
     tried = [(units, apart) for units in (fields, each) for apart in (3e-3, 3e-4)]
@@ -299,7 +303,9 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
 
 
 def _gradients(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """Gradients of all targets on a few sites, along every parameter; of the first on those of the run, if not many."""
+    """Yield the checks of gradients of all targets on a few sites, and of the first target on the run's lattice if
+    small.
+    """
     sizes, start, about = _few_sizes(subject), subject.start, (subject.h, subject.t0)
     x, parameters = _on_few(cell, start, sizes, ring(sizes[0]) if subject.solver.interface.graph else ())
     usual = _units(np.abs(trajectory.x).max(axis=tuple(i for i in range(trajectory.x.ndim) if i != 1)))
@@ -318,7 +324,7 @@ def _gradients(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> 
 
 
 def _few_sizes(subject: _Subject) -> list[int]:
-    """The sizes of a lattice of a few sites that the method takes, with the seams of the run."""
+    """Return sizes of a small lattice that the method accepts and that has the same boundary seams as the run."""
     about = subject.solver.interface
     least = 3 if len(about.axes) < 3 else 2
     sizes = [-(-max(size, least) // p) * p for size, p in zip(about.least, about.periods, strict=True)]
@@ -326,7 +332,9 @@ def _few_sizes(subject: _Subject) -> list[int]:
 
 
 def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:
-    """Sizes from those on that have the seams of the run, and along one or two axes sites away from them."""
+    """Increase sizes until the boundary seams are those of the run; with one or two axes some sites lie away from the
+    seams.
+    """
     seams = subject.compilation.sweeps.colouring.seams
     for axis, (seam, size) in enumerate(zip(seams, subject.start.sizes, strict=False)):
         sizes[axis] += 2 * seam.near * (len(seams) < 3)
@@ -336,7 +344,7 @@ def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:
 
 @dataclass(frozen=True)
 class _Few:
-    """A lattice of a few sites, with the state where its steps begin."""
+    """Lattice of a few sites with its initial state."""
 
     whole: Expansion
     subject: _Subject
@@ -350,13 +358,13 @@ class _Few:
         return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters, **held}
 
     def tangent(self, solver: LatticeSolver, h: float) -> tuple[Floats, Floats]:
-        """The state after a step, and its derivative (numbers, numbers)."""
+        """Return the state after a step and the tangent map of the step (numbers, numbers)."""
         count = self.x.size
         after, columns = solver.step_tangent(self.x, h, np.eye(count).reshape(count, *self.x.shape), **self.given)
         return after, columns.reshape(count, count).T
 
     def defect(self, solver: LatticeSolver, h: float, units: Floats) -> float:
-        """DΦ π DΦᵀ − π∘Φ, where states are in some units (numbers,)."""
+        """Return the largest entry of DΦ π DΦᵀ − π∘Φ, relative to its terms, for states in given units (numbers,)."""
         after, slopes = self.tangent(solver, h)
         slopes = slopes * units / units[:, None]
         before, image = (_poisson(self.whole, x, self.parameters) / units / units[:, None] for x in (self.x, after))
@@ -364,7 +372,9 @@ class _Few:
         return float(np.abs(slopes @ before @ slopes.T - image).max()) / size
 
     def slip(self, solver: LatticeSolver, units: Floats, apart: float) -> float:
-        """The error of the derivative against differences of order 6, relative to its largest entry, in some units."""
+        """Return the error of the tangent map against differences of order 6, relative to its largest entry, in these
+        units.
+        """
 
         def step(y: Floats) -> Floats:
             there = solver.step((y * units).reshape(self.x.shape), self.subject.h, **self.given)
@@ -376,7 +386,9 @@ class _Few:
 
 
 def _with_finite_brackets(cell: Cell, few: _Few) -> tuple[_Few, str]:
-    """Return the lattice with other values for parameters that are 0 where π is infinite, and a note on them."""
+    """Return the lattice with non-zero values for parameters whose value 0 makes π infinite, and a note on these
+    values.
+    """
     with np.errstate(all="ignore"):
         if np.isfinite(_poisson(few.whole, few.x, few.parameters)).all():
             return few, ""
@@ -395,7 +407,7 @@ def _units(sizes: Floats) -> Floats:
 
 
 def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Floats:
-    """The derivative, by differences of order 6."""
+    """Return the derivative by differences of order 6."""
     weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
     columns = []
     for k in range(len(y)):
@@ -405,7 +417,7 @@ def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Fl
 
 
 def _picked(start: Start, sizes: Sequence[int]) -> Any:
-    """Numbers of sites of a run, in the places of a small lattice."""
+    """Return random site numbers of the run for the sites of a small lattice."""
     sites, count = int(np.prod(start.sizes)), int(np.prod(sizes))
     return np.random.default_rng(1).choice(sites, count, replace=sites < count).reshape(sizes)
 
@@ -413,7 +425,7 @@ def _picked(start: Start, sizes: Sequence[int]) -> Any:
 def _on_few(
     cell: Cell, start: Start, sizes: Sequence[int], bonds: Sequence[tuple[int, int]]
 ) -> tuple[Floats, dict[str, Any]]:
-    """A state of a small lattice, and its parameters: those of sites that are picked."""
+    """Return the state and the parameters of a small lattice, taken from random sites of the run."""
     picked, arguments = _picked(start, sizes), dict[str, Any]()
     for p in cell.parameters:
         value = np.asarray(start.parameters[p.name])

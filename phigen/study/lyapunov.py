@@ -1,9 +1,9 @@
 """Lyapunov exponents of a trajectory, through the exact tangent map of each step.
 
-A frame of tangent vectors is carried along by the derivatives of the steps and made orthonormal again after each, by
-QR: the logarithms of the diagonal of R add up to the growth of lengths, areas, …: G. Benettin et al., Meccanica 15
-(1980); K. Geist, U. Parlitz, W. Lauterborn, Prog. Theor. Phys. 83 (1990). Exponents are those of the step as a map,
-per unit of time.
+A frame of tangent vectors is propagated by the tangent maps of the steps and made orthonormal by QR after each step.
+The logarithms of the diagonal of R add up to the growth of lengths, areas, … (G. Benettin et al., Meccanica 15 (1980);
+K. Geist, U. Parlitz, W. Lauterborn, Prog. Theor. Phys. 83 (1990)). The exponents are those of the step as a map, per
+unit of time.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 from phigen.symbolic.arrays import Floats
 
-#: The numbers of steps at which the exponents are noted grow by this factor.
+#: Factor between successive step numbers at which the exponents are recorded.
 _SPACING = 2 ** (1 / 8)
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """The exponents of a trajectory after the time ``t``, the largest first, and how they converged.
+    """Exponents of a trajectory after the time ``t``, in descending order, with the history of their convergence.
 
     ``history`` (rows, DIM) holds the exponents at the times ``times`` (rows,), which grow geometrically. The ``clock``
-    is what steps are equal in: with a monitor all is in τ.
+    is the variable in which steps are uniform: τ for monitored systems.
     """
 
     exponents: Floats
@@ -45,17 +45,19 @@ class Spectrum:
 
     @property
     def t(self) -> float:
-        """The time over which lengths were followed."""
+        """The time over which the growth was measured."""
         return float(self.times[-1])
 
     @property
     def total(self) -> float:
-        """The sum of all exponents: the growth of volume, 0 where π is constant or the coordinates unimodular."""
+        """The sum of all exponents: the growth of volume, 0 where π is constant or the structure unimodular."""
         return float(np.sum(self.exponents))
 
     @property
     def pairing(self) -> float:
-        """The largest |λ_i + λ_{n+1−i}|: 0 for symplectic maps, and on leaves if the Casimirs add zeros."""
+        """The largest |λ_i + λ_{n+1−i}|: 0 for symplectic maps, also on symplectic leaves, where Casimirs contribute
+        zeros.
+        """
         return float(np.max(np.abs(self.exponents + self.exponents[::-1])))
 
     @property
@@ -66,9 +68,9 @@ class Spectrum:
 
 
 class FrameGrowth:
-    """The growth of a frame of tangent vectors, step by step; ``state`` has all of it, as arrays.
+    """Growth of a frame of tangent vectors, step by step; ``state`` is the complete state, as arrays.
 
-    It begins as all unit vectors, or as the columns of ``frame``.
+    The initial frame consists of all unit vectors, or of the columns of ``frame``.
     """
 
     def __init__(self, dimension: int, h: float, frame: Floats | None = None) -> None:
@@ -84,16 +86,16 @@ class FrameGrowth:
 
     @property
     def frame(self) -> Floats:
-        """The vectors, as orthonormal columns."""
+        """The tangent vectors, as orthonormal columns."""
         frame: Floats = self.state["frame"]
         return frame
 
     def see(self, tangent: Floats) -> None:
-        """Carry the frame through one step of that derivative."""
+        """Propagate the frame through one step with the given tangent map."""
         self.take(tangent @ self.frame)
 
     def take(self, carried: Floats, steps: int = 1) -> None:
-        """The columns of the frame after some steps."""
+        """Accept the columns of the frame propagated through some steps, and make them orthonormal."""
         state = self.state
         state["frame"], r = np.linalg.qr(carried)
         state["logs"] = state["logs"] + np.log(np.abs(np.diagonal(r)))
@@ -102,7 +104,7 @@ class FrameGrowth:
             state["times"], state["history"] = self._noted()
 
     def spectrum(self) -> Spectrum:
-        """The exponents so far; raises `ValueError` if no step was made."""
+        """Return the exponents so far; raises `ValueError` if no step was made."""
         if not self.state["steps"]:
             raise ValueError("there are no exponents without a step")
         times, history = self._noted()
@@ -110,7 +112,7 @@ class FrameGrowth:
         return Spectrum(history[-1][order], times, history[:, order])
 
     def _noted(self) -> tuple[Floats, Floats]:
-        """Times and history with the exponents of now at their end."""
+        """Return the times and the history with the current exponents appended."""
         t, times, history = abs(float(self.state["steps"]) * self._h), self.state["times"], self.state["history"]
         if len(times) and times[-1] == t:
             return times, history
@@ -126,7 +128,7 @@ def spectrum(
     t0: float | None = None,
     **draws: Any,
 ) -> Spectrum:
-    """The Lyapunov exponents along ``steps`` steps of size ``h`` from ``x0`` (DIM,).
+    """Return the Lyapunov exponents along ``steps`` steps of size ``h`` from ``x0`` (DIM,).
 
     ``solver`` must be compiled with ``tangent=True``, else `TypeError`. Raises `StepError`, and `ValueError` for wrong
     arguments. ``draws`` are those of noise: seed, member, step0.
@@ -149,16 +151,16 @@ def lattice_spectrum(
     progress: Progress | None = None,
     **draws: int | None,
 ) -> Spectrum:
-    """The ``count`` largest Lyapunov exponents of a lattice along a run from ``x0`` (coordinates, *sizes).
+    """Return the ``count`` largest Lyapunov exponents of a lattice along a run from ``x0`` (coordinates, *sizes).
 
-    The tangent vectors begin at random, and are made orthonormal ``every`` so many steps. ``solver`` must be compiled
-    with ``tangent=True``, else `TypeError`. Raises `StepError`, and `ValueError` for wrong arguments. ``draws`` are
-    those of noise: seed, step0.
+    The initial tangent vectors are random; they are made orthonormal after each ``every`` steps. ``solver`` must be
+    compiled with ``tangent=True``, else `TypeError`. Raises `StepError`, and `ValueError` for wrong arguments.
+    ``draws`` are those of noise: seed, step0.
     """
     x = np.asarray(x0, dtype=float)
     if not 1 <= count <= x.size:
         raise ValueError(f"a lattice of these sizes has 1 to {x.size} exponents, not {count}")
-    expect_room(f"the arrays of {count} tangent vectors", 3 * 8 * count * x.size)  # drawn, in qr, and orthonormal
+    expect_room(f"the arrays of {count} tangent vectors", 3 * 8 * count * x.size)  # drawn; copy in qr; result
     frame = np.linalg.qr(np.random.default_rng(0).normal(size=(x.size, count)))[0]
     growth = FrameGrowth(x.size, h, frame)
     options: Any = {"t0": t0, "parameters": parameters, **draws}

@@ -1,4 +1,4 @@
-"""Rows of a verification: the quantity that each measures, and the cause if it fails; for readers of the table."""
+"""Explanations of the rows of a verification table: the measured quantity, and the cause of a failure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Meaning:
     failure: str = ""
 
 
-#: The failure of every row that judges the drift of the energy.
+#: Cause of a failure in all rows that judge the drift of the energy.
 _DRIFT = "the solver does not follow the flow of a Hamiltonian near H, or the step is too large for one to exist"
 
 MEANINGS = (
@@ -155,7 +155,7 @@ MEANINGS = (
 
 
 def meaning_of(check: str) -> Meaning:
-    """The meaning of the check of that name."""
+    """Return the meaning of the check with this name."""
     kind, colon, rest = check.partition(": ")
     noun = kind.partition(" ")[0]
     name = f"{noun}: {rest}" if colon and noun in ("Casimir", "invariant") else check

@@ -1,4 +1,4 @@
-"""Measurements of one-step methods for verification: numbers only, judged elsewhere."""
+"""Measurements of one-step methods for verification, without judgement of the results."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from phigen.geometry.system import System
 from phigen.study.methods import Method, by_differences
 from phigen.symbolic.arrays import Floats, evaluate
 
-#: Below this error, relative to the size of a quantity, differences say nothing about the method.
+#: Errors below this value, relative to the size of a quantity, are rounding errors and say nothing about the method.
 ROUNDING = 4e-16
 
-#: The factor by which distances of differences are shorter than usual.
+#: Factors by which the displacements of finite differences are reduced.
 DISTANCES = (1.0, 256.0)
-#: Part of the largest derivative from which on differences in proportion to each coordinate are tried as well.
+#: Error, relative to the largest derivative, above which displacements in proportion to each coordinate are tried as
+#: well.
 ROUGH = 1e-8
 
-#: The relative displacement of a coordinate that shows the effect of its rounding on π.
+#: Relative displacement of a coordinate for estimating the effect of its rounding on π.
 _SHARE = 1e-6
 
 #: Refinements of the step, as factors: pairs two apart halve the step.
@@ -30,10 +31,10 @@ _REFINEMENTS = tuple(f * 2**k for k in range(9) for f in (4, 6))
 
 @dataclass(frozen=True)
 class Observed:
-    """The observed order: the slope between the two finest steps in the asymptotic range; NaN if there are none.
+    """Observed order: the slope between the two finest steps in the asymptotic range; NaN if there are none.
 
     ``pairs`` lists step sizes and errors relative to the solution, ``floor`` is the error of the reference.
-    ``exact`` tells that all errors are at the floor.
+    ``exact`` is true if all errors are at the floor.
     """
 
     order: float
@@ -43,7 +44,7 @@ class Observed:
 
 
 def observed_order(method: Method, reference: Callable[[float], tuple[Floats, float]], x: Floats, t: float) -> Observed:
-    """Errors at time t for steps t/4, t/6, t/8, t/12, …, against ``reference(t)``: a state and its relative error."""
+    """Measure the order from errors at time t with steps t/4, t/6, …; ``reference(t)`` is a state with its error."""
     solution, uncertainty = reference(t)
     size = float(np.max(np.abs(solution)))
     floor = max(uncertainty, 4 * ROUNDING)
@@ -56,7 +57,7 @@ def observed_order(method: Method, reference: Callable[[float], tuple[Floats, fl
         errors[n] = float(np.max(np.abs(state - solution))) / size
         if errors[n] < 10 * floor and len(errors) > 4:
             break
-    # An order is a statement about small steps; at large ones the error may be of any size.
+    # Only small steps show the order; at large steps the error may have any size.
     usable = {n: e for n, e in errors.items() if 30 * floor < e < 0.02}
     slopes = [math.log2(e / usable[2 * n]) for n, e in usable.items() if 2 * n in usable]
     pairs = tuple((t / n, e) for n, e in errors.items())
@@ -65,16 +66,16 @@ def observed_order(method: Method, reference: Callable[[float], tuple[Floats, fl
 
 
 def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -> Floats:
-    """π(x), (DIM, DIM)."""
+    """Return π(x), (DIM, DIM)."""
     at = {**parameters, **dict(zip(system.coordinates, x, strict=True))}
     return np.array([float(e) for e in evaluate([e for row in system.poisson for e in row], at)]).reshape((len(x),) * 2)
 
 
 def poisson_defect(system: System, parameters: Mapping[str, float], method: Method, x: Floats, h: float) -> float:
-    """The largest entry of DΦ π DΦᵀ − π∘Φ, relative to |DΦ| |π| |DΦ|ᵀ; DΦ by differences if the code states none.
+    """Return max |DΦ π DΦᵀ − π∘Φ| relative to |DΦ| |π| |DΦ|ᵀ; DΦ by finite differences if the code has no tangent map.
 
-    Where π nearly vanishes, as terms of it cancel, it is known to what rounding of the state leaves of it: there the
-    defect is relative to Σ |x_i ∂_i π|.
+    Where terms of π nearly cancel, rounding of the state limits the accuracy of π; there the defect is relative to
+    Σ |x_i ∂_i π|.
     """
     tangent, image = method.tangent(x, h) if method.tangent else by_differences(method, x, h), method.step(x, h)
     before, after = (poisson_matrix(system, parameters, state) for state in (x, image))
@@ -85,10 +86,10 @@ def poisson_defect(system: System, parameters: Mapping[str, float], method: Meth
 
 
 def tangent_error(method: Method, x: Floats, h: float) -> float:
-    """The difference between the stated derivative and differences of the step, relative to its largest entry.
+    """Return the difference between the tangent map and finite differences of the step, relative to the largest entry.
 
-    These are taken at several distances, and the best counts: near a singularity the larger leads past it, and
-    coordinates may be of very different sizes.
+    The best of several displacements counts: near a singularity a large one leads beyond it, and coordinates may differ
+    widely in size.
     """
     if method.tangent is None:
         return 0.0
@@ -100,12 +101,14 @@ def tangent_error(method: Method, x: Floats, h: float) -> float:
 
 
 def reversal(method: Method, x: Floats, h: float) -> float:
-    """|Φ_{−h}(Φ_h(x)) − x|, relative to the largest coordinate."""
+    """Return |Φ_{−h}(Φ_h(x)) − x|, relative to the largest coordinate."""
     return float(np.max(np.abs(method.after(h).step(method.step(x, h), -h) - x))) / float(np.max(np.abs(x)))
 
 
 def largest_step(method: Method, states: Sequence[Floats], h: float, most: float = 256.0) -> float:
-    """The largest factor f, to 5 %, for which a step of f·h can be made from all states; 0 if not even h/64."""
+    """Return the largest factor f, to 5 %, for which a step of size f·h succeeds from all states; 0 if a step h/64
+    fails.
+    """
 
     def works(factor: float) -> bool:
         try:

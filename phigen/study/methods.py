@@ -1,4 +1,4 @@
-"""One-step methods as verification sees them: generated solvers and classical methods behind one set of functions."""
+"""Common interface of one-step methods for verification: generated solvers and classical methods."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from phigen.runtime.solver import Solver
 from phigen.study import classical
 from phigen.symbolic.arrays import Floats
 
-#: The offset of differences in units of the state; with formulas of order 6 their error is about 1e-12.
+#: Displacement of finite differences in units of the state; with formulas of order 6 their error is about 1e-12.
 _WIDTH = 2e-3
 _WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
 
 
 @dataclass(frozen=True)
 class Method:
-    """``step(x, h)`` maps states (DIM,), ``rows(x, h, steps, stride)`` gives (rows, DIM); both raise `StepError`.
+    """One-step method: ``step(x, h)`` maps states (DIM,), ``rows(x, h, steps, stride)`` returns (rows, DIM).
 
-    ``tangent(x, h)`` is the derivative (DIM, DIM) of a step that the code itself states, None if it states none. All
-    begin at one time; ``later(h)`` is the method that begins later. ``together`` makes one step of many members.
+    Both raise `StepError`. ``tangent(x, h)`` is the tangent map (DIM, DIM) that the code provides, None if there is
+    none. All steps begin at the same time; ``later(h)`` is the method with a time later by h. ``together`` makes one
+    step of many members.
     """
 
     name: str
@@ -37,12 +38,12 @@ class Method:
         return self.together(states, h) if self.together else np.array([self.step(x, h) for x in states])
 
     def after(self, h: float) -> Method:
-        """The method for what begins so much later."""
+        """Return the method that begins later by h."""
         return self.later(h) if self.later else self
 
 
 def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | None = None, t0: float = 0.0) -> Method:
-    """A generated solver; with a ``gauge``, all steps are those of one map, whatever they start from."""
+    """Return the method of a generated solver; a ``gauge`` makes all steps the same map, for any initial state."""
     fixed = solver if gauge is None else Solver(solver.backend.with_gauge(gauge), solver.interface)
     begin = t0 if solver.interface.time else None
 
@@ -61,7 +62,7 @@ def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | N
 
 
 def without_noise(solver: Solver, parameters: Mapping[str, float], t0: float = 0.0) -> Method:
-    """A generated solver whose increments of the noise are all 0."""
+    """Return the method of a generated solver with all noise increments 0."""
     begin, draws = t0 if solver.interface.time else None, solver.interface.draws
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
@@ -72,9 +73,9 @@ def without_noise(solver: Solver, parameters: Mapping[str, float], t0: float = 0
 
 
 def field_of(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
-    """The vector field of a solver at one state (DIM,), without the checks that the public method makes each time.
+    """Return the vector field of a solver at one state (DIM,), without the argument checks of the public method.
 
-    Where it depends on the time, that is one more coordinate, the last: see `extended`.
+    If the vector field depends on the time, the time is an additional last coordinate: see `extended`.
     """
     if solver.interface.time:
         return lambda x: np.append(solver.backend.vector_field(x[None, :-1], parameters, x[-1:])[0], 1.0)
@@ -87,7 +88,7 @@ def field_of(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Float
 
 
 def extended(solver: Solver, x: Floats, t0: float) -> Floats:
-    """The state that `field_of` starts from."""
+    """Return the initial state for the field of `field_of`, with the time appended if there is one."""
     return np.append(x, t0) if solver.interface.time else x
 
 
@@ -98,7 +99,7 @@ def of_classical(
     t0: float = 0.0,
     vector_field: Callable[[Floats], Floats] | None = None,
 ) -> Method:
-    """A classical method on the vector field of a solver, or on ``vector_field`` instead."""
+    """Return a classical method for the vector field of a solver, or for ``vector_field`` instead."""
     field = vector_field or field_of(solver, parameters)
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
@@ -116,9 +117,11 @@ def of_classical(
 
 
 def by_differences(method: Method, x: Floats, h: float, finer: float = 1.0, *, by_coordinate: bool = False) -> Floats:
-    """The derivative (DIM, DIM) of a step by central differences of order 6, at so many times smaller distances.
+    """Return the derivative (DIM, DIM) of a step by central differences of order 6; ``finer`` divides the
+    displacements.
 
-    These are of the size of the state or, ``by_coordinate``, of each coordinate, as momenta of small masses ask for.
+    Displacements are in proportion to the state or, ``by_coordinate``, to each coordinate, for example for momenta of
+    small masses.
     """
     size = float(np.max(np.abs(x))) or 1.0
     widths = _WIDTH / finer * np.where(x == 0, 0.1 * size, np.maximum(np.abs(x), 0.0 if by_coordinate else 0.1 * size))

@@ -1,4 +1,4 @@
-"""The motion of a monitored system in τ: the reference for its steps."""
+"""Motion of a monitored system in τ: the reference for its steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from phigen.symbolic.arrays import Floats
 
 
 def field_in_tau(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
-    """g π∇H at a state (DIM,), which is the motion in τ where K = 0; followed by dt/dτ where the time is behind it."""
+    """Return the field g π∇H, the motion in τ where K = 0; dt/dτ is appended for states with the time as last
+    coordinate.
+    """
     n, backend = solver.interface.dimension, solver.backend
 
     def field(x: Floats) -> Floats:
@@ -25,7 +27,7 @@ def field_in_tau(solver: Solver, parameters: Mapping[str, float]) -> Callable[[F
 
 
 def with_time(solver: Solver, parameters: Mapping[str, float], gauge: Floats) -> Method:
-    """A generated solver whose rows have the time behind the state; e is held fixed."""
+    """Return the method of a solver with fixed e and with the time as last coordinate of its rows."""
     fixed = Solver(solver.backend.with_gauge(gauge), solver.interface)
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:

@@ -1,4 +1,4 @@
-"""Error against step size and against time: a solver and classical methods on one initial value problem."""
+"""Errors of a solver and of classical methods against step size and computing time, for one initial value problem."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from phigen.study import classical
 from phigen.study.race import OWN, Race, Runner
 from phigen.symbolic.arrays import Floats
 
-#: Doublings of the step above that of the run, and halvings below it.
+#: Number of doublings and of halvings of the run's step.
 COARSER, FINER = 6, 7
-#: Repetitions of a measurement, of which the fastest counts; the seconds each is to last at least, and one run at most.
+#: Repetitions of a measurement, of which the fastest counts; least duration of each in seconds; longest duration of one
+#: run.
 ROUNDS, LEAST_SECONDS, MOST_SECONDS = 5, 2e-3, 0.05
-#: Steps of the run that are studied, from the longest: errors that grow too fast tell no order.
+#: Numbers of steps of the studied part of the run, tried in this order; too fast error growth hides the order of long
+#: parts.
 SPANS = (4096, 256, 16)
-#: Errors between the floor, times this, and this bound tell the order.
+#: The order is determined from errors between the floor, times the first factor, and the second value.
 ABOVE_FLOOR, ASYMPTOTIC = 30.0, 0.02
-#: No error is measured below this, relative to the solution; one below that may be of rounding.
+#: Smallest measurable error relative to the solution, and the error below which rounding may dominate.
 ROUNDING, SMALL = 2.0**-52, 1e-6
 
 
 @dataclass(frozen=True)
 class PrecisionPoint:
-    """Errors at the end, relative: of the solution and of the Casimirs; and the seconds of the fastest repetition."""
+    """Relative errors of solution and Casimirs at the end of a run, and the seconds of the fastest repetition."""
 
     step: float
     steps: int
@@ -39,7 +41,7 @@ class PrecisionPoint:
 
 @dataclass(frozen=True)
 class PrecisionCurve:
-    """All points of one method, from the largest step; ``slope`` is the observed order, NaN if none can be told."""
+    """All points of one method, from the largest step; ``slope`` is the observed order, NaN if undetermined."""
 
     label: str
     order: int
@@ -47,7 +49,7 @@ class PrecisionCurve:
     slope: float
 
     def seconds_for(self, tolerance: float) -> float:
-        """The least time of a point with no larger error; NaN if there is none."""
+        """Return the least time of a point whose error is at most the given one; NaN if there is none."""
         return min((p.seconds for p in self.points if p.error <= tolerance), default=math.nan)
 
 
@@ -55,9 +57,9 @@ class PrecisionCurve:
 class Study:
     """Measurements from 0 to ``time`` of the ``clock``, t or τ.
 
-    Errors below ``floor`` are those of the ``reference``. ``set_up`` are the seconds that the solver takes once per
-    trajectory; those of the points do not contain it. ``language`` is that of all methods, ``rounds`` the number of
-    repetitions.
+    Errors below ``floor`` are errors of the ``reference``. ``set_up`` is the time in seconds that the solver needs once
+    per trajectory; the times of the points do not contain it. All methods are implemented in ``language``; ``rounds``
+    is the number of repetitions.
     """
 
     time: float
@@ -85,11 +87,11 @@ def study(
     casimirs: Callable[[Floats], float] | None = None,
     rounds: int = ROUNDS,
 ) -> Study:
-    """Run all methods with steps of size ``h``, larger and smaller ones, over the first of at most ``steps`` steps.
+    """Run all methods with steps of size ``h``, larger and smaller ones, over the first of ``steps`` steps of the run.
 
-    ``solution`` is the closed form, if there is one; otherwise DOP853 at a step where halving changes no more.
-    ``casimirs`` gives the largest error of a Casimir at a state. Raises `ArithmeticError` if DOP853 cannot follow the
-    solution.
+    ``solution`` is the closed form, if there is one; otherwise DOP853 provides the reference, with a step so small that
+    halving it no longer changes the result. ``casimirs`` returns the largest error of a Casimir at a state. Raises
+    `ArithmeticError` if DOP853 cannot follow the solution.
     """
     for span in sorted({min(steps, s) for s in SPANS}, reverse=True):
         target, floor = (solution(h * span), 4 * ROUNDING) if solution else _by_dop853(race, h * span, span)
@@ -114,14 +116,14 @@ def study(
 
 
 def error_of(state: Floats, target: Floats) -> float:
-    """The largest error of a coordinate relative to the largest coordinate."""
+    """Return the largest error of a coordinate, relative to the largest coordinate."""
     size = float(np.max(np.abs(target))) or 1.0
     return max(float(np.max(np.abs(state - target))) / size, ROUNDING)
 
 
 def slope(errors: Mapping[int, float], floor: float) -> float:
-    """The median slope of the last three halvings of the step in the asymptotic range; NaN if there are none."""
-    # Where a smaller step brings a larger error, rounding has taken over.
+    """Return the median slope of the last three halvings of the step in the asymptotic range; NaN if there are none."""
+    # Where a smaller step has a larger error, rounding dominates.
     floor = max([floor, *(b for a, b in pairwise(errors.values()) if a < b and a < SMALL)])
     usable = {n: e for n, e in errors.items() if ABOVE_FLOOR * floor < e < ASYMPTOTIC}
     slopes = [math.log2(e / usable[2 * n]) for n, e in usable.items() if 2 * n in usable]
@@ -129,13 +131,15 @@ def slope(errors: Mapping[int, float], floor: float) -> float:
 
 
 def _states(run: Runner, end: float, span: int, target: Floats, floor: float) -> dict[int, Floats]:
-    """The state at the end for each number of steps that can be made in time, until rounding is all of its error."""
+    """Return the final state for increasing numbers of steps, until rounding dominates the error or a run takes too
+    long.
+    """
     states: dict[int, Floats] = {}
     least, done = math.inf, 0
     for n in sorted({round(span * f * 2.0**k) for k in range(-COARSER, FINER + 1) for f in (1.0, 1.5)} - {0}):
         start = time.perf_counter()
         state = run(end / n, n, 1)
-        # NaN, of a solution that could not be had, is no error below 1.
+        # The negated comparison also skips NaN, from a missing solution.
         if state is None or not (error := error_of(state, target)) < 1:
             continue
         states[n] = state
@@ -147,9 +151,9 @@ def _states(run: Runner, end: float, span: int, target: Floats, floor: float) ->
 
 
 def _times(race: Race, counts: Mapping[str, Sequence[int]], end: float, rounds: int) -> dict[tuple[str, int], float]:
-    """The seconds of one run of each method and number of steps: the least of several, methods taken in turn.
+    """Return the seconds of one run for each method and number of steps: the minimum of interleaved repetitions.
 
-    The seconds of setting up have the key ("", 0).
+    The set-up time has the key ("", 0).
     """
     works: dict[tuple[str, int], Callable[[int], object]] = {("", 0): race.set_up}
     for label, run in race.runners.items():
@@ -168,7 +172,7 @@ def _times(race: Race, counts: Mapping[str, Sequence[int]], end: float, rounds: 
 
 
 def _by_dop853(race: Race, end: float, span: int) -> tuple[Floats, float]:
-    """The solution at the end, and the least difference of results with steps h and h/2; infinity if all fail."""
+    """Return the final solution and the least difference of results with steps h and h/2; infinity if all runs fail."""
     best, last = (np.full(1, np.nan), math.inf), None
     for k in range(-2, FINER):
         n = max(1, math.ceil(span * 2.0**k))

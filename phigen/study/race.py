@@ -33,15 +33,16 @@ TABLEAUX: Mapping[str, tuple[Sequence[Mapping[int, float]], Mapping[int, float]]
     "dop853": (dop853.A[1:], dop853.B),
 }
 
-#: Repeats a number of steps of size h from the start; returns the last state, None if a step fails.
+#: Function that makes a run of steps of size h several times; returns the final state, None if a step fails.
 Runner = Callable[[float, int, int], Floats | None]
 
 
 @dataclass(frozen=True)
 class Race:
-    """The runners by their labels, and ``set_up``, which repeats the work that the solver does once per trajectory.
+    """Runners by label, and ``set_up``, which repeats the work that the solver does once per trajectory.
 
-    ``language`` is what all of them are written in: ``C`` or ``Python``. The ``clock`` is what steps are equal in.
+    All of them are written in ``language``, ``C`` or ``Python``. The ``clock`` is the variable in which steps are
+    uniform.
     """
 
     runners: Mapping[str, Runner]
@@ -53,7 +54,7 @@ class Race:
 def compiled(
     compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """The solver and those of the methods that are explicit, in C, with a monitor all in τ. Raises `ToolchainError`."""
+    """Return the solver and the explicit methods in C; for monitored systems all step in τ. Raises `ToolchainError`."""
     from phigen.targets.rendering import render
 
     name = compilation.program.name
@@ -97,7 +98,7 @@ def compiled(
 def interpreted(
     solver: Solver, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """The solver and the methods as Python runs them, with a monitor all in τ."""
+    """Return the solver and the methods as run from Python; for monitored systems all step in τ."""
 
     begin = t0 if solver.interface.time else None
 

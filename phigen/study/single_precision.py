@@ -12,14 +12,14 @@ from phigen.study.methods import Method
 from phigen.study.summary import summarise
 from phigen.symbolic.arrays import Floats
 
-#: A unit of the last place, of 24 binary digits, in those of double precision, of 53.
+#: Rounding unit of single precision (24 binary digits) in rounding units of double precision (53 binary digits).
 COARSER = 2.0**29
-#: The largest difference between steps in single and in double precision, relative to the state.
+#: Limit for the difference between steps in single and in double precision, relative to the state.
 ONE_STEP = 2.0**-19
 
-#: Name, value, and the largest value allowed.
+#: Name, value and limit.
 Measured = tuple[str, float, float]
-#: A step of size h from a state.
+#: Function that makes a step of size h from a state.
 Step = Callable[[Floats, float], Floats]
 
 
@@ -34,7 +34,7 @@ def measured(
     parameters: Mapping[str, float],
     t0: float,
 ) -> Iterator[Measured]:
-    """Differences between steps in single and in double precision, and changes of Casimirs along a run."""
+    """Yield the differences of steps in single from steps in double precision, and the Casimir errors of a run."""
     apart = farthest(single.step, double.step, states, h)
     yield "single precision: a step, beside double", apart, ONE_STEP
     rows, times = single.rows(start, h, steps, 1), t0 + h * np.arange(steps + 1.0)
@@ -48,7 +48,7 @@ def measured(
 
 
 def farthest(single: Step, double: Step, states: Sequence[Floats], h: float) -> float:
-    """The largest difference of single steps from the same states, which single precision has, in sizes of these."""
+    """Return the largest relative difference of single steps from the same states, rounded to single precision."""
     worst = 0.0
     for x in states:
         rounded = x.astype(np.float32).astype(np.float64)

@@ -1,4 +1,4 @@
-"""Runs of any length in as many rows as a figure can show."""
+"""Reduction of runs of any length to the number of rows that a figure can show."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from phigen.symbolic.arrays import Floats
 
 Numbers = NDArray[np.int64]
 
-#: Rows that are kept of a run, and windows of it whose largest errors are kept as well.
+#: Largest number of stored rows of a run, and number of windows whose row with the largest error is stored as well.
 ROWS, WINDOWS = 8000, 400
-#: Points that are kept of a section.
+#: Largest number of stored points of a section.
 POINTS = 20_000
 
 
 class Thinned:
-    """At most a given number of successive rows: every one, every second, every fourth, … of them.
+    """Subset of at most ``most`` successive rows: every row, every second, every fourth, …
 
-    Which rows are kept depends on their number alone. ``state`` has all of it, as arrays.
+    The choice depends only on the number of rows. ``state`` is the complete state, as arrays.
     """
 
     def __init__(self, width: int, most: int) -> None:
@@ -45,7 +45,7 @@ class Thinned:
         return int(self.state["seen"])
 
     def see(self, rows: Floats) -> None:
-        """Take in the next rows (rows, width)."""
+        """Accept the next rows (rows, width)."""
         every, seen = int(self.state["every"]), self.seen
         thinned = np.concatenate([self.rows, rows[-seen % every :: every]])
         while len(thinned) > self._most:
@@ -54,10 +54,11 @@ class Thinned:
 
 
 class Sketch:
-    """Rows of a run for its figures: rows at equal distances, and those with the largest errors of `WINDOWS` windows.
+    """Rows of a run for its figures: rows at equal intervals, and the row with the largest error in each of `WINDOWS`
+    windows.
 
-    Rows are t, x, energy, Casimirs and observables side by side, with their number before them. ``rows`` is how many
-    there will be. Observables have no errors.
+    Each row contains its number, t, x, energy, Casimirs and observables. ``rows`` is the total number of rows of the
+    run. Errors of observables are not considered.
     """
 
     def __init__(self, dimension: int, casimirs: int, rows: int, observables: int = 0) -> None:
@@ -83,7 +84,7 @@ class Sketch:
         self._peaks = {name: arrays[name] for name in self._peaks}
 
     def see(self, rows: Floats) -> None:
-        """Take in the next rows (rows, 2 + DIM + Casimirs + observables): t, x, energy, Casimirs, observables."""
+        """Accept the next rows (rows, 2 + DIM + Casimirs + observables): t, x, energy, Casimirs, observables."""
         if not len(rows):
             return
         numbered = np.column_stack([np.arange(self._thinned.seen, self._thinned.seen + len(rows)), rows])
@@ -113,7 +114,7 @@ class Sketch:
         broken: bool = False,
         observables: tuple[str, ...] = (),
     ) -> Trajectory:
-        """The rows that were kept, in their order; if the run is ``broken`` off, a row of NaN comes after them."""
+        """Return the stored rows in order; if the run is ``broken`` off, a row of NaN follows."""
         peaks = self._peaks["peaks"].reshape(-1, self._peaks["peaks"].shape[-1])
         stored = np.concatenate(
             [self._thinned.rows, peaks[self._peaks["errors"].ravel() >= 0], self._peaks["last"][None]]

@@ -12,19 +12,20 @@ from phigen.runtime.solver import Solver
 from phigen.scheme.program import MAX_NORMAL_VARIATE
 from phigen.symbolic.arrays import Floats
 
-#: Paths that are followed, the halvings of the step, how many more the reference has, and the seed of all paths.
+#: Number of Wiener paths; number of halvings of the step; additional halvings of the reference; seed of all paths.
 PATHS, LEVELS, BEYOND, SEED = 48, 5, 2, 1
-#: Choices of signs for the largest increments at one state.
+#: Number of random sign choices for the largest increments at one state.
 SIGNS = 8
 
 
 def strong_order(
     solver: Solver, x0: Floats, parameters: Mapping[str, float], t0: float, h: float, steps: int, paths: int = PATHS
 ) -> float:
-    """The strong order: the slope of the errors of steps of h, h/2, h/4, … along the same paths.
+    """Return the strong order: the slope of the errors of steps of h, h/2, h/4, … along the same Wiener paths.
 
-    The increments of a coarse step are the sums of those of the fine ones in it. Errors are against the motion along
-    the same path joined by straight lines, which knows the vector fields only: it converges to Stratonovich's sense.
+    An increment of a coarse step is the sum of the increments of the fine steps within. Reference solutions follow the
+    piecewise linear interpolation of the same path and use only the vector fields; they converge to the Stratonovich
+    solution.
     """
     draws, finest = solver.interface.draws, steps << (LEVELS + BEYOND)
     begin = t0 if solver.interface.time else None
@@ -45,7 +46,7 @@ def strong_order(
 def _along_lines(
     solver: Solver, x: Floats, parameters: Mapping[str, float], t0: float, h: float, increments: Floats
 ) -> Floats:
-    """The ends of paths (paths, steps, sources) from x (paths, DIM), by a step of RK4 along each piece."""
+    """Return the ends of paths (paths, steps, sources) from x (paths, DIM), by one RK4 step for each increment."""
     backend, timed = solver.backend, bool(solver.interface.time)
     sources = len(solver.interface.noise)
 
@@ -65,7 +66,7 @@ def _along_lines(
 
 
 def failures(solver: Solver, states: Sequence[Floats], parameters: Mapping[str, float], t0: float, h: float) -> int:
-    """The number of steps from these states that fail with the largest possible increments."""
+    """Return the number of steps from these states that fail with the largest possible increments."""
     draws, begin = solver.interface.draws, t0 if solver.interface.time else None
     random, failed = np.random.default_rng(SEED), 0
     for x in states:

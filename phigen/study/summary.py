@@ -1,4 +1,4 @@
-"""Conservation in a run: errors of one method, from its states."""
+"""Conservation in a run: errors of one method, computed from its states."""
 
 from __future__ import annotations
 
@@ -17,18 +17,20 @@ from phigen.study.balance import powers, works
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.symbols import ELAPSED, initial
 
-#: Windows of equal length in which the largest energy error is taken, to tell drift from oscillation.
+#: Number of windows of equal length; comparing the largest energy errors of windows distinguishes drift from
+#: oscillation.
 WINDOWS = 10
 
-#: The largest error of a window without rows.
+#: Value that marks a window without rows.
 _NOTHING = -1.0
-#: Windows are compared if the first sees every coordinate that turns at all turn so often: back and forth once.
+#: Windows are compared if each coordinate with turning points in the run has at least this number of them in the first
+#: window: one oscillation.
 _TURNS = 2
 
 
 @dataclass(frozen=True)
 class Drift:
-    """Error of a conserved quantity: the largest one, in a unit of its own.
+    """Largest error of a conserved quantity, in its own unit.
 
     ``growth`` is the largest error in the last tenth of the run over that in the first; 1 without drift. It is NaN if
     that says nothing: where the error is one of rounding, and where the first tenth has not seen the motion.
@@ -74,14 +76,14 @@ class Summary:
 def summarise(
     method: str, system: System, run: Run | None, parameters: Mapping[str, float], t: Floats, x: Floats
 ) -> Summary:
-    """The summary of states ``x`` (rows, DIM) at times ``t``, all quantities evaluated from their formulas."""
+    """Return the summary of states ``x`` (rows, DIM) at times ``t``; all quantities are evaluated from formulas."""
     watch = Watch(method, system, run, parameters, len(x))
     watch.see(t, x)
     return watch.summary()
 
 
 class Watch:
-    """Sums up the states of one method as they come, in memory that does not grow with their number.
+    """Running summary of the states of one method, in memory that does not grow with their number.
 
     ``rows`` is how many there will be, for the windows in which drift is told from oscillation. ``state`` is all that
     was seen, as arrays.
@@ -112,7 +114,7 @@ class Watch:
             "broken": np.zeros((), dtype=bool),
         }
         self._powers = powers(system)
-        if self._powers:  # the last time with the powers there; the work since the start, and how far that may be off
+        if self._powers:  # last time and its powers; work since the start and its estimated error
             self.state |= {"instant": np.full(1 + len(self._powers), np.nan), "work": np.zeros(2)}
             self.state |= {"change": np.zeros(())}
         if system.driven:
@@ -120,7 +122,7 @@ class Watch:
 
     @property
     def begun(self) -> bool:
-        """Whether the initial state has been seen."""
+        """Whether the initial state has been received."""
         return bool(self.state["good"])
 
     @property
@@ -129,7 +131,9 @@ class Watch:
         return int(self.state["good"])
 
     def see(self, t: Floats, x: Floats) -> None:
-        """Take in the next rows, times (rows,) and states (rows, DIM); those after one not finite do not count."""
+        """Accept the next rows, times (rows,) and states (rows, DIM); rows from the first non-finite one on are
+        ignored.
+        """
         state, good = self.state, int(self.state["good"])
         finite = np.isfinite(x).all(axis=1)
         count = 0 if state["broken"] else len(x) if finite.all() else int(np.argmin(finite))
@@ -150,9 +154,9 @@ class Watch:
         state["good"] = np.asarray(good + count)
         windows = _windows(np.arange(good, good + count), self._about[1])
         for k, (v, unit) in enumerate(zip(values, self._units(), strict=True)):
-            with np.errstate(invalid="ignore"):  # where the start has no value, errors have none
+            with np.errstate(invalid="ignore"):  # errors are undefined where the initial value is
                 np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
-        if self._powers:  # the balance begins with the energy
+        if self._powers:  # the balance starts at the initial energy
             changes = self._units()[0].errors(energies, float(state["start"][0]))
             state["change"] = np.maximum(state["change"], np.max(changes))
         self._see_turns(x, windows)
@@ -162,7 +166,9 @@ class Watch:
         state["final"] = x[-1].copy()
 
     def _work(self, t: Floats, slopes: Sequence[Floats]) -> Floats:
-        """∫ ∂_tH dt up to each of the times, which follow those seen before, from the powers there."""
+        """Return the work done up to each of the times, which follow those received before, from the powers at these
+        times.
+        """
         state = self.state
         if not self.begun:
             state["instant"] = np.array([t[0], *(f[0] for f in slopes)])
@@ -174,7 +180,7 @@ class Watch:
         return sums
 
     def summary(self) -> Summary:
-        """The summary of the rows so far."""
+        """Return the summary of the rows so far."""
         (method, rows), state = self._about, self.state
         steps = self._run.steps if self._run else rows
         telling = rows >= 2 * WINDOWS and _is_telling(state["turns"])
@@ -204,7 +210,7 @@ class Watch:
         return self._found or [Unit()] * len(self._formulas)
 
     def _see_turns(self, x: Floats, windows: NDArray[np.int64]) -> None:
-        """Count where coordinates turn back: in the first window, and at all."""
+        """Count the turning points of each coordinate: in the first window, and in the whole run."""
         state = self.state
         before = state["final"] if np.isfinite(state["final"]).all() else x[0]
         for i, moves in enumerate(np.diff(x, axis=0, prepend=before[None]).T):
@@ -216,13 +222,15 @@ class Watch:
 
 
 def _is_telling(turns: NDArray[np.int64]) -> bool:
-    """Whether the first window sees the motion, by the turns of each coordinate there and at all."""
+    """Return whether the first window contains an oscillation, from the turning points in it and in the whole run."""
     turning = turns[1] > 0
     return bool(turning.any() and (turns[0, turning] >= _TURNS).all())
 
 
 def _windows(rows: NDArray[np.int64], of: int) -> NDArray[np.int64]:
-    """The window of each row but the first, which has one of its own: `WINDOWS` parts of a run of so many rows."""
+    """Return the window of each row of a run of ``of`` rows: one of `WINDOWS` parts, or an extra window for the first
+    row.
+    """
     share, rest = divmod(of - 1, WINDOWS)
     ends = np.cumsum([share + (k < rest) for k in range(WINDOWS)])
     return np.where(rows == 0, WINDOWS, np.searchsorted(ends, rows - 1, side="right"))
@@ -238,7 +246,7 @@ def _drift(maxima: Floats, unit: Unit, steps: int, telling: bool) -> Drift:
 def exact_solution(
     system: System, run: Run, parameters: Mapping[str, float], x0: Floats, t: Floats
 ) -> dict[str, Floats]:
-    """The closed form of a run, coordinate by coordinate, for those it gives."""
+    """Return the closed form of a run by coordinate, for the coordinates that the run states."""
     values: dict[str, Any] = {ELAPSED: t, **parameters}
     values |= {initial(c): float(v) for c, v in zip(system.coordinates, x0, strict=True)}
     arrays = evaluate(list(run.exact.values()), values)
@@ -248,7 +256,7 @@ def exact_solution(
 def _against_exact(
     system: System, run: Run, parameters: Mapping[str, float], x0: Floats, t: Floats, x: Floats
 ) -> float:
-    """The largest difference, relative to the largest coordinate of the closed form at that time."""
+    """Return the largest difference, relative to the largest coordinate of the closed form at the same time."""
     solution = exact_solution(system, run, parameters, x0, t)
     columns = [system.coordinates.index(c) for c in solution]
     expected = np.column_stack(list(solution.values()))

@@ -1,8 +1,8 @@
 """Verification: properties of a generated solver, measured on a run and judged against stated limits.
 
-The limits are those of round-off where a property is exact: Casimirs, the Poisson identity, reversibility, agreement
-of the targets. The order must be the stated one, and energy must not drift. Solvers from approximate bi-realisations
-are Poisson up to a stated power of h only, and held to that power.
+Exact properties must hold to round-off: Casimirs, the Poisson identity, reversibility, agreement of the targets. The
+order must be the stated one, and the energy must not drift. Solvers from approximate bi-realisations are Poisson only
+up to a stated power of h, and that power is checked.
 """
 
 from __future__ import annotations
@@ -28,27 +28,28 @@ from phigen.study.summary import Drift, Summary, summarise
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
-#: Observed orders may fall short of the stated one by this much.
+#: Largest accepted shortfall of an observed order below the stated one.
 ORDER_SLACK = 0.3
-#: The same of strong orders, which are measured on few paths.
+#: Largest accepted shortfall of a strong order, which is measured on few paths.
 STRONG_SLACK = 0.2
-#: The power of the modified Hamiltonian may fall short by this part of what the last correction adds to it.
+#: Largest accepted shortfall of the power of the modified Hamiltonian, as a fraction of the gain by the last
+#: correction.
 MODIFIED_SLACK = 0.6
-#: One-step identities: the Poisson defect, reversibility, agreement of targets, each relative to its terms.
+#: Limit for one-step identities relative to their terms: Poisson defect, reversibility, agreement of targets.
 ONE_STEP = 1e-13
-#: The stated derivative against differences of the step, whose own error this is.
+#: Limit for the tangent map against finite differences of the step: the error of the latter.
 DIFFERENCES = 1e-7
-#: The largest energy error of the last tenth of the run may be this many times that of the first.
+#: Limit for the ratio of the largest energy error in the last tenth of the run to that in the first tenth.
 GROWTH = 4.0
-#: Steps of a run that are made at most, and with --quick.
+#: Largest number of steps of a run, without and with --quick.
 MOST_STEPS, FEW_STEPS = 20_000, 2_000
-#: States along the run at which single steps are examined.
+#: Number of states along the run from which single steps are examined.
 STATES = 4
 
 
 @dataclass(frozen=True)
 class Check:
-    """One property: the measured ``value``, ``passed``, and the ``limit`` in words; empty for mere information.
+    """One property: the measured ``value``, ``passed``, and the ``limit`` in words, empty if the value is not judged.
 
     ``reason`` says why it failed. ``others`` holds the values of the methods to compare with.
     """
@@ -63,9 +64,9 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks of one spec on one run; ``label`` says what the solver claims to be, ``units`` what errors are in.
+    """All checks of one spec on one run; ``label`` states the claim of the solver, ``units`` the units of errors.
 
-    Of a lattice ``said`` does that in words. The ``clock`` is what steps are equal in, t or τ.
+    For lattices the text ``said`` states the units. ``clock`` is the variable in which steps are uniform, t or τ.
     """
 
     name: str
@@ -82,7 +83,7 @@ class Verification:
 
     @property
     def made(self) -> str:
-        """The run that was made, in words."""
+        """Description of the run."""
         return f"{self.steps} steps of {self.step:.9g}" + " in τ" * (self.clock == "τ")
 
     @property
@@ -93,7 +94,7 @@ class Verification:
 
 @dataclass(frozen=True)
 class Subject:
-    """The subject of a verification: the methods of all targets, those to compare with, and the numbers of the run."""
+    """Subject of a verification: methods of all targets (``own``), methods for comparison, numbers of the run."""
 
     compilation: Compilation
     solvers: Mapping[str, Solver]
@@ -104,16 +105,16 @@ class Subject:
     h: float
     steps: int
     t0: float
-    field: Callable[[Floats], Floats]  # the motion in the variable that steps are equal in
+    field: Callable[[Floats], Floats]  # the motion in the variable in which steps are uniform
 
     @property
     def solver(self) -> Solver:
-        """The solver of that target."""
+        """The solver of the `main` target."""
         return next(iter(self.solvers.values()))
 
     @property
     def main(self) -> Method:
-        """The target that is measured where one suffices: C, if it is there."""
+        """The method for measurements that need only one target: C if available."""
         return next(iter(self.own.values()))
 
     @property
@@ -138,7 +139,7 @@ def verify(
 ) -> Verification:
     """Measure and judge the solvers of a compilation (by target, with their tangent maps) on the numbers of a run.
 
-    All begins at the time ``t0``, single steps from states along the run too. ``single`` is the same solver in single
+    All steps begin at the time ``t0``, also those from states along the run. ``single`` is the same solver in single
     precision, if there is one: it is measured against the others.
 
     Raises `StepError` if the run itself cannot be made.
@@ -153,7 +154,7 @@ def verify(
     step_count = min(steps, FEW_STEPS if quick else MOST_STEPS)
     subject = Subject(compilation, solvers, methods, others, parameters, x, h, step_count, t0, field)
     rows = subject.main.rows(x, h, step_count, 1)
-    # With noise, trajectories may well start where single steps have no scale: at rest, at the origin.
+    # With noise, trajectories may start where relative errors of single steps have no scale: at rest, at the origin.
     first = step_count // STATES if noisy else 0
     states = [rows[i] for i in np.linspace(first, step_count, STATES, dtype=int)] if step_count >= STATES else [x]
     symmetry = "symmetric" if compilation.symmetric else "not symmetric"
@@ -186,7 +187,7 @@ def verify(
 
 
 def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) -> tuple[Check, ...]:
-    """The checks of all groups, each group a stage for those who watch."""
+    """Yield the checks of all groups, each group as a stage of the progress display."""
     results: list[Check] = []
     with progress.stage(f"{name}: measurements", len(groups)) as running:
         for title, checks in groups.items():
@@ -197,7 +198,7 @@ def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) ->
 
 
 def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float]) -> Floats | None:
-    """The gauge that a solver chooses for the trajectory from x, None if it has none to choose."""
+    """Return the gauge that a solver chooses for the trajectory from x; None for solvers without gauge."""
     if not compilation.program.held:
         return None
     from phigen.api import solver_of
@@ -207,7 +208,7 @@ def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float
 
 
 def order_check(subject: Subject, state: Floats, *, quick: bool = False) -> Check:
-    """The observed order against the stated one; with noise, that without it, from a state along the run."""
+    """Return the check of the observed order; systems with noise are measured without it, from a state of the run."""
     if not subject.compilation.system.noise:
         return _order_check("observed order", subject, quick=quick)
     still = without_noise(subject.solver, subject.parameters, subject.t0)
@@ -216,7 +217,7 @@ def order_check(subject: Subject, state: Floats, *, quick: bool = False) -> Chec
 
 
 def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
-    """The strong order along given paths, and that the largest increments of all sources leave steps possible."""
+    """Yield the checks of the strong order, and that steps with the largest increments of all sources succeed."""
     system = subject.compilation.system
     if not system.noise:
         return
@@ -236,7 +237,7 @@ def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
 
 
 def time_checks(subject: Subject, gauge: Floats | None, *, quick: bool = False) -> Iterator[Check]:
-    """The observed order of the state with its time, of steps that are equal in τ."""
+    """Yield the check of the observed order of state and time, for steps uniform in τ."""
     if subject.compilation.program.monitor is None or gauge is None:
         return
     main = with_time(subject.solver, subject.parameters, gauge)
@@ -268,7 +269,7 @@ def _order_check(title: str, subject: Subject, *, quick: bool) -> Check:
 
 
 def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
-    """The solution at a time, by DOP853 with halved steps until two results agree; and how far they agree."""
+    """Return the solution at a time with its uncertainty, by DOP853 with halved steps until two results agree."""
     solver = of_classical("dop853", subject.solver, subject.parameters, subject.t0, subject.field)
     known: dict[float, tuple[Floats, float]] = {}
 
@@ -296,11 +297,11 @@ def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
 
 
 def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
-    """Casimirs constant to round-off; energy without drift."""
+    """Yield the checks that Casimirs are constant to round-off and that the energy does not drift."""
     system, steps = subject.compilation.system, subject.steps
     compared = subject.others
     times: Floats = subject.t0 + subject.h * np.arange(len(rows), dtype=np.float64)
-    if system.forces and subject.compilation.monitor:  # work is done in the time that passes, which others do not tell
+    if system.forces and subject.compilation.monitor:  # work needs the physical time, which the other methods lack
         trajectory = subject.solver.integrate(subject.start, subject.h, len(rows) - 1, 1, parameters=subject.parameters)
         times, compared = trajectory.t, {}
     summary = _summary(subject, subject.main.name, rows, times)
@@ -345,7 +346,7 @@ def _summary(subject: Subject, name: str, rows: Floats, times: Floats) -> Summar
 
 
 def _summary_of(subject: Subject, method: Method, times: Floats) -> Summary | None:
-    """The errors of another method; None if one of its steps fails."""
+    """Return the errors of another method; None if one of its steps fails."""
     try:
         return _summary(subject, method.name, method.rows(subject.start, subject.h, subject.steps, 1), times)
     except StepError:
@@ -353,7 +354,9 @@ def _summary_of(subject: Subject, method: Method, times: Floats) -> Summary | No
 
 
 def _recurrent(rows: Floats) -> bool:
-    """Whether windows are comparable: the second half of the states stays within the range of the first and 20 %."""
+    """Return whether the second half of the states stays within the range of the first, plus 20 %: windows are
+    comparable.
+    """
     half = len(rows) // 2
     low, high = rows[:half].min(axis=0), rows[:half].max(axis=0)
     margin = 0.2 * np.max(high - low)
@@ -361,7 +364,7 @@ def _recurrent(rows: Floats) -> bool:
 
 
 def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
-    """The Poisson identity, with the stated derivative, which must be that of the step; reversibility."""
+    """Yield the checks of tangent map, Poisson identity and reversibility of single steps."""
     system, parameters = subject.compilation.system, subject.parameters
     settings = [(x, f * subject.h) for x in states for f in (1.0, 0.5, -1.0)]
 
@@ -396,10 +399,11 @@ def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Chec
 
 
 def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Floats]) -> Iterator[Check]:
-    """Gradients of short runs against tangent maps and differences, and those of members against those of single runs.
+    """Yield the checks of gradients of short runs, against tangent maps and differences, and of batched against single
+    runs.
 
-    The multiples of a gauge are held fixed, as gradients take them to be. With a monitor, e = −H(x₀) follows the start,
-    but for tangent maps, which hold it.
+    The multiples of a gauge are held fixed, as gradients treat them as constants. In monitored systems e = −H(x₀)
+    varies with the start, except in tangent maps, which keep e constant.
     """
     program = subject.compilation.program
     if not program.extras.adjoint:
@@ -423,7 +427,7 @@ def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Flo
 def _approximate(
     subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], largest: float
 ) -> tuple[str, bool, str]:
-    """The limit for a truncation of degree d: a defect of O(h^(d+1))."""
+    """Return limit, verdict and reason for a truncation of degree d: the defect is O(h^(d+1))."""
     degree = subject.compilation.degree
     if degree is None:
         return "", True, ""
@@ -443,7 +447,7 @@ def _or_infinite(measure: Callable[[Method, Floats, float], float], method: Meth
 
 
 def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
-    """Single steps of all targets from the same states."""
+    """Return the check that single steps of all targets from the same states agree."""
     name, difference = "agreement of " + " and ".join(subject.own), 0.0
     if len(subject.own) < 2:
         return Check(f"agreement: only one target, {subject.main.name}", math.nan)
@@ -458,7 +462,7 @@ def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
 def single_checks(
     subject: Subject, solver: Solver | None, gauge: Floats | None, states: Sequence[Floats]
 ) -> Iterator[Check]:
-    """Checks of single precision, where the spec asks for it."""
+    """Yield the checks of single precision, where the spec requests it."""
     if solver is None:
         return
     method = of_solver(solver, subject.parameters, gauge, subject.t0)
@@ -470,14 +474,14 @@ def single_checks(
 
 
 def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
-    """The modified Hamiltonian with m corrections is constant to order p + m, or p + 2m of a symmetric method."""
+    """Yield the checks that H̃ with m corrections is constant to order p + m, or p + 2m for a symmetric method."""
     try:
         series = backward.modified(subject.compilation, subject.parameters, gauge)
     except backward.NotOfferedError:
         return
     observed = backward.observed_powers(series, subject.main, subject.start, subject.h)
     for m, (power, shown) in enumerate(zip(series.powers[1:], observed[1:], strict=True), 1):
-        # A wrong correction shows the power of the one before.
+        # With a wrong correction, the power is that without the correction.
         limit = power - MODIFIED_SLACK * (power - series.powers[m - 1])
         reason = f"shrinks like h^{shown:.2f} instead of h^{power}"
         name = f"modified H, {m} correction{'s' * (m > 1)}: order"
@@ -485,7 +489,7 @@ def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
 
 
 def step_check(subject: Subject, states: Sequence[Floats]) -> Check:
-    """The largest step that can be made, in units of the run's."""
+    """Return the largest step that succeeds, in units of the run's step."""
     largest = measures.largest_step(subject.main, states, subject.h)
     return Check(
         "largest step that converges, of the run's", largest, "at least 1", largest >= 1, "the run's step fails"

@@ -1,1 +1,1 @@
-"""Sweeps: ensembles of any size, chunk by chunk, on the processes of one machine or of many."""
+"""Sweeps: ensembles of any size, computed in chunks by processes on one machine or on many."""

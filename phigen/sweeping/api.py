@@ -49,18 +49,19 @@ def sweep(
     profile: str | None = None,
     progress: Callable[[int, int], Any] | None = None,
 ) -> xr.Dataset:
-    """Make a run for many parameters, initial values or steps; what is kept of each, with the dimensions of ``over``.
+    """Make a run for many parameters, initial values or steps; return results with the dimensions of ``over``.
 
-    The sweep is that of the spec with this ``name``, the first by default, changed by what is given; without sweeps in
-    the spec ``over`` is needed, and without runs ``initial``, ``h`` and ``steps``. ``over`` maps names of parameters,
-    coordinates, ``step`` or ``start`` to arrays, or to ``{"from": a, "to": b, "count": n, "scale": "log"}``; without a
-    count they are drawn, with ``random: n`` and ``seed: k`` beside them. The result lies in the Zarr store ``output``,
-    from which it is read as it is needed; an existing one of the same sweep is gone on with. Without ``output`` it is
-    in memory. ``scheduler`` is the address of a Dask cluster; the default are ``workers`` processes of this machine,
-    one for each core, or for each device of the target. ``target``, ``order``, ``scheme`` and ``profile`` are those of
-    `phigen.compile`. ``progress`` is told the members made and those of them that failed, chunk by chunk. Scripts that
-    call this need the guard ``if __name__ == "__main__":``, as all that start processes do. Raises `SpecError`,
-    `MissingPackageError` without dask, distributed, xarray or zarr, ``phigen.errors.FileError`` and `PhigenError`.
+    The sweep is the one with this ``name`` in the spec, the first by default; other arguments replace its settings. A
+    spec without sweeps needs ``over``, and one without runs needs ``initial``, ``h`` and ``steps``. ``over`` maps names
+    of parameters, coordinates, ``step`` or ``start`` to arrays, or to ``{"from": a, "to": b, "count": n, "scale":
+    "log"}``; without a count the values are random, and ``over`` also contains ``random: n`` and ``seed: k``. The
+    result lies in the Zarr store ``output``, from which data are loaded on demand; an existing store of the same sweep
+    is continued. Without ``output`` the result is in memory. ``scheduler`` is the address of a Dask cluster; the
+    default are ``workers`` processes of this machine, one for each core, or for each device of the target. ``target``,
+    ``order``, ``scheme`` and ``profile`` are those of `phigen.compile`. ``progress`` receives the numbers of computed
+    and of failed members after each chunk. Scripts that call this function need the guard ``if __name__ ==
+    "__main__":``, as it starts processes. Raises `SpecError`, `MissingPackageError` without dask, distributed, xarray
+    or zarr, ``phigen.errors.FileError`` and `PhigenError`.
     """
     from phigen.sweeping.store import imported
     from phigen.sweeping.sweep import SweepSetting, made
@@ -99,7 +100,7 @@ def _run_of(
     steps: int | None,
     parameters: Mapping[str, float] | None,
 ) -> Run:
-    """The run that is made many times, with what is given in place of what the spec says."""
+    """Return the run to repeat: that of the spec with the arguments of the call in place of its settings."""
     sweep = spec.sweeps.get(name) if name else next(iter(spec.sweeps.values()), None)
     run = run or (sweep.run if sweep else next(iter(spec.runs), None))
     if run is not None and run not in spec.runs:
@@ -123,7 +124,7 @@ def _run_of(
 
 
 def _parameters(spec: Spec, parameters: Mapping[str, float]) -> dict[str, Fraction]:
-    """Values of parameters that are the same for all members."""
+    """Return the values of the parameters that are the same for all members."""
     arguments.expect_known(parameters, {p.name: 0.0 for p in spec.parameters})
     values = {name: arguments.number(value, f"parameter {name!r}") for name, value in parameters.items()}
     for p in spec.parameters:
@@ -133,7 +134,7 @@ def _parameters(spec: Spec, parameters: Mapping[str, float]) -> dict[str, Fracti
 
 
 def _numbers(sequence: Any, what: str) -> list[float]:
-    """A list of finite numbers."""
+    """Return a list of finite numbers."""
     return arguments.array(sequence, what, (len(sequence),) if np.ndim(sequence) else (1,)).tolist()  # type: ignore[no-any-return]
 
 
@@ -189,7 +190,7 @@ def _sweep_of(
 
 
 def _words(over: Mapping[str, Any], spec: Spec) -> dict[str, Any]:
-    """The entries of ``over`` besides ranges; a parameter of the same name has a range instead."""
+    """Return the entries of ``over`` that are not ranges; a range under the same name belongs to a parameter."""
     if not isinstance(over, Mapping):
         raise TypeError(f"over must map names to ranges or lists, not {over!r}")
     parameters = {p.name for p in spec.parameters}
@@ -218,14 +219,14 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
 
 
 def _draws(value: Mapping[str, Any]) -> Axis:
-    """The numbers of draws, along a dimension of the sweep."""
+    """Return the numbers of random draws as a dimension of the sweep."""
     if set(value) != {"count"}:
         raise ValueError(f"over: seed takes a count, and nothing else, not {dict(value)!r}")
     return Axis("seed", count=arguments.count(value["count"], "over: seed: count", 1, limits.SWEPT))
 
 
 def _range(name: str, value: Mapping[str, Any]) -> Axis:
-    """The axis of a range in words."""
+    """Return the axis that a mapping or an array describes."""
     for word in (*value, "from", "to"):
         if word not in ("from", "to", "count", "scale") or word not in value:
             raise ValueError(f"over: {name} needs from and to, and may have count and scale, not {dict(value)!r}")

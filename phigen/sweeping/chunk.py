@@ -1,6 +1,6 @@
-"""One chunk of a sweep, as a worker makes it: integrate the members, measure, store.
+"""Work of a sweep worker on one chunk: integrate the members, measure, store.
 
-A worker is told the path of the store and the number of a chunk; solver and plan lie in the store.
+A worker receives the path of the store and the number of a chunk; solver and plan are in the store.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from phigen.sweeping.devices import own_device
 from phigen.sweeping.statistics import MOST_BYTES, statistics_of
 from phigen.sweeping.store import Job, open_job
 
-#: Members with which nothing was done: their numbers are refused.
+#: Status of members that were not run because their parameters or initial values are refused.
 _REFUSED = STATUSES.index("BAD_ARGUMENT")
 
 
 def make(store: str, digest: str, number: int) -> tuple[int, int]:
-    """Make a chunk. Returns how many members it has, and how many of them failed."""
+    """Compute a chunk. Return the number of its members and the number of those that failed."""
     job, solver = _ready(store, digest)
     plan = job.plan
     region = plan.region(number)
@@ -43,13 +43,15 @@ def make(store: str, digest: str, number: int) -> tuple[int, int]:
     for name, values in results.items():
         if name != "status":
             job.root[name][region] = values.reshape(sizes + values.shape[1:])
-    job.root["status"][region] = results["status"].reshape(sizes)  # the last: what has a status is complete
+    job.root["status"][region] = results["status"].reshape(
+        sizes
+    )  # written last, so that members with a status are complete
     return count, int(np.count_nonzero(results["status"]))
 
 
 @lru_cache(maxsize=4)
 def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
-    """The job and its solver, once for each process; one process of a machine compiles, and the others wait for it."""
+    """Return the job and its solver, loaded once per process; one process of a machine compiles, the others wait."""
     job = open_job(store)
     device = own_device(job.plan.about["target"])
     with _alone(job.interface.name):
@@ -60,10 +62,10 @@ def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
 
 @contextlib.contextmanager
 def _alone(name: str) -> Iterator[None]:
-    """While it lasts, no other process of this machine is here."""
+    """Exclude all other processes of this machine from the block."""
     try:
         import fcntl
-    except ImportError:  # Windows: then several may compile
+    except ImportError:  # Windows has no such lock, and several processes may compile
         yield
         return
     folder = cache.directory()
@@ -81,7 +83,7 @@ def _alone(name: str) -> Iterator[None]:
 
 
 def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Floats]:
-    """The results of members by their numbers, and their statuses. With noise, each member has its own path."""
+    """Return results and statuses of the members with these numbers. Each member has its own path of the noise."""
     plan, count = job.plan, len(numbers)
     parameters = {name: varied.get(name, np.full(count, value)) for name, value in plan.parameters.items()}
     x0 = np.stack([varied.get(c, np.full(count, v)) for c, v in zip(plan.coordinates, plan.initial, strict=True)], 1)
@@ -125,14 +127,14 @@ def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: A
 
 
 def _spread(values: Floats, allowed: Any, count: int) -> Floats:
-    """Values of the members that are allowed among all; no numbers elsewhere."""
+    """Distribute the values of allowed members over all members; NaN elsewhere."""
     spread = np.full((count, *values.shape[1:]), np.nan)
     spread[allowed] = values
     return spread
 
 
 def _integrated(solver: Solver, members: Members) -> tuple[Floats, dict[int, str]]:
-    """States (rows, members, DIM), the last the final ones, and which members failed, and why."""
+    """Return states (rows, members, DIM), of which the last row is final, and the status of each failed member."""
     failures: dict[int, str] = {}
     try:
         states = solver.backend.ensemble(members, 1)
@@ -142,7 +144,7 @@ def _integrated(solver: Solver, members: Members) -> tuple[Floats, dict[int, str
 
 
 def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
-    """The number of crossings of the section in the direction of the run, counted at the steps."""
+    """Return the number of crossings of the section in the direction of the run, counted from step to step."""
     section, time, signs = job.section()
     room = max(1, MOST_BYTES // (8 * members.x0.shape[1] * (members.steps + 1)))
     counts = np.zeros(len(members))
@@ -159,7 +161,7 @@ def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
 
 
 def _lyapunov(solver: Solver, members: Members, failures: Mapping[int, str]) -> Floats:
-    """The largest exponent of each member, by the derivatives of its steps, one after the other."""
+    """Return the largest Lyapunov exponent of each member, from the tangent maps of its steps."""
     from phigen.errors import StepError
     from phigen.study.lyapunov import spectrum
 

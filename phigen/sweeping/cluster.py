@@ -1,4 +1,4 @@
-"""Chunks made by the workers of a Dask cluster: processes of this machine, or any cluster by its address."""
+"""Chunks computed by the workers of a Dask cluster: processes of this machine, or a cluster given by its address."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from phigen.errors import PhigenError
 from phigen.sweeping.chunk import make
 from phigen.sweeping.store import imported
 
-#: The number of attempts at a chunk whose worker died.
+#: Number of attempts at a chunk whose worker died.
 TRIES = 4
 
-#: Chunks that are submitted at a time for each thread of the workers.
+#: Number of chunks submitted at a time for each thread of the workers.
 _AHEAD = 4
 
-#: The time limit for the answer of a scheduler.
+#: Time limit for the answer of a scheduler.
 PATIENCE = "10s"
 
-#: Receives the number of members computed, and the number of these that failed.
+#: Callback that receives the number of computed members and the number of those that failed.
 Tell = Callable[[int, int], None]
 
 
@@ -32,7 +32,9 @@ class SweepError(PhigenError):
 
 @contextlib.contextmanager
 def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
-    """A client of the cluster at an address, or of processes of this machine; and how many chunks fit at a time."""
+    """Return a client of the cluster at an address, or of local processes, and the number of chunks submitted at a
+    time.
+    """
     distributed, dask = imported("distributed"), imported("dask")
     if scheduler is not None:
         try:
@@ -43,7 +45,7 @@ def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
             yield client, max(1, sum(client.nthreads().values()))
         return
     with (
-        # A worker may be killed with any chunk; which one is to blame, TRIES decides.
+        # A dying worker may have held several chunks; a chunk counts as the cause only after TRIES attempts.
         dask.config.set({"distributed.scheduler.allowed-failures": TRIES, "distributed.worker.profile.enabled": False}),
         distributed.LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=logging.ERROR
@@ -54,7 +56,7 @@ def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
 
 
 def make_all(client: Any, slots: int, store: str, digest: str, chunks: Sequence[int], tell: Tell) -> None:
-    """Make the chunks of these numbers. Raises `SweepError`, and what a chunk raises unless its worker died."""
+    """Compute the chunks with these numbers. Raises `SweepError`, and passes on the exceptions of chunks."""
     distributed = imported("distributed")
     tries = dict.fromkeys(chunks, 0)
     left = iter(chunks)

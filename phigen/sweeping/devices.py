@@ -1,4 +1,4 @@
-"""Devices of the workers of a sweep: each takes one of those of its machine."""
+"""Assignment of the devices of a machine to the workers of a sweep."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ def workers_of(target: str) -> int:
 
 
 def own_device(target: str) -> int | None:
-    """Return the number of the device of this worker; None for the default one, or that of `CHOICE`.
+    """Return the device number of this worker; None for the default device or the one that `CHOICE` selects.
 
-    Workers of one machine are numbered by Dask, and take its devices in turn.
+    Dask numbers the workers of a machine; successive workers use successive devices.
     """
     if target not in registry.DEVICES or os.environ.get(CHOICE):
         return None
     try:
         name = imported("distributed").get_worker().name
-    except ValueError:  # no worker
+    except ValueError:  # this process is not a worker
         return None
     return name % devices_of(target) if isinstance(name, int) else None

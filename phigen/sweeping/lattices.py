@@ -1,4 +1,4 @@
-"""Members of sweeps that are lattices: their starts and parameters, runs, and what is kept of them."""
+"""Lattice members of sweeps: starts and parameters, runs, and stored results."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from phigen.study.averages import Averages
 from phigen.sweeping.plan import Plan
 from phigen.sweeping.store import Job
 
-#: Seconds of a trial.
+#: Duration of a trial in seconds.
 _TRIAL = 0.3
 
-#: Steps after which a tangent vector is normalised.
+#: Number of steps after which a tangent vector is normalised.
 _CARRIED = 50
 
 _REFUSED = STATUSES.index("BAD_ARGUMENT")
 
 
 def begun(spec: Spec, run: Run, draw: int) -> Start:
-    """The start of a member: the seeds of the run's random values are increased by the member's number of a draw."""
+    """Return the start of a member; its draw number is added to the seeds of the run's random values."""
     if not draw or run.lattice is None:
         return start_of(spec, run)
 
@@ -59,7 +59,7 @@ def _start(job: Job, draw: int) -> Start:
 
 
 def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Any]:
-    """The results of members by their numbers, and their statuses. With noise, each member has its own path."""
+    """Return results and statuses of the members with these numbers. Each member has its own path of the noise."""
     plan, count, shape = job.plan, len(numbers), (len(job.plan.coordinates), *job.plan.sizes)
     results: dict[str, Any] = {"status": np.full(count, _REFUSED, dtype=np.uint8)}
     results |= {name: np.full(count, np.nan) for name in plan.keep if name != "final"}
@@ -79,7 +79,7 @@ def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], numb
 
 
 class _Member:
-    """One lattice, made: its status, and what is kept of it if that is 0."""
+    """One integrated lattice: its status, and its results if the status is 0."""
 
     def __init__(
         self, plan: Plan, solver: LatticeSolver, start: Start, member_values: dict[str, float], number: int
@@ -129,7 +129,7 @@ class _Member:
         return results | ({"frames": frames} if plan.frames else {})
 
     def _statistics(self, statistics: Mapping[str, Statistic], averages: Averages) -> dict[str, float]:
-        """Return the statistics of observables by their words, at the end of the run."""
+        """Return the statistics of observables by their keywords, at the end of the run."""
         if not statistics:
             return {}
         names = self.solver.interface.observables
@@ -144,7 +144,7 @@ class _Member:
         return {word: values[s.of][s.observable] for word, s in statistics.items()}
 
     def _seen(self) -> tuple[float, list[Floats]]:
-        """The energy, and the Casimirs."""
+        """Return the energy and the Casimirs."""
         kinds: LatticeInterface = self.solver.interface
         if "casimir_error" not in self.plan.keep:
             return self.session.hamiltonian(), []
@@ -152,14 +152,14 @@ class _Member:
         return self.session.hamiltonian(), [np.asarray(reduced(kind, densities)) for kind, densities in pairs]
 
     def _changes(self, before: tuple[float, list[Floats]]) -> dict[str, float]:
-        """The largest changes of energy and Casimirs from their values at the start."""
+        """Return the largest changes of energy and Casimirs from their values at the start."""
         energy, casimirs = self._seen()
         changes = [float(np.abs(a - b).max()) for a, b in zip(casimirs, before[1], strict=True)]
         return {"energy_error": abs(energy - before[0]), "casimir_error": max(changes, default=0.0)}
 
 
 def _values(plan: Plan, solver: LatticeSolver, start: Start, member_values: Mapping[str, float]) -> dict[str, Any]:
-    """The parameters of a member. Raises `ValueError` for those that are refused."""
+    """Return the parameters of a member. Raises `ValueError` for refused values."""
     numbers = {name: value for name, value in plan.parameters.items() if np.ndim(start.parameters[name]) == 0}
     return solver.values({**start.arguments, **numbers, **member_values}, {}, start.sizes)
 
@@ -167,7 +167,7 @@ def _values(plan: Plan, solver: LatticeSolver, start: Start, member_values: Mapp
 def energies_at_start(
     job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], count: int
 ) -> tuple[Floats, Floats]:
-    """The energies of members at their starts, and the sums of the magnitudes of the energies of their sites."""
+    """Return the initial energies of members, and the sums of the magnitudes of the energies of their sites."""
     energies = np.full((2, count), np.nan)
     for m in range(count):
         member_values = {name: float(values[m]) for name, values in varied.items() if name != "step"}
@@ -181,9 +181,9 @@ def energies_at_start(
 
 
 def exponent(session: LatticeSession, h: float, steps: int) -> float:
-    """The largest Lyapunov exponent, by a vector that the derivatives of all steps carry along.
+    """Return the largest Lyapunov exponent, by propagating a tangent vector through all steps.
 
-    ``session`` stands at the start. Raises `BackendError`.
+    ``session`` is at the start of the run. Raises `BackendError`.
     """
     vector, grown = np.random.default_rng(0).normal(size=(1, *session.state().shape)), 0.0
     vector = vector / np.linalg.norm(vector)
@@ -196,7 +196,7 @@ def exponent(session: LatticeSession, h: float, steps: int) -> float:
 
 
 def seconds_of_a_member(job: Job) -> float:
-    """Seconds of a member, estimated by a trial of a part of one."""
+    """Return the estimated seconds per member, from a trial of a part of a run."""
     plan, solver = job.plan, LatticeSolver(job.backend(), job.interface)  # type: ignore[arg-type]
     start = _start(job, 0)
     began, done, ahead = time.process_time(), 0, 1
@@ -207,5 +207,5 @@ def seconds_of_a_member(job: Job) -> float:
             session.advance(plan.h, ahead)
             done, ahead = done + ahead, 2 * ahead
     except (BackendError, ValueError):
-        return 1.0  # nothing is known
+        return 1.0  # default where the trial fails
     return (time.process_time() - began) / max(done, 1) * plan.steps + 1e-4

@@ -1,8 +1,8 @@
-"""Plan of a sweep: dimensions, chunks, and the numbers of each member, computed where they are needed.
+"""Plan of a sweep: dimensions, chunks, and the values of each member, computed on demand.
 
-A plan is plain data, stored beside the result as JSON, so that whoever opens it knows what was made, and a worker needs
-nothing else. Members are numbered in the order of the dimensions, the last the fastest. A chunk is a box of members
-whose numbers follow one another.
+A plan is plain data, stored with the result as JSON: it documents the result, and it is all that a worker needs.
+Members are numbered in the order of the dimensions, with the last dimension the fastest. A chunk is a box of members
+with consecutive numbers.
 """
 
 from __future__ import annotations
@@ -19,18 +19,19 @@ from phigen.spec.model import Axis, Statistic
 
 Floats = NDArray[np.float64]
 
-#: Bytes of frames that a chunk may hold in memory.
+#: Largest size in bytes of the frames of a chunk in memory.
 _MOST_BYTES = 256 * 2**20
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A sweep in numbers: ``initial``, ``h``, ``t0`` and ``parameters`` are those of what is not varied.
+    """Numerical description of a sweep; ``initial``, ``h``, ``t0`` and ``parameters`` are the values of what is not
+    varied.
 
-    ``axes`` are varied, those without a size drawn from ``seed``; ``noise`` is the seed of the noise, whose member each
-    is by its number. ``members`` is the number of those in a file or of
-    random ones, whose only dimension is ``member``; ``listed`` names the columns of the file. Of a
-    lattice of these ``sizes`` there is no ``initial``: workers find it by the spec.
+    ``axes`` are the varied quantities; values along axes without a size are drawn with ``seed``. ``noise`` is the seed
+    of the noise, from which each member number has its own path. ``members`` is the number of members in a file or of
+    random members, whose only dimension is ``member``; ``listed`` names the columns of the file. Lattices of
+    ``sizes`` have no ``initial``: workers compute the start from the spec.
     """
 
     name: str
@@ -47,12 +48,12 @@ class Plan:
     listed: tuple[str, ...] = ()
     keep: tuple[str, ...] = ("final",)
     frames: int = 0
-    after: float | None = None  # the time from which means of observables are taken
-    blocks: int | None = None  # of rows, for the errors of these means
-    stride: int = 1  # of lattices without frames: steps between the rows that means are over
+    after: float | None = None  # start of the time averages of observables
+    blocks: int | None = None  # number of blocks of rows for the standard errors
+    stride: int = 1  # steps between averaged rows, for lattices without frames
     chunk: tuple[int, ...] = ()
     sizes: tuple[int, ...] = ()
-    about: Mapping[str, Any] = field(default_factory=dict)  # target, version: what else decides the result
+    about: Mapping[str, Any] = field(default_factory=dict)  # further facts that determine the result: target, version
 
     @property
     def grid(self) -> tuple[Axis, ...]:
@@ -71,7 +72,7 @@ class Plan:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Their sizes."""
+        """The sizes of the dimensions."""
         return (self.members,) if self.members else tuple(axis.size for axis in self.grid)
 
     @property
@@ -86,31 +87,31 @@ class Plan:
 
     @property
     def rows(self) -> tuple[int, ...]:
-        """The numbers of the steps that are stored as frames."""
+        """The step numbers of the stored frames."""
         return tuple(range(0, self.steps + 1, self.frames)) if self.frames else ()
 
     def statistics(self, observables: Collection[str]) -> dict[str, Statistic]:
-        """Return what is kept of observables, by the words for it."""
+        """Return the stored statistics of observables by their keywords."""
         read = {word: Statistic.read(word, observables) for word in self.keep}
         return {word: statistic for word, statistic in read.items() if statistic is not None}
 
     @property
     def bytes_of_member(self) -> int:
-        """The least memory of a member in bytes: its current states, and all of its frames."""
+        """Lower bound of the memory of a member in bytes: its current states and all of its frames."""
         return 8 * len(self.coordinates) * prod(self.sizes) * (len(self.rows) + 4)
 
     def region(self, number: int) -> tuple[slice, ...]:
-        """The box of a chunk."""
+        """Return the box of members of a chunk."""
         place = np.unravel_index(number, self.boxes)
         ends = zip(place, self.chunk, self.shape, strict=True)
         return tuple(slice(int(k) * of, min((int(k) + 1) * of, size)) for k, of, size in ends)
 
     def first(self, region: Sequence[slice]) -> int:
-        """The number of the first member of a region."""
+        """Return the number of the first member of a region."""
         return int(np.ravel_multi_index([part.start for part in region], self.shape))
 
     def varied(self, region: Sequence[slice], listed: Mapping[str, Floats]) -> dict[str, Floats]:
-        """The varied numbers of the members of a region, (members,) each; ``listed`` are those of a file."""
+        """Return the varied values of the members of a region, (members,) each; ``listed`` are those from a file."""
         sizes = tuple(part.stop - part.start for part in region)
         first = self.first(region)
         columns: dict[str, Floats] = dict(listed)
@@ -124,12 +125,12 @@ class Plan:
         return {name: values for name, values in columns.items() if name != "seed" or seeded}
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return the plan as plain data."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Plan:
-        """The inverse of `as_json`."""
+        """Return the plan from the data of `as_json`."""
         axes = tuple(
             Axis(**{**axis, "values": tuple(axis["values"]), "ends": tuple(axis["ends"])}) for axis in data["axes"]
         )
@@ -138,7 +139,7 @@ class Plan:
 
 
 def values_of(axis: Axis) -> Floats:
-    """The values along an axis; of ``seed`` the numbers of the draws."""
+    """Return the values along an axis; for the axis ``seed`` these are the numbers of draws."""
     if axis.values:
         return np.array(axis.values)
     if axis.name == "seed" and axis.ends == (0.0, 0.0):
@@ -150,7 +151,7 @@ def values_of(axis: Axis) -> Floats:
 
 
 def _spaced(axis: Axis, share: Floats) -> Floats:
-    """Values at shares, from 0 to 1, of the way from one end to the other."""
+    """Return the values at fractions 0 to 1 of the way between the ends of an axis."""
     first, last = axis.ends
     if axis.scale == "log":
         return np.asarray(first * (last / first) ** share)
@@ -158,14 +159,14 @@ def _spaced(axis: Axis, share: Floats) -> Floats:
 
 
 def _uniform(seed: int, column: int, first: int, count: int) -> Floats:
-    """Numbers of a stream of their own for each column, from a place on: the same however they are cut into chunks."""
+    """Return random numbers of a column from position ``first`` on; they do not depend on the division into chunks."""
     stream = np.random.Philox(key=[seed, column])
-    stream.advance(first // 4)  # four numbers come from one round
+    stream.advance(first // 4)  # one round yields four numbers
     return np.random.Generator(stream).random(first % 4 + count)[first % 4 :]
 
 
 def chunk_of(plan: Plan, members: int) -> tuple[int, ...]:
-    """The sizes of a chunk of so many members at most, and of no more than memory has room for."""
+    """Return the sizes of a chunk with at most ``members`` members that fit into the memory limit."""
     left = max(1, min(members, _MOST_BYTES // plan.bytes_of_member))
     sides: list[int] = []
     for size in reversed(plan.shape):

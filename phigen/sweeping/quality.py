@@ -1,4 +1,4 @@
-"""Members of a sweep whose energy error is too large for their numbers to mean anything."""
+"""Detection of sweep members whose energy error is too large for meaningful results."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """``count`` members whose energy error is above a limit, and the ``largest`` error of all, both relative."""
+    """Number (``count``) of members with a relative energy error above a limit, and the ``largest`` error."""
 
     count: int = 0
     largest: float = 0.0
 
 
 def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
-    """The stored energy errors of a sweep of an ordinary system, in the units of `phigen.geometry.conservation`.
+    """Return the stored energy errors of a sweep of an ordinary system, in the units of `phigen.geometry.conservation`.
 
-    Members that failed, or wait, do not count, and none does where time, forces or noise change the energy.
+    Failed and waiting members do not count. Nothing counts where time, forces or noise change the energy.
     """
 
     def at_start(varied: Mapping[str, Floats], count: int) -> tuple[Floats, Floats]:
@@ -38,7 +38,7 @@ def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
 
 
 def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
-    """The same for a sweep of a lattice, whose starts are made again."""
+    """Return the stored energy errors of a sweep of a lattice; the units need the recomputed starts of members."""
     if cell.driven or "energy_error" not in job.plan.keep:
         return EnergyErrors()
     from phigen.runtime.lattice import LatticeSolver
@@ -51,7 +51,7 @@ def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
 def _counted(
     job: Job, at_start: Callable[[Mapping[str, Floats], int], tuple[Floats, Floats]], limit: float
 ) -> EnergyErrors:
-    """Count the large errors; ``at_start`` returns the energies of members and their terms."""
+    """Count the large errors; ``at_start`` returns initial energies of members and the magnitudes of their terms."""
     if "energy_error" not in job.plan.keep:
         return EnergyErrors()
     count, largest = 0, 0.0

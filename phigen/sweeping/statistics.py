@@ -1,4 +1,4 @@
-"""Observables of the members of a sweep: their values at the end, and means, standard deviations and errors."""
+"""Observables of the members of a sweep: final values, means, standard deviations and standard errors."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from phigen.spec.names import STATISTICS
 from phigen.study.averages import Averages
 from phigen.sweeping.store import Job
 
-#: Bytes of states of members that are held at a time where every step of a run counts.
+#: Largest size in bytes of states in memory at a time where statistics include every step.
 MOST_BYTES = 64 * 2**20
 
 
 def statistics_of(
     job: Job, solver: Solver, members: Members, states: Floats, statistics: Mapping[str, Statistic]
 ) -> dict[str, Floats]:
-    """Return the statistics by their words, (members,) each.
+    """Return the statistics by their keywords, (members,) each.
 
     ``states`` (rows, members, DIM) are the frames of the sweep, or the final states alone. Statistics are over the
-    frames, of a sweep without frames over the start and all steps; rows before ``plan.after`` do not count.
+    frames; without frames they are over the start and all steps. Rows before ``plan.after`` do not count.
     """
     names = list(solver.interface.observables)
     values: dict[str, Floats] = {}
@@ -45,7 +45,7 @@ def statistics_of(
 
 
 def _values(job: Job, solver: Solver, members: Members, states: Floats, numbers: Floats) -> Floats:
-    """Return the observables (rows, members, observables) of states after so many steps each."""
+    """Return the observables (rows, members, observables) of states with the given step numbers."""
     when: tuple[Any, ...] = ()
     if solver.interface.time:
         when = (members.t0 + numbers[:, np.newaxis] * members.h,)
@@ -53,7 +53,7 @@ def _values(job: Job, solver: Solver, members: Members, states: Floats, numbers:
 
 
 def _moments(job: Job, solver: Solver, members: Members, rows: Floats, numbers: Floats) -> tuple[Floats, Floats]:
-    """Return means and standard deviations (members, observables) over rows, NaN where none counts."""
+    """Return means and standard deviations (members, observables) over rows, NaN where no row counts."""
     values = _values(job, solver, members, rows, numbers)
     after = job.plan.after
     if after is not None:
@@ -82,7 +82,7 @@ def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: F
 def _pieces(
     job: Job, solver: Solver, members: Members, states: Floats
 ) -> Iterator[tuple[slice, Members, Floats, Floats]]:
-    """Yield members with the states that count of each, and the numbers of their steps, as many as memory holds."""
+    """Yield groups of members that fit into memory, with the states that count and their step numbers."""
     if job.plan.frames:
         numbers = np.array(job.plan.rows, dtype=np.float64)
         yield slice(None), members, states[: len(numbers)], numbers

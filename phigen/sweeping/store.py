@@ -1,6 +1,6 @@
-"""The store of a sweep: a Zarr group that xarray opens, with plan and solver beside it.
+"""Store of a sweep: a Zarr group that xarray opens, with plan and solver in its attributes.
 
-The group has an array for each thing that is kept, in the chunks of the sweep, and the values along its dimensions. The
+The group contains an array for each result, in the chunks of the sweep, and the values along the dimensions. The
 array ``status`` is written last: a chunk whose members have a status is complete. The subgroup ``made_by`` has the plan
 and the source of the solver in its attributes.
 """
@@ -25,7 +25,7 @@ from phigen.runtime.crossings import SIGNS
 from phigen.runtime.interface import STATUSES, Floats, Interface, LatticeInterface
 from phigen.sweeping.plan import Plan, values_of
 
-#: The status of a member that was not made yet.
+#: Status of a member that is not computed yet.
 WAITING = 255
 
 _BESIDE = "made_by"
@@ -35,13 +35,13 @@ OWN = ("status", "coordinate", "frame", "frames", _BESIDE)
 
 
 def imported(name: str) -> Any:
-    """Return a package that sweeps need. Raises `MissingPackageError`."""
+    """Import and return a package that sweeps need. Raises `MissingPackageError`."""
     return packages.imported(name, "sweeps", "dask distributed xarray zarr")
 
 
 @dataclass(frozen=True)
 class Job:
-    """An opened store: plan, interface, and sources of the solver and of the functions of states in NumPy."""
+    """Opened store: plan, interface, source of the solver, and NumPy source of the functions of states."""
 
     root: Any
     plan: Plan
@@ -51,21 +51,23 @@ class Job:
     spec: str
 
     def backend(self, device: int | None = None) -> Any:
-        """The loaded solver, on the device of a number. Raises `ToolchainError`."""
+        """Return the loaded solver, on the device with this number. Raises `ToolchainError`."""
         from phigen import registry
 
         return registry.find(self.plan.about["target"]).load(self.files, self.interface, device)
 
     @cached_property
     def module(self) -> Any:
-        """The NumPy module with the functions of states."""
+        """Return the NumPy module with the functions of states."""
         from phigen.runtime.modules import load_module
 
         return load_module(self.functions, self.interface.name)
 
     def section(self) -> tuple[Callable[[Floats, Mapping[str, Floats]], Floats], str, tuple[float, ...]]:
-        """The section of the run, as a function of states (…, DIM) and what else has a name; the name of the time; the
-        signs that it changes with."""
+        """Return the section of the run as a function of states, the name of the time and the signs of crossings.
+
+        The function takes states (…, DIM) and all other values by name.
+        """
         from phigen import spec as specs
         from phigen.symbolic.arrays import evaluate
 
@@ -82,21 +84,21 @@ class Job:
 
 
 def digest_of(plan: Plan, made_by: Mapping[str, Any]) -> str:
-    """A hash of all that decides the numbers; how they are cut into chunks is left out."""
+    """Return a hash of all that determines the results; the division into chunks does not count."""
     facts = {**plan.as_json(), "chunk": None}
     return hashlib.sha256(json.dumps([facts, made_by], sort_keys=True).encode()).hexdigest()[:16]
 
 
 def made_by(interface: Interface, files: Mapping[str, str], functions: str, spec: str) -> dict[str, Any]:
-    """The attributes stored beside the plan."""
+    """Return the attributes stored with the plan."""
     about = {key: sorted(v) if isinstance(v, frozenset) else v for key, v in asdict(interface).items()}
     return json.loads(json.dumps({"interface": about, "files": dict(files), "functions": functions, "spec": spec}))  # type: ignore[no-any-return]
 
 
 def create(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats]) -> bool:
-    """Make a new store without members; false if somebody else has made one there meanwhile. Raises `OSError`.
+    """Create a store without members; return false if another process has created one meanwhile. Raises `OSError`.
 
-    It is made beside its place and moved there: whoever finds a store finds all of it.
+    The store is written to a temporary path and renamed, so that an existing store is always complete.
     """
     temporary = path.with_name(f".phigen-{uuid.uuid4().hex}.zarr")
     try:
@@ -112,7 +114,7 @@ def create(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[st
 
 
 def _fill(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats]) -> None:
-    """The arrays of a store, and what workers need."""
+    """Write the arrays of a store and the data that workers need."""
     zarr = imported("zarr")
     root = zarr.open_group(str(path), mode="w-", zarr_format=2)
 
@@ -124,7 +126,9 @@ def _fill(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str
 
     def along(name: str, values: Any) -> None:
         about = {"_ARRAY_DIMENSIONS": [name]}
-        root.create_array(name, data=np.asarray(values), fill_value=None, attributes=about)  # 0 is a value like others
+        root.create_array(
+            name, data=np.asarray(values), fill_value=None, attributes=about
+        )  # 0 is a valid value, not a mark of missing data
 
     for axis in plan.grid if not plan.members else ():
         values = values_of(axis)
@@ -153,7 +157,7 @@ def _fill(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str
 
 
 def open_job(path: str) -> Job:
-    """The job in a store. Raises `FileError` where there is none."""
+    """Return the job in a store. Raises `FileError` where there is none."""
     zarr = imported("zarr")
     try:
         root = zarr.open_group(path, mode="r+")
@@ -165,7 +169,7 @@ def open_job(path: str) -> Job:
 
 
 def interface_of(about: Mapping[str, Any]) -> Interface:
-    """An interface from plain data."""
+    """Return an interface from plain data."""
     interface_type = LatticeInterface if "axes" in about else Interface
     kinds = {f.name: str(f.type) for f in fields(interface_type)}
     makers: dict[str, Callable[[Any], Any]] = {"tuple": tuple, "frozenset": frozenset}
@@ -175,7 +179,7 @@ def interface_of(about: Mapping[str, Any]) -> Interface:
 
 
 def waiting(job: Job) -> list[int]:
-    """The numbers of the chunks that are still to be made."""
+    """Return the numbers of the chunks that are not complete."""
     status, plan = job.root["status"], job.plan
     numbers = []
     for number in range(int(np.prod(plan.boxes))):

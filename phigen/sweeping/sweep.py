@@ -30,13 +30,13 @@ from phigen.sweeping.devices import workers_of
 from phigen.sweeping.plan import Plan, chunk_of
 from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_errors
 
-#: Seconds that a chunk should take: long beside what scheduling and storing cost, short beside a coffee.
+#: Intended duration of a chunk in seconds: long compared with scheduling and storing, short for a waiting user.
 _SECONDS = 4.0
 
-#: Seconds of a step with its derivative, and what is done with that in Python.
+#: Seconds of a step with its tangent map, including its processing in Python.
 _TANGENT = 40e-6
 
-#: Members of a chunk, at least and at most.
+#: Smallest and largest number of members of a chunk.
 _LEAST, _MOST = 32, 1 << 17
 
 
@@ -55,7 +55,7 @@ class SweepSetting:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Number of members made and failed in this call, the number of all, and the quality of their energies."""
+    """Numbers of members computed and failed in this call, number of all members, and quality of their energies."""
 
     members: int
     failed: int
@@ -73,10 +73,10 @@ def made(
     started: Callable[[int], None],
     tell: cluster.Tell,
 ) -> Outcome:
-    """Make what the store lacks of a sweep; ``started`` is told how many members that is.
+    """Compute the missing members of a sweep; ``started`` receives their number.
 
-    Raises `SpecError`, `FileError` where the store holds something else, `LimitError` where the members that are made
-    at a time do not fit into memory, and `SweepError`.
+    Raises `SpecError`, `FileError` where the store contains another sweep, `LimitError` where the members computed at a
+    time do not fit into memory, and `SweepError`.
     """
     store.imported("zarr")
     compilation = compilation_of(
@@ -103,7 +103,7 @@ def made(
         with cluster.connected(setting.scheduler, setting.workers or workers_of(target)) as (client, slots):
             job = job or _created(setting.output, plan, beside, listed, slots)
             chunks = store.waiting(job)
-            if setting.scheduler is None:  # another machine has memory of its own, of which its workers ask
+            if setting.scheduler is None:  # workers on another machine check the memory of that machine
                 running, held = min(slots, len(chunks)), prod(job.plan.chunk) * job.plan.bytes_of_member
                 expect_room(f"{running} chunks of a sweep at a time", running * held)
             started(sum(_members_of(job.plan, number) for number in chunks))
@@ -119,7 +119,7 @@ def made(
 
 
 def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> None:
-    """`SpecError` for a name under which the store has something else."""
+    """Raise `SpecError` for a name that the store uses for other data."""
     for name in varied:
         if name in (*store.OWN, *KEPT, *sweep.keep):
             message = f"{spec.file}: a sweep over {name!r}, under which its store has something else"
@@ -127,12 +127,12 @@ def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> No
 
 
 def _with_ensembles(spec: Spec) -> Spec:
-    """Return the spec with code for ensembles, which sweeps need, whatever it leaves out."""
+    """Return the spec with the ensemble code that sweeps need, even if the spec excludes ensembles."""
     return replace(spec, extras=replace(spec.extras, without=spec.extras.without - {"ensemble", "members"}))
 
 
 def _expect_room_for_axes(sweep: SweepSettings, spec: Spec) -> None:
-    """`LimitError` where the values along a dimension do not fit into memory; they are made with one copy."""
+    """Raise `LimitError` where the values along a dimension, with one copy of them, do not fit into memory."""
     for axis in sweep.over:
         place = spec.diagnostic(("sweeps", sweep.name, "over", axis.name), "").location
         expect_room(f"{axis.size} values of {axis.name}", 2 * 8 * axis.size, place, "random members have no axes")
@@ -143,7 +143,7 @@ def _members_of(plan: Plan, number: int) -> int:
 
 
 def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int], target: str) -> Plan:
-    """The sweep in numbers, without chunks."""
+    """Return the plan of a sweep, without chunks."""
     return Plan(
         name=sweep.name,
         coordinates=spec.coordinates,
@@ -168,7 +168,7 @@ def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int]
 
 
 def _files(spec: Spec, run: Run) -> dict[str, str]:
-    """The folder of the spec, if a run of a lattice reads files beside it."""
+    """Return the folder of the spec if a run of a lattice reads files from there."""
     if run.lattice is None:
         return {}
     values = [*run.lattice.state.values(), *run.lattice.arrays.values(), *(p.values for p in spec.parameters)]
@@ -177,14 +177,14 @@ def _files(spec: Spec, run: Run) -> dict[str, str]:
 
 
 def _beside(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]:
-    """The solver as source, and what else workers need."""
+    """Return the source of the solver and the other data that workers need."""
     program, command = compilation.program, f"phigen build {compilation.program.name}.yaml"
     (functions,) = emit(program, "numpy", command).values()
     return store.made_by(interface_of(program), files_of(program, target, command), functions, spec.source)
 
 
 def _gone_on_with(output: Path, plan: Plan, beside: Mapping[str, Any]) -> store.Job:
-    """The store of an earlier call, if it is one of this sweep. Raises `FileError`."""
+    """Return the store of an earlier call if it belongs to this sweep. Raises `FileError`."""
     job = store.open_job(str(output))
     stored = store.made_by(job.interface, job.files, job.functions, job.spec)
     if store.digest_of(job.plan, stored) != store.digest_of(plan, beside):
@@ -196,7 +196,9 @@ def _gone_on_with(output: Path, plan: Plan, beside: Mapping[str, Any]) -> store.
 def _created(
     output: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats], slots: int
 ) -> store.Job:
-    """A new store, in chunks that keep all workers busy, or the one that somebody has made here meanwhile."""
+    """Return a new store with chunks that keep all workers busy, or the store that another process has created
+    meanwhile.
+    """
     job = store.Job(
         None, plan, store.interface_of(beside["interface"]), beside["files"], beside["functions"], beside["spec"]
     )
@@ -209,7 +211,7 @@ def _created(
 
 
 def _seconds_of_a_member(job: store.Job) -> float:
-    """Seconds of a member, by a trial of a few members and steps; the first call compiles the solver for all."""
+    """Return the seconds per member, from a trial of a few members and steps; the first call compiles the solver."""
     if job.plan.sizes:
         return lattices.seconds_of_a_member(job)
     plan, steps = job.plan, min(job.plan.steps, 2000)
@@ -218,18 +220,18 @@ def _seconds_of_a_member(job: store.Job) -> float:
     h, t0 = np.asarray(plan.h), np.asarray(plan.t0)
     trial = Members(x0, h, steps, values, t0, draws=Draws(plan.noise), paths=np.arange(len(x0)))
     backend = job.backend()
-    began = time.process_time()  # of a machine that is busy with other things, no less should be asked at a time
+    began = time.process_time()  # processor time: a busy machine should not get smaller chunks
     try:
         backend.ensemble(trial, 1)
     except BackendError:
-        return _SECONDS / 4096  # nothing is known
+        return _SECONDS / 4096  # default where the trial fails
     seconds = (time.process_time() - began) / len(x0) * (plan.steps / steps) + 1e-7
     counted = ("crossings" in plan.keep) + any("(" in word for word in plan.keep)
     return seconds * (1 + counted) + ("lyapunov" in plan.keep) * _TANGENT * plan.steps
 
 
 def _listed(sweep: SweepSettings, spec: Spec) -> dict[str, Floats]:
-    """The columns of a file of members, by their names. Raises `SpecError`, at the place of the file in the spec."""
+    """Return the columns of a file of members by name. Raises `SpecError`, located at the file name in the spec."""
     path = Path(spec.file).parent / sweep.file
 
     def refused(why: str, hint: str = "") -> SpecError:
