@@ -106,6 +106,8 @@ def _values(compilation: Compilation, language: BindingLanguage) -> dict[str, ob
         "monitored": about.monitored,
         "noise": bool(about.noise),
         "element": about.element,
+        "rotation": about.element - 3 * about.position,
+        "position": about.position,
         "kicks": program.offers("kicks"),
         "real": language.reals[about.single],
         "parameters": [

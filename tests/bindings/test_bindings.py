@@ -203,6 +203,71 @@ def test_bindings_compile_for_systems_of_all_kinds(source, tmp_path):
     assert symbols <= set(re.findall(rf"\b{name}_\w+", (tmp_path / f"{name}.h").read_text(encoding="utf-8")))
 
 
+#: A body in a fluid, with an attitude and a position behind it.
+FLUID = """phigen: 1
+name: hull
+coordinates: [m1, m2, m3, p1, p2, p3]
+poisson: {lie_algebra: {name: se(3), sign: minus}}
+hamiltonian: m1**2/2 + m2**2/4 + m3**2/6 + p1**2/2 + p2**2/3 + p3**2/4
+order: 2
+profile: small
+reconstruct: quaternion
+"""
+#: Programs that set an attitude and a position, print what they read, and whether a quaternion of 0 is refused.
+SETTERS = {
+    "cpp": """#include <cstdio>
+#include "hull.hpp"
+int main()
+{
+    hull_phigen::Solver hull({1, 2, 3, 4, 5, 6});
+    hull.set_attitude({0, 3, 0, 4, 5, 6, 7});
+    for (double value : hull.attitude()) std::printf("%.1f ", value);
+    try { hull.set_attitude({0, 0, 0, 0, 5, 6, 7}); } catch (const hull_phigen::Error &) { std::printf("refused"); }
+}
+""",
+    "fortran": """program main
+  use hull_phigen
+  type(hull_solver) :: hull
+  integer :: status
+  call hull%init([1, 2, 3, 4, 5, 6]*1.0_hull_real)
+  call hull%set_attitude([0, 3, 0, 4, 5, 6, 7]*1.0_hull_real)
+  write (*, "(*(f3.1, 1x))", advance="no") hull%attitude()
+  call hull%set_attitude([0, 0, 0, 0, 5, 6, 7]*1.0_hull_real, status)
+  if (status /= hull_ok) print "(a)", "refused"
+end program
+""",
+    "rust": """include!("rust/src/lib.rs");
+extern crate std;
+fn main() {
+    let mut hull = Solver::new(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], &Parameters::default()).unwrap();
+    hull.set_attitude(&[0.0, 3.0, 0.0, 4.0, 5.0, 6.0, 7.0]).unwrap();
+    for value in hull.attitude() { std::print!("{value:.1} ") }
+    if hull.set_attitude(&[0.0, 0.0, 0.0, 0.0, 5.0, 6.0, 7.0]).is_err() { std::print!("refused") }
+}
+""",
+}
+
+
+@pytest.mark.slow
+def test_attitudes_and_positions_can_be_set(tmp_path):
+    compilation = compile_proved(specs.loads(FLUID))
+    for file, text in emit(compilation.program, "c", "x").items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    for language, program in SETTERS.items():
+        for file, text in binding(compilation, language).items():
+            (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / file).write_text(text.replace("//! ", "// ").replace("#![", "// #!["), encoding="utf-8")
+        (tmp_path / f"main.{language}").write_text(program, encoding="utf-8")
+    run([tool("gcc"), "-std=c99", "-c", "hull.c"], tmp_path)
+    library = ["hull.o", "-lm", "-o"]
+    run([tool("g++"), "-std=c++11", "-x", "c++", "main.cpp", "-x", "none", *library, "by_cpp"], tmp_path)
+    run([tool("gfortran"), "-x", "f95", "hull.f90", "main.fortran", "-x", "none", *library, "by_fortran"], tmp_path)
+    linked = ["-Clink-arg=hull.o", "-Clink-arg=-lm", "-o", "by_rust"]
+    run([tool("rustc"), "--edition=2021", "-Adead_code", "main.rust", *linked], tmp_path)
+    for language in SETTERS:
+        assert run([tmp_path / f"by_{language}"], tmp_path).strip() == "0.0 0.6 0.0 0.8 5.0 6.0 7.0 refused"
+
+
 def test_hand_edits_stay_and_lattices_are_refused(tumbler):
     path = tumbler / "generated/tumbler/tumbler.hpp"
     text = path.read_text(encoding="utf-8")
