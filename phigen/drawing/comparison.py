@@ -1,4 +1,4 @@
-"""Figure of a comparison: errors of energy and orbit against the CPU time of the run, a point for each method."""
+"""Figure of a comparison: errors of energy and orbit against the CPU time of the run, one point per method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Thousands of dots as one path: a tenth of the bytes that markers take in an SVG file."""
+"""Thousands of dots as one path, which takes a tenth of the bytes of markers in an SVG file."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from phigen.symbolic.arrays import Floats
 
 
 def draw_dots(axes: Any, points: Floats, colour: str, size: float, order: float, label: str | None = None) -> None:
-    """Dots at points (rows, 2), ``size`` across in points of 1/72 inch: lines of no length with round ends."""
+    """Draw dots at points (rows, 2) as very short lines with round ends; ``size`` is the diameter in 1/72 inch."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    # What has no length at all is not drawn by every program.
+    # Some programs do not draw lines of length 0.
     offset = 1e-5 * np.max(np.abs(points), axis=0, initial=1e-300)
     vertices = np.stack([points, points + offset], axis=1).reshape(-1, 2)
     path = Path(vertices, np.tile([Path.MOVETO, Path.LINETO], len(points)).astype(np.uint8))

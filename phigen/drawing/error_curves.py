@@ -17,22 +17,23 @@ from phigen.symbolic.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
-#: Windows in which the largest error is drawn, where there are more rows.
+#: Number of windows whose largest error is drawn, for runs of more rows.
 WINDOWS = 400
-#: The title of the values of an energy that is not conserved.
+#: Title of the values of an energy that is not conserved.
 HAMILTONIAN = "H(t)"
-#: The height of a row of panels in inches.
+#: Height of a row of panels in inches.
 ROW = 2.3
-#: The unit in the last place, drawn as the smallest error that can be expected.
+#: Rounding unit, drawn as the smallest error that can be expected.
 ROUNDING = 2.0**-52
 
 LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.2, 1.2, 1.2)), (0, (8, 2)), (0, (2.5, 1)))
 
 
 def windowed_maxima(t: Floats, values: Floats, windows: int = WINDOWS) -> tuple[Floats, Floats]:
-    """The largest value in each window of rows and its time, so that no peak is lost.
+    """Return the largest value in each window of rows and its time, so that no peak is lost.
 
-    A window with a value that is not finite gives NaN. Up to twice as many rows as windows are kept all.
+    A window with a non-finite value gives NaN. If there are at most twice as many rows as windows, all rows are
+    returned.
     """
     if len(t) <= 2 * windows:
         return t, np.where(np.isfinite(values), values, np.nan)
@@ -43,14 +44,14 @@ def windowed_maxima(t: Floats, values: Floats, windows: int = WINDOWS) -> tuple[
 
 
 def grid(methods: Mapping[str, Trajectory]) -> tuple[int, int]:
-    """Rows and columns of the panels that `draw_errors` makes."""
+    """Return the numbers of rows and columns of the panels of `draw_errors`."""
     panels = 1 + len(next(iter(methods.values())).casimirs)
     columns = panels if panels <= 3 else 2 if panels == 4 else 3
     return -(-panels // columns), columns
 
 
 def height(methods: Mapping[str, Trajectory]) -> float:
-    """The height of all panels in inches."""
+    """Return the height of all panels in inches."""
     return ROW * grid(methods)[0]
 
 
@@ -59,10 +60,10 @@ def draw_errors(
     methods: Mapping[str, Trajectory],
     units: Mapping[str, Unit] | None = None,
 ) -> None:
-    """One panel for the energy and each Casimir, one curve for each method; the first method lies on top.
+    """Draw a panel for the energy and each Casimir, with a curve for each method; the first method is on top.
 
-    Errors are in the ``units``; without them relative to the value at the start, unless that is 0. A quantity that
-    time, forces or noise change has no error: its values are drawn, H(t) for the energy.
+    Errors are in ``units``, or without these relative to the initial value, unless that is 0. For quantities that time,
+    forces or noise change, the values are drawn instead of errors: H(t) for the energy.
     """
     first = next(iter(methods.values()))
     panels = [ENERGY, *first.casimirs]
@@ -104,7 +105,7 @@ def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
     positive = np.concatenate([values[values > 0] for _, values in curves.values()])
     low, high = (positive.min(), positive.max()) if len(positive) else (ROUNDING, ROUNDING)
     lowest, highest = math.floor(math.log10(low)), max(math.ceil(math.log10(high)), math.floor(math.log10(low)) + 1)
-    # The decade below all errors is that of the zeros, which a logarithmic scale has no place for.
+    # A logarithmic scale has no zero, so zeros are drawn one decade below all errors.
     zeros = any((values == 0).any() for _, values in curves.values())
     zero = 10.0 ** (lowest - 0.8)
     axes.set(yscale="log", ylim=(10.0 ** (lowest - (1.4 if zeros else 0.1)), 10.0 ** (highest + 0.1)))
@@ -123,7 +124,7 @@ def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
 
 
 def _set_ticks(axes: Any, lowest: int, highest: int, zero: float | None) -> None:
-    """Powers of ten, at most six of them, and a 0 where zeros are drawn."""
+    """Set at most six ticks at powers of ten, and a tick 0 where zeros are drawn."""
     powers = range(highest, lowest - 1, -max(1, math.ceil((highest - lowest) / 5)))
     places, labels = [10.0**p for p in powers], [f"$10^{{{p}}}$" for p in powers]
     axes.set_yticks([*places, zero] if zero else places, [*labels, "0"] if zero else labels)

@@ -1,4 +1,4 @@
-"""The convergence of Lyapunov exponents."""
+"""Plot of the convergence of Lyapunov exponents."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from phigen.drawing.palette import MARK, PALETTE, SERIES
 if TYPE_CHECKING:
     from phigen.study.lyapunov import Spectrum
 
-#: The height of the panel in inches.
+#: Height of the panel in inches.
 HEIGHT = 2.4
 
 
 def draw_exponents(axes: Any, spectrum: Spectrum) -> None:
-    """All exponents against the time over which they were taken, the largest on top of the others."""
+    """Draw all exponents against the averaging time, with the largest on top."""
     axes.axhline(0, **MARK)
     for values in spectrum.history.T[:0:-1]:
         axes.plot(spectrum.times, values, color=PALETTE["leaf"], linewidth=0.9, zorder=2)
     axes.plot(spectrum.times, spectrum.history[:, 0], color=SERIES[0], linewidth=1.4, zorder=3)
-    # The first exponents are transient, and would flatten the rest of the curves.
+    # The first values are transients, which would compress the scale of the rest of the curves.
     late = np.abs(spectrum.history[spectrum.times >= spectrum.t / 100])
     height = 1.2 * float(np.max(late)) or 1.0
     axes.set(xlim=(spectrum.t / 1000, 1.1 * spectrum.t), ylim=(-height, height))

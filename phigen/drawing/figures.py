@@ -1,8 +1,8 @@
-"""Figures of runs: trajectories, errors of what should be conserved, Poincaré sections, convergence, work.
+"""Figures of runs: trajectories, errors of conserved quantities, Poincaré sections, convergence, work.
 
 Each function returns a `matplotlib.figure.Figure` and leaves matplotlib's global state as it was. The colours are those
-of `phigen.drawing.palette.PALETTE`; `save` and `svg` there write figures so that their bytes are a function of
-what they show. matplotlib is the optional extra ``plot``; without it every function here raises `MissingPackageError`.
+of `phigen.drawing.palette.PALETTE`; `save` and `svg` there write figures reproducibly: equal figures give equal
+bytes. matplotlib is the optional extra ``plot``; without it every function here raises `MissingPackageError`.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ __all__ = ["PALETTE", "SUFFIXES", "WIDTH", "constancy_figure", "convergence_figu
            "lyapunov_figure", "run_figure", "save", "section_figure", "svg", "trajectory_figure", "tuning_figure",
            "work_precision_figure"]  # fmt: skip
 
-#: The widths of a page and of a single panel, in inches; PNG files have 200 dots per inch.
+#: Widths of a page and of a single panel, in inches; PNG files have 200 dots per inch.
 WIDTH, NARROW = 7.2, 4.8
 _SECTION, _SQUARE = 3.4, 3.8
 
 
 @styled
 def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]) -> Figure:
-    """The curve in phase space, in a plane, in space or in several projections, by the number of coordinates.
+    """Return a figure of the curve in phase space: in a plane, in space or in several projections.
 
-    ``casimirs`` are the formulas of the Casimirs. In space the leaf is drawn: the surface on which the first Casimir
-    of these three coordinates is constant.
+    ``casimirs`` are the formulas of the Casimirs. In space the symplectic leaf is drawn: the surface on which the first
+    Casimir of the three coordinates is constant.
     """
     _, columns = phase_space.grid(trajectory.coordinates)
     figure = _figure(phase_space.height(trajectory.coordinates), WIDTH if columns > 1 else NARROW)
@@ -61,10 +61,11 @@ def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]
 
 @styled
 def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> Figure:
-    """The errors of energy and Casimirs against time, of several methods by their labels; one panel per quantity.
+    """Return a figure of the errors of energy and Casimirs of several methods against time; one panel per quantity.
 
-    Errors are in the ``units`` of `phigen.geometry.conservation.units_of`. Of long runs the largest error of each of
-    some hundred windows is drawn. Zeros have a place of their own, marked 0; a cross marks where a method broke down.
+    Errors are in the ``units`` of `phigen.geometry.conservation.units_of`. For long
+    runs the largest errors of some hundred windows are drawn. Zeros have a separate tick 0; a cross marks the time at
+    which a method broke down.
     """
     figure = _figure(error_curves.height(methods))
     error_curves.draw_errors(figure, methods, units)
@@ -73,7 +74,7 @@ def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | 
 
 @styled
 def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figure:
-    """Points (rows, DIM) of Poincaré sections by their labels, in a plane of two of the coordinates ``names``."""
+    """Return a figure of Poincaré sections: points (rows, DIM) by label, in the plane of two of the ``names``."""
     figure = _figure(_SECTION, NARROW)
     section_plane.draw_section(figure.add_subplot(), sections, names)
     return figure
@@ -81,7 +82,7 @@ def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figu
 
 @styled
 def convergence_figure(study: Study) -> Figure:
-    """Error at the end against the step size, one curve per method, each with a thin line of its stated order."""
+    """Return a figure of final errors against the step size: per method a curve and a thin line of its order."""
     figure = _figure(_SQUARE, NARROW)
     precision_curves.draw_convergence(figure.add_subplot(), study)
     return figure
@@ -89,7 +90,7 @@ def convergence_figure(study: Study) -> Figure:
 
 @styled
 def work_precision_figure(study: Study) -> Figure:
-    """Errors at the end against the time that the run took: of the solution and, if there are any, of the Casimirs."""
+    """Return a figure of the final errors of solution and Casimirs against the computing time."""
     panels = [precision_curves.draw_work, precision_curves.draw_conserved][: 1 + study.has_casimirs]
     figure = _figure(_SQUARE, WIDTH if len(panels) > 1 else NARROW)
     for axes, draw in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
@@ -99,7 +100,7 @@ def work_precision_figure(study: Study) -> Figure:
 
 @styled
 def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
-    """The error of all candidates of a tuning against the time they take, and what was proposed."""
+    """Return a figure of the errors of all candidates of a tuning against computing time, with the proposals."""
     figure = _figure(1.2 * _SQUARE, WIDTH)
     if title:
         figure.suptitle(title, fontsize=11)
@@ -109,7 +110,7 @@ def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
 
 @styled
 def constancy_figure(constancy: Constancy) -> Figure:
-    """Changes of H and of the modified Hamiltonian: along a trajectory, and against the step size."""
+    """Return a figure of changes of H and H̃: along a trajectory, and against the step size."""
     figure = _figure(_SQUARE)
     along, against = figure.subplots(1, 2)
     backward_curves.draw_along(along, constancy)
@@ -126,10 +127,10 @@ def run_figure(
     spectrum: Spectrum | None = None,
     units: Mapping[str, Unit] | None = None,
 ) -> Figure:
-    """All figures of a run on one page.
+    """Return all figures of a run on one page.
 
-    The trajectory of the first method with its sections and observables, the errors of all methods, and the Lyapunov
-    exponents if there are any.
+    The page shows the trajectory of the first method with its sections and observables, the errors of all methods, and
+    the Lyapunov exponents if computed.
     """
     first = next(iter(methods.values()))
 
@@ -142,7 +143,7 @@ def run_figure(
     rows: list[tuple[float, list[Callable[[FigureBase], None]]]]
     rows = [(phase_space.height(first.coordinates), [draw_trajectory])]
     if sections and phase_space.grid(first.coordinates) == (1, 1):
-        rows[0][1].append(draw_section)  # a single panel leaves room at its side
+        rows[0][1].append(draw_section)  # a single panel leaves space beside it
     elif sections:
         rows.append((_SECTION, [draw_section]))
     errors: Callable[[FigureBase], None] = partial(error_curves.draw_errors, methods=methods, units=units)
@@ -168,7 +169,7 @@ def run_figure(
 
 @styled
 def lyapunov_figure(spectrum: Spectrum) -> Figure:
-    """Convergence of the Lyapunov exponents of a trajectory."""
+    """Return a figure of the convergence of the Lyapunov exponents of a trajectory."""
     figure = _figure(exponents.HEIGHT, NARROW)
     exponents.draw_exponents(figure.add_subplot(), spectrum)
     return figure

@@ -1,4 +1,4 @@
-"""Films of runs of lattices: chains as curves over the sites, planes and graphs as pictures, one after the other."""
+"""Films of runs of lattices: chains as curves over the sites, planes and graphs as sequences of pictures."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from phigen.errors import MissingPackageError
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats
 
-#: Pictures of a film at most, in a second, and dots to an inch.
+#: Largest number of pictures of a film; pictures per second; dots per inch.
 MOST_PICTURES, RATE, DOTS = 400, 20, 80
 
 
 @styled
 def film(run: LatticeTrajectory, title: str, path: Path) -> None:
-    """Write a film of the coordinates, ``.gif`` or ``.mp4``. Raises `MissingPackageError` where ffmpeg is not there."""
+    """Write a film of the coordinates, ``.gif`` or ``.mp4``. Raises `MissingPackageError` if ffmpeg is missing."""
     from matplotlib.animation import FFMpegWriter, PillowWriter
     from matplotlib.figure import Figure
 
@@ -47,7 +47,7 @@ def film(run: LatticeTrajectory, title: str, path: Path) -> None:
 
 
 def expect_writer(path: Path) -> None:
-    """Raises `MissingPackageError` for a film that needs ffmpeg where there is none."""
+    """Raise `MissingPackageError` for a film that needs ffmpeg if ffmpeg is missing."""
     from matplotlib.animation import FFMpegWriter
 
     if path.suffix.lower() != ".gif" and not FFMpegWriter.isAvailable():
@@ -55,12 +55,12 @@ def expect_writer(path: Path) -> None:
 
 
 def _flat(values: Floats) -> Floats:
-    """A chain as it is, a plane, or the middle plane across the first axis."""
+    """Return chains and planes unchanged, and the middle plane along the first axis of three-dimensional lattices."""
     return values if values.ndim < 3 else values[values.shape[0] // 2]
 
 
 def _graph(axes: Any, name: str, run: LatticeTrajectory, places: Floats) -> Any:
-    """A coordinate on a graph: the function that changes it."""
+    """Draw a coordinate on a graph; return the function that updates the picture."""
     values = run.column(name)
     picture = draw_sites(axes, run.parameters["bonds"], places, values[0], shades_of(values))
     axes.set_title(name)
@@ -68,7 +68,7 @@ def _graph(axes: Any, name: str, run: LatticeTrajectory, places: Floats) -> Any:
 
 
 def _shown(axes: Any, name: str, values: Floats) -> Any:
-    """The function that extracts the displayed values from a coordinate (frames, *sizes)."""
+    """Return the function that extracts the displayed values from a coordinate (frames, *sizes)."""
     first = _flat(values[0])
     axes.set_title(name)
     if first.ndim == 1:

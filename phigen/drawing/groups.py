@@ -9,11 +9,11 @@ Group = tuple[str, ...]
 
 
 def groups(coordinates: Sequence[str]) -> list[Group]:
-    """The coordinates in groups of up to three, in their order; a coordinate alone is drawn against the time.
+    """Return the coordinates in groups of up to three, in order; a group of one is drawn against the time.
 
-    Up to three coordinates are one group. Otherwise, positions are paired with the momenta named after them (q and p,
-    q1 and p1, x and px), but two positions are the orbit in a plane, and their momenta another group; if there are none
-    such, neighbours with the same letters or the same number make a group.
+    Up to three coordinates are one group. Otherwise each position is paired with the momentum named after it (q and p,
+    q1 and p1, x and px). With exactly two positions, the positions are one group, the orbit in a plane, and the momenta
+    are another. Without such pairs, neighbours with the same letters or the same number form a group.
     """
     names = tuple(coordinates)
     if len(names) <= 3:
@@ -27,13 +27,13 @@ def groups(coordinates: Sequence[str]) -> list[Group]:
 
 
 def phase_planes(coordinates: Sequence[str]) -> list[Group]:
-    """Positions with their momenta where there are such, else `groups`: the planes of Poincaré sections."""
+    """Return the planes of Poincaré sections: positions paired with their momenta, else `groups`."""
     pairs = _pairs(tuple(coordinates))
     return pairs if len(coordinates) > 3 and 2 * len(pairs) == len(coordinates) else groups(coordinates)
 
 
 def is_orbit(coordinates: Sequence[str]) -> bool:
-    """Whether they are two positions and their momenta: an orbit in a plane."""
+    """Return whether the coordinates are two positions and their momenta: an orbit in a plane."""
     return len(coordinates) == 4 and len(_pairs(tuple(coordinates))) == 2
 
 
@@ -47,7 +47,7 @@ def _momentum(q: str, names: Group) -> str | None:
 
 
 def _runs(names: Group) -> list[Group]:
-    """Neighbours of one kind: the same letters, or the same number after them, whichever makes fewer runs."""
+    """Return neighbours with equal letters, or neighbours with equal numbers, whichever gives fewer groups."""
     by_letters = _split(names, lambda name: re.sub(r"[\d_]+$", "", name))
     by_number = _split(names, lambda name: name[len(re.sub(r"\d+$", "", name)) :])
     return min(by_number, by_letters, key=len)
@@ -64,7 +64,7 @@ def _split(names: Group, kind: Callable[[str], str]) -> list[Group]:
 
 
 def _parts(run: Group) -> list[Group]:
-    """A run in threes if it starts like a place in space or comes out even, else in twos, with one three if odd."""
+    """Split into threes if the names begin with x, y, z or divide by three; else into pairs and at most one three."""
     if run[:3] == ("x", "y", "z") or len(run) % 3 == 0:
         return [run[i : i + 3] for i in range(0, len(run), 3)]
     first = 3 if len(run) % 2 and len(run) > 1 else 0

@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 
     from phigen.study.lyapunov import Spectrum
 
-#: Most panels of coordinates, times in a diagram, and snapshots in a row.
+#: Largest numbers of panels of coordinates, of times in a diagram, and of snapshots in a row.
 MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
-#: Sites of a graph that is drawn as one; more of them, some times over, make large files.
+#: Largest number of sites of a graph that is drawn as a graph; larger graphs, drawn several times, make large files.
 MOST_DRAWN = 100
-#: Colours of diagrams, and of snapshots: few enough that files stay small.
+#: Numbers of colours of diagrams and of snapshots, limited to keep files small.
 LEVELS = 48
 #: Height in inches of a panel with paths in a plane.
 ORBITS_HEIGHT = 5.0
-#: Most sites whose names are drawn: more would overlap in a panel.
+#: Largest number of sites with names; the names of more sites would overlap in a panel.
 MOST_NAMED = 24
 
 
@@ -45,17 +45,17 @@ def lattice_figure(
     spectrum: Spectrum | None = None,
     site_names: Sequence[str] = (),
 ) -> Figure:
-    """The coordinates over space and time, and the ``errors`` (frames,) of what is conserved, by name.
+    """Return a figure of the coordinates over space and time, and of the ``errors`` (frames,) by quantity.
 
     Where time, forces or noise change the energy, H(t) is drawn in place of its error.
 
-    Of pairs the paths in the plane of the first two coordinates are drawn.
+    For systems of pairs, the paths in the plane of the first two coordinates are drawn.
 
     Sites of graphs and pairs may have names.
 
-    Below are the observables against the time, S(q, ω), a correlation, and Lyapunov exponents, if there are any.
+    Further panels show observables against the time, S(q, ω), a correlation, and Lyapunov exponents, if available.
 
-    A diagram has at most ``dots`` dots along the time.
+    A diagram has at most ``dots`` dots along the time axis.
     """
     from matplotlib.figure import Figure
 
@@ -103,7 +103,7 @@ def lattice_figure(
 
 @styled
 def series_figure(run: LatticeSeries, title: str) -> Figure:
-    """The recorded numbers of a run without frames, against the time."""
+    """Return a figure of the recorded series of a run without frames."""
     from matplotlib.figure import Figure
 
     names = [*run.columns][: 2 * MOST_PANELS]
@@ -116,7 +116,7 @@ def series_figure(run: LatticeSeries, title: str) -> Figure:
 
 @styled
 def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
-    """The ``energies`` (frames, *sizes) of the sites, and the changes of their Casimirs."""
+    """Return a figure of the ``energies`` (frames, *sizes) of the sites and of the changes of their Casimirs."""
     from matplotlib.figure import Figure
 
     local = {name: values for name, values in run.casimirs.items() if values.ndim > 1}
@@ -144,7 +144,7 @@ def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
 
 
 def _draw_orbits(axes: Any, run: LatticeTrajectory, site_names: Sequence[str]) -> None:
-    """The paths of bodies in the plane of their first two coordinates, with a point where each of them ends."""
+    """Draw the paths of bodies in the plane of their first two coordinates, with a dot at the end of each path."""
     x, y = run.x[:, 0], run.x[:, 1]
     for site in range(x.shape[1]):
         colour = SERIES[site % len(SERIES)]
@@ -166,7 +166,7 @@ def _draw_diagram(
     dots: int = MOST_TIMES,
     site_names: Sequence[str] = (),
 ) -> None:
-    """One coordinate of a chain: sites upwards, time to the right."""
+    """Draw one coordinate of a chain: sites upwards, time to the right."""
     axes = part.add_subplot()
     times = _shown_frames(run, dots)
     shown = axes.imshow(
@@ -182,8 +182,8 @@ def _draw_diagram(
 
 
 def _shown_frames(run: LatticeTrajectory, dots: int) -> Any:
-    """Numbers of frames at about equal times, with the nearest frame to each where frames are not equal times apart."""
-    apart = np.diff(run.t[:-1])  # the last frame may come earlier
+    """Return frame numbers at about equal intervals of time; each is the frame nearest to the desired time."""
+    apart = np.diff(run.t[:-1])  # the last frame may follow after a shorter interval
     if len(apart) < 2 or np.ptp(apart) <= 1e-6 * abs(apart[0]):
         return np.linspace(0, len(run) - 1, min(len(run), dots)).astype(int)
     order = np.argsort(run.t)
@@ -192,7 +192,7 @@ def _shown_frames(run: LatticeTrajectory, dots: int) -> Any:
 
 
 def places_of(run: LatticeTrajectory) -> Floats | None:
-    """Positions of the sites of a graph in the picture (sites, 2); None for grids and for graphs that are too large."""
+    """Return positions of the sites of a graph (sites, 2); None for grids and for graphs that are too large."""
     if "bonds" not in run.parameters or run.x.shape[2] > MOST_DRAWN:
         return None
     return placed(run.parameters["bonds"], run.x.shape[2])
@@ -201,7 +201,7 @@ def places_of(run: LatticeTrajectory) -> Floats | None:
 def _draw_graph(
     part: Any, name: str, run: LatticeTrajectory, values: Floats, places: Floats, site_names: Sequence[str] = ()
 ) -> None:
-    """One coordinate of a graph at some times."""
+    """Draw one coordinate of a graph at some times."""
     frames, shades = _snapshots(run), shades_of(values, LEVELS)
     panels = np.atleast_1d(part.subplots(1, len(frames)))
     for axes, k in zip(panels, frames.tolist(), strict=True):
@@ -213,7 +213,7 @@ def _draw_graph(
 
 
 def draw_sites(axes: Any, bonds: Any, places: Floats, values: Floats, shades: Mapping[str, Any]) -> Any:
-    """The sites of a graph with the bonds between them, coloured by values (sites,) as `shades_of` says."""
+    """Draw the sites and bonds of a graph; the sites have the colours of `shades_of` for the values (sites,)."""
     from matplotlib.collections import LineCollection
 
     lines = places[np.asarray(bonds).reshape(-1, 2)]
@@ -229,12 +229,12 @@ def draw_sites(axes: Any, bonds: Any, places: Floats, values: Floats, shades: Ma
 
 
 def _snapshots(run: LatticeTrajectory) -> Any:
-    """Numbers of some frames, from the first to the last."""
+    """Return the numbers of some frames, from the first to the last."""
     return np.unique(np.linspace(0, len(run) - 1, min(len(run), SNAPSHOTS)).astype(int))
 
 
 def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats) -> None:
-    """One coordinate of a plane, or of the middle plane across the first axis, at some times."""
+    """Draw one coordinate of a plane, or of the middle plane along the first axis, at some times."""
     frames = _snapshots(run)
     planes = values if values.ndim == 3 else values[:, values.shape[1] // 2]
     shades = shades_of(planes, LEVELS)

@@ -1,4 +1,4 @@
-"""The surface in space on which a Casimir is constant, as a net of its cuts with planes."""
+"""Surface in space on which a Casimir is constant, drawn as a net of its intersections with planes."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient, symbols_of
 
-#: Planes per axis, points along the side of the grid in a plane, and Newton steps that put its lines on the surface.
+#: Number of planes per axis; grid points along a side of a plane; Newton steps that move lines onto the surface.
 CUTS, GRID, NEWTON_STEPS = 9, 41, 8
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """The surface ``casimir`` = ``level`` over three ``names``; ``parameters`` has the values of all other symbols."""
+    """Surface ``casimir`` = ``level`` over three ``names``; ``parameters`` has the values of all other symbols."""
 
     casimir: Expression
     names: tuple[str, ...]
@@ -24,7 +24,7 @@ class Leaf:
     level: float
 
     def value_and_gradient(self, points: Floats) -> tuple[Floats, Floats]:
-        """C − level of points (…, 3), shape (…), and ∇C, shape (…, 3)."""
+        """Return C − level at points (…, 3), shape (…), and ∇C, shape (…, 3)."""
         values = {**self.parameters, **{name: points[..., i] for i, name in enumerate(self.names)}}
         arrays = evaluate([self.casimir, *gradient(self.casimir, self.names)], values)
         value, *slopes = (np.broadcast_to(a, points.shape[:-1]) for a in arrays)
@@ -37,7 +37,7 @@ def leaf_of(
     start: Mapping[str, float],
     parameters: Mapping[str, float],
 ) -> Leaf | None:
-    """The leaf through ``start`` (all coordinates) of the first Casimir of three names alone; None if there is none."""
+    """Return the leaf through ``start`` of the first Casimir of three names only; None if there is none."""
     for casimir in casimirs.values():
         used = set(symbols_of(casimir)) & set(start)
         if len(names) == 3 and used and used <= set(names):
@@ -47,7 +47,7 @@ def leaf_of(
 
 
 def around(leaf: Leaf, box: Floats) -> Floats:
-    """The box (2, 3) of the whole leaf if that is closed and not much larger than the given one, else the given one."""
+    """Return the box (2, 3) around a closed leaf if it is not much larger than the given box, else the given box."""
     middle, half = box.mean(axis=0), float(np.max(box[1] - box[0]))
     large = np.stack([middle - half, middle + half])
     lines = net(leaf, large)
@@ -61,7 +61,7 @@ def around(leaf: Leaf, box: Floats) -> Floats:
 
 
 def net(leaf: Leaf, box: Floats) -> list[Floats]:
-    """Lines (points, 3) of the leaf in a box (2, 3) of lower and upper bounds."""
+    """Return lines (points, 3) of the leaf within a box (2, 3) of lower and upper bounds."""
     lines = []
     cell = (box[1] - box[0]) / (GRID - 1)
     for axis in range(3):
@@ -72,19 +72,19 @@ def net(leaf: Leaf, box: Floats) -> list[Floats]:
 
 
 def _cut(leaf: Leaf, box: Floats, axis: int, place: float) -> list[Floats]:
-    """Lines of the leaf in the plane x_axis = place, as far as straight pieces between points of a grid go."""
+    """Return lines of the leaf in the plane x_axis = place, linearly interpolated on a grid."""
     from contourpy import contour_generator
 
     u, v = (np.linspace(box[0, i], box[1, i], GRID) for i in range(3) if i != axis)
     grid = np.insert(np.stack(np.meshgrid(u, v), axis=-1), axis, place, axis=-1)
     values, _ = leaf.value_and_gradient(grid)
-    # Where C is not defined there is no leaf.
+    # Grid cells where C is undefined contain no leaf.
     lines = contour_generator(u, v, np.ma.masked_invalid(values)).lines(0.0)
     return [np.insert(np.asarray(line, dtype=np.float64), axis, place, axis=-1) for line in lines]
 
 
 def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Floats]:
-    """The line moved onto the surface within its plane, cut where that fails: C changes its sign at a pole as well."""
+    """Return the line moved onto the surface within its plane, split where Newton fails, as at a pole of C."""
     moved = line.copy()
     with np.errstate(all="ignore"):
         for _ in range(NEWTON_STEPS):

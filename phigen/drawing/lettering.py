@@ -1,4 +1,4 @@
-"""Ticks and names of axes in space, moved apart by their measured sizes, since matplotlib only estimates places."""
+"""Ticks and axis names of panels in space, moved apart by measured text sizes; matplotlib only estimates positions."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from phigen.symbolic.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: There is no tick in this part of an axis at both ends, where two axes meet.
+#: Fraction of an axis at both ends that has no ticks, as two axes meet there.
 CORNER = 0.08
-#: Letters of ticks that fit beside the upright axis, and what more of them take, in points each.
+#: Number of letters of ticks that fit beside the vertical axis, and width of each further letter in points.
 LETTERS, WIDTH = 4, 2.2
-#: The distance by which a name is moved at a time, in points; the largest number of moves; pixels between texts.
+#: Distance of one move of a name, in points; largest number of moves; least distance between texts, in pixels.
 PAD, MOST_MOVES, GAP = 3.0, 20, 3.5
 _SUPERSCRIPTS = str.maketrans("−-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def letter(axes: Any, names: tuple[str, ...], box: Floats, most: int) -> None:
-    """Names of axes in space over a box (2, 3), and some ``most`` ticks; the power of ten of ticks goes to the name."""
+    """Label axes in space over a box (2, 3), with about ``most`` ticks; names contain the power of ten of ticks."""
     for axis, name, (low, high) in zip(_axes(axes), names, box.T.tolist(), strict=True):
         ticks = _ticks(low, high, most)
         axis.set_ticks(ticks)
@@ -44,14 +44,14 @@ def _ticks(low: float, high: float, most: int) -> list[float]:
 
 
 def move_apart(figure: Figure) -> None:
-    """Move the names of axes in space outwards until they meet no other text of their axes, all within the figure."""
+    """Move axis names of panels in space outwards, within the figure, until they overlap no text of their axes."""
     spaces, layout = figure.findobj(lambda artist: hasattr(artist, "zaxis")), cast(Any, figure.get_layout_engine())
     left = right = 0.0
     for _ in range(MOST_MOVES if spaces else 0):
         figure.draw_without_rendering()
         names = [axis.label.get_window_extent() for axes in spaces for axis in _axes(axes)]
         meeting = [axis for axes in spaces for axis in _meeting(axes)]
-        # Layouts leave room for ticks, not for names.
+        # Layouts reserve space for ticks, but not for names.
         outside = min(name.x0 for name in names), max(name.x1 for name in names) - figure.bbox.x1
         left, right = max(left, left - outside[0]), max(right, right + outside[1])
         if not meeting and outside[0] >= 0 and outside[1] <= 0:
@@ -67,7 +67,7 @@ def _axes(axes: Any) -> tuple[Any, Any, Any]:
 
 
 def _meeting(axes: Any) -> Iterator[Any]:
-    """The axes whose names meet another text."""
+    """Return the axes whose names overlap another text."""
     ticks = [tick.label1.get_window_extent() for axis in _axes(axes) for tick in axis.get_major_ticks()]
     names = [axis.label.get_window_extent().padded(GAP) for axis in _axes(axes)]
     for k, (axis, name) in enumerate(zip(_axes(axes), names, strict=True)):

@@ -20,8 +20,8 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 #: The role of each colour. No two are equal, and SVG files contain them literally, so that a page can replace them by
-#: variables of its own. Those of the series have a contrast of 3 and more on white as well as on black, and are told
-#: apart with every kind of colour vision (Okabe and Ito, the light ones darkened).
+#: variables of its own. The series colours have a contrast of at least 3 on white and on black, and are
+#: distinguishable with every kind of colour vision (Okabe and Ito, with the light colours darkened).
 PALETTE: Mapping[str, str] = {
     "paper": "#ffffff",
     "ink": "#24292f",
@@ -35,14 +35,14 @@ PALETTE: Mapping[str, str] = {
     "series-5": "#a6761d",
     "series-6": "#7a7a7a",
 }
-#: The colours of these roles on a dark page; all others are seen on both.
+#: Colours of these roles on a dark page; all other colours are visible on light and dark pages.
 DARK: Mapping[str, str] = {"paper": "#0d1117", "ink": "#e6edf3", "muted": "#9198a1", "grid": "#30363d"}
 SERIES = tuple(colour for role, colour in PALETTE.items() if role.startswith("series"))
 
-#: The command that installs what the extra ``plot`` names: true in a checkout and of any release.
+#: Command that installs the packages of the extra ``plot``; valid in a checkout and for any release.
 INSTALLED_BY = "pip install matplotlib"
 
-#: Files that figures are written to.
+#: Suffixes of files for figures.
 SUFFIXES = (".png", ".svg", ".pdf")
 
 _STYLE: Any = {
@@ -81,12 +81,12 @@ _STYLE: Any = {
 }
 
 
-#: A level that curves are compared with: rounding, an accuracy, zero.
+#: Style of a horizontal reference line: rounding, an accuracy, zero.
 MARK: Mapping[str, Any] = {"color": PALETTE["muted"], "linewidth": 0.8, "linestyle": (0, (1, 2)), "zorder": 1}
 
 
 def require_matplotlib() -> None:
-    """Raises `MissingPackageError` if it is not installed, or is not whole."""
+    """Raise `MissingPackageError` if matplotlib is not installed, or only in part."""
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
@@ -96,7 +96,7 @@ def require_matplotlib() -> None:
 
 @contextmanager
 def _styled() -> Iterator[None]:
-    """matplotlib with our settings instead of those of the user."""
+    """Apply the settings of this module instead of those of the user within the block."""
     require_matplotlib()
     import matplotlib as mpl
 
@@ -107,7 +107,7 @@ def _styled() -> Iterator[None]:
 
 
 def styled(draw: Callable[P, T]) -> Callable[P, T]:
-    """Decorates functions that draw or write figures."""
+    """Decorate a function that draws or writes figures, so that it runs with `_styled`."""
 
     @wraps(draw)
     def drawn(*args: P.args, **kwargs: P.kwargs) -> T:
@@ -135,8 +135,8 @@ def save_for_pages(figure: Figure, path: Path) -> None:
 def in_both_themes(svg_text: str) -> str:
     """Replace the colours of an SVG file that depend on the theme by variables.
 
-    Browsers choose their values by the reader's preference. Other programs know no variables: files for them keep
-    the colours.
+    Browsers choose the values by the reader's preference. Other programs do not support variables; files for them have
+    literal colours.
     """
     for role in DARK:
         svg_text = svg_text.replace(PALETTE[role], f"var(--{role})")
@@ -149,7 +149,7 @@ def in_both_themes(svg_text: str) -> str:
 
 @styled
 def svg(figure: Figure) -> str:
-    """A figure as the text of an SVG file, without a background."""
+    """Return a figure as the text of an SVG file, without a background."""
     return _rendered(figure, "svg", transparent=True).decode("utf-8")
 
 
@@ -162,5 +162,5 @@ def _rendered(figure: Figure, kind: str, transparent: bool = False) -> bytes:
 
 
 def _shortened(text: bytes) -> bytes:
-    """Places in an SVG file to a thousandth of a point: a third of the bytes of long curves."""
+    """Round positions in an SVG file to a thousandth of a point, which saves bytes of long curves."""
     return re.sub(rb"(?<=[ML ])(-?\d+\.\d{3})\d+", rb"\1", text)

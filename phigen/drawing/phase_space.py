@@ -21,42 +21,43 @@ from phigen.symbolic.expression import Expression
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
-#: The largest number of coordinates drawn in panels of their own; more are drawn as an image over time.
+#: Largest number of coordinates drawn in separate panels; more coordinates are drawn as an image over time.
 MOST_COORDINATES = 24
-#: Rows are not joined if the typical angle between their chords is more than this, since the line would not be the
-#: orbit; of a long curve even chords that look right one by one cover the panel.
+#: Rows are not joined by a line if the typical angle between successive chords exceeds the first limit, as the line
+#: would not show the orbit. The second limit is for long curves, whose chords cover the panel.
 TURN, FINE_TURN = math.radians(40), math.radians(15)
-#: A curve is long if it could cross its panel this number of times.
+#: A curve is long if its length is this multiple of the size of its panel.
 LONG = 60.0
-#: The views of a panel in space, in degrees, the usual one first; and the bands of distance that fade to the back.
+#: Elevation and azimuths of views of a panel in space, in degrees, the default first; number of bands of distance that
+#: fade towards the back.
 ELEVATION, AZIMUTHS, BANDS = 22.0, (-52.0, -22.0, 8.0, 38.0, -82.0, -112.0), 4
 
-#: The fraction of a small panel that a box in space fills.
+#: Fraction of a small panel that a box in space fills.
 SMALL = 0.76
 
 
 def grid(coordinates: tuple[str, ...]) -> tuple[int, int]:
-    """Rows and columns of the panels of a trajectory."""
+    """Return the numbers of rows and columns of the panels of a trajectory."""
     panels = 1 if len(coordinates) > MOST_COORDINATES else len(groups(coordinates))
     columns = panels if panels < 4 else 2 if panels == 4 else 3
     return -(-panels // columns), columns
 
 
 def height(coordinates: tuple[str, ...]) -> float:
-    """The height of all panels in inches."""
+    """Return the height of all panels in inches."""
     rows, columns = grid(coordinates)
     return rows * (4.4 if len(coordinates) == 3 else 3.4 if columns < 3 else 2.4)
 
 
 def draw_trajectory(figure: FigureBase, trajectory: Trajectory, casimirs: Mapping[str, Expression]) -> None:
-    """All panels of a trajectory; rows that are not finite are left out."""
+    """Draw all panels of a trajectory; non-finite rows are left out."""
     good = np.isfinite(trajectory.x).all(axis=1)
     t, x, names = trajectory.t[good], trajectory.x[good], trajectory.coordinates
     if len(names) > MOST_COORDINATES:
         _draw_image(figure, names, t, x)
         return
     rows, columns = grid(names)
-    zoom = 0.9 if columns < 3 else SMALL  # the labels around the box are as large in small panels
+    zoom = 0.9 if columns < 3 else SMALL  # labels around the box do not shrink in small panels
     start = dict(zip(names, x[0].tolist(), strict=True))
     for index, group in enumerate(groups(names), start=1):
         points = x[:, [names.index(name) for name in group]]
@@ -73,7 +74,7 @@ def draw_trajectory(figure: FigureBase, trajectory: Trajectory, casimirs: Mappin
 
 
 def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
-    """A curve (rows, 2), and where it starts."""
+    """Draw a curve (rows, 2) and its first point."""
     axes.set_xlabel(names[0], labelpad=2)
     axes.set_ylabel(names[1], labelpad=2)
     axes.grid(True)
@@ -83,9 +84,9 @@ def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
 
 
 def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zoom: float) -> None:
-    """A curve (rows, 3) over the net of its leaf, paler towards the back, and where it starts."""
+    """Draw a curve (rows, 3), paler towards the back, with the net of its leaf and its first point."""
     box = around(leaf, box_of(points)) if leaf else box_of(points)
-    # The same unit of length along all axes, unless a coordinate would be squeezed flat.
+    # All axes have the same unit of length, unless a coordinate would become too flat.
     size = box[1] - box[0]
     axes.set_box_aspect(size if size.max() < 2.2 * size.min() else (1, 1, 1), zoom=zoom)
     azimuth = _azimuth((points - points.mean(axis=0)) / size)
@@ -100,14 +101,14 @@ def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zo
         lines = [part for line in net(leaf, box) for part in (line, np.full((1, 3), np.nan))]
         if lines:
             _draw_faded(axes, box, towards, np.concatenate(lines), PALETTE["leaf"], 0.45, (0.2, 0.75), 1.0)
-    # Of a curve that winds around many times, bands would show where its chords happen to end.
+    # For curves with many windings, bands would show the arbitrary ends of chords.
     alphas = (0.3, 1.0) if _length(points) < LONG else (0.8, 0.8)
     _draw_faded(axes, box, towards, points, SERIES[0], _width(points), alphas, 1.5, joins(points))
     axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=20)
 
 
 def _directions(azimuth: float) -> Floats:
-    """The directions to the right, up and towards the viewer, as rows."""
+    """Return the directions to the right, up and towards the viewer, as rows."""
     e, a = math.radians(ELEVATION), math.radians(azimuth)
     towards = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
     right = np.array([-math.sin(a), math.cos(a), 0.0])
@@ -115,7 +116,9 @@ def _directions(azimuth: float) -> Floats:
 
 
 def _azimuth(centred: Floats) -> float:
-    """A view in which the curve is not seen from its edge: the usual one, if another does not show much more of it."""
+    """Return the azimuth of a view that is not along the plane of the curve: the default, unless another is much
+    better.
+    """
     spread = centred.T @ centred
 
     def area(azimuth: float) -> float:
@@ -130,12 +133,12 @@ def _draw_faded(
     axes: Any, box: Floats, towards: Floats, points: Floats, colour: str, width: float,
     alphas: tuple[float, float], order: float, joined: bool = True,
 ) -> None:  # fmt: skip
-    """Points (rows, 3) as a curve, in bands by their distance from the viewer."""
+    """Draw points (rows, 3) as a curve, in bands by their distance from the viewer."""
     centred = (points - box.mean(axis=0)) / (box[1] - box[0])
     depth = np.clip(centred @ towards / np.abs(towards).sum() * 2 + 0.5, 0, 1 - 1e-9)
     band = np.where(np.isfinite(depth), np.floor(depth * BANDS), -1)
     for level in range(BANDS):
-        # A band keeps the point after its last one, so that no gap opens between bands.
+        # A band also contains the point after its last one, so that bands join without gaps.
         inside = band == level
         shown = inside | np.r_[False, inside[:-1]] if joined else inside
         alpha = alphas[0] + (alphas[1] - alphas[0]) * level / (BANDS - 1)
@@ -145,7 +148,7 @@ def _draw_faded(
 
 
 def _draw_curve(axes: Any, points: Floats, colour: str, alpha: float, order: float, width: float, joined: bool) -> None:
-    """A line, or dots where the rows are too far apart for one."""
+    """Draw a line, or dots where the rows are too far apart for a line."""
     if joined:
         axes.plot(*points.T, "-", color=colour, linewidth=width, alpha=alpha, zorder=order)
         return
@@ -157,12 +160,12 @@ def _draw_curve(axes: Any, points: Floats, colour: str, alpha: float, order: flo
 
 
 def _width(points: Floats) -> float:
-    """The width of a line: the longer, the thinner."""
+    """Return the width of a line, smaller for longer lines."""
     return float(np.clip(1.5 * math.sqrt(LONG / 2 / max(_length(points), 1e-9)), 0.3, 1.5))
 
 
 def joins(points: Floats) -> bool:
-    """Whether chords between the rows look like the curve."""
+    """Return whether chords between the rows approximate the curve."""
     points = points[np.isfinite(points).all(axis=1)]
     size = np.ptp(points, axis=0) if len(points) else np.zeros(points.shape[1])
     chords = np.diff(points / np.where(size > 0, size, 1.0), axis=0)
@@ -177,7 +180,7 @@ def joins(points: Floats) -> bool:
 
 
 def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
-    """All coordinates over time, as colours."""
+    """Draw all coordinates over time, as colours."""
     axes = figure.add_subplot()
     times = np.linspace(0, len(t) - 1, min(len(t), 800)).astype(int)
     shown = axes.imshow(
@@ -191,7 +194,7 @@ def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
 
 
 def box_of(points: Floats) -> Floats:
-    """Bounds (2, 3) around points with a margin; flat in no direction, unless that has a scale of its own."""
+    """Return bounds (2, 3) around points with a margin; no direction is too flat, unless it has its own scale."""
     low, high, most = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
     size = high - low
     alike = most > 0.01 * most.max()
@@ -202,6 +205,6 @@ def box_of(points: Floats) -> Floats:
 
 
 def _length(points: Floats) -> float:
-    """The length of the curve if the space it fills had the size 1 in each direction."""
+    """Return the length of the curve, scaled to the size 1 in each direction."""
     size = np.ptp(points, axis=0)
     return float(np.sum(np.linalg.norm(np.diff(points / np.where(size > 0, size, 1.0), axis=0), axis=1)))

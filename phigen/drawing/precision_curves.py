@@ -1,4 +1,4 @@
-"""Error against step size, and against time."""
+"""Plots of errors against step size and against computing time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MARKERS = "osD^vX"
 
 
 def draw_convergence(axes: Any, study: Study) -> None:
-    """Error against step size, with the observed order of each method, and a thin line of the order of the first."""
+    """Draw errors against step size with the observed orders, and a thin line of the order of the first method."""
     for place, curve in enumerate(study.curves):
         slope = f"slope {curve.slope:.2f}" if math.isfinite(curve.slope) else "slope unknown"
         _draw(axes, place, [p.step for p in curve.points], [p.error for p in curve.points], f"{label(curve)}: {slope}")
@@ -24,7 +24,7 @@ def draw_convergence(axes: Any, study: Study) -> None:
 
 
 def draw_work(axes: Any, study: Study) -> None:
-    """Error of the solution against the seconds of a run."""
+    """Draw errors of the solution against the seconds of a run."""
     for place, curve in enumerate(study.curves):
         _draw(axes, place, [p.seconds for p in curve.points], [p.error for p in curve.points], label(curve))
     axes.set(xlabel="seconds of the run", title=f"relative error of the solution at {study.clock} = {study.time:.4g}")
@@ -32,7 +32,7 @@ def draw_work(axes: Any, study: Study) -> None:
 
 
 def draw_conserved(axes: Any, study: Study) -> None:
-    """The largest error of a Casimir against the seconds of a run."""
+    """Draw the largest error of a Casimir against the seconds of a run."""
     for place, curve in enumerate(study.curves):
         _draw(axes, place, [p.seconds for p in curve.points], [p.casimirs for p in curve.points], label(curve))
     axes.set(xlabel="seconds of the run", title=f"relative error of the Casimirs at {study.clock} = {study.time:.4g}")
@@ -40,7 +40,7 @@ def draw_conserved(axes: Any, study: Study) -> None:
 
 
 def label(curve: PrecisionCurve) -> str:
-    """The method and its stated order."""
+    """Return the name of the method with its stated order."""
     return f"{curve.label} (order {curve.order})"
 
 

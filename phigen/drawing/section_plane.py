@@ -1,4 +1,4 @@
-"""Points of Poincaré sections."""
+"""Plots of Poincaré sections."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from phigen.drawing.groups import phase_planes
 from phigen.drawing.palette import SERIES
 from phigen.symbolic.arrays import Floats
 
-#: A coordinate that varies less than this, relative to the largest, is that of the section itself.
+#: A coordinate with less variation than this, relative to the largest, is treated as fixed by the section.
 _CONSTANT = 1e-8
 
 
 def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
-    """The two columns (rows, names) to draw: a pair that belongs together, without the constant ones if possible."""
+    """Return the two columns (rows, names) to draw: if possible a conjugate pair without constant coordinates."""
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
     varying = [name for name, fixed in zip(names, constant, strict=True) if not fixed]
     pairs = [moving for group in phase_planes(names) if len(moving := [n for n in group if n in varying]) >= 2]
-    # Of an orbit that closes there is one point; a coordinate that is zero is likely to be that of the section.
+    # A closed orbit gives a single point; there a coordinate that is zero is probably the one fixed by the section.
     sizes = np.max(np.abs(points), axis=0, initial=0.0)
     rest = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])
     chosen = (pairs[0] if pairs else [*varying, *rest])[:2]
@@ -32,7 +32,7 @@ def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
 
 
 def draw_section(axes: Any, sections: Mapping[str, Floats], names: Sequence[str]) -> None:
-    """Points (rows, names) of each section, a dot each."""
+    """Draw each point (rows, names) of each section as a dot."""
     point_sets = [points for points in sections.values() if len(points)]
     i, j = plane_of(names, np.concatenate(point_sets) if point_sets else np.empty((0, len(names))))
     for place, (label, points) in enumerate(sections.items()):
@@ -51,7 +51,7 @@ def draw_section(axes: Any, sections: Mapping[str, Floats], names: Sequence[str]
 
 
 def _widen(axes: Any) -> None:
-    """Points in one place, up to rounding, are shown as that, not as a cloud of rounding errors."""
+    """Widen the axes if all points agree up to rounding, so that rounding errors are not shown as a cloud."""
     for kind in "xy":
         low, high = getattr(axes, f"get_{kind}lim")()
         middle, half = (low + high) / 2, (high - low) / 2

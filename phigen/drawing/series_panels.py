@@ -1,4 +1,4 @@
-"""Panels of numbers against the time."""
+"""Panels of time series."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy as np
 from phigen.drawing.palette import SERIES
 from phigen.symbolic.arrays import Floats
 
-#: Most observables in a figure of a run, and the height of the panel of one.
+#: Largest number of observables in a figure of a run, and the height of each panel.
 MAX_PANELS, HEIGHT = 4, 1.4
 
 
 def draw_series(axes: Any, name: str, t: Floats, values: Floats) -> None:
-    """An observable against the time."""
+    """Draw an observable against the time."""
     axes.plot(t, values, color=SERIES[0], linewidth=1.0)
     axes.set(xlabel="t", ylabel=name)
     axes.grid(True)
 
 
 def height(observables: Mapping[str, Floats]) -> float:
-    """The height of the panels of `draw_observables`."""
+    """Return the height of the panels of `draw_observables`."""
     return HEIGHT * min(len(observables), MAX_PANELS)
 
 
 def draw_observables(part: Any, t: Floats, observables: Mapping[str, Floats]) -> None:
-    """The first observables against the time, one panel each, in a figure or a part of one."""
+    """Draw the first observables against the time, one panel each, in a figure or a part of one."""
     names = [*observables][:MAX_PANELS]
     panels = np.atleast_1d(part.subplots(len(names), 1, sharex=True))
     for axes, name in zip(panels, names, strict=True):

@@ -1,4 +1,4 @@
-"""Values as colours: on both sides of 0 where their sign changes, else from the least to the largest."""
+"""Colour maps of values: diverging around 0 where the values have both signs, else from the least to the largest."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from phigen.symbolic.arrays import Floats
 
-#: The maps of colours of values with both signs, and of others; the latter has no colour of its own for 0.
+#: Colour maps for values with both signs and for other values; the latter has no special colour for 0.
 DIVERGING, SEQUENTIAL = "RdBu_r", "viridis"
 
 
 def bounds_of(values: Floats) -> tuple[float, float]:
-    """The ends of a scale of values, which is symmetric about 0 if some are negative and some positive."""
+    """Return the ends of a scale of values, symmetric about 0 if the values have both signs."""
     least, most = float(np.min(values)), float(np.max(values))
     if least < 0 < most:
         return -max(-least, most), max(-least, most)
@@ -22,7 +22,7 @@ def bounds_of(values: Floats) -> tuple[float, float]:
 
 
 def shades_of(values: Floats, levels: int = 256) -> dict[str, Any]:
-    """A map of so many colours and its bounds, as functions of matplotlib take them."""
+    """Return a colour map with the given number of colours, and its bounds, as keyword arguments of matplotlib."""
     from matplotlib import colormaps
 
     low, high = bounds_of(values)

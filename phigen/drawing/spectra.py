@@ -1,4 +1,4 @@
-"""Pictures of dynamic structure factors."""
+"""Plots of dynamic structure factors and correlations."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
     from phigen.runtime.spectra import Correlation, DynamicSpectrum
 
-#: Decades below the largest value that are shown: what lies below is leakage of the window, and rounding.
+#: Number of decades shown below the largest value; smaller values are leakage of the window and rounding errors.
 DECADES = 6
 
 
 @styled
 def spectrum_figure(spectrum: DynamicSpectrum, title: str) -> Figure:
-    """S(q, ω) by its logarithm over q of the first axis and ω ≥ 0, at q = 0 of the others."""
+    """Return a figure of log S(q, ω) over q of the first axis and ω ≥ 0, at q = 0 of the other axes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.6, 4.0), layout="constrained")
@@ -28,7 +28,7 @@ def spectrum_figure(spectrum: DynamicSpectrum, title: str) -> Figure:
 
 
 def draw_correlation(axes: Any, correlation: Correlation) -> None:
-    """The correlation of two fields against their distance."""
+    """Draw the correlation of two fields against the distance."""
     axes.plot(np.arange(len(correlation.values)), correlation.values, ".-", linewidth=1.0)
     axes.axhline(0.0, color="0.6", linewidth=0.8)
     axes.set(
@@ -38,7 +38,7 @@ def draw_correlation(axes: Any, correlation: Correlation) -> None:
 
 
 def draw_spectrum(figure: Any, spectrum: DynamicSpectrum, title: str = "") -> None:
-    """The same in a figure or a part of one."""
+    """Draw S(q, ω) in a figure or a part of one, as in `spectrum_figure`."""
     from matplotlib.colors import LogNorm
 
     values = spectrum.values

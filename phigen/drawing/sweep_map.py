@@ -1,4 +1,4 @@
-"""Maps of sweeps: what was kept of each member, over two of the dimensions."""
+"""Maps of sweeps: a stored result of each member over two of the dimensions."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from phigen.spec.names import KEPT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Numbers that are kept beside observables, the first of them that is there is drawn.
+#: Results other than observables, in the order in which the default to draw is chosen.
 _FIRST = ("lyapunov", "crossings", "energy_error", "casimir_error", "final")
 
-#: Values that differ by more than this factor are drawn by their logarithms.
+#: Values that span more than this factor are drawn on a logarithmic scale.
 _WIDE = 1e3
 
 _PANELS = 6
 
 
 def draw(store: Path, path: Path, shown: str | None = None) -> None:
-    """Draw a variable of a store into a file. Raises `FileError` where there is none of that name."""
+    """Draw a variable of a store into a file. Raises `FileError` if the store has no variable with this name."""
     import xarray
 
     from phigen.sweeping.store import open_job
@@ -51,7 +51,7 @@ def _figure(data: Any, name: str, logarithmic: Set[str]) -> Figure:
 
     values = data[name]
     sites = values.dims[values.dims.index("coordinate") + 1 :] if "coordinate" in values.dims else ()
-    if sites:  # the fields of lattices: their means over the sites
+    if sites:  # fields of lattices are averaged over the sites
         values = values.mean(dim=sites)
     panels = [values]
     if "coordinate" in values.dims:
@@ -73,17 +73,16 @@ def _figure(data: Any, name: str, logarithmic: Set[str]) -> Figure:
 
 
 def _errors(data: Any, name: str) -> Any:
-    """Return the standard errors of the mean of an observable where they are kept too; None of all else."""
+    """Return the stored standard errors of the mean of an observable; None for other variables."""
     of, opened, rest = name.partition("(")
     errors = f"error({rest}"
     return data[errors] if of == "mean" and opened and errors in data else None
 
 
 def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors: Any, *, observed: bool) -> None:
-    """Over one dimension a curve, over two a map; over further ones, draws first, the median is taken.
+    """Draw a curve over one dimension or a map over two; the median is taken over further dimensions, draws first.
 
-    Along one dimension, means of observables over draws have error bars, and so have others of which there are
-    ``errors``.
+    Along one dimension, means of observables over draws have error bars, as have variables with ``errors``.
     """
     dims = [*panel.dims]
     if "seed" in dims and len(dims) == 2 and panel.sizes["seed"] > 1 and observed:
@@ -113,7 +112,7 @@ def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors
 
 
 def _edges(values: Any, *, logarithmic: bool) -> Any:
-    """The edges of the cells around values: half-way between them, on a logarithmic axis by their logarithms."""
+    """Return the edges of cells around values: midpoints, or geometric midpoints on a logarithmic axis."""
     places = np.log(values) if logarithmic else values
     if len(places) == 1:
         edges = places[0] + np.array([-0.5, 0.5])
@@ -124,7 +123,7 @@ def _edges(values: Any, *, logarithmic: bool) -> Any:
 
 
 def _scatter(figure: Any, axes: Any, data: Any, panel: Any) -> None:
-    """Members of their own, over the first two numbers that they differ in."""
+    """Draw members without a grid as points over the first two quantities in which they differ."""
     results = (*_FIRST, "status", panel.name)
     names = [n for n in data.data_vars if data[n].dims == ("member",) and n not in results and "(" not in n][:2]
     if len(names) < 2:
@@ -137,7 +136,7 @@ def _scatter(figure: Any, axes: Any, data: Any, panel: Any) -> None:
 
 
 def _colours(panel: Any) -> dict[str, Any]:
-    """The scale: logarithmic where values are positive and far apart. What is no number is left out."""
+    """Return the colour scale: logarithmic where values are positive and span a wide range. NaN is left out."""
     from matplotlib.colors import LogNorm
 
     good = _positive(panel)
@@ -145,7 +144,7 @@ def _colours(panel: Any) -> dict[str, Any]:
 
 
 def _positive(panel: Any) -> Any:
-    """The values other than 0, if all are positive; else none."""
+    """Return the non-zero values if all of them are positive; else an empty array."""
     values = np.asarray(panel)
     good = values[np.isfinite(values) & (values != 0)]
     return good if good.size and good.min() > 0 else good[:0]

@@ -1,4 +1,4 @@
-"""Error against the time that a method takes, of all candidates of one tuning."""
+"""Plot of error against computing time for all candidates of one tuning."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MARKERS = "osD^vX"
 
 
 def draw_tuning(axes: Any, tuning: Tuning) -> None:
-    """The finalists and the classical methods in colour, the other candidates pale; stars are confirmed proposals."""
+    """Draw finalists and classical methods in colour, other candidates pale, and confirmed proposals as stars."""
     chosen = [f.curve for f in (*tuning.finalists, *tuning.peers)]
     others = [c for c in tuning.curves if c not in chosen and c.points]
     for curve in others:
@@ -53,7 +53,7 @@ def _coordinates(curve: Curve, horizon: float) -> tuple[list[float], list[float]
 
 
 def _basis(tuning: Tuning) -> str:
-    """The part of the picture that was measured, in words."""
+    """Return a sentence about the measured part of the plot."""
     if tuning.piece > 0.99 * tuning.horizon:
         return "measured over all of it"
     best = tuning.winner

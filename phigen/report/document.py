@@ -1,4 +1,4 @@
-"""The page of a spec, put together from its sections."""
+"""Page of a spec, composed of its sections."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from phigen.report.precision import precision_section
 from phigen.report.system import system_section
 from phigen.report.viewer import viewer
 
-#: Characters of the spec that are shown.
+#: Largest number of characters of the spec that are shown.
 SOURCE = 100_000
 
 
 def document(material: Material) -> str:
-    """The HTML of the page. Everything but measured times depends on its arguments alone."""
+    """Return the HTML of the page. Apart from measured times it depends only on the arguments."""
     spec = material.compilation.spec
     solvers = script(material.live) if material.live and material.live.solvers else ""
     return page.page(
@@ -33,7 +33,7 @@ def document(material: Material) -> str:
 
 
 def lead(compilation: Compilation) -> Markup:
-    """The beginning of the page."""
+    """Return the beginning of the page."""
     spec = compilation.spec
     return page.block(
         "lead",
@@ -98,13 +98,13 @@ def _run(material: Material) -> Iterator[Markup]:
 
 
 def _values(values: Mapping[str, float]) -> Markup:
-    """``x_1 = 0.5, x_2 = 1``."""
+    """Return names with their values: ``x_1 = 0.5, x_2 = 1``."""
     written = (Markup("{} = {}").format(Markup(math(name(n))), f"{v:.9g}".replace("-", "−")) for n, v in values.items())
     return Markup(", ").join(written)
 
 
 def provenance(material: Material) -> Iterator[Markup]:
-    """Provenance: the spec, the version and the command of the page."""
+    """Return the section on provenance: the spec, the version and the command of the page."""
     spec = material.compilation.spec
     pairs = [
         ("phigen", material.compilation.program.version),

@@ -13,20 +13,20 @@ from phigen.scheme.lowering import operation_counts
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import SHOWN, Formula
 
-#: Names and numbers of a group of formulas: beyond the first number it is folded, beyond the second left out.
+#: Sizes of a group of formulas, in names and numbers, above which the group is folded or left out.
 FOLDED, LEFT_OUT = 160, 4_000
-#: Terms of a polynomial that can be unfolded.
+#: Largest number of terms of a polynomial that can be unfolded.
 MOST_TERMS = 150
 
 
 def equation(left: str, form: Formula | Expression, sign: str = "=") -> list[str]:
-    """The pieces of one equation."""
+    """Return the parts of one equation, between which lines may break."""
     first, *rest = mathml.pieces(form)
     return [mathml.math(f"{left}<mo>{sign}</mo>{first}"), *map(mathml.math, rest)]
 
 
 def group(left: Sequence[str], expressions: Sequence[Expression], what: str, sign: str = "=") -> Markup:
-    """Equations for ``what``, with names for the parts that they share."""
+    """Return equations for ``what``, with names for common subexpressions."""
     formulas = parts.readable(expressions)
     if formulas.size > LEFT_OUT:
         counts = ", ".join(f"{n} {kind}" for kind, n in operation_counts(list(expressions)).items() if n)
@@ -39,7 +39,7 @@ def group(left: Sequence[str], expressions: Sequence[Expression], what: str, sig
 
 
 def polynomial(left: str, formula: Formula) -> Markup:
-    """One equation, all of whose terms can be unfolded if there are many."""
+    """Return one equation; a long polynomial is abbreviated, and all of its terms can be unfolded."""
     if formula.size <= SHOWN + 1:
         return page.equations([equation(left, formula)])
     cut = replace(formula, terms=formula.terms[:SHOWN], hidden=formula.size - SHOWN)

@@ -1,4 +1,4 @@
-"""The sections about what was chosen, proved and measured: tables."""
+"""Tables of the compiler's choices, of proofs and of measurements."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MARKS = {_GOOD: "✓ ", _BAD: "✗ ", _UNSURE: "~ "}
 
 
 def brief_section(material: Material) -> Markup:
-    """The whole page in a few numbers."""
+    """Return the summary of the page in a few numbers."""
     tiles = [_proofs_tile(material.examination.statements)]
     if material.verification:
         tiles += _measured_tiles(material.verification)
@@ -37,7 +37,7 @@ def brief_section(material: Material) -> Markup:
 
 
 def choices_section(compilation: Compilation) -> Markup:
-    """The choices of the compiler, with their reasons."""
+    """Return the section on the choices of the compiler, with reasons."""
     program = compilation.program
     pairs = [
         ("Poisson tensor", str(compilation.system.shape)),
@@ -55,7 +55,7 @@ def choices_section(compilation: Compilation) -> Markup:
 
 
 def proofs_section(material: Material) -> Markup:
-    """All statements of `phigen check`."""
+    """Return the section with all statements of `phigen check`."""
     blocks, columns = [], [("", "statement"), ("verdict", "verdict"), ("", "how")]
     for group, statements in material.examination.groups.items():
         rows = [_statement(s) for s in statements]
@@ -65,7 +65,7 @@ def proofs_section(material: Material) -> Markup:
 
 
 def measured_section(v: Verification) -> Markup:
-    """All checks of `phigen verify`."""
+    """Return the section with all checks of `phigen verify`."""
     columns = [("", "property"), ("number", "phigen"), ("", "required"), ("verdict", "verdict")]
     columns += [("number", method) for method in v.compared]
     rows = [_check(check, v.compared) for check in v.checks]
@@ -87,7 +87,7 @@ def _meaning(m: Meaning) -> str:
 
 
 def summary_table(summaries: Sequence[Summary]) -> Markup:
-    """The largest errors of a run, one column for each method."""
+    """Return a table of the largest errors of a run, one column for each method."""
     first = summaries[0]
     rows = [("energy H", [_drift(s.energy) for s in summaries])]
     for kind, noun in (("casimirs", "Casimir"), ("invariants", "invariant")):
@@ -102,7 +102,7 @@ def summary_table(summaries: Sequence[Summary]) -> Markup:
 
 
 def lyapunov_paragraph(spectrum: Spectrum) -> Markup:
-    """The exponents, and how well they are known."""
+    """Return a paragraph with the Lyapunov exponents and their uncertainty."""
     exponents = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
     late, after = page.scientific(spectrum.uncertainty), f"{spectrum.clock} = {spectrum.t:.9g}"
     if len(spectrum.exponents) == 1:

@@ -1,4 +1,4 @@
-"""The page of a lattice: its cell, what was proved for all sizes, and one run over space and time."""
+"""Page of a lattice: its cell, the proofs for all sizes, and one run over space and time."""
 
 from __future__ import annotations
 
@@ -30,8 +30,9 @@ from phigen.symbolic.arrays import Floats
 class LatticeMaterial:
     """Material of the page of a lattice; without a run there is neither a trajectory nor a verification.
 
-    ``errors`` (frames,) are those of what is conserved, by name; ``energies`` (frames, *sizes) those of the sites.
-    ``failure`` says why the run came to no end. ``live`` is the panel, ``spectrum`` are Lyapunov exponents.
+    ``errors`` (frames,) are those of conserved quantities, by name; ``energies`` (frames, *sizes) are those of the
+    sites. ``failure`` is the reason for an incomplete run. ``live`` is the live panel, ``spectrum`` contains Lyapunov
+    exponents.
     """
 
     examination: Examination
@@ -48,7 +49,7 @@ class LatticeMaterial:
 
 
 def lattice_document(material: LatticeMaterial) -> str:
-    """The HTML of the page."""
+    """Return the HTML of the page."""
     spec = material.compilation.spec
     solvers = lattice_script(material.live) if material.live and material.live.solvers else ""
     title = f"{spec.title or spec.name} – phigen"

@@ -1,4 +1,4 @@
-"""The live panel of a page: the generated JavaScript runs in it, beside RK4, with sliders for all that can be set."""
+"""Live panel of a page: it runs the generated JavaScript and RK4, with sliders for all settings."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from phigen.targets.js.emitter import emit
 from phigen.targets.js.printing import LANGUAGE
 from phigen.targets.names import Scope
 
-#: Orders that are offered beside that of the page, where they are less; the most characters of all solvers together.
+#: Orders offered in addition to that of the page if they are lower; largest total number of characters of all solvers.
 ORDERS, MOST = (2, 4), 200_000
-#: So many sliders are shown unfolded; coordinates that have one; the factors that step, speed and parameters go up to.
+#: Largest number of unfolded sliders of a group; largest number of coordinates with sliders; largest factors by which
+#: sliders change step, speed and parameters.
 FEW, COORDINATES = 4, 15
 STEP, SPEED, PARAMETER = 16, 20, 8
 
@@ -41,7 +42,7 @@ _PRIVATE = Extras(without=frozenset({"ensemble"}))
 
 @dataclass(frozen=True)
 class Live:
-    """The solvers of a panel, JavaScript by order, and where it starts; without solvers, ``why_not``."""
+    """JavaScript solvers of a panel by order, its run and parameters; or the reason ``why_not``."""
 
     solvers: Mapping[int, str]
     run: Run | None = None
@@ -52,7 +53,7 @@ class Live:
 
 @dataclass(frozen=True)
 class Slider:
-    """A slider: which setting of the panel it moves, and how far its ends are from the usual value."""
+    """Slider: the setting of the panel that it changes, and the distance of its ends from the default value."""
 
     label: Markup | str
     kind: str
@@ -70,7 +71,7 @@ def gathered(
     parameters: Mapping[str, float],
     orders: Sequence[int] = ORDERS,
 ) -> Live:
-    """The panel for a run: the solver in JavaScript, of the order of the page and of those of ``orders`` below it."""
+    """Return the panel for a run: JavaScript solvers of the order of the page and of lower orders in ``orders``."""
     if compilation.system.noise:
         return Live({}, why_not=NOISE)
     by_order, why_not = solvers(compilation, scheme, orders)
@@ -80,9 +81,10 @@ def gathered(
 def solvers(
     compilation: Compilation, scheme: str | None, orders: Sequence[int], spec: Spec | None = None
 ) -> tuple[dict[int, str], str]:
-    """JavaScript by order: of the order of the page and those of ``orders`` below it, of lattices any; or why not.
+    """Return JavaScript by order, for the order of the page and for ``orders``, or the reason why there is none.
 
-    A ``spec`` takes the place of that of the compilation, from which it differs by its observables.
+    For ordinary systems only lower ``orders`` count. ``spec`` replaces the spec of the compilation, from which it
+    differs only by observables.
     """
     page_order, is_own = compilation.order.order, spec is None
     spec = replace(spec or compilation.spec, reconstruct="", extras=_PRIVATE)
@@ -106,12 +108,12 @@ def solvers(
 
 
 def emits(compilation: Compilation) -> bool:
-    """Whether the program of the page is as it is what a panel runs."""
+    """Return whether the panel can run the program of the page unchanged."""
     return not compilation.spec.reconstruct and compilation.program.extras in (NO_EXTRAS, _PRIVATE)
 
 
 def enclosed(module: str) -> str:
-    """A generated module as a function that returns what the panel takes of it, without comments."""
+    """Return a generated module, without comments, as a function that returns what the panel uses."""
     code = _COMMENT.sub("", module).replace("export class", "class")
     lines = (line.strip() for line in code.splitlines())
     body = "\n".join(line for line in lines if line)
@@ -120,14 +122,14 @@ def enclosed(module: str) -> str:
 
 
 def script(live: Live) -> str:
-    """The solvers and the invariants for the script of the page."""
+    """Return the solvers and the invariants for the script of the page."""
     invariants = f"const liveInvariants = [ {live.invariants} ];\n"
     by_order = ", ".join(f"{order}: {text}" for order, text in live.solvers.items())
     return f"{invariants}const liveSolvers = {{ {by_order} }};"
 
 
 def function_of(formula: Expression, names: Sequence[str]) -> str:
-    """A formula as an arrow function in JavaScript of the named symbols."""
+    """Return a formula as a JavaScript arrow function of the named symbols."""
     assignments, (value,) = assign(expand_powers([formula]))
     scope = Scope(LANGUAGE.reserved | set(LANGUAGE.functions.values()))
     arguments = [scope[name] for name in names]
@@ -137,7 +139,7 @@ def function_of(formula: Expression, names: Sequence[str]) -> str:
 
 
 def _invariants(system: System) -> str:
-    """The functions (x, params, t) of the declared invariants in JavaScript, with commas between them."""
+    """Return the JavaScript functions (x, params, t) of the declared invariants, separated by commas."""
     parameters = [p.name for p in system.parameters]
     names = [*system.coordinates, *parameters, *system.times]
     values = ["...x", *(f"params.{name}" for name in parameters), *(["t"] if system.time else [])]
@@ -146,7 +148,7 @@ def _invariants(system: System) -> str:
 
 
 def live_section(compilation: Compilation, live: Live) -> Markup:
-    """The panel, or why there is none."""
+    """Return the panel, or the reason why there is none."""
     run, system = live.run, compilation.system
     if not live.solvers or run is None:
         return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
@@ -189,12 +191,12 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
 
 
 def slid(slider: Slider) -> Markup:
-    """The slider as HTML."""
+    """Return the slider as HTML."""
     return page.block("slider", **vars(slider))
 
 
 def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
-    """The two methods."""
+    """Return the labels of the two methods."""
     return [
         (1, "ours", "phigen", "id=live-order", f"order {compilation.order.order}"),
         (2, "theirs", "RK4", "id=live-cost", ""),
@@ -202,7 +204,7 @@ def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
 
 
 def _quantities(system: System) -> list[dict[str, object]]:
-    """The quantities that the flow conserves: the energy, all its Casimirs as one, and all invariants as one."""
+    """Return the conserved quantities: energy, one entry for all Casimirs, one entry for all invariants."""
     moved = moving(system)
     quantities: list[dict[str, object]] = [] if ENERGY in moved else [{"name": "energy error", "casimirs": None}]
     casimirs = {name: i for i, name in enumerate(system.casimirs) if name not in moved}
@@ -218,7 +220,7 @@ def _quantities(system: System) -> list[dict[str, object]]:
 
 
 def _named(system: System, casimirs: Mapping[str, int]) -> str:
-    """The label of the errors of Casimirs, which are given by their numbers."""
+    """Return the label of the errors of the Casimirs with these numbers."""
     names = ", ".join(casimirs)
     if len(casimirs) > 1:
         return f"Casimir errors ({names})" if len(casimirs) <= 3 else f"error of {len(casimirs)} Casimirs"
@@ -227,13 +229,13 @@ def _named(system: System, casimirs: Mapping[str, int]) -> str:
 
 
 def _groups(system: System) -> list[Group]:
-    """Coordinates that are drawn together, the largest groups first."""
+    """Return the groups of coordinates that are drawn together, the largest groups first."""
     several = [group for group in groups(system.coordinates) if len(group) > 1]
     return sorted(several or [(system.coordinates[0],) * 2], key=len, reverse=True)
 
 
 def _leaf(system: System, group: Group) -> int | None:
-    """The Casimir of these three coordinates alone, by its number; −1 is the energy in the plane."""
+    """Return the number of the Casimir that depends only on these three coordinates; −1 is the energy in the plane."""
     if len(group) == 2:
         return -1 if system.dimension == 2 and ENERGY not in moving(system) else None
     coordinates = set(system.coordinates)
@@ -245,7 +247,7 @@ def _leaf(system: System, group: Group) -> int | None:
 
 
 def _say(system: System, conserved: Sequence[Mapping[str, object]], drawn: bool) -> str:
-    """The sentence above the panel that describes the picture."""
+    """Return the text above the panel that describes the picture."""
     said = "Two solvers follow the motion from the same start, in your browser, now. "
     properties = ["keeps its energy"] if any(q["name"] == "energy error" for q in conserved) else []
     if drawn:
@@ -258,7 +260,7 @@ def _say(system: System, conserved: Sequence[Mapping[str, object]], drawn: bool)
 
 
 def general(live: Live) -> Iterable[Slider]:
-    """The sliders of every panel."""
+    """Yield the sliders of every panel."""
     yield Slider("Step", "h", reach=STEP)
     if len(live.solvers) > 1:
         yield Slider("Order", "order", low=0, high=len(live.solvers) - 1)
@@ -268,7 +270,7 @@ def general(live: Live) -> Iterable[Slider]:
 def _folds(
     system: System, start: list[float], parameters: Mapping[str, float]
 ) -> Iterable[tuple[str, bool, list[Slider]]]:
-    """Groups of sliders: what they are, whether they are unfolded, and the sliders."""
+    """Yield groups of sliders: title, whether the group is unfolded, and the sliders."""
     listed = [slider_of(p, parameters[p.name]) for p in system.parameters]
     if listed:
         yield "Parameters", len(listed) <= FEW, listed
@@ -278,7 +280,7 @@ def _folds(
 
 
 def slider_of(p: Parameter, value: float) -> Slider:
-    """The slider of a parameter."""
+    """Return the slider of a parameter."""
     if p.positive and value > 0:
         return Slider(p.name, "params", p.name, reach=PARAMETER)
     return Slider(p.name, "params", p.name, "linear", 2 * abs(value) or 1.0)

@@ -1,4 +1,4 @@
-"""The live panel of a lattice: its fields move, by the generated JavaScript and by RK4."""
+"""Live panel of a lattice: its fields evolve by the generated JavaScript and by RK4."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ from phigen.report.live import (
 from phigen.spec.model import LieAlgebraForm, Parameter, Reduction, Run, Spec, Values
 from phigen.symbolic.expression import Expression, call, total
 
-#: The least number of sites along an axis for halved sizes, and the largest numbers of sites for doubled ones.
+#: Least number of sites along an axis for halved sizes; largest numbers of sites for doubled sizes.
 FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
-#: Numbers of lists that a page holds.
+#: Largest number of list entries in a page.
 MOST_NUMBERS = 20_000
 
 HELP = {
@@ -51,7 +51,7 @@ _DIRECTION = " The hue is the direction in the plane of {}, {}; the lighter, the
 
 @dataclass(frozen=True)
 class LatticeLive(Live):
-    """The panel of a run from a ``start``, with ``formulas`` in JavaScript for starts of any size."""
+    """Panel of a run from a ``start``, with ``formulas`` in JavaScript for starts of any size."""
 
     start: Start | None = None
     formulas: str = ""
@@ -60,7 +60,7 @@ class LatticeLive(Live):
 def gathered_lattice(
     compilation: CompiledLattice, scheme: str | None, run: Run, start: Start, orders: Sequence[int] = ORDERS
 ) -> LatticeLive:
-    """The panel for a run of a lattice."""
+    """Return the panel for a run of a lattice."""
     if compilation.spec.noise:
         return LatticeLive({}, why_not=NOISE)
     if _numbers(compilation.spec, run, start) > MOST_NUMBERS:
@@ -70,12 +70,12 @@ def gathered_lattice(
 
 
 def _with_invariants(compilation: CompiledLattice) -> Spec | None:
-    """The spec with the invariants, and the magnitudes of their terms, as further observables; None without any."""
+    """Return the spec with invariants and magnitudes of their terms as further observables; None without invariants."""
     spec, cell = compilation.spec, compilation.cell
     assert spec.lattice is not None
     densities: dict[str, Expression] = {}
     for name, density in cell.invariants.items():
-        apart = "_" * (1 + max(map(len, spec.observables), default=0))  # longer than any name
+        apart = "_" * (1 + max(map(len, spec.observables), default=0))  # longer than any name of the spec, so unique
         densities[f"{name}{apart}"] = density
         densities[f"terms_{name}{apart}"] = total(call("abs", term) for term in cell.additive_terms(density))
     if not densities:
@@ -86,12 +86,12 @@ def _with_invariants(compilation: CompiledLattice) -> Spec | None:
 
 
 def lattice_script(live: LatticeLive) -> str:
-    """The solvers and the formulas of starts for the script of the page."""
+    """Return the solvers and the formulas of starts for the script of the page."""
     return f"{script(live)}\nconst liveValues = {{ {live.formulas} }};"
 
 
 def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Markup:
-    """The panel, or why there is none."""
+    """Return the panel, or the reason why there is none."""
     run, start, cell = live.run, live.start, compilation.cell
     if not live.solvers or run is None or start is None:
         return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
@@ -149,7 +149,7 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
 
 
 def _picture(compilation: CompiledLattice, start: Start) -> str:
-    """The kind of picture of a lattice: see fields.js."""
+    """Return the kind of picture of a lattice: see fields.js."""
     cell = compilation.cell
     if start.graph and start.sizes[0] <= MOST_PLACED:
         return "graph"
@@ -159,7 +159,7 @@ def _picture(compilation: CompiledLattice, start: Start) -> str:
 
 
 def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, list[int]]]:
-    """The quantities that can be drawn: name, kind, and the numbers of the fields."""
+    """Return the quantities that can be drawn: name, kind, and the numbers of the fields."""
     fields = compilation.spec.coordinates
     if picture == "moving":
         return [(f"{fields[0]}, {fields[1]}", "field", [0, 1])]
@@ -173,7 +173,7 @@ def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, 
 
 
 def _sizes(compilation: CompiledLattice, run: Run, start: Start) -> list[list[int]]:
-    """The sizes that a panel offers; those of the run alone where its start is a list."""
+    """Return the sizes that a panel offers; only those of the run if its start is a list."""
     choices, cell = [list(start.sizes)], compilation.cell
     arrays = (*_initial(compilation.spec, run).values(), *(_source(run, p) for p in compilation.spec.parameters))
     if start.graph or any(v and (v.listed or v.file) for v in arrays):
@@ -201,7 +201,7 @@ def _parameters(spec: Spec, run: Run, start: Start, moved: Sequence[Parameter]) 
         yield slider_of(p, value)
 
 
-# -- what a run starts from
+# -- start of a run
 
 
 def _initial(spec: Spec, run: Run) -> Mapping[str, Values]:
@@ -213,7 +213,7 @@ def _source(run: Run, p: Parameter) -> Values | None:
 
 
 def _values(spec: Spec, run: Run, start: Start, name: str) -> float | None:
-    """The value of a parameter that is one number; None of others."""
+    """Return the value of a scalar parameter; None for other parameters."""
     array = np.asarray(start.parameters[name])
     p = next(p for p in spec.parameters if p.name == name)
     if array.ndim == 0 or (_source(run, p) is None and array.size and np.all(array == array.flat[0])):
@@ -222,9 +222,9 @@ def _values(spec: Spec, run: Run, start: Start, name: str) -> float | None:
 
 
 def _array(spec: Spec, run: Run, start: Start, p: Parameter) -> dict[str, Any]:
-    """A parameter at sites or bonds for the page."""
+    """Return a parameter at sites or bonds for the page."""
     source = _source(run, p)
-    if source is None:  # a column of the file of bonds
+    if source is None:  # a column of the file with the bonds
         return {"at": p.at, "listed": _listed(start.parameters[p.name])}
     return {"at": p.at, **_given(source, start, p.name, spec)}
 
@@ -244,14 +244,14 @@ def _listed(array: Any) -> list[float]:
 
 
 def _numbers(spec: Spec, run: Run, start: Start) -> int:
-    """Numbers that the page would list."""
+    """Return the numbers for a list in the page."""
     arrays = [_given(v, start, name, spec) for name, v in _initial(spec, run).items()]
     arrays += [_array(spec, run, start, p) for p in spec.parameters if _values(spec, run, start, p.name) is None]
     return sum(len(g.get("listed", ())) for g in arrays) + start.bonds.size
 
 
 def _formulas(spec: Spec, run: Run) -> str:
-    """Functions of the indices of a site and the sizes, for each array that is given so."""
+    """Return JavaScript functions of site indices and sizes, for each array defined by a formula."""
     arrays = {**{p.name: _source(run, p) for p in spec.parameters}, **_initial(spec, run)}
     assert spec.lattice is not None
     indices = spec.lattice.indices
@@ -261,16 +261,16 @@ def _formulas(spec: Spec, run: Run) -> str:
 
 
 def _sign(spec: Spec, start: Start) -> str:
-    """A parameter at sites that has both signs."""
+    """Return the name of a parameter at sites whose values have both signs; empty if there is none."""
     arrays = {p.name: np.asarray(start.parameters[p.name]) for p in spec.parameters if p.at == "sites"}
     return next((name for name, a in arrays.items() if a.size and a.min() < 0 < a.max()), "")
 
 
-# -- what is said
+# -- texts
 
 
 def _quantities(compilation: CompiledLattice) -> list[dict[str, Any]]:
-    """The conserved quantities: the energy, unless time or forces act, and the conserved Casimirs as one."""
+    """Return the conserved quantities: the energy, unless time or forces act, and one entry for all Casimirs."""
     cell, pushed = compilation.cell, compilation.program.pushed
     quantities: list[dict[str, Any]] = [] if cell.driven else [{"name": "energy error", "casimirs": None}]
     casimirs = {name: k for k, name in enumerate(cell.casimirs) if name not in pushed}

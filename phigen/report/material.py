@@ -1,4 +1,4 @@
-"""Everything that a page is made of; gathering it takes the time, see `phigen.cli.report_material`."""
+"""Content of a page; collecting it takes most of the time, see `phigen.cli.report_material`."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass(frozen=True)
 class Material:
-    """Proofs, and measurements on one run; missing parts are None, and ``notes`` have the reason.
+    """Proofs and measurements on one run; missing parts are None, and ``notes`` give the reasons.
 
-    ``steps`` are those of the run, in words. ``methods`` are trajectories by their labels, the solver's first;
-    ``opening`` has each of the first steps, where ``methods`` do not have all. ``section`` is what its Poincaré section
-    is the zero of, some of its points (rows, DIM), and how many there are; ``spectrum`` are its Lyapunov exponents.
-    ``constancy`` is that of the modified Hamiltonian; ``no_constancy`` says why there is none.
-    ``environment`` says what the times depend on. ``command`` makes the page again.
+    ``steps`` describes the steps of the run. ``methods`` are trajectories by label, the solver's first; ``opening``
+    contains every step of a first part of the run if ``methods`` do not. ``section`` consists of the function whose
+    zeros define the Poincaré section, some points (rows, DIM), and the number of all points. ``spectrum`` contains the
+    Lyapunov exponents. ``constancy`` is that of the modified Hamiltonian; ``no_constancy`` is the reason why it is
+    missing. ``environment`` describes the conditions of timings. ``command`` reproduces the page.
     """
 
     examination: Examination

@@ -1,4 +1,4 @@
-"""The section about the method: α, β and S_1 … S_k of a series, or the flows of a splitting."""
+"""Section on the method: α, β and S_1 … S_k of a series, or the flows of a splitting."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from phigen.report.known import ALPHA_BETA_OF_A_PATH, BETA_OF_ALPHA, GAUGED, MOD
 from phigen.scheme.steps import Step
 from phigen.splitting.flow import Flow
 
-#: A step of more flows is folded.
+#: Number of flows above which the list of a step is folded.
 FLOWS = 12
 
 
 def method_section(compilation: Compilation) -> Markup:
-    """The formulas of a step."""
+    """Return the section with the formulas of a step."""
     said = compilation.by_kind(generating.method, flows.method, collocation.method)
     blocks = compilation.by_kind(_series, _splitting, _collocation)
     lead = page.paragraph(page.typeset(f"{said[0].upper()}{said[1:]}."))
@@ -27,7 +27,7 @@ def method_section(compilation: Compilation) -> Markup:
 
 
 def _collocation(compilation: CompiledGauss) -> list[Markup]:
-    """The equations of a Gauss step, and what its unknowns are."""
+    """Return the equations of a Gauss step and a description of its unknowns."""
     listed = [page.paragraph(page.typeset(f"{left} = {right}")) for left, right in collocation.equations()]
     said = [page.paragraph(page.typeset(f"{line}.")) for line in collocation.lines(compilation)]
     return [page.heading("One step"), *listed, page.heading("Unknowns"), *said]
@@ -108,7 +108,7 @@ def _flow(compilation: CompiledSplitting, k: int, flow: Flow) -> list[Markup]:
 
 
 def _schedule(step: Step, letters: Sequence[str]) -> Markup:
-    """The flows of one step, in their order."""
+    """Return the flows of one step in order."""
     rows = [
         (str(i), [("", page.typeset(f"{letters[part]}_{part + 1}")), ("number", f"{time:.16g}".replace("-", "−"))])
         for i, (part, time) in enumerate(flows.schedule(step), 1)

@@ -1,4 +1,4 @@
-"""The section about the modified Hamiltonian: that it is as constant as it should be."""
+"""Section on the modified Hamiltonian: measured changes against the expected powers of h."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from phigen.study.backward import Constancy, truncation
 
 
 def modified_section(constancy: Constancy | None, why_not: str) -> Markup:
-    """The measurements in a table and a figure; or the reason why there are none."""
+    """Return the measurements as a table and a figure, or the reason why there are none."""
     said = (
         "A step of the solver is the exact flow, over the time h, of a Hamiltonian H̃ near H. So it keeps H̃, and H up "
         "to the difference: this is why energy oscillates and does not drift. H̃ is a series in h."

@@ -1,7 +1,7 @@
-"""HTML: blocks made from templates that escape what they are given, and the page around them.
+"""HTML of pages: blocks from templates that escape their arguments, and the page around the blocks.
 
-Text of specs is untrusted. Templates escape; only what this package has built itself is `Markup`. The page declares a
-Content-Security-Policy which allows no more than its own style sheet and scripts, by their hashes, and no network.
+Text of specs is untrusted, so templates escape it; only text that this package has built is `Markup`. The page declares
+a Content-Security-Policy that allows only its own style sheet and scripts, by their hashes, and no network access.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from markupsafe import Markup, escape
 from phigen import resources
 from phigen._version import __version__
 
-#: A cell of a table: its class, and its text or markup.
+#: Cell of a table: its class, and its text or markup.
 Cell = tuple[str, str]
 
-#: More equations than this stand in columns if none has more characters of markup than that.
+#: Equations are set in columns if there are more than the first number and none has more characters of markup than the
+#: second.
 MANY, SHORT = 6, 420
 
 _STYLES, _SCRIPTS = ("report.css",), ("theme.js", "space.js", "viewer.js")
-#: The scripts of the live panel, after its solvers; what it draws is in one of its own.
+#: Scripts of the live panel, after its solvers; each kind of picture has a separate script.
 CURVES, FIELDS = ("race.js", "curves.js", "live.js"), ("race.js", "fields.js", "live.js")
 
 
@@ -44,42 +45,42 @@ def _environment() -> jinja2.Environment:
 
 
 def block(template: str, **values: object) -> Markup:
-    """``templates/report/TEMPLATE.html.jinja`` with the values put in, escaped unless they are `Markup`."""
+    """Render ``templates/report/TEMPLATE.html.jinja`` with values, which are escaped unless they are `Markup`."""
     return Markup(_environment().get_template(f"{template}.html.jinja").render(values))
 
 
 def joined(blocks: Iterable[Markup]) -> Markup:
-    """Blocks one after the other."""
+    """Return the concatenation of blocks."""
     return Markup("\n").join(blocks)
 
 
 def paragraph(text: str, kind: str = "") -> Markup:
-    """A paragraph; ``kind`` is its class."""
+    """Return a paragraph; ``kind`` is its class."""
     return block("paragraph", text=text, kind=kind)
 
 
 def heading(text: str) -> Markup:
-    """A heading within a section."""
+    """Return a heading within a section."""
     return block("heading", text=text)
 
 
 def table(caption: str, columns: Sequence[Cell], rows: Sequence[tuple[str, Sequence[Cell]]], kind: str = "") -> Markup:
-    """A table whose rows have headers; ``columns`` names the first column too, ``kind`` is a class."""
+    """Return a table with row headers; ``columns`` includes the name of the first column, ``kind`` is a class."""
     return block("table", caption=caption, columns=columns, rows=rows, kind=kind)
 
 
 def facts(pairs: Iterable[tuple[str, str]]) -> Markup:
-    """Terms and what is to be said of them."""
+    """Return a description list of terms."""
     return block("facts", pairs=list(pairs))
 
 
 def fold(summary: str, body: Markup) -> Markup:
-    """A part of the page that opens on demand."""
+    """Return a collapsible part of the page."""
     return block("fold", summary=summary, body=body)
 
 
 def equations(listed: Sequence[Sequence[str]]) -> Markup:
-    """Equations, each in pieces of MathML between which lines may break; in columns if there are many and all short."""
+    """Return equations from parts of MathML, between which lines may break; many short ones are set in columns."""
     short = len(listed) > MANY and all(sum(map(len, pieces)) < SHORT for pieces in listed)
     return block(
         "equations",
@@ -89,7 +90,7 @@ def equations(listed: Sequence[Sequence[str]]) -> Markup:
 
 
 def data(identifier: str, value: Any) -> Markup:
-    """Data for a script; no text in it can end the element."""
+    """Return a data element for a script; no text in the data can end the element."""
     return block("data", identifier=identifier, value=htmlsafe_json_dumps(value, dumps=_compact))
 
 
@@ -104,7 +105,7 @@ def page(
     solvers: str = "",
     panel: Sequence[str] = CURVES,
 ) -> str:
-    """The whole page from sections (id, title, body); ``solvers`` is the JavaScript of its live ``panel``."""
+    """Return the page from sections (id, title, body); ``solvers`` is the JavaScript of its live ``panel``."""
     live = [solvers, *map(_asset, panel)] if solvers else []
     return _complete(
         "page",
@@ -117,19 +118,19 @@ def page(
 
 
 def alone(title: str, body: Markup, solvers: str, panel: Sequence[str]) -> str:
-    """A page with a live panel and nothing else."""
+    """Return a page with only a live panel."""
     scripts = [_asset("space.js"), solvers, *map(_asset, (*panel, "alone.js"))]
     return _complete("alone", [_short(script) for script in scripts], title=title, body=body)
 
 
 def _short(script: str) -> str:
-    """A script without comments on lines of their own, and without indentation."""
+    """Return a script without comment lines and without indentation."""
     lines = (line.strip() for line in script.splitlines())
     return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 def _complete(template: str, scripts: Sequence[str], **values: object) -> str:
-    """A page with its style sheet and scripts, and the policy that allows these only."""
+    """Return a page with its style sheet and scripts, and the policy that allows only these."""
     css, code = "\n".join(map(_asset, _STYLES)), "\n".join(scripts)
     return _environment().get_template(f"{template}.html.jinja").render(
         policy=f"default-src 'none'; img-src data:; style-src {_hash(css)}; script-src {_hash(code)}; "
@@ -146,7 +147,7 @@ def _asset(name: str) -> str:
 
 
 def _hash(text: str) -> str:
-    """The source expression of an inline element in a Content-Security-Policy."""
+    """Return the source expression of an inline element in a Content-Security-Policy."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
@@ -157,7 +158,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def typeset(text: str) -> Markup:
-    """Plain text with formulas in it: S_1, h^2 and 3e-16 as mathematics writes them."""
+    """Return plain text with formulas such as S_1, h^2 and 3e-16 in mathematical notation."""
     markup = str(escape(text))
     markup = _SUBSCRIPT.sub(r"<sub>\1</sub>", markup)
     markup = _POWER.sub(r"<sup>\1</sup>", markup)
@@ -165,7 +166,7 @@ def typeset(text: str) -> Markup:
 
 
 def scientific(value: float, digits: int = 2) -> str:
-    """A number to read: 3.1·10⁻⁸, 0.25, 7.99, 0, ∞, and a dash for what is not a number."""
+    """Return a number for readers: 3.1·10⁻⁸, 0.25, 7.99, 0, ∞, and a dash for NaN."""
     if value != value:
         return "–"
     if value in (float("inf"), float("-inf")):
@@ -179,5 +180,5 @@ def scientific(value: float, digits: int = 2) -> str:
 
 
 def listed(values: Mapping[str, float]) -> str:
-    """``rk4 3.1·10⁻⁸, dop853 …``."""
+    """Return labels with their numbers: ``rk4 3.1·10⁻⁸, dop853 …``."""
     return ", ".join(f"{name} {scientific(value)}" for name, value in values.items())

@@ -1,4 +1,4 @@
-"""A page with the live panel alone, to be shown inside another page."""
+"""Page with only the live panel, to be embedded in another page."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from phigen.spec.model import Run
 
 
 class NoPanelError(CheckError):
-    """A system has no live panel: the message says why."""
+    """Refusal: a system has no live panel; the message says why."""
 
 
 def panel_page(compilation: Compilation, run: Run) -> str:
-    """The HTML of the panel of a run, of the order of the spec.
+    """Return the HTML of the panel of a run, with a solver of the order of the spec.
 
     Raises `NoPanelError`, and `SpecError` for a start that cannot be read.
     """

@@ -1,4 +1,4 @@
-"""The figures of a page, each with a title, a description for those who cannot see it, and a caption."""
+"""Figures of a page, each with a title, a text description for accessibility, and a caption."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ from phigen.symbolic.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Rows of a trajectory, and Casimirs, that are drawn at most.
+#: Largest number of drawn rows of a trajectory, and of drawn Casimirs.
 ROWS, CASIMIRS = 3_000, 11
 
 
 def trajectory_picture(compilation: Compilation, trajectory: Trajectory) -> Markup:
-    """The trajectory in phase space."""
+    """Return the figure of the trajectory in phase space."""
     names = ", ".join(trajectory.coordinates)
     figure = figures.trajectory_figure(_thinned(trajectory), compilation.system.casimirs)
     caption = f"The trajectory of {names}, from the dot at t = {trajectory.t[0]:.9g} to t = {trajectory.t[-1]:.9g}."
-    # Three coordinates are what the viewer shows, but on paper and without scripts.
+    # The viewer shows three coordinates; the figure replaces it on paper and without scripts.
     instead = "instead" if len(trajectory.coordinates) == 3 else ""
     return picture("trajectory", figure, "Trajectory in phase space", caption, caption, instead)
 
 
 def error_picture(material: Material) -> Markup:
-    """Errors of energy and Casimirs over the time."""
+    """Return the figure of the errors of energy and Casimirs against time."""
     caption = (
         "Errors of what the flow conserves, over the time, on a logarithmic scale. The dotted line is one unit in the "
         "last place of a double."
@@ -53,7 +53,7 @@ def error_picture(material: Material) -> Markup:
 
 
 def section_picture(names: Sequence[str], function: str, points: Floats, count: int) -> Markup:
-    """The Poincaré section: some of its points."""
+    """Return the figure of some points of the Poincaré section."""
     shown = points[:: max(1, -(-len(points) // ROWS))]
     caption = f"Poincaré section: {count} points where {function} rises through zero"
     caption += f"; {len(shown)} of them are drawn." if len(shown) < count else "."
@@ -62,7 +62,7 @@ def section_picture(names: Sequence[str], function: str, points: Floats, count: 
 
 
 def constancy_picture(constancy: Constancy) -> Markup:
-    """The figure of changes of the modified Hamiltonian."""
+    """Return the figure of the changes of the modified Hamiltonian."""
     largest = page.listed({truncation(m): float(e.max()) for m, e in enumerate(constancy.errors)})
     caption = "Changes of H and of H̃ with one and two corrections, relative to the energy. Thin lines have the slopes "
     caption += "that they should have. The dotted line is one unit in the last place of a double."
@@ -71,7 +71,7 @@ def constancy_picture(constancy: Constancy) -> Markup:
 
 
 def lyapunov_picture(spectrum: Spectrum) -> Markup:
-    """The figure of the convergence of the Lyapunov exponents."""
+    """Return the figure of the convergence of the Lyapunov exponents."""
     caption = f"How the Lyapunov exponents converge, up to {spectrum.clock} = {spectrum.t:.9g}."
     exponents = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
     return picture(
@@ -80,7 +80,7 @@ def lyapunov_picture(spectrum: Spectrum) -> Markup:
 
 
 def convergence_picture(study: Study) -> Markup:
-    """Error against step size."""
+    """Return the figure of errors against step size."""
     slopes = page.listed({f"{c.label} (order {c.order})": c.slope for c in study.curves})
     caption = f"Error at {study.clock} = {study.time:.4g} against the step. "
     caption += "The thin line has the slope of the stated order."
@@ -90,7 +90,7 @@ def convergence_picture(study: Study) -> Markup:
 
 
 def work_picture(study: Study) -> Markup:
-    """Error against time."""
+    """Return the figure of errors against computing time."""
     figure = figures.work_precision_figure(study)
     words = "; ".join(_fastest(study, tolerance) for tolerance in (1e-3, 1e-6, 1e-9))
     caption = f"Error at {study.clock} = {study.time:.4g} against the time of the run (measured)."
@@ -98,11 +98,11 @@ def work_picture(study: Study) -> Markup:
 
 
 def picture(identifier: str, figure: Figure, title: str, description: str, caption: str, instead: str = "") -> Markup:
-    """A figure with its title, a description for those who cannot see it, and a caption."""
+    """Return a figure with its title, a text description for accessibility, and a caption."""
     image = inlined(figures.svg(figure), identifier, title, description)
     wide = figure.get_figwidth() > figures.NARROW
     kind = " ".join(filter(None, ["wide" if wide else "", instead]))
-    tabindex = "0" if wide else "-1"  # what is wider than the page scrolls, by the keyboard too
+    tabindex = "0" if wide else "-1"  # wide figures scroll, also by the keyboard
     return page.block(
         "figure", identifier=f"figure-{identifier}", kind=kind, tabindex=tabindex, image=image, caption=caption
     )

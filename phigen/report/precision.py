@@ -1,4 +1,4 @@
-"""The section about errors against step and time."""
+"""Section on errors against step size and computing time."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from phigen.report import page
 from phigen.report.drawable import drawable
 from phigen.study.precision import Study
 
-#: Errors for which the time is tabulated.
+#: Errors for which the computing time is tabulated.
 TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
 
 
 def precision_section(study: Study) -> Markup:
-    """Convergence, work and precision, and under which conditions they were measured."""
+    """Return the section on convergence, work and precision, with the conditions of the measurement."""
     said = (
         f"All methods solve the same problem up to {study.clock} = {study.time:.9g}, {study.steps} steps of the run, "
         "with steps up to 64 times larger and 128 times smaller. Errors are relative, against "

@@ -1,4 +1,4 @@
-"""Figures as parts of a page: colours become variables of its style sheet, ids unique, and styles attributes.
+"""Figures as parts of a page: colours become variables of its style sheet, ids unique, and styles become attributes.
 
 Style attributes and style elements would need an exception from the page's Content-Security-Policy.
 """
@@ -17,14 +17,14 @@ _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _FONT = re.compile(r"(?:(\w+) )?([\d.]+)px .*")
 #: Attributes that matplotlib writes with default values.
 _COLOURS = {**{value: f"var(--{role})" for role, value in PALETTE.items()}, "#000000": "var(--ink)"}
-#: Pixels of a page for one point of a figure: the widest fills the column.
+#: Pixels of a page for one point of a figure, such that the widest figure fills the column.
 PIXELS = 1.75
-#: Elements of no use in a page.
+#: Elements that a page does not need.
 _DROPPED = (f"{_SVG}metadata", f"{_SVG}style")
 
 
 def inlined(text: str, identifier: str, title: str, description: str) -> Markup:
-    """An SVG file of matplotlib's as an element of a page; ``identifier`` begins all of its ids."""
+    """Return an SVG file of matplotlib as an element of a page; all of its ids begin with ``identifier``."""
     root = ElementTree.fromstring(text)
     for parent in list(root.iter()):
         for child in [c for c in parent if c.tag in _DROPPED]:
@@ -44,7 +44,7 @@ def inlined(text: str, identifier: str, title: str, description: str) -> Markup:
 
 
 def _plain(element: ElementTree.Element) -> None:
-    """Style as attributes, colours as variables, numbers with two decimals."""
+    """Convert styles to attributes, colours to variables, and numbers to two decimals."""
     for declaration in element.attrib.pop("style", "").split(";"):
         name, _, value = (part.strip() for part in declaration.partition(":"))
         font = _FONT.fullmatch(value) if name == "font" else None
@@ -62,7 +62,7 @@ def _plain(element: ElementTree.Element) -> None:
 
 
 def _identified(element: ElementTree.Element, prefix: str) -> None:
-    """Ids and references to them with a prefix."""
+    """Add a prefix to ids and to references to them."""
     for name, value in list(element.attrib.items()):
         if name == "id":
             element.set(name, prefix + value)
@@ -71,6 +71,6 @@ def _identified(element: ElementTree.Element, prefix: str) -> None:
         elif name in ("href", _LINK) and value.startswith("#"):
             element.attrib.pop(name)
             element.set("href", f"#{prefix}{value[1:]}")
-        elif name == _LINK:  # of an image, whose data are its address
+        elif name == _LINK:  # the link of an image contains its data
             element.attrib.pop(name)
             element.set("href", value)

@@ -1,4 +1,4 @@
-"""The section about the system: π, H, Casimirs, the equations of motion, parameters."""
+"""Section on the system: π, H, Casimirs, the equations of motion, parameters."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from phigen.report import page
 from phigen.report.equations import group
 from phigen.report.known import MOTION
 
-#: Matrices of more rows, or of more names and numbers, are shown as brackets.
+#: Matrices with more rows, or with more names and numbers, are shown as brackets.
 ROWS, ENTRIES = 6, 90
 
 
 def system_section(system: System) -> Markup:
-    """Everything that the spec says of the system, as formulas."""
+    """Return the section with the formulas of the spec."""
     named = [("H", system.hamiltonian), *system.casimirs.items(), *system.invariants.items()]
     blocks = [
         page.paragraph(f"Poisson tensor: {system.shape}.", "note"),
@@ -41,7 +41,7 @@ def _tensor(system: System) -> Markup:
 
 
 def _kinds(system: System) -> Markup:
-    """The kinds of names: coordinates, parameters, Casimirs."""
+    """Return the kinds of names: coordinates, parameters, Casimirs."""
     declared = [c for c in system.casimirs if c in system.declared]
     undeclared = [c for c in system.casimirs if c not in system.declared]
     kinds = [("Casimirs of the spec", declared), ("Casimirs that phigen found", undeclared)]

@@ -1,4 +1,4 @@
-"""Data of the viewer of a page: trajectories, thinned and rounded to the resolution of a screen."""
+"""Data for the viewer of a page: trajectories, thinned and rounded to the resolution of a screen."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
-#: Numbers of all curves together, rows of one at most, and the steps to which a coordinate is rounded.
+#: Largest number of values of all curves; largest number of rows of a curve; number of levels of a rounded coordinate.
 MOST_NUMBERS, MOST_ROWS, STEPS = 90_000, 4_000, 9_999
-#: The largest number of curves in the viewer.
+#: Largest number of curves in the viewer.
 CURVES = 2
-#: The number of letters to which a coordinate name is cut where there is little room.
+#: Number of letters to which a coordinate name is cut in narrow places.
 LETTERS = 24
 
 
 def viewer(
     methods: Mapping[str, Trajectory], opening: Mapping[str, Trajectory], casimirs: Mapping[str, Expression]
 ) -> Markup:
-    """The viewer of the first trajectory and of the one beside it; nothing if there is no curve to see.
+    """Return the viewer of the first two trajectories; an empty text if there is no curve.
 
-    Where the rows of the whole run are too far apart for a line, it shows the ``opening``, the first steps of the same
-    methods. The leaf of one of the ``casimirs`` is around the curve, if there is one in the space it begins with.
+    If the rows of the whole run are too far apart for a line, the viewer shows ``opening``, the first steps of the same
+    methods. The leaf of one of the ``casimirs`` is drawn if it exists in the space of the initial axes.
     """
     first = next(iter(methods.values()), None)
     if first is None:
@@ -57,7 +57,7 @@ def viewer(
 
 
 def _until(methods: Mapping[str, Trajectory], chosen: Mapping[str, Trajectory]) -> str:
-    """Said where what is chosen ends before the run does."""
+    """Return a sentence for a displayed part that ends before the run; else an empty text."""
     end, shown = (_finite(next(iter(curves.values())))[-1, -1] for curves in (methods, chosen))
     return f" It shows the first part of the run, up to t = {shown:.6g}." if abs(shown) < abs(end) else ""
 
@@ -67,7 +67,7 @@ def _joined(methods: Mapping[str, Trajectory], axes: list[int]) -> bool:
 
 
 def _leaf(casimirs: Mapping[str, Expression], curve: Trajectory, axes: list[int]) -> Floats | None:
-    """Lines (points, 3) of the leaf in the space of the axes, rows of NaN between them; None if there is none."""
+    """Return lines (points, 3) of the leaf in the space of the axes, separated by rows of NaN; None without leaf."""
     if not drawable() or len(curve.coordinates) in axes:
         return None
     start = dict(zip(curve.coordinates, curve.x[0].tolist(), strict=True))
@@ -102,19 +102,19 @@ def _data(methods: Mapping[str, Trajectory], names: list[str], axes: list[int], 
 
 
 def _whole(points: Floats) -> list[list[int | None]]:
-    """Columns of whole numbers, None for NaN."""
+    """Return columns of integers, with None for NaN."""
     return [[None if v != v else round(v) for v in column] for column in points.T.tolist()]
 
 
 def _finite(trajectory: Trajectory) -> Any:
-    """The rows of the coordinates and of the time, up to the first that is not finite."""
+    """Return the rows of coordinates and time before the first non-finite row."""
     bad = np.flatnonzero(~np.isfinite(trajectory.x).all(axis=1))
     end = int(bad[0]) if len(bad) else len(trajectory)
     return np.column_stack([trajectory.x[:end], trajectory.t[:end]])
 
 
 def _axes(coordinates: tuple[str, ...]) -> list[int]:
-    """The columns to begin with: three coordinates that belong together, or two and the time."""
+    """Return the initial columns: three coordinates of a group, or two coordinates and the time."""
     group = max(groups(coordinates), key=len)
     chosen = [coordinates.index(c) for c in group][:3]
     more = [i for i in range(len(coordinates)) if i not in chosen] if len(chosen) > 2 else []
