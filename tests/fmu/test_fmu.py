@@ -216,6 +216,19 @@ def test_a_step_that_fails_is_discarded_and_leaves_the_state(free, version, tmp_
 
 
 @pytest.mark.parametrize("version", [2, 3])
+def test_steps_beyond_the_stop_time_are_errors_and_leave_the_state(free, version, tmp_path):
+    """The standard asks for it; a step to the stop time may be off by rounding."""
+    with running(free[1][version], tmp_path, start=1.0, stop=1.3) as instance:
+        for k in range(2):
+            instance.step(1.0 + 0.1 * k, 0.1)
+        before = instance.get("m1", "time")
+        with pytest.raises(Exception, match=r"status 3|\(error\)"):
+            instance.step(1.2, 0.11)
+        assert instance.get("m1", "time") == before
+        instance.step(1.2, 0.1 + 1e-14)
+
+
+@pytest.mark.parametrize("version", [2, 3])
 def test_states_can_be_copied_and_serialised(free, version, tmp_path):
     _, paths = free
     with running(paths[version], tmp_path) as instance:

@@ -49,7 +49,7 @@ def written(source, folder, versions=(3, 2), **options):
 class Instance:
     """An instance of an FMU by fmpy, between its initialisation and its end, with values by name."""
 
-    def __init__(self, path, folder, start=0.0, values=None, update=None, **options):
+    def __init__(self, path, folder, start=0.0, stop=None, values=None, update=None, **options):
         from fmpy.fmi2 import FMU2Slave
         from fmpy.fmi3 import FMU3Slave
 
@@ -66,10 +66,10 @@ class Instance:
         if self.version == 3:
             self.raw.instantiate(intermediateUpdate=update, earlyReturnAllowed=update is not None, **options)
             self.set(values or {})
-            self.raw.enterInitializationMode(startTime=start)
+            self.raw.enterInitializationMode(startTime=start, stopTime=stop)
         else:
             self.raw.instantiate()
-            self.raw.setupExperiment(startTime=start)
+            self.raw.setupExperiment(startTime=start, stopTime=stop)
             self.set(values or {})
             self.raw.enterInitializationMode()
         self.raw.exitInitializationMode()

@@ -25,6 +25,7 @@ typedef struct {
     phi_solver now;  /* state at the communication point */
     double origin;   /* time of the environment minus that of the solver */
     double time;     /* time of the communication point */
+    double stop;     /* no communication step may end after this time; infinity if the environment names none */
     double step;     /* size of a whole step */
     int32_t seed;    /* seed of the random numbers */
     int32_t mode;    /* a phi_fmu_mode */
@@ -40,8 +41,19 @@ static void phi_fmu_reset(phi_fmu_state *f)
     memcpy(f->now.attitude, phi_start_attitude, sizeof f->now.attitude);
 #endif
     f->step = phi_start_step;
+    f->stop = HUGE_VAL;
     f->seed = phi_start_seed;
     f->mode = PHI_INSTANTIATED;
+}
+
+/* Set the times of the start and, if there is one, of the end. Returns false, with *f unchanged, if they are not
+   allowed. */
+static bool phi_fmu_experiment(phi_fmu_state *f, double start, bool has_stop, double stop)
+{
+    if (!isfinite(start) || (has_stop && !(stop >= start))) return false;
+    f->time = start;
+    f->stop = has_stop ? stop : HUGE_VAL;
+    return true;
 }
 
 /* Time of the environment for the state of a solver. */
@@ -366,12 +378,13 @@ static void phi_fmu_free(phi_fmu *instance)
     free(instance);
 }
 
-/* Whether a communication step may start at this time with this size: both finite, and the time is the present
-   communication point. */
+/* Whether a communication step may start at this time with this size: both finite, the time is the present
+   communication point, and the step ends at the stop time or before it. */
 static bool phi_fmu_may_step(const phi_fmu_state *f, double from, double size)
 {
     if (f->mode != PHI_STEPPING || !isfinite(from) || !(size >= 0.0) || !isfinite(size)) return false;
-    return fabs(from - f->time) <= phi_fmu_tolerance(f, fmax(fabs(from), fabs(from + size)));
+    const double tolerance = phi_fmu_tolerance(f, fmax(fabs(from), fabs(from + size)));
+    return fabs(from - f->time) <= tolerance && from + size <= f->stop + tolerance;
 }
 
 /* Callback for a completed whole step; returns whether the environment ends the communication step here. */

@@ -80,11 +80,8 @@ FMI2_STATUS(SetupExperiment)(fmi2Component of, fmi2Boolean has_tolerance, fmi2Re
 {
     (void)has_tolerance;
     (void)tolerance;
-    (void)has_stop;
-    (void)stop;
-    if (of == NULL || !isfinite(start) || phi_fmi3_state(of)->mode != PHI_INSTANTIATED) return fmi2Error;
-    phi_fmi3_state(of)->time = start;
-    return fmi2OK;
+    if (of == NULL || phi_fmi3_state(of)->mode != PHI_INSTANTIATED) return fmi2Error;
+    return phi_fmu_experiment(phi_fmi3_state(of), start, has_stop != 0, stop) ? fmi2OK : fmi2Error;
 }
 
 FMI2_STATUS(EnterInitializationMode)(fmi2Component of)

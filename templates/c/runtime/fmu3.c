@@ -144,12 +144,10 @@ FMI3_STATUS(EnterInitializationMode)(fmi3Instance of, fmi3Boolean has_tolerance,
 {
     (void)has_tolerance;
     (void)tolerance;
-    (void)has_stop;
-    (void)stop;
-    if (of == NULL || !isfinite(start)) return phi_fmi3_refuse(of, "the start time is not finite");
-    if (phi_fmi3_enter(of, PHI_INSTANTIATED, PHI_INITIALISING) != fmi3OK) return fmi3Error;
-    phi_fmi3_state(of)->time = start;
-    return fmi3OK;
+    if (phi_fmi3_expect(of, PHI_INSTANTIATED) != fmi3OK) return fmi3Error;
+    if (!phi_fmu_experiment(phi_fmi3_state(of), start, has_stop, stop))
+        return phi_fmi3_refuse(of, "the start time is not finite, or the stop time lies before it");
+    return phi_fmi3_enter(of, PHI_INSTANTIATED, PHI_INITIALISING);
 }
 
 FMI3_STATUS(ExitInitializationMode)(fmi3Instance of)
@@ -387,7 +385,7 @@ FMI3_STATUS(DoStep)(fmi3Instance of, fmi3Float64 from, fmi3Float64 size, fmi3Boo
     if (instance == NULL || event == NULL || terminate == NULL || early == NULL || reached == NULL) return fmi3Error;
     *event = *terminate = *early = false;
     *reached = instance->state.time;
-    if (!phi_fmu_may_step(&instance->state, from, size)) return phi_fmi3_refuse(of, "a step from another time, or mode");
+    if (!phi_fmu_may_step(&instance->state, from, size)) return phi_fmi3_refuse(of, "a step from another time or mode, or beyond the stop time");
     status = phi_fmu_do_step(instance, from + size, instance->update == NULL ? NULL : phi_fmi3_listener);
     *reached = instance->state.time;
     *early = status == PHI_OK && *reached < from + size;
