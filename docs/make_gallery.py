@@ -18,11 +18,11 @@ from phigen.cli.list import kind_of_structure
 from phigen.cli.show import readable_one
 from phigen.drawing import figures
 from phigen.drawing.groups import groups
-from phigen.drawing.lattices import lattice_figure
+from phigen.drawing.lattice_figures import lattice_figure
 from phigen.drawing.palette import save_for_pages
 from phigen.drawing.phase_space import joins
 from phigen.lattice.states import start_of as start_of_lattice
-from phigen.notation.lattices import described, sections
+from phigen.notation.cell_formulas import described, sections
 from phigen.paper.runge_kutta import started
 from phigen.runtime.interface import BackendError
 from phigen.runtime.sections import function_of

@@ -170,14 +170,14 @@ def _tell_of_lattice(spec: Spec) -> None:
 def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
     """Prove what can be proved about a lattice, for all sizes at once."""
     from phigen.lattice.cell_building import cell_from_spec
-    from phigen.proofs import lattices
+    from phigen.proofs import lattice_statements
 
     with bounded(spec), progress.stage(spec.name):
         try:
             cell = clock.timed("cell", lambda: cell_from_spec(spec))
         except SpecError as error:
             raise located(error, spec) from None
-        groups = clock.timed("proofs", lambda: lattices.lattice(cell))
+        groups = clock.timed("proofs", lambda: lattice_statements.lattice(cell))
         rests = UNEXAMINED if len(groups) == 1 else ""
         groups = groups | statements.damping_of_lattice(spec)
         if refuted(groups):
@@ -186,7 +186,7 @@ def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
             compilation = _swept(spec, cell, clock)
         except SpecError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
-        groups = groups | clock.timed("proofs", lambda: lattices.sweeps(compilation))
+        groups = groups | clock.timed("proofs", lambda: lattice_statements.sweeps(compilation))
     return Examination(spec, groups, compilation)
 
 
@@ -306,7 +306,7 @@ def _split(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
     )
     group = _group(spec, source, "exponential")
     if group:
-        from phigen.attitude.parts import by_angles
+        from phigen.attitude.flow_elements import by_angles
         from phigen.scheme.attitude import uniform
 
         flows = by_angles(discretised, group, choice.splitting.flows, put_back=uniform(source))

@@ -16,12 +16,12 @@ DISPLAYS = {
     "page of a system": ("phigen.notation.notebook", "system_html"),
     "formulas of a compilation": ("phigen.notation.latex", "document"),
     "page of a compilation": ("phigen.notation.notebook", "compilation_html"),
-    "formulas of a cell": ("phigen.notation.lattices", "document"),
+    "formulas of a cell": ("phigen.notation.cell_formulas", "document"),
     "page of a trajectory": ("phigen.notation.notebook", "trajectory_html"),
     "page of a lattice trajectory": ("phigen.notation.notebook", "lattice_trajectory_html"),
     "figure of runs": ("phigen.drawing.figures", "run_figure"),
     "figure of a spectrum": ("phigen.drawing.spectra", "spectrum_figure"),
-    "figure of a lattice run": ("phigen.drawing.lattices", "lattice_figure"),
+    "figure of a lattice run": ("phigen.drawing.lattice_figures", "lattice_figure"),
 }
 
 

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -84,6 +85,9 @@ REGULAR_EXPRESSIONS = {
     "phigen/targets/js/printing.py": "names of kernels and arrays, for identifiers",
     "phigen/targets/js/runtime.py": "lines of the runtime that include or import",
 }
+
+#: The most modules of one name, where those of the targets count as one, since each target may have its own.
+LARGEST_NAMESAKES = 3
 
 #: Tests on the kind of a step or of a compilation: ``isinstance``, class patterns, and comparisons of the records of
 #: kinds or of their names. Kinds differ by facts in their records, entries in tables, and methods.
@@ -221,6 +225,17 @@ def test_regular_expressions_read_what_is_listed():
     assert users == REGULAR_EXPRESSIONS.keys()
 
 
+def shared_names() -> Counter[str]:
+    """The names that several modules have, with their numbers; each target may have a module of a name."""
+    files = (p for p in (ROOT / "phigen").rglob("*.py") if p.name != "__init__.py")
+    rooms = {(p.stem, "targets" if "targets" in p.parts else p.parent) for p in files}
+    return Counter({name: n for name, n in Counter(name for name, _ in rooms).items() if n > 1})
+
+
+def test_names_of_modules_are_shared_by_few():
+    assert max(shared_names().values()) <= LARGEST_NAMESAKES, shared_names()
+
+
 def test_circles_are_found():
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set()}
     assert circles(graph) == [{"a", "b", "c"}]
@@ -251,6 +266,7 @@ def f(step):
 if __name__ == "__main__":
     print([len(circle) for circle in circles(imports())], "modules in circles")
     print(len(upward_imports()), "imports from higher rooms")
+    print(shared_names().total(), "modules that share their names")
     print(sum(map(len, all_kind_tests().values())), "tests on kinds of steps and compilations")
     print("{} of {} lines of the runtime in C are conditions".format(*conditions()))
     print("{} of {} lines of the runtime in JavaScript are conditions".format(*javascript_conditions()))

@@ -82,7 +82,7 @@ def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
 
     Without a translation and about a coordinate axis it is not divided by its length: (1, tan(|r|/2)) is the
     cheapest form, since a flow knows the angle anyway. Products are normalised at the end of a step. With a
-    translation it has sin and 1 − cos of half the angle, as the flow in `phigen.attitude.parts.by_angles`.
+    translation it has sin and 1 − cos of half the angle, as the flow in `phigen.attitude.flow_elements.by_angles`.
     """
     s, turning = dot(r, r), [ri for ri in r if not ri.is_zero]
     if len(turning) == 1 and not t:

@@ -217,7 +217,7 @@ def _draw(
     title = f"{spec.name}, {run.name}"
     if isinstance(result, LatticeSeries):
         from phigen.drawing.figures import save
-        from phigen.drawing.lattices import series_figure
+        from phigen.drawing.lattice_figures import series_figure
 
         save(series_figure(result, title), plot)
     elif plot.suffix.lower() in FILMS:
@@ -226,7 +226,7 @@ def _draw(
         film(result, title, plot)
     else:
         from phigen.drawing.figures import save
-        from phigen.drawing.lattices import lattice_figure
+        from phigen.drawing.lattice_figures import lattice_figure
 
         names = run.lattice.names if run.lattice else ()
         save(lattice_figure(result, errors, title, spectrum=spectrum, site_names=names), plot)

@@ -53,7 +53,7 @@ def command(
     from phigen.compiler import examine
     from phigen.proofs.examination import refutation
     from phigen.report.document import document
-    from phigen.report.lattice import lattice_document
+    from phigen.report.lattice_page import lattice_document
 
     spec = load_one(spec_file)
     if panel:

@@ -10,7 +10,7 @@ from phigen.errors import PhigenError, StepError
 if TYPE_CHECKING:
     from phigen.compilation import CompiledLattice
     from phigen.proofs.examination import Examination
-    from phigen.report.lattice import LatticeMaterial
+    from phigen.report.lattice_page import LatticeMaterial
     from phigen.spec.model import Run
 
 
@@ -25,7 +25,7 @@ def gathered_of_lattice(
     console: Console,
 ) -> tuple[LatticeMaterial, list[PhigenError]]:
     """Collect the material of the page, with one run and its verification, and the failures on the way."""
-    from phigen.report.lattice import LatticeMaterial
+    from phigen.report.lattice_page import LatticeMaterial
 
     material = LatticeMaterial(examination, compilation, written)
     if run is None:

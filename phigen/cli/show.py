@@ -95,7 +95,7 @@ def command(
 def _show_cell(spec: Spec, most: int | None, *, as_latex: bool, as_json: bool) -> None:
     from phigen.cli.show_lattice import described_cell, print_cell
     from phigen.lattice.cell_building import cell_from_spec
-    from phigen.notation.lattices import document
+    from phigen.notation.cell_formulas import document
 
     cell = cell_from_spec(spec)
     if as_latex:
@@ -212,7 +212,7 @@ def _casimirs(system: System, most: int | None) -> list[tuple[str, str]]:
 
 def _maps(compilation: CompiledSeries, most: int | None) -> list[tuple[str, str]]:
     """α and β, of a symmetric pair α alone and what β is; of a path they are series, of which this is the beginning."""
-    from phigen.notation.parts import texts
+    from phigen.notation.named_parts import texts
 
     realisation, names = compilation.realisation, compilation.system.coordinates
     more = " + …" if realisation.path else ""

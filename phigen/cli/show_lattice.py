@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def print_cell(spec: Spec, cell: Cell, most: int | None) -> None:
     """The formulas of a cell."""
-    from phigen.notation.lattices import described, sections
+    from phigen.notation.cell_formulas import described, sections
 
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     reach = [f"{a} {h}" for a, h in zip(cell.axes, cell.hamiltonian_reach, strict=True)]
@@ -34,7 +34,7 @@ def _parameter(p: Parameter) -> str:
 
 def described_cell(spec: Spec, cell: Cell) -> dict[str, object]:
     """The cell for machines."""
-    from phigen.notation.lattices import brackets, rates
+    from phigen.notation.cell_formulas import brackets, rates
     from phigen.symbolic.expression import text
     from phigen.symbolic.readable import readable
 

@@ -154,7 +154,7 @@ def _of_lattice(
     from phigen.cli.lattice_experiment import LatticeExperiment
     from phigen.cli.lattice_run import parameters_of
     from phigen.lattice.states import start_of
-    from phigen.tuning.lattices import MOST_COMPARED, lattice_problem
+    from phigen.tuning.lattice_problem import MOST_COMPARED, lattice_problem
 
     changed = {s.partition("=")[0].strip() for s in settings}
     start = start_of(compilation.spec, run)

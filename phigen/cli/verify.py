@@ -164,7 +164,7 @@ def verified_lattice(
     from phigen.cli.experiment import run_of
     from phigen.cli.lattice_experiment import LatticeExperiment
     from phigen.lattice.states import start_of
-    from phigen.study.lattices import verify_lattice
+    from phigen.study.lattice_verification import verify_lattice
 
     spec = compilation.spec
     run = run_of(spec, name)

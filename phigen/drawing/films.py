@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from phigen.drawing.lattices import MOST_PANELS, draw_sites, places_of
+from phigen.drawing.lattice_figures import MOST_PANELS, draw_sites, places_of
 from phigen.drawing.palette import SERIES, styled
 from phigen.drawing.shades import bounds_of, shades_of
 from phigen.errors import MissingPackageError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from phigen.compilation import CompiledSplitting
-from phigen.notation import parts
+from phigen.notation import named_parts
 from phigen.scheme.steps import Step
 from phigen.splitting.flow import Flow
 from phigen.splitting.matrices import MatrixExponential
@@ -74,7 +74,7 @@ def formulas(compilation: CompiledSplitting, most: int | None) -> list[tuple[str
         named = [f"{flow.letter}_{k}{': ' * bool(c)}{c}" for c, _ in definitions(flow, compilation.system.coordinates)]
         local = [e for _, e in definitions(flow, compilation.system.coordinates)]
         listed += zip(named, readable(local, most), strict=True)
-        listed += [(f"Φ_{k}: {name}", text) for name, text in parts.texts(moved, most)]
+        listed += [(f"Φ_{k}: {name}", text) for name, text in named_parts.texts(moved, most)]
     for number, matrix in matrices(compilation):
         listed.append((f"{EXPONENTIAL}{number}", f"exp(h*{RATES}{number}) - 1"))
         entries = rates(number, matrix)

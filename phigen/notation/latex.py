@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from phigen.compilation import Compilation, CompiledSeries, CompiledSplitting
 from phigen.geometry.system import System
-from phigen.notation import flows, mathml, parts
+from phigen.notation import flows, mathml, named_parts
 from phigen.notation.generating import modified_formulas, series_formulas
 from phigen.notation.typesetting import INDENT, LINE, latex, lines, width
 from phigen.splitting.matrices import MatrixExponential
@@ -137,7 +137,7 @@ def _assigned(names: Sequence[str], expressions: Sequence[Expression]) -> list[E
 
 def _equations(left: Sequence[str], expressions: Sequence[Expression], more: Sequence[str] = ()) -> list[Equation]:
     """Equations for expressions; shared parts get names and equations of their own at the end."""
-    formulas = parts.readable(expressions)
+    formulas = named_parts.readable(expressions)
     listed = [(name, [*mathml.pieces(form), *more]) for name, form in zip(left, formulas.forms, strict=True)]
     return [*listed, *((mathml.name(name), mathml.pieces(e)) for name, e in formulas.parts)]
 

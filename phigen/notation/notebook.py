@@ -13,7 +13,7 @@ import numpy as np
 from phigen.compilation import Compilation
 from phigen.geometry.system import System
 from phigen.lattice.cell import Cell
-from phigen.notation import latex, lattices, mathml
+from phigen.notation import cell_formulas, latex, mathml
 from phigen.runtime.interface import Floats
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.runtime.trajectory import Trajectory
@@ -51,8 +51,10 @@ def compilation_html(compilation: Compilation) -> str:
 
 def _cell_html(cell: Cell) -> str:
     """The brackets, the density of H, Casimirs and invariants of a lattice."""
-    lines = [_formula(left, "".join(right)) for _, equations in lattices.formulas(cell) for left, right in equations]
-    return f"<div><strong>{escape(cell.name)}</strong> {escape(lattices.described(cell))}{''.join(lines)}</div>"
+    lines = [
+        _formula(left, "".join(right)) for _, equations in cell_formulas.formulas(cell) for left, right in equations
+    ]
+    return f"<div><strong>{escape(cell.name)}</strong> {escape(cell_formulas.described(cell))}{''.join(lines)}</div>"
 
 
 def trajectory_html(trajectory: Trajectory) -> str:

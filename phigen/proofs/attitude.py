@@ -14,9 +14,9 @@ from functools import partial
 from itertools import combinations, islice
 
 from phigen.attitude.elements import cross, direction, dot, element, product, rotated, with_phi
+from phigen.attitude.flow_elements import Turning, constancy, factor_elements, joined, turnings
 from phigen.attitude.group import Group
 from phigen.attitude.matrices import multiplied
-from phigen.attitude.parts import Turning, constancy, factor_elements, joined, turnings
 from phigen.compilation import Compilation, CompiledGauss, CompiledSeries, CompiledSplitting
 from phigen.gauss.rotation import group_element
 from phigen.gauss.stage_map import at_unknowns, stage_map, vector_field

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from phigen.geometry.blocks import blocks
-from phigen.geometry.parts import block_of
 from phigen.geometry.shapes import Canonical, Constant
+from phigen.geometry.subsystems import block_of
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation, Builder, refuse
 from phigen.spec.model import BirealisationChoice

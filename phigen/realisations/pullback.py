@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from phigen.geometry.forms import poisson_matrix
-from phigen.geometry.parts import part
 from phigen.geometry.pullback import Coordinates, change_of_coordinates
+from phigen.geometry.subsystems import part
 from phigen.geometry.system import System
 from phigen.realisations.protocol import (
     BiRealisation,

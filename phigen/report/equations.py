@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from markupsafe import Markup
 
-from phigen.notation import mathml, parts
+from phigen.notation import mathml, named_parts
 from phigen.report import page
 from phigen.scheme.lowering import operation_counts
 from phigen.symbolic.expression import Expression
@@ -27,7 +27,7 @@ def equation(left: str, form: Formula | Expression, sign: str = "=") -> list[str
 
 def group(left: Sequence[str], expressions: Sequence[Expression], what: str, sign: str = "=") -> Markup:
     """Return equations for ``what``, with names for common subexpressions."""
-    formulas = parts.readable(expressions)
+    formulas = named_parts.readable(expressions)
     if formulas.size > LEFT_OUT:
         counts = ", ".join(f"{n} {kind}" for kind, n in operation_counts(list(expressions)).items() if n)
         return page.paragraph(f"{what}: {len(left)} formulas of {counts}; phigen show prints them.", "note")

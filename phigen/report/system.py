@@ -5,7 +5,7 @@ from __future__ import annotations
 from markupsafe import Markup
 
 from phigen.geometry.system import System
-from phigen.notation import mathml, parts
+from phigen.notation import mathml, named_parts
 from phigen.report import page
 from phigen.report.equations import group
 from phigen.report.known import MOTION
@@ -32,7 +32,7 @@ def system_section(system: System) -> Markup:
 
 def _tensor(system: System) -> Markup:
     entries = [e for row in system.poisson for e in row]
-    if system.dimension <= ROWS and sum(map(parts.leaves, entries)) <= ENTRIES:
+    if system.dimension <= ROWS and sum(map(named_parts.leaves, entries)) <= ENTRIES:
         return page.equations([[mathml.math(f"<mi>π</mi><mo>=</mo>{mathml.matrix(system.poisson)}")]])
     names, n = system.coordinates, system.dimension
     pairs = [(i, j) for i in range(n) for j in range(i + 1, n) if not system.poisson[i][j].is_zero]

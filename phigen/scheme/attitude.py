@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from phigen.attitude.elements import element
+from phigen.attitude.flow_elements import Turning, factor_elements, joined, turning_of, turnings
 from phigen.attitude.group import Group, refused
 from phigen.attitude.matrices import cayley as cayley_transform
 from phigen.attitude.matrices import exponential, size_of
-from phigen.attitude.parts import Turning, factor_elements, joined, turning_of, turnings
 from phigen.gauss.rotation import group_element
 from phigen.gauss.stage_map import StageMap
 from phigen.geometry.system import System

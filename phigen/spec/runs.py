@@ -10,7 +10,7 @@ from typing import Any
 from phigen.spec import limits
 from phigen.spec.declarations import Declarations
 from phigen.spec.grammar import AllowedNames
-from phigen.spec.lattice import run_of_lattice
+from phigen.spec.lattice_sections import run_of_lattice
 from phigen.spec.model import AverageChoice, Run, Values
 from phigen.spec.problems import counted, did_you_mean, one_of, shown
 from phigen.spec.values import values as site_values

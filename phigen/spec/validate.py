@@ -13,8 +13,8 @@ from phigen.spec.declarations import Declarations, declare
 from phigen.spec.fields import SPEC
 from phigen.spec.grammar import AllowedNames
 from phigen.spec.kinds import Reader
-from phigen.spec.lattice import casimirs as read_casimirs
-from phigen.spec.lattice import densities, scope_of_numbers, scope_of_states, with_kinds
+from phigen.spec.lattice_sections import casimirs as read_casimirs
+from phigen.spec.lattice_sections import densities, scope_of_numbers, scope_of_states, with_kinds
 from phigen.spec.model import (
     DEFAULT_ORDER,
     NOISY_ORDER,

@@ -20,7 +20,7 @@ from phigen.runtime.interface import STATUSES, BackendError, Draws, Floats, Latt
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.members import Members
 from phigen.runtime.solver import Solver
-from phigen.sweeping import lattices
+from phigen.sweeping import lattice_members
 from phigen.sweeping.devices import own_device
 from phigen.sweeping.statistics import MOST_BYTES, statistics_of
 from phigen.sweeping.store import Job, open_job
@@ -36,7 +36,7 @@ def make(store: str, digest: str, number: int) -> tuple[int, int]:
     region = plan.region(number)
     varied = plan.varied(region, {name: job.root[name][region] for name in plan.listed})
     count = prod(part.stop - part.start for part in region)
-    measured: Any = lattices.measured if isinstance(solver, LatticeSolver) else _measured
+    measured: Any = lattice_members.measured if isinstance(solver, LatticeSolver) else _measured
     results = measured(job, solver, varied, plan.first(region) + np.arange(count))
     results |= {axis.name: varied[axis.name] for axis in plan.drawn}
     sizes = tuple(part.stop - part.start for part in region)

@@ -42,7 +42,7 @@ def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
     if cell.driven or "energy_error" not in job.plan.keep:
         return EnergyErrors()
     from phigen.runtime.lattice import LatticeSolver
-    from phigen.sweeping.lattices import energies_at_start
+    from phigen.sweeping.lattice_members import energies_at_start
 
     solver = LatticeSolver(job.backend(), job.interface)  # type: ignore[arg-type]
     return _counted(job, lambda varied, count: energies_at_start(job, solver, varied, count), limit)

@@ -25,7 +25,7 @@ from phigen.runtime.members import Members
 from phigen.spec.model import Run, Spec, SweepSettings
 from phigen.spec.names import KEPT
 from phigen.spec.problems import did_you_mean
-from phigen.sweeping import cluster, lattices, store
+from phigen.sweeping import cluster, lattice_members, store
 from phigen.sweeping.devices import workers_of
 from phigen.sweeping.plan import Plan, chunk_of
 from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_errors
@@ -162,7 +162,7 @@ def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int]
         after=None if run.average.after is None else float(run.average.after),
         blocks=run.average.blocks,
         stride=run.stride,
-        sizes=lattices.begun(spec, run, 0).sizes if spec.lattice else (),
+        sizes=lattice_members.begun(spec, run, 0).sizes if spec.lattice else (),
         about={"sweep": sweep.name, "run": run.name, "target": target, "phigen": __version__, **_files(spec, run)},
     )
 
@@ -213,7 +213,7 @@ def _created(
 def _seconds_of_a_member(job: store.Job) -> float:
     """Return the seconds per member, from a trial of a few members and steps; the first call compiles the solver."""
     if job.plan.sizes:
-        return lattices.seconds_of_a_member(job)
+        return lattice_members.seconds_of_a_member(job)
     plan, steps = job.plan, min(job.plan.steps, 2000)
     values = {name: np.asarray(value) for name, value in plan.parameters.items()}
     x0 = np.array([plan.initial] * 64)

@@ -112,7 +112,7 @@ runs:
 """
 
 
-@pytest.mark.slow  # its pieces are in tests/tuning/test_lattices.py
+@pytest.mark.slow  # its pieces are in tests/tuning/test_lattice_problem.py
 def test_lattices_are_tuned_by_the_same_search(phigen, in_tmp):
     Path("chain.yaml").write_text(CHAIN, encoding="utf-8")
     asked = ["--accuracy", "1e-6", "--horizon", "40", "--budget", "1", "--json"]

@@ -9,7 +9,7 @@ import phigen
 
 pytest.importorskip("matplotlib")
 
-from phigen.drawing.lattices import lattice_figure
+from phigen.drawing.lattice_figures import lattice_figure
 from phigen.drawing.shades import DIVERGING, SEQUENTIAL, shades_of
 
 

@@ -21,14 +21,14 @@ from phigen.errors import SpecError
 from phigen.geometry.system import system_from_spec
 from phigen.lattice.expansion import Expansion, expand
 from phigen.lattice.states import Start
-from phigen.proofs import lattices
+from phigen.proofs import lattice_statements
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.numpy_lattice import NumpyLatticeSession
 from phigen.spec.yaml_text import spec_text
 from phigen.study import lattice_noise
 from phigen.study.lattice_errors import BALANCE, CHANGE, errors_of
-from phigen.study.lattices import verify_lattice
+from phigen.study.lattice_verification import verify_lattice
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.verdict import PROVED
 
@@ -151,7 +151,7 @@ def test_covectors_and_noise_keep_the_casimirs_of_every_site(name: str) -> None:
 @pytest.mark.parametrize("name", TEXTS)
 def test_what_is_claimed_is_proved(name: str) -> None:
     made = compiled(name)
-    groups = lattices.lattice(made.cell) | lattices.sweeps(made)
+    groups = lattice_statements.lattice(made.cell) | lattice_statements.sweeps(made)
     assert [str(s) for group in groups.values() for s in group if s.verdict != PROVED] == []
     titles = [s.name for s in groups.get("Noise", ())]
     stationary = [t for t in titles if t.startswith("the density exp(−H/θ) on the leaves is stationary, with θ = T")]

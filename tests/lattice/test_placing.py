@@ -52,7 +52,7 @@ def test_graphs_are_drawn_with_their_bonds() -> None:
     from matplotlib.collections import LineCollection, PathCollection
     from matplotlib.figure import Figure
 
-    from phigen.drawing.lattices import draw_sites
+    from phigen.drawing.lattice_figures import draw_sites
     from phigen.drawing.shades import shades_of
 
     axes, bonds = Figure().add_subplot(), square(3)

@@ -358,7 +358,7 @@ def test_names_are_for_graphs_and_pairs():
 
 def test_paths_of_bodies_are_drawn_in_their_plane_with_their_names():
     pytest.importorskip("matplotlib")
-    from phigen.drawing.lattices import lattice_figure
+    from phigen.drawing.lattice_figures import lattice_figure
 
     run = phigen.compile(phigen.spec.loads(PLANETS), target="numpy").run()
     paths = lattice_figure(run, {"energy": np.full(len(run), 1e-3)}, "", site_names=["Sun", "Jupiter", "&<b>"]).axes[0]

@@ -22,7 +22,7 @@ from phigen.compiler import compile_spec, emit
 from phigen.errors import SpecError, StepError
 from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import Expansion, expand
-from phigen.proofs import lattices, statements
+from phigen.proofs import lattice_statements, statements
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.modules import load_module
 from phigen.spec.model import BirealisationChoice
@@ -653,7 +653,7 @@ def test_colours_are_such_as_all_runs_have_sizes_for(sizes: list[int], scheme: s
     text = f"lattice: {{axes: [i], boundary: periodic}}\nscheme: {scheme}\ncoordinates: [x]\nhamiltonian: x\n"
     found = compile_text(f'{text}poisson: {{brackets: {{x: {{"x[i+1]": "x*x[i+1]"}}}}}}\nruns:\n{runs}')
     assert any(fact.endswith(step) for fact in found.program.about.facts)
-    assert {s.verdict for group in lattices.sweeps(found).values() for s in group} == {PROVED}
+    assert {s.verdict for group in lattice_statements.sweeps(found).values() for s in group} == {PROVED}
 
 
 @pytest.mark.parametrize(
@@ -725,7 +725,7 @@ def test_defaults_of_other_sizes_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", TEXTS)
 def test_methods_are_proved(name: str) -> None:
     compilation = compiled(name)
-    ((group, found),) = lattices.sweeps(compilation).items()
+    ((group, found),) = lattice_statements.sweeps(compilation).items()
     if name in SERIES:
         assert len(found) == 7
     else:
@@ -742,5 +742,5 @@ def test_a_wrong_flow_is_refuted() -> None:
     wrong = {f: -e if f == "y" else e for f, e in motion.solution.items()}
     flows = (replace(first, motions=(replace(motion, solution=wrong),)), *others)
     broken = replace(plan, choice=replace(plan.choice, splitting=replace(plan.choice.splitting, flows=flows)))
-    verdicts = [s.verdict for s in lattices.sweeps(replace(compilation, sweeps=broken))[statements.SPLITTING]]
+    verdicts = [s.verdict for s in lattice_statements.sweeps(replace(compilation, sweeps=broken))[statements.SPLITTING]]
     assert verdicts == [PROVED, REFUTED, PROVED, PROVED]

@@ -30,7 +30,7 @@ from phigen.compiler import compile_spec
 from phigen.errors import StepError
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver
-from phigen.study.lattices import verify_lattice
+from phigen.study.lattice_verification import verify_lattice
 
 H = 0.2
 

@@ -18,13 +18,13 @@ from phigen.geometry.system import system_from_spec
 from phigen.lattice.energy_balance import Power, integral
 from phigen.lattice.expansion import expand
 from phigen.lattice.states import Start
-from phigen.proofs import lattices
+from phigen.proofs import lattice_statements
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.lattice import LatticeSolver
 from phigen.spec.model import Spec
 from phigen.spec.yaml_text import spec_text
 from phigen.study.lattice_errors import BALANCE, errors_of
-from phigen.study.lattices import verify_lattice
+from phigen.study.lattice_verification import verify_lattice
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.expression import gradient
 from phigen.symbolic.verdict import PROVED
@@ -203,7 +203,7 @@ def test_integrals_along_steps_are_those_of_polynomials() -> None:
 @pytest.mark.parametrize("name", TEXTS)
 def test_parts_flows_and_dated_invariants_are_proved(name: str) -> None:
     made = compiled(name)
-    groups = lattices.lattice(made.cell) | lattices.sweeps(made)
+    groups = lattice_statements.lattice(made.cell) | lattice_statements.sweeps(made)
     assert [str(s) for group in groups.values() for s in group if s.verdict != PROVED] == []
 
 

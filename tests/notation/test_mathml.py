@@ -10,7 +10,7 @@ from mathml_value import value_of
 
 from phigen import resources, spec
 from phigen.geometry.system import system_from_spec
-from phigen.notation import mathml, parts
+from phigen.notation import mathml, named_parts
 from phigen.realisations.catalogue import realise
 from phigen.symbolic.elliptic import ELLIPTIC
 from phigen.symbolic.expression import (
@@ -170,14 +170,14 @@ def doubled(e, times=60):
 
 
 def test_names_for_shared_parts_keep_formulas_short():
-    named, (root,) = parts.with_names([doubled(x * y)])
+    named, (root,) = named_parts.with_names([doubled(x * y)])
     assert 50 < len(named) < 200
-    assert sum(parts.leaves(part) for _, part in named) + parts.leaves(root) < 1000
+    assert sum(named_parts.leaves(part) for _, part in named) + named_parts.leaves(root) < 1000
 
 
 def test_names_for_shared_parts_keep_the_value():
     e = doubled(x * y + w * prey * y, 5)
-    known, (named, (root,)) = dict(VALUES), parts.with_names([e])
+    known, (named, (root,)) = dict(VALUES), named_parts.with_names([e])
     for name, part in named:
         known[name] = value_of(mathml.expression(part), known)
     assert value_of(mathml.expression(root), known) == pytest.approx(value(e), rel=1e-12)
@@ -189,7 +189,7 @@ def test_readable_realisation_says_what_alpha_is(name):
     realisation = realise(system, system.spec.birealisation)
     symbols = [*system.coordinates, *realisation.covector, *system.parameter_names]
     values = {s: 0.3 + 0.1 * i for i, s in enumerate(symbols)}
-    found = parts.readable(realisation.alpha)
+    found = named_parts.readable(realisation.alpha)
     known = dict(values)
     phi = {k: (lambda v, k=k: evaluate([call(k, symbol("s"))], {"s": v})[0]) for k in ("phi0", "phi1", "phi2")}
     functions = {"φ": phi["phi0"], "φ′": phi["phi1"], "φ″": phi["phi2"]}

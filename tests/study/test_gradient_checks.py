@@ -12,7 +12,7 @@ from phigen.api import lattice_solver_of, solver_of
 from phigen.cli import group
 from phigen.compiler import compile_spec
 from phigen.lattice.states import start_of
-from phigen.study import gradients, lattices, verification
+from phigen.study import gradients, lattice_verification, verification
 from phigen.study.meanings import meaning_of
 
 SWING = """phigen: 1
@@ -58,9 +58,11 @@ def checks(compilation, solver, run):
     """The checks of gradients of one solver on a run."""
     h = float(run.step)
     if compilation.spec.lattice:
-        subject = lattices._Subject(compilation, {solver.target: solver}, start_of(compilation.spec, run), h)
+        subject = lattice_verification._Subject(
+            compilation, {solver.target: solver}, start_of(compilation.spec, run), h
+        )
         made = solver.integrate(subject.start.state, h, 4, parameters=subject.start.arguments)
-        return list(lattices._gradients(compilation.cell, subject, made))
+        return list(lattice_verification._gradients(compilation.cell, subject, made))
     values, x = compilation.spec.parameters_of(run), np.array([float(v) for v in run.initial])
     subject = verification.Subject(compilation, {solver.target: solver}, {}, {}, values, x, h, 40, 0.0, None)
     states = solver.integrate(x, h, 40, 10, parameters=values).x

@@ -480,7 +480,7 @@ def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path
 def test_exponents_of_lattices_are_the_growth_of_a_vector(noise):
     """Whatever length it gets on its way, along the whole path of a noise."""
     from phigen.runtime.interface import FIRST_DRAWS, Draws
-    from phigen.sweeping.lattices import exponent
+    from phigen.sweeping.lattice_members import exponent
 
     ring = CHAIN.partition("sweeps:")[0] + noise
     solver, rng = phigen.compile(specs.loads(ring + "tangent: true\n"), target="numpy"), np.random.default_rng(4)

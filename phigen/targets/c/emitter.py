@@ -81,7 +81,7 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     from phigen.targets.c.lattice import adjoint as lattice_adjoint
     from phigen.targets.c.lattice import layout as lattice_layout
     from phigen.targets.c.lattice import model as lattice_model
-    from phigen.targets.c.lattice.parts import parameters, sweeps
+    from phigen.targets.c.lattice.sweep_functions import parameters, sweeps
 
     assert isinstance(lanes, Rows)
     has |= lattice_layout.switches(program, step, lattice_layout.layout_of(program, step)) | {

@@ -42,12 +42,12 @@ def expect_offered(program: Program) -> None:
 
 def _lattice(program: Program, step: Sweeps) -> str:
     """Return the body of the module of a lattice."""
-    from phigen.targets.js import lattice
+    from phigen.targets.js import lattice_tables
 
-    features = lattice.features(program, step)
+    features = lattice_tables.features(program, step)
     early = [_function(kernel) for kernel in (step.prepare, step.refresh) if kernel]
-    pieces = [lattice.tables(program, step), *early, *_functions(program)]
-    model = "\n\n".join(piece.strip("\n") for piece in (*pieces, *lattice.kernels(program, step)))
+    pieces = [lattice_tables.tables(program, step), *early, *_functions(program)]
+    model = "\n\n".join(piece.strip("\n") for piece in (*pieces, *lattice_tables.kernels(program, step)))
     return f"{model}\n\n{assembled(chosen(LATTICE_MODULES, features), features, POLICIES)}\n"
 
 

@@ -110,7 +110,7 @@ def _splitting_kernels(program: Program, step: Splitting) -> Sequence[Kernel | N
     return [replace(step.prepare, name="prepare_row"), step.refresh, *flows, *step.tangents]
 
 
-#: The text of each kind of step; that of a lattice is `phigen.targets.js.lattice`.
+#: The text of each kind of step; that of a lattice is `phigen.targets.js.lattice_tables`.
 STEP_MODULES: Mapping[str, StepModule] = {
     "newton": StepModule(
         kernels=lambda program, step: [step.prepare, step.refresh, step.main],

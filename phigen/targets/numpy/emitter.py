@@ -24,11 +24,11 @@ def emit(program: Program, command: str) -> dict[str, str]:
 def _body(program: Program) -> str:
     """Return the module without its header."""
     if step := program.step.swept:
-        from phigen.targets.numpy import lattice
+        from phigen.targets.numpy import lattice_module
 
         early = [step.prepare, step.refresh]
         early += [step.adjoint.prepare, step.adjoint.refresh] if step.adjoint else []
-        return lattice.body(program, step, "\n\n".join(function(program, kernel) for kernel in early if kernel))
+        return lattice_module.body(program, step, "\n\n".join(function(program, kernel) for kernel in early if kernel))
     pieces = [render("numpy", part, values_of(program)) for part in ("preamble.py", "arrays.py", "parameters.py")]
     pieces += functions.called(program)
     stage = functions_of(program).stage(program, program.step)

@@ -163,7 +163,7 @@ def _splitting_values(step: Splitting) -> dict[str, object]:
     }
 
 
-#: The text of each kind of step; that of a lattice is `phigen.targets.numpy.lattice`.
+#: The text of each kind of step; that of a lattice is `phigen.targets.numpy.lattice_module`.
 STEP_FUNCTIONS: Mapping[str, StepFunctions] = {
     "newton": StepFunctions(
         stage=_newton,

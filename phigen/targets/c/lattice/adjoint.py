@@ -58,7 +58,7 @@ from phigen.targets.c.lattice.adjoint_loops import First, Seeds, handed_by
 from phigen.targets.c.lattice.layout import Layout, layout_of
 from phigen.targets.c.lattice.loops import RowLoops, code
 from phigen.targets.c.lattice.loops import printed as loop_text
-from phigen.targets.c.lattice.parts import calls_of, driver_text, drivers
+from phigen.targets.c.lattice.sweep_functions import calls_of, driver_text, drivers
 from phigen.targets.rendering import render
 
 

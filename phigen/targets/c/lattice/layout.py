@@ -22,7 +22,7 @@ from phigen.scheme.sweep_facts import (
 )
 from phigen.scheme.sweep_inverse import can_recompute_fields
 from phigen.symbolic.symbols import Symbol
-from phigen.targets import lattice
+from phigen.targets import lattice_values
 from phigen.targets.c.language import members
 
 #: Number of differences in the predictors of all stages: more gain little, and each is an array over sites.
@@ -94,7 +94,7 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
 def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
     """The switches of the runtime for lattices."""
     banded = band(step) > 0 and program.offers("recurrences")
-    return lattice.switches(step) | {
+    return lattice_values.switches(step) | {
         "CASIMIRS": bool(program.casimirs),
         "KICKED": program.offers("kicks") and program.profile == "fast",
         "OPEN": bool(layout.weights),

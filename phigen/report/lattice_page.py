@@ -9,10 +9,10 @@ import numpy as np
 from markupsafe import Markup
 
 from phigen.compilation import CompiledLattice
-from phigen.drawing.lattices import lattice_figure, places_of, sites_figure
+from phigen.drawing.lattice_figures import lattice_figure, places_of, sites_figure
 from phigen.lattice.cell import Cell
 from phigen.notation import mathml
-from phigen.notation.lattices import described, formulas
+from phigen.notation.cell_formulas import described, formulas
 from phigen.proofs.examination import Examination
 from phigen.report import evidence, page
 from phigen.report.document import lead, provenance

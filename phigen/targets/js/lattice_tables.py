@@ -12,7 +12,7 @@ from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweep, Sweeps
-from phigen.targets import lattice
+from phigen.targets import lattice_values
 from phigen.targets.features import switches
 from phigen.targets.header import facts
 from phigen.targets.js.loops import function
@@ -25,7 +25,7 @@ _FIXED = "\N{NO-BREAK SPACE}"
 
 def features(program: Program, step: Sweeps) -> dict[str, bool]:
     """Return the switches of the runtime, including those of lattices."""
-    return switches(program) | lattice.switches(step) | {"SPLIT": step.equation is None}
+    return switches(program) | lattice_values.switches(step) | {"SPLIT": step.equation is None}
 
 
 def tables(program: Program, step: Sweeps) -> str:
@@ -43,7 +43,7 @@ def _facts(program: Program, step: Sweeps) -> dict[str, object]:
     return {
         "contents": [f" * {line}".rstrip() for line in _contents(program, step)],
         **facts(program, json.dumps, key),
-        **lattice.tables(program, step, json.dumps),
+        **lattice_values.tables(program, step, json.dumps),
         "kinds": json.dumps(step.casimir_kinds),
         "reductions": json.dumps([[r.kind, r.over] for r in program.observables.reductions]),
         "properties": properties(program.parameters),
@@ -54,12 +54,12 @@ def _tables(program: Program, step: Sweeps) -> dict[str, object]:
     """Return the tables that the runtime reads."""
     loops = LatticeLoops(program, step)
     return {
-        **lattice.tables(program, step, json.dumps),
+        **lattice_values.tables(program, step, json.dumps),
         "near": json.dumps(loops.neighbours),
         "bounds": json.dumps([bounds(w.key) for w in loops.weights]),
         "wanted": json.dumps([[s.key[0], list(s.key[1:])] for s in loops.seams]),
         "sums": step.sums,
-        "gathers": lattice.switches(step)["GATHER"],
+        "gathers": lattice_values.switches(step)["GATHER"],
         "unit": "stages" if step.equation else "flows",
         "schedule": f"[{', '.join(f'[{part},{_FIXED}{row}]' for part, row in step.schedule.flows)}]",
         "flows": f"[{', '.join(map(_listed, step.parts))}]",

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from phigen.lattice.cell import GRID, Cell, bond_forces, forces, vector_field
 from phigen.notation import mathml
 from phigen.notation.latex import Equation, aligned
-from phigen.notation.parts import short
+from phigen.notation.named_parts import short
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.neighbours import Offset, steps
 from phigen.symbolic.readable import SHOWN, readable

@@ -9,7 +9,7 @@ import pytest
 
 from phigen import resources
 from phigen.compiler import compile_spec
-from phigen.notation import flows, parts
+from phigen.notation import flows, named_parts
 from phigen.spec import load, loads
 from phigen.symbolic.expression import call, symbol, total
 from phigen.symbolic.numeric import evaluate
@@ -55,7 +55,7 @@ def test_parts_that_only_hidden_terms_mention_are_left_out():
     sums = {
         name: total(factor**k * angle for k, angle in enumerate(angles, 1)) for name, factor in (("f", a), ("g", b))
     }
-    everything, some = (parts.texts(sums, most) for most in (None, 4))
+    everything, some = (named_parts.texts(sums, most) for most in (None, 4))
     mentioned = {name for _, text in some for name in re.findall(r"σ_\d+", text)}
     assert 2 < len(some) < len(everything)
     assert [name for name, _ in some[2:]] == [f"σ_{k}" for k in range(1, len(mentioned) + 1)]
@@ -82,7 +82,7 @@ def test_terms_that_are_left_out_are_not_the_leading_ones(most):
     compilation = compile_spec(loads(PENCIL))
     names = compilation.system.coordinates
     maps = {f"α_{c}": e for c, e in zip(names, compilation.realisation.alpha, strict=True)}
-    listed = parts.texts(maps, most)
+    listed = named_parts.texts(maps, most)
     assert any("…" in text for _, text in listed)
     known = {name: 0.3 + k for k, name in enumerate((*names, "mu"))} | {f"p_{c}": 0.0 for c in names}
     for name, text in reversed(listed):

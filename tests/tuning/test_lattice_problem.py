@@ -9,7 +9,7 @@ import pytest
 from phigen import spec as specs
 from phigen.api import lattice_solver_of
 from phigen.compiler import compile_spec
-from phigen.tuning import lattices
+from phigen.tuning import lattice_problem
 from phigen.tuning.building import Built, build
 from phigen.tuning.problem import Classical
 from phigen.tuning.scales import fastest_rate
@@ -39,7 +39,7 @@ order: 4
 
 @pytest.fixture(autouse=True)
 def in_numpy(monkeypatch):
-    monkeypatch.setattr(lattices, "lattice_solver_of", lambda made: lattice_solver_of(made, "numpy"))
+    monkeypatch.setattr(lattice_problem, "lattice_solver_of", lambda made: lattice_solver_of(made, "numpy"))
     monkeypatch.setattr("phigen.tuning.building.chosen_target", lambda target: "numpy")
 
 
@@ -51,7 +51,7 @@ def compiled():
 def problem(sizes=(24,), **settings):
     run = compiled().spec.runs["wave"]
     run = replace(run, lattice=replace(run.lattice, sizes=sizes))
-    return lattices.lattice_problem(compiled(), run, settings, 0.05, 10.0, 1.0)
+    return lattice_problem.lattice_problem(compiled(), run, settings, 0.05, 10.0, 1.0)
 
 
 def candidate(found):
@@ -92,9 +92,9 @@ def test_the_fastest_rate_of_many_sites_is_found_without_all_eigenvalues():
 def test_large_grids_are_measured_on_fewer_sites_where_their_start_is_known():
     found = problem((60_000,))
     assert found.whole == (60_000,)
-    assert found.sizes[0] <= lattices.MOST_SITES
+    assert found.sizes[0] <= lattice_problem.MOST_SITES
     assert found.start.reshape(2, -1).shape[1] == found.sizes[0]
-    assert found.most_rows * len(found.start) <= 1.1 * lattices.MOST_NUMBERS
+    assert found.most_rows * len(found.start) <= 1.1 * lattice_problem.MOST_NUMBERS
 
 
 def test_settings_of_lattices_mean_what_is_built():

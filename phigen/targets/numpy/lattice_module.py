@@ -13,7 +13,7 @@ from phigen.scheme.policies import POLICIES
 from phigen.scheme.program import Program
 from phigen.scheme.steps import BACK, Gather, Sweep, Sweeps
 from phigen.spec.names import OVER
-from phigen.targets import lattice
+from phigen.targets import lattice_values
 from phigen.targets.header import facts
 from phigen.targets.numpy import functions
 from phigen.targets.numpy.language import listed, quoted
@@ -29,7 +29,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     """Return the text of the module; ``prepare`` are the functions that compute coefficients."""
     values: dict[str, object] = {
         **facts(program, listed, quoted),
-        **lattice.tables(program, step, listed),
+        **lattice_values.tables(program, step, listed),
         **{name: PYTHON.text(policy) for name, policy in POLICIES.items()},
         "schedule": repr(tuple(step.schedule.flows)),
         "by_colour": repr(step.by_colour),
