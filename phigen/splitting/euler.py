@@ -80,11 +80,9 @@ def _changes(x: Vector, factors: Vector) -> list[Expression]:
     s, c, _ = functions_of(kappa, p, q)
     square, z = s**2, p * kappa**2
     roots = [sqrt(c**2 + e * square) for e in above]
-    sigma = [call("choose", e, root, c) for e, root in zip(above, roots, strict=True)]
+    sigma = _at_smallest(levels, [c] * 3, roots)
     versine = 8 * z * power(1 + z, -2)  # 1 − C
-    losses = [
-        call("choose", e, d * square / (1 + root), versine) for e, d, root in zip(above, below, roots, strict=True)
-    ]
+    losses = _at_smallest(levels, [versine] * 3, [d * square / (1 + r) for d, r in zip(below, roots, strict=True)])
     divisor = c**2 - low * square
     # Where D is small, 1 − σ_j and 1 − σ_k are not.
     gaps = [
@@ -101,6 +99,19 @@ def _levels(x: Vector, factors: Vector) -> list[Expression]:
 
 def _smaller(a: Expression, b: Expression) -> Expression:
     return call("choose", b - a, a, b)
+
+
+def _at_smallest(levels: Vector, chosen: Vector, others: Vector) -> list[Expression]:
+    """Return the i-th of ``chosen`` for one i with the smallest E_i, and those of ``others`` for the other two.
+
+    On the separatrix two E_i are equal, but have different derivatives.
+    """
+    second = levels[1] - levels[0]
+    third = levels[2] - _smaller(*levels[:2])
+    first_two = ((chosen[0], others[0]), (others[1], chosen[1]))
+    pairs = zip(first_two, others[:2], strict=True)
+    placed = [call("choose", third, call("choose", second, *values), other) for values, other in pairs]
+    return [*placed, call("choose", third, others[2], chosen[2])]
 
 
 def _ends(

@@ -132,6 +132,23 @@ def test_gradients_along_state_and_moments_are_differences(target):
             assert found.parameters_bar[name] == pytest.approx((above - below) / (2 * d), rel=1e-7)
 
 
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_derivatives_are_exact_where_the_state_is_on_the_separatrix_to_the_last_digit(target):
+    """Two of the E_i are equal there, in floating point too, but their derivatives are not."""
+    x, weights, moments, d = np.array([0.5, 0, 1]), np.array([1, -2, 0.5]), np.array([0.25, 1, 4]), 1e-3
+    made = solver(body("adjoint: true\n"), target)
+
+    def value(*shifts):
+        ends = made.integrate(x + shifts[:3], 0.2, 3, **dict(zip("ABC", moments + shifts[3:], strict=True)))
+        return weights @ ends.x[-1]
+
+    found = made.pullback(x, 0.2, 3, weights, **dict(zip("ABC", moments, strict=True)))
+    f = [[value(*(s * d * row)) for s in (2, 1, -1, -2)] for row in np.eye(6) * ([1] * 3 + [*moments / 4])]
+    slopes = np.array([(8 * (b - c) - (a - e)) / (12 * d) for a, b, c, e in f]) / ([1] * 3 + [*moments / 4])
+    assert np.abs(slopes).min() > 0.01
+    np.testing.assert_allclose([*found.x0_bar, *found.parameters_bar.values()], slopes, rtol=0, atol=1e-7)
+
+
 def test_the_flow_is_proved_and_a_wrong_sign_is_refuted(monkeypatch):
     assert {s.verdict for s in check(body().system, body().splitting)} == {PROVED}
     genuine = euler._ends
