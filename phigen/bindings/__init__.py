@@ -1,1 +1,1 @@
-"""Bindings: modules of other languages that call the generated C, printed from the `Interface` of a solver."""
+"""Bindings: modules in other languages that call the generated C, printed from the `Interface` of a solver."""

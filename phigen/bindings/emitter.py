@@ -1,4 +1,4 @@
-"""The files of a binding, printed from the templates in ``templates/bindings``."""
+"""Files of a binding, printed from the templates in ``templates/bindings``."""
 
 from __future__ import annotations
 
@@ -127,8 +127,8 @@ def _described(description: str, unit: str) -> str:
 def _fields(names: Iterable[str], language: BindingLanguage) -> list[str]:
     """Return names of fields in the order of ``names``.
 
-    A name that is reserved, or that a field before it has, gets underscores at its end. Where case is not
-    distinguished, which Fortran does not, a name that begins with an underscore gets the prefix "p".
+    A reserved name, or one that equals an earlier field, gets trailing underscores. In languages that do not
+    distinguish case, such as Fortran, a name that begins with an underscore gets the prefix "p".
     """
     fields: list[str] = []
     for name in names:

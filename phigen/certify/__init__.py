@@ -1,1 +1,1 @@
-"""Certificates of steps: rigorous bounds for the distance of computed steps from the exact Poisson map."""
+"""Certificates of steps: rigorous bounds for the distance between computed steps and the exact Poisson map."""

@@ -1,4 +1,4 @@
-"""Checker of certificates: python checker.py NAME.bounds.json NAME.c. It needs python-flint and nothing else."""
+"""Checker of certificates: python checker.py NAME.bounds.json NAME.c. It needs only python-flint."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from typing import Any, TypeAlias
 
 from flint import arb, arb_mat, ctx, fmpq, fmpq_poly
 
-Ball: TypeAlias = Any  # flint.arb; and sequences of these, and flint.arb_mat
+Ball: TypeAlias = Any  # flint.arb; sequences of flint.arb; flint.arb_mat
 Balls: TypeAlias = Any
 Matrix: TypeAlias = Any
-BITS = 80  # precision of the balls, whose own rounding is far below that of doubles
+BITS = 80  # precision of the balls in bits, far above that of doubles
 U, TINY, BALL, ZERO, ONE, HALF = arb(2) ** -53, arb(2) ** -1074, arb(0, 1), arb(0), arb(1), arb(0.5)
 CARRY = U * arb("1.01")  # largest compensation term of a coordinate of size 1
-ROUNDED = arb("1.000001")  # of a size that the C computes and compares
+ROUNDED = arb("1.000001")  # factor for the rounding of a size that the C computes and compares
 KRAWCZYK = "Krawczyk's test does not show that the equation of a step has one solution"
-POINTS = (0.318309886, 0.577215665, 0.869604401)  # where derivatives are compared with printed ones
-LESS_ACCURATE = ("sinh", "cosh", "tanh")  # twice the error of the other functions, as glibc documents
+POINTS = (0.318309886, 0.577215665, 0.869604401)  # places in a box at which derivatives are compared
+LESS_ACCURATE = ("sinh", "cosh", "tanh")  # glibc documents twice the error of the other functions
 LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {  # functions with their derivatives
     "sqrt": (arb.sqrt, lambda x: 1 / (2 * x.sqrt())), "exp": (arb.exp, arb.exp), "expm1": (arb.expm1, arb.exp),
     "log": (arb.log, lambda x: 1 / x), "log1p": (arb.log1p, lambda x: 1 / (1 + x)), "sin": (arb.sin, arb.cos),
@@ -31,7 +31,7 @@ LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {  #
     "cosh": (arb.cosh, arb.sinh), "tanh": (arb.tanh, lambda x: 1 - square(x.tanh())),
 }  # fmt: skip
 EXACT = {"add": operator.add, "sub": operator.sub, "mul": operator.mul}
-OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # with derivatives by their operands
+OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # operations with derivatives by their operands
     "add": lambda x, y: (x + y, ONE, ONE), "sub": lambda x, y: (x - y, ONE, -ONE), "neg": lambda x: (-x, -ONE),
     "mul": lambda x, y: (x * y, y, x), "square": lambda x, _: (square(x), x, x), "max": lambda x, y: (x.max(y),),
     "div": lambda x, y: (x / y, 1 / y, -x / (y * y)), "abs": lambda x: (x.abs_lower().union(x.abs_upper()),),
@@ -52,7 +52,7 @@ SERIES: Mapping[str, Callable[[int], fmpq]] = {  # coefficient n of functions th
 
 
 class RefusedError(Exception):
-    """Refusal of a certificate, or of what cannot be certified."""
+    """Refusal of a certificate, or of a problem that cannot be certified."""
 
 
 def demand(condition: bool, message: str) -> None:
@@ -62,65 +62,65 @@ def demand(condition: bool, message: str) -> None:
 
 
 def mag(x: Ball) -> Ball:
-    """The largest absolute value in a ball."""
+    """Return the largest absolute value in a ball."""
     demand(x.is_finite(), "a value is not bounded")
     return x.abs_upper()
 
 
 def square(x: Ball) -> Ball:
-    """The square of a ball, which is not negative."""
+    """Return the square of a ball, which is not negative."""
     return (x.abs_lower() * x.abs_lower()).union(x.abs_upper() * x.abs_upper())
 
 
 def top(values: Iterable[Ball]) -> Ball:
-    """The largest of some balls, or a ball that contains it."""
+    """Return the largest of some balls, or a ball that contains it."""
     return reduce(arb.max, values)
 
 
 def gap(a: Ball, b: Ball) -> Ball:
-    """The largest distance of numbers in two balls."""
+    """Return the largest distance between numbers in two balls."""
     return mag(a - b)
 
 
 def middle(x: Ball) -> Ball:
-    """The middle of a ball."""
+    """Return the midpoint of a ball."""
     return arb(x.mid())
 
 
 def below(a: Matrix, b: Matrix) -> bool:
-    """Whether all entries of a matrix are below those of another one."""
+    """Return whether all entries of a matrix are below those of another matrix."""
     return all(v < w for v, w in zip(a.entries(), b.entries(), strict=True))
 
 
 def interval(ends: Sequence[float]) -> Ball:
-    """The ball around an interval."""
+    """Return the ball around an interval."""
     return arb(ends[0]).union(arb(ends[1]))
 
 
 def column(values: Iterable[Ball]) -> Matrix:
-    """A matrix of one column."""
+    """Return a matrix of one column."""
     return arb_mat([[v] for v in values])
 
 
 def each(f: Callable[..., Ball], *matrices: Matrix) -> Matrix:
-    """A matrix of a function of the entries of matrices of one shape."""
+    """Return a function applied to the corresponding entries of matrices of one shape."""
     entries = [f(*v) for v in zip(*(m.entries() for m in matrices), strict=True)]
     return arb_mat(matrices[0].nrows(), matrices[0].ncols(), entries)
 
 
 def identity(n: int) -> Matrix:
-    """The identity matrix."""
+    """Return the identity matrix."""
     return arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
 
 
 @cache
 def coefficients(name: str) -> list[fmpq]:
-    """The first coefficients of a function of `SERIES`."""
+    """Return the first coefficients of a function of `SERIES`."""
     return [SERIES[name](n) for n in range(TERMS)]
 
 
 class Evaluation:
-    """Operations at balls: enclosures, derivatives by the operands, and a bound for the error of each alone.
+    """Operations evaluated at balls: enclosures, derivatives by operands, and bounds for single errors.
 
     Enclosures contain the exact and the computed values. ``inputs`` are the balls of operations that read values.
     """
@@ -132,10 +132,10 @@ class Evaluation:
         powers, v = set[int](), self.x
         for k, (op, *a) in enumerate(operations):
             error, slopes = ZERO, list[tuple[int, Ball]]()
-            if op in ("number", "exact", "constant"):  # literals, of which long ones are rounded; numbers of the C
+            if op in ("number", "exact", "constant"):  # literals, rounded if long; constants of the C
                 value = a[0] if op != "constant" else c[a[0]] if len(a) == 1 else c[a[0]][a[1]]
                 x, error = arb(value), U * abs(value) if op == "number" and len(repr(value)) > 15 else ZERO
-                powers |= {k} if abs(math.frexp(value)[0]) == 0.5 else set()  # which multiply exactly
+                powers |= {k} if abs(math.frexp(value)[0]) == 0.5 else set()  # powers of 2 multiply exactly
             elif op in inputs:
                 x, self.inputs[op, a[0]] = inputs[op][a[0]], k
                 error = CARRY * mag(x) if op == "x" else ZERO  # the C reads x without its compensation term
@@ -143,7 +143,7 @@ class Evaluation:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
-            elif op == "rest":  # of a Taylor series: three times its terms, since this error is one of derivatives too
+            elif op == "rest":  # rest of a Taylor series: three times its terms, as the bound also covers derivatives
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]
             elif op in LIBM:
@@ -158,7 +158,7 @@ class Evaluation:
             v.append(x if exact else x + BALL * error)
 
     def outputs(self, indices: Sequence[int], by: Mapping[str, int]) -> tuple[Matrix, ...]:
-        """Values of outputs, bounds for their errors, by the mean value theorem, and derivatives by some inputs."""
+        """Return values of outputs, error bounds by the mean value theorem, and derivatives by some inputs."""
         errors, rows = list[Ball](), list[list[Ball]]()
         for output in indices:  # reverse differentiation
             row = [ZERO] * output + [arb(1)] + [ZERO] * (len(self.x) - output)
@@ -173,9 +173,9 @@ class Evaluation:
 
 
 def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
-    """The function that a polynomial stands for, its derivative, and rounding and truncation of the polynomial."""
+    """Return the function that a polynomial approximates, its derivative, and rounding and truncation errors."""
     name, beyond = series["name"], series["beyond"]
-    if beyond and mag(s) >= series["radius"]:  # where the C calls the function of libm
+    if beyond and mag(s) >= series["radius"]:  # there the C calls the function of libm
         x, slope, ulps = LIBM[name][0](s), LIBM[name][1](s), c["ulps"] * (1 + 9 * U)
         inside = s.intersection(BALL * arb(series["radius"])) if s.overlaps(BALL * arb(series["radius"])) else None
         error = polynomial(c, {**series, "beyond": False}, inside)[2] if inside is not None else ZERO
@@ -194,7 +194,7 @@ def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
 
 
 def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exact: bool = False) -> Evaluation:
-    """The operations of a stage for states in X, times in T and unknowns u, with the rests of Taylor series."""
+    """Evaluate the operations of a stage for states in X, times in T and unknowns u, with rests of Taylor series."""
     carry, tail, along = [BALL * CARRY * mag(x) for x in X], [ZERO] * len(X), "path" in stage and not exact
     if along:  # the path dm/dt = field from x stays in the box P
         P, path = [interval(p) for p in leaf["path"]], stage["path"]
@@ -206,12 +206,12 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
         c, stage["operations"], {"x": X, "start": X, "carry": carry, "t": [T], "u": u, "tail": tail}, exact
     )
     hidden = [(mag(run.x[a]), run.x[b].abs_lower() / ROUNDED) for a, b in stage["hidden"]] if along else []
-    demand(all(a < b for a, b in hidden), "a Taylor series may end late")  # it ends after two hidden by rounding
+    demand(all(a < b for a, b in hidden), "a Taylor series may end late")  # the C stops after two such terms
     return run
 
 
 def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, of: str) -> Matrix:
-    """Outputs of a stage by the mean value theorem, with their errors: narrower than in a run over small boxes."""
+    """Return outputs of a stage by the mean value theorem, with errors: narrower than in `run_of` over small boxes."""
     _, error, by_u, by_x = run.outputs(stage[of], {"u": len(box), "x": len(X)})
     x, u = ([arb(v.mid()) for v in values] for values in (X, box))
     at = run_of(c, stage, x, T, leaf, u, exact=True)
@@ -220,7 +220,7 @@ def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: E
 
 
 def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls) -> None:
-    """Matrices that the C computes as derivatives are those, to 20 digits at some points."""
+    """Demand that matrices that the C computes as derivatives are these derivatives, to 20 digits at some points."""
     precision, ctx.prec = ctx.prec, 300
     for point in POINTS:
         at = [arb((v.lower() + (v.upper() - v.lower()) * point).mid()) for v in box]
@@ -233,7 +233,7 @@ def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Ba
 
 
 def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ...]:
-    """Change by an implicit stage, its error and derivative: u - base + d(u) = 0, solved by corrections M^-1 residual.
+    """Return change, error and derivative of an implicit stage: u - base + d(u) = 0, by corrections M^-1 residual.
 
     The last result is a bound for the part of the change that the C adds to the compensation term.
     """
@@ -251,7 +251,7 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
         M, M_error = arb_mat(m, m, J.entries()), each(lambda e: e + pivots, arb_mat(m, m, errors.entries()))
     if derived:
         expect_derivatives(c, stage, X, T, leaf, box)
-    elif solves:  # so the C may take differences of residuals in place of the matrix
+    elif solves:  # the C may then use differences of residuals instead of the matrix
         least = -top(-v for v in low.entries())
         demand(least > 0, "the unknowns, in whose sizes residuals are measured, may be 0")
         noise = (d_error + U * Y) * (2 / (stage["difference"] * least))
@@ -261,17 +261,17 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     first_order = each(gap, M, A)
 
     def residual_error(e: Matrix) -> Matrix:
-        """Rounding errors of the residual, at a distance e from the solution."""
+        """Return bounds for rounding errors of the residual, at a distance e from the solution."""
         first = d_error + U * (size + e + CARRY * Y) * based
         return first + 2 * U * (A_size * e + first + U * size + CARRY * Y * based) if solves else first
 
     def missed(e: Matrix) -> Matrix:
-        """The rest that a correction leaves of an error e of u."""
+        """Return the error of u after a correction of an error e."""
         bent = arb_mat(m, m, (each(mag, bends) * e * HALF).entries()) + M_error if derived else first_order
         return inverse * (bent * e + residual_error(e))
 
     def worst_of(size: Ball) -> Matrix:
-        """The largest error where the C measures corrections or residuals as at most a size."""
+        """Return the largest error if corrections or residuals, as measured by the C, are at most a size."""
         return each(mag, A.inv()) * (measured * (size * ROUNDED) + residual_error(reach))
 
     C = each(middle, each(middle, A).inv())
@@ -285,14 +285,14 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     inside = zip(box, K.entries(), beyond.entries(), strict=True)
     demand(all(v.contains_interior(k + BALL * r) for v, k, r in inside), KRAWCZYK)
     demand(below(missed(reach) + U * Y * solves, reach), "the iteration may diverge")
-    if stage.get("seen"):  # two terms after one that is seen series may end
+    if stage.get("seen"):  # series may end two terms after one above rounding
         (seen,) = centred(c, stage, X, T, leaf, box, run, "seen").entries()
         demand(seen.abs_lower() > ROUNDED * mag(run.x[stage["seen_above"]]), "a Taylor series may end early")
 
     noise = 2 * (residual_error(reach) + A_size * Y * U * solves)
     q, shaken, share = stalling(stage, each(mag, identity(m) - A * M.inv()), noise, low, high)
     e, rest = column([ZERO] * m), column([ZERO] * m)
-    for stop in stage["stops"]:  # by a size, by that of the correction before, or where sizes hardly shrink
+    for stop in stage["stops"]:  # by a size, by that of the previous correction, or at stagnation
         errors = [worst_of(share * stop["now"] / stop.get("rate", 1))] if "now" in stop else []
         before = [share * stop["before"]] if "before" in stop else []
         before += [share * shaken / (stop["part"] - q)] if q < arb(stop.get("part", 0)) else []
@@ -310,7 +310,7 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
 
 
 def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matrix) -> tuple[Ball, Ball, Ball]:
-    """Contraction and noise of sizes as the C measures them: means of squares over stages, or the largest."""
+    """Return contraction and noise of sizes in the norm of the C: mean square over stages, or maximum."""
     m, share = len(stage["equation"]), arb(stage["share"] or 1).sqrt()
     scaled = [[factor[i, j] * high[j, 0] / high[i, 0] for j in range(m)] for i in range(m)]
     across, down = (top(sum(r, ZERO) for r in rows) for rows in (scaled, zip(*scaled, strict=True)))
@@ -322,7 +322,7 @@ def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matri
 
 
 def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
-    """Bounds and image of a step, one stage after the other."""
+    """Return error bounds and image of a step, stage by stage."""
     total, n = column([ZERO] * len(X)), len(X)
     for stage, part in zip(c["stages"], leaf["stages"], strict=True):
         if "equation" in stage:
@@ -353,14 +353,14 @@ def check(c: Any, domain: Sequence[Sequence[float]], node: Any) -> tuple[int, li
 
 
 def digest(c: Mapping[str, Any]) -> str:
-    """The digest of a certificate without its digest."""
+    """Return the digest of a certificate without its entry of the digest."""
     return hashlib.sha256(
         json.dumps({k: v for k, v in c.items() if k != "sha256"}, sort_keys=True).encode()
     ).hexdigest()
 
 
 def replayed(c: Any, text: bytes) -> str:
-    """Check a certificate of a C file; return what it says. Raises `RefusedError`."""
+    """Check a certificate of a C file; return its statement. Raises `RefusedError`."""
     demand(digest(c) == c["sha256"], "the certificate was changed")
     demand(hashlib.sha256(text).hexdigest() == c["c_sha256"], "the certificate is about another C file")
     boxes, largest = check(c, [*c["domain"], c["time"]], c["tree"])

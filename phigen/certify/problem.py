@@ -1,4 +1,4 @@
-"""StepProblem to be certified, from a compilation and its C; refusals of what certificates do not cover."""
+"""Construction of the `StepProblem` of a compilation and its C; refusals of what certificates do not cover."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def problem_of(
     ulps: float,
     within: float,
 ) -> StepProblem:
-    """Return the problem of a solver. The gauge is that of the trajectory from ``start``.
+    """Return the problem of a solver, with the gauge of the trajectory from ``start``.
 
     Raises `SpecError` for what certificates do not cover.
     """
@@ -59,7 +59,7 @@ def _expect_covered(program: Program, spec: Spec) -> None:
 
 
 def _gauge(compilation: Compilation, parameters: Mapping[str, float], start: Sequence[float]) -> list[float]:
-    """The gauge that the solver chooses for the trajectory from a state, nearly: multiples of Casimirs, or e."""
+    """Return an approximation of the gauge for the trajectory from a state: multiples of Casimirs, or e."""
     program = compilation.program
     values = {**parameters, **dict(zip(compilation.spec.coordinates, start, strict=True))}
     if program.monitor and program.held:

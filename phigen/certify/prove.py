@@ -29,26 +29,28 @@ from phigen.certify.checker import (
 from phigen.certify.reader import read
 from phigen.certify.stages import stages_of
 
-#: Passes in which the box of the unknowns of a stage grows until it is shown to hold the solution.
+#: Largest number of passes in which the box of the unknowns of a stage grows until it is proved to contain the
+#: solution.
 PASSES = 8
 
-#: Growth of that box in each pass: less needs more passes, more makes contraction harder to show.
+#: Growth factor of that box per pass: a smaller factor needs more passes, a larger one makes contraction harder to
+#: prove.
 GROWTH = 1.25
 
-#: Reach of the iterates of moves that hardly change, in sizes of the largest: sweeps mix all of them.
+#: Least reach of iterates of an unknown in Gauss steps, relative to the largest reach, as sweeps couple all unknowns.
 LEAST_REACH = 0.05
 
-#: Reach of the iterates of steps along paths beside that of their starts: the C may take differences over less.
+#: Additional relative reach of iterates of steps along paths; the C uses finite differences over smaller displacements.
 DIFFERENCES = arb(2) ** -20
 
-#: Bisections after which a box is given up: its parts have 2^-40 of its volume.
+#: Number of bisections after which the search fails: the parts have 2^-40 of the volume of the box.
 MAX_DEPTH = 40
 
 Box = Sequence[Sequence[float]]
 
 
 class NoCertificateError(RefusedError):
-    """Refusal of what cannot be certified; a hint says what to do."""
+    """Refusal of a problem that cannot be certified, with a hint for the user."""
 
     def __init__(self, message: str, hint: str) -> None:
         super().__init__(message)
@@ -75,7 +77,7 @@ class StepProblem:
 def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
     """Return the certificate without its boxes and bounds. Raises `RefusedError` for C that is not covered.
 
-    For the ``exact`` map paths are expanded as far as the C can.
+    For the ``exact`` map, paths are expanded to the largest order of the C.
     """
     facts = read(problem.text, problem.name)
     numbers = {
@@ -103,7 +105,7 @@ def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
 
 @contextmanager
 def precise() -> Iterator[None]:
-    """Let balls have `BITS` bits."""
+    """Set the precision of balls to `BITS` bits within the block."""
     before, ctx.prec = ctx.prec, BITS
     try:
         yield
@@ -112,7 +114,7 @@ def precise() -> Iterator[None]:
 
 
 def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
-    """Return the certificate of a problem. Raises `RefusedError` where none is found within a number of boxes."""
+    """Return the certificate of a problem. Raises `RefusedError` if none is found within a number of boxes."""
     certificate = described(problem)
     with precise():
         leaves = list[tuple[list[float], list[float]]]()
@@ -126,13 +128,13 @@ def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Search:
-    """The division of a box into parts in which the bounds hold and are at most ``within`` units in the last place."""
+    """Division of a box into parts in which the bounds hold and are at most ``within`` units in the last place."""
 
     certificate: dict[str, Any]
     within: float
     max_boxes: int
-    leaves: list[tuple[list[float], list[float]]]  # bounds, and largest absolute values of coordinates
-    divided: list[int]  # depths of the boxes that were divided
+    leaves: list[tuple[list[float], list[float]]]  # error bounds; largest absolute values of coordinates
+    divided: list[int]  # depths of the divided boxes
 
     def tree(self, domain: Box, depth: int = 0) -> dict[str, Any]:
         """Return the tree of the boxes below a box. Raises `RefusedError`."""
@@ -166,20 +168,20 @@ def _refusal(c: dict[str, Any], domain: Box, failure: Exception, done: int) -> N
 
 
 def _widest(domain: Box) -> int | None:
-    """The axis along which a box is to be divided; None if it is a point, as far as doubles tell."""
+    """Return the axis along which a box is to be divided; None if doubles cannot divide it further."""
     widths = [(b - a) / max(abs(a), abs(b), 1.0) for a, b in domain]
     axis = max(range(len(domain)), key=widths.__getitem__)
     return axis if widths[axis] > 1e-12 else None
 
 
 def _ends(x: Any) -> list[float]:
-    """The ends of a ball as doubles, outwards."""
+    """Return the ends of a ball as doubles, rounded outwards."""
     low, high = math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
     return [low, high]
 
 
 def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """The boxes of the unknowns of each stage, how far its iterates may be from the solution, and boxes of paths."""
+    """Return for each stage the box of unknowns, the reach of iterates from the solution, and boxes of paths."""
     parts, image = list[dict[str, Any]](), X
     for stage in c["stages"]:
         parts.append(_implicit_part(c, stage, image, T) if "equation" in stage else {})
@@ -189,7 +191,7 @@ def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
 
 
 def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """The box of the unknowns of a stage: u = base - d(u) is iterated, and the box grown until the proof holds."""
+    """Return the box of unknowns of a stage: u = base - d(u) is iterated and the box enlarged until the proof holds."""
     base = X if stage["based"] else [arb(0)] * len(stage["equation"])
     start = run_of(c, stage, X, T, {}, base, exact=True)
     box = base if stage["based"] else [start.x[k] for k in stage["start"]]
@@ -218,7 +220,7 @@ def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: An
 
 
 def _path_box(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any, u: list[Any]) -> list[list[float]]:
-    """A box in which paths from X under u stay, by Picard's iteration."""
+    """Return a box that contains the paths from X under u, by Picard's iteration."""
     P = X
     for _ in range(PASSES):
         run = Evaluation(c, stage["path"]["operations"], {"m": P, "u": u, "t": [T]})

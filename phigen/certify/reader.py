@@ -12,17 +12,17 @@ from phigen.certify.checker import LIBM, SERIES, RefusedError
 
 _OPERATIONS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
 
-#: Array in which the parts of a long function leave values for one another.
+#: Array by which the parts of a long function exchange values.
 _WORK = "work"
 
-#: Number in C, with a point or an exponent; whole numbers without are indices.
+#: Floating-point literal in C, with a point or an exponent; integer literals are indices.
 _NUMBER = r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)"
 
 
 class GeneratedC:
     """A generated C file, without comments and without the name of the solver before each name.
 
-    Functions of the solver that would then be called like one of libm begin with ``own_``.
+    A function of the solver whose remaining name is that of a function of libm gets the prefix ``own_``.
     """
 
     def __init__(self, text: str, name: str) -> None:
@@ -39,7 +39,7 @@ class GeneratedC:
         return arguments, matched[2]
 
     def has(self, name: str) -> bool:
-        """Whether there is a function of that name."""
+        """Return whether the file has a function with this name."""
         return self.function(name) is not None
 
     def numbers(self, name: str, text: str | None = None) -> list[float]:
@@ -59,7 +59,7 @@ class GeneratedC:
 
 
 class KernelReader:
-    """Operations of one function, in the order in which it makes them, each shared as the C shares it.
+    """Operations of one function in their order in the C; values that the C reuses occur once.
 
     ``outputs`` maps each array that the function writes to the indices of the operations that are its entries. The
     functions that the C itself defines by polynomials are entered into ``series``.
@@ -76,7 +76,7 @@ class KernelReader:
 
     @property
     def described(self) -> dict[str, Any]:
-        """The kernel as a certificate stores it."""
+        """The kernel in the format of a certificate."""
         written = {name: entries for name, entries in self.outputs.items() if name != _WORK}
         outputs = {name: [entries[i] for i in range(len(entries))] for name, entries in written.items()}
         return {"operations": self.operations, "outputs": outputs}
@@ -92,7 +92,7 @@ class KernelReader:
                     self._names[str(declared.arg)] = self._index(declared.value)
             elif cleared := re.fullmatch(r"(?:\(void\))?memset\((\w+), 0, (\d+) \* sizeof \w+\[0\]\)", statement):
                 self.outputs[cleared[1]] = dict.fromkeys(range(int(cleared[2])), self._operation("number", 0.0))
-            elif re.fullmatch(r"\w+_part\d+\(.*\)", statement):  # of a function that is cut into parts
+            elif re.fullmatch(r"\w+_part\d+\(.*\)", statement):  # part of a divided function
                 self._run(_expect(self._source.function(statement.split("(")[0]), statement)[1])
             elif statement and not re.fullmatch(rf"\(void\)\w+(?:, \(void\)\w+)*|double {_WORK}\[\d+\]", statement):
                 self._store(statement)
@@ -105,7 +105,7 @@ class KernelReader:
                 raise RefusedError(f"the C has the statement {statement!r}, which certificates do not cover")
 
     def _index(self, e: ast.expr) -> int:
-        """Return the index of the operation that an expression is."""
+        """Return the index of the operation for an expression."""
         match e:
             case ast.Constant(str(text)):
                 return self._operation("number", float(text))
@@ -212,7 +212,7 @@ class PathReader(KernelReader):
 
 
 def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
-    """The polynomial by which a function is computed for small arguments, and the radius where it is."""
+    """Return the polynomial for small arguments of a function, and the radius up to which it is used."""
     (argument,), body = _expect(source.function(name), name)
     branch = re.search(r"if \(fabs\(\w+\) [<>] ([\d.]+)\)", body)
     plain = name.removeprefix("own_")
@@ -247,7 +247,7 @@ def _expect(function: tuple[list[str], str] | None, name: str) -> tuple[list[str
 
 
 def read(text: str, name: str) -> dict[str, Any]:
-    """Return all that a certificate states about the C of a solver: the kind of its step, kernels, and tables.
+    """Return the facts about the C of a solver for a certificate: kind of step, kernels, and tables.
 
     Raises `RefusedError` for what certificates do not cover.
     """
@@ -268,7 +268,7 @@ def read(text: str, name: str) -> dict[str, Any]:
     return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
 
 
-#: Functions of the kinds of steps; the last is there for no other kind.
+#: Functions of each kind of step; the last function identifies the kind.
 _FUNCTIONS = {
     "path": ("prepare", "generate", "path_begin", "path_order"),
     "newton": ("prepare", "linearise"),
@@ -304,7 +304,7 @@ def _gauss(source: GeneratedC) -> dict[str, Any]:
 
 
 def _splitting(source: GeneratedC) -> dict[str, Any]:
-    """The times of flows; the flows of a step, between those of correctors; the coordinates that each changes."""
+    """Return times of flows, the flows of a step between its correctors, and the coordinates that each flow changes."""
     row = int(source.number("ROW"))
     schedules = [_schedule(source, "flows", {"coef": 0, "ROW": row})]
     if source.has("corrector"):
@@ -316,17 +316,17 @@ def _splitting(source: GeneratedC) -> dict[str, Any]:
 
 
 def _schedule(source: GeneratedC, function: str, names: dict[str, int]) -> list[list[int]]:
-    """The flows that a function calls, each with its row of coefficients."""
+    """Return the flows that a function calls, each with its row of coefficients."""
     _, body = _expect(source.function(function), function)
     return _called(_block(iter(map(str.strip, body.splitlines()))), names, [])
 
 
-#: Flows of a step at most, in all rounds of its loops.
+#: Largest number of flows of a step, including all iterations of loops.
 MOST_FLOWS = 10_000
 
 
 def _block(lines: Iterator[str]) -> list[tuple[str, Any]]:
-    """The statements of a block up to its end: loops with their blocks, calls of flows, and advances of ``coef``."""
+    """Parse the statements of a block up to its end: loops with blocks, calls of flows, and advances of ``coef``."""
     statements = list[tuple[str, Any]]()
     for line in itertools.takewhile(lambda line: line != "}", lines):
         loop = re.fullmatch(r"for \(int (\w+) = (\d+); \w+ < (\d+); (?:\+\+\w+|\w+ \+= (\d+))\) \{", line)
@@ -360,7 +360,7 @@ def _called(statements: list[tuple[str, Any]], names: dict[str, int], called: li
 
 
 def _whole(text: str, names: Mapping[str, int]) -> int:
-    """The value of sums and products of whole numbers and names. Raises `RefusedError` for anything else."""
+    """Return the value of sums and products of integers and names. Raises `RefusedError` for anything else."""
 
     def value(node: ast.expr) -> int:
         match node:
@@ -384,7 +384,7 @@ def _whole(text: str, names: Mapping[str, int]) -> int:
 
 
 def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
-    """The coordinates to which a flow adds its changes, with the indices of these."""
+    """Return the coordinates to which a flow adds changes, with the indices of the changes."""
     _, body = _expect(source.function(f"flow{flow}"), f"flow{flow}")
     added = re.findall(r"add\(x, moved, start, (\d+), change\[(\d+)\]\);", body)
     if len(added) != body.count(";") - 2:

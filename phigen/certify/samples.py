@@ -1,4 +1,4 @@
-"""Steps of the compiled C beside the exact map, in many digits: how far a bound is from what occurs."""
+"""Comparison of steps of the compiled C with the exact map in many digits, which shows how tight a bound is."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from flint import arb, arb_mat, ctx
 
 from phigen.certify.checker import identity, run_of
 
-#: Bits of the exact map.
+#: Precision of the exact map in bits.
 BITS = 300
 
-#: Corrections that reach that precision, with the inverse of a matrix at the centre of the box.
+#: Number of corrections, with the inverse of a matrix at the centre of the box, that reach this precision.
 CORRECTIONS = 400
 
-#: A last correction, after which the rest is negligible.
+#: Size of the last correction below which the remaining error is negligible.
 SOLVED = 1e-40
 
 Numbers = Sequence[Any]
@@ -34,7 +34,7 @@ def _precise() -> Iterator[None]:
 
 
 class ExactMap:
-    """The exact map of a certificate: `described` with ``exact``."""
+    """Exact map of a certificate: `described` with ``exact``."""
 
     def __init__(self, c: Mapping[str, Any]) -> None:
         self._c = c
@@ -51,7 +51,7 @@ class ExactMap:
             return x
 
     def _solved(self, number: int, stage: Mapping[str, Any], x: Numbers, t: Any) -> list[Any]:
-        """The unknowns of a stage, by corrections."""
+        """Return the unknowns of a stage, by corrections."""
         base = x if stage["based"] else [arb(0)] * len(stage["equation"])
         start = run_of(self._c, stage, x, t, {}, base, exact=True)
         u = [arb(start.x[k].mid()) for k in stage["start"]]
@@ -70,10 +70,10 @@ class ExactMap:
 
 
 def observed(c: Mapping[str, Any], exact: Mapping[str, Any], library: Any, count: int, seed: int = 0) -> list[float]:
-    """Return the largest distance of each coordinate from the exact map, of steps from random states in the domain.
+    """Return the largest error of each coordinate against the exact map, for steps from random states in the domain.
 
-    ``exact`` describes that map, and ``library`` is the compiled C. Half of the states have a random compensation term
-    too. Raises `RuntimeError` if a step fails.
+    ``exact`` describes that map, and ``library`` is the compiled C. Half of the states also have a
+    random compensation term. Raises `RuntimeError` if a step fails.
     """
     exact_step = ExactMap(exact)
     draw, worst = random.Random(seed), [0.0] * len(c["domain"])
@@ -108,7 +108,7 @@ def one_step(
         status = getattr(library, f"{name}_init_gauge")(*start, gauge)
     else:
         status = getattr(library, f"{name}_init")(*start)
-    solver = (ctypes.c_double * (2 * n)).from_buffer(room)  # begins with the state and its compensation
+    solver = (ctypes.c_double * (2 * n)).from_buffer(room)  # the struct begins with state and compensation
     solver[n:] = list(carry)
     if status or getattr(library, f"{name}_step")(room, ctypes.c_double(c["step"])):
         raise RuntimeError(f"a step of {name} fails at {list(x)}")

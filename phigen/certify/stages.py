@@ -11,15 +11,15 @@ from flint import arb
 from phigen.certify.checker import Evaluation, RefusedError, column
 from phigen.certify.reader import GeneratedC, PathReader
 
-#: Contraction by sweeps that a Gauss solver remembers at least, by which it decides when to stop. Certificates hold
-#: while that is so; in runs of the corpus it is between 0.05 and 0.5.
+#: Smallest contraction rate that certificates assume in the stopping criterion of a Gauss solver, which estimates the
+#: rate from its sweeps; in runs of the corpus the rate is between 0.05 and 0.5.
 LEAST_RATE = 0.05
 
 Stage = dict[str, Any]
 
 
 class Listing:
-    """A flat list of operations, into which kernels are copied; inputs are listed once."""
+    """Flat list of operations, into which kernels are copied; inputs are listed once."""
 
     def __init__(self) -> None:
         self.operations: list[list[Any]] = []
@@ -59,7 +59,7 @@ class Listing:
 
 
 class _Parameters(dict[str, int]):
-    """Indices of parameters in a listing, which are listed when they are read."""
+    """Indices of parameters in a listing; a parameter is added when it is first read."""
 
     def __init__(self, listing: Listing) -> None:
         self._listing = listing
@@ -80,7 +80,7 @@ def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int
     if len(facts["fractions"]) > 1:
         h = listing.add("mul", listing.input("exact", facts["fractions"][stage]), step)
     kick = []
-    if facts.get("multiples"):  # of the modified potential, in units of the square of the whole step
+    if facts.get("multiples"):  # coefficient of the modified potential, in units of h^2 of the whole step
         square = listing.add("mul", step, step)
         kick = [listing.add("mul", listing.input("exact", facts["multiples"][stage]), square)]
     kernels, inputs = facts["kernels"], {"params": _Parameters(listing), "gauge": _Gauge(listing)}
@@ -95,7 +95,7 @@ def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int
 def stages_of(
     facts: Mapping[str, Any], text: str, name: str, centre: Sequence[Any], exact: bool = False
 ) -> list[Stage]:
-    """Return the stages of a step from the facts about its C; paths are expanded in a box, or ``exact``-ly."""
+    """Return the stages of a step from the facts about its C; path expansions suit a box or the ``exact`` map."""
     source, n = GeneratedC(text, name), len(centre)
     if facts["kind"] == "path":
         return _path(facts, source, n, centre, exact)
@@ -110,7 +110,7 @@ def _explicit(facts: Mapping[str, Any], n: int) -> list[Stage]:
 
 
 def _splitting(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Flows, which add their changes to a sum that begins with the compensation term."""
+    """Return the stages of flows, which add their changes to a sum that begins with the compensation term."""
     return [_flows(facts, schedule, n) for schedule in facts["schedules"]]
 
 
@@ -131,7 +131,7 @@ def _flows(facts: Mapping[str, Any], schedule: Sequence[Sequence[int]], n: int) 
 
 
 def _newton(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Newton's method for y, with the last correction of the increment to first order."""
+    """Return the stages of Newton's method for y, with the last correction of the increment to first order."""
     stages = []
     for k in range(len(facts["fractions"])):
         listing = Listing()
@@ -161,7 +161,7 @@ def _newton(facts: Mapping[str, Any], n: int) -> list[Stage]:
 
 
 def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Sweeps over all stages of a Gauss method: the unknowns are the moves of all stages."""
+    """Return the stage of sweeps of a Gauss method: the unknowns are the increments of all its stages."""
     listing, kernels, nodes = Listing(), facts["kernels"], len(facts["weights"])
     width = len(kernels["stage_field"]["outputs"]["move"])
     coef = prepared(facts, listing, 0)
@@ -205,14 +205,14 @@ def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
     ]
 
 
-#: Margin of the sizes of terms of Taylor series by which their numbers are chosen, since boxes of p are wider then.
+#: Safety factor for term sizes when the number of terms of a Taylor series is chosen, as later boxes of p are wider.
 MARGIN = 4.0
 
 
 def _path(
     facts: Mapping[str, Any], source: GeneratedC, n: int, centre: Sequence[Any], exact: bool = False
 ) -> list[Stage]:
-    """Iterations for p, the mean gradient of S_h along a path, which is expanded in one piece."""
+    """Return the stages of iterations for p, the mean gradient of S_h along a path with one expansion."""
     limit = int(facts["most_terms"])
     longest, stages = PathReader(source, facts["series"], n, limit).described, []
     for k in range(len(facts["fractions"])):
@@ -231,7 +231,7 @@ def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: 
 def _along_path(
     facts: Mapping[str, Any], source: GeneratedC, n: int, k: int, least: int, most: int, coordinate: int
 ) -> Stage:
-    """Stage k whose series have between ``least`` and ``most`` terms, as that of one coordinate shows."""
+    """Return stage k, whose series have ``least`` to ``most`` terms, as the series of ``coordinate`` proves."""
     listing, kernels = Listing(), facts["kernels"]
     x, u, coef = listing.inputs("x", n), listing.inputs("u", n), prepared(facts, listing, k)
     terms = _series(facts, PathReader(source, facts["series"], n, most).described, listing, k, x, u)
@@ -284,7 +284,7 @@ def _largest(listing: Listing, sizes: Sequence[int]) -> int:
 def _measured(
     facts: Mapping[str, Any], listing: Listing, x: Sequence[int], terms: Sequence[Sequence[int]], orders: Sequence[int]
 ) -> list[list[int]]:
-    """Append the sizes of terms that count as rounding; return pairs of terms of some orders and these sizes."""
+    """Append the sizes below which terms are negligible; return pairs of terms of some orders and these sizes."""
     starts = [listing.add("abs", i) for i in x]
     least = listing.add("mul", listing.add("exact", facts["least_share"]), listing.sum(starts))
     negligible, pairs = listing.add("exact", facts["negligible"]), []
@@ -296,7 +296,7 @@ def _measured(
 
 
 def _orders(facts: Mapping[str, Any], kernel: Any, n: int, k: int, box: Sequence[Any]) -> tuple[int, int, int]:
-    """The least and the largest number of terms of series of paths from a box; the coordinate that shows the least."""
+    """Return least and largest number of terms of series of paths from a box; the coordinate that proves the least."""
     listing = Listing()
     x = listing.inputs("x", n)
     p = listing.copy(facts["kernels"]["generate"], coef=prepared(facts, listing, k), y=x)["slope"]

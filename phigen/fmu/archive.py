@@ -1,4 +1,4 @@
-"""The files of an FMU: sources, binaries and descriptions, in archives whose bytes depend on their contents alone."""
+"""Files of an FMU: sources, binaries and descriptions, in reproducible archives: equal contents give equal bytes."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def archive(unit: MockupUnit, version: int, libraries: Mapping[str, bytes]) -> b
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as file:
         for path, data in contents.items():
             entry = zipfile.ZipInfo(path, _DATE)
-            entry.create_system = 3  # so that permissions hold, whatever machine writes it
+            entry.create_system = 3  # fixed, so that file permissions do not depend on the machine
             entry.external_attr = _PROGRAM if path.startswith("binaries/") else _FILE
             entry.compress_type = zipfile.ZIP_DEFLATED
             file.writestr(entry, data)

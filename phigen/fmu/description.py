@@ -17,7 +17,7 @@ from phigen.fmu.variables import Variable, first_run
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
 
-#: Vendor name under which the annotations of phigen stand.
+#: Vendor name of the annotations of phigen.
 VENDOR = "phigen"
 
 _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -85,7 +85,9 @@ def _co_simulation(root: ET.Element, compilation: Compilation, version: int, sou
     of_steps = ET.SubElement(root, "CoSimulation", modelIdentifier=compilation.spec.name)
     for ability in _ABILITIES[version]:
         of_steps.set(ability, "true")
-    if compilation.program.noise:  # a step with noise cannot be divided: the parts would draw other random numbers
+    if (
+        compilation.program.noise
+    ):  # a step with noise cannot be divided, as its parts would draw different random numbers
         of_steps.set("canHandleVariableCommunicationStepSize", "false")
     if version == 2:
         of_steps.set("canNotUseMemoryManagementFunctions", "true")
@@ -95,9 +97,9 @@ def _co_simulation(root: ET.Element, compilation: Compilation, version: int, sou
 
 
 def _experiment(root: ET.Element, compilation: Compilation) -> None:
-    """Add the default experiment: that of `first_run`.
+    """Add the default experiment, which is that of `first_run`.
 
-    With a monitor steps are equal in τ. The physical time of the end is then unknown, and only the start is stated.
+    Steps of monitored systems are uniform in τ. The physical end time is then unknown, and only the start is stated.
     """
     run = first_run(compilation.spec)
     experiment = ET.SubElement(root, "DefaultExperiment", startTime=repr(float(run.start)))

@@ -1,4 +1,4 @@
-"""The platforms for which binaries of an FMU are compiled, and the compilers for them."""
+"""Platforms for which binaries of an FMU are compiled, and their compilers."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ PLATFORMS = {
     )
 }
 
-#: No fused multiply-add: then results differ between platforms only by their libm. Only the functions of FMI are
-#: exported, and symbols for debuggers are stripped.
+#: Without fused multiply-add, results differ between platforms only by their libm. Only the functions of FMI are
+#: exported, and debugging symbols are stripped.
 FLAGS = ("-ffp-contract=off", "-fvisibility=hidden", "-s")
 
 #: Limit of a compilation in seconds. The first one for a platform also builds zig's runtime libraries for it.

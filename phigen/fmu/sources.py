@@ -1,6 +1,6 @@
-"""The C of an FMU: the solver as ``phigen build`` writes it, and the functions of FMI 2.0 and 3.0 that call it.
+"""C of an FMU: the solver as ``phigen build`` writes it, and the functions of FMI 2.0 and 3.0 that call it.
 
-The functions of FMI lie in ``templates/c/runtime/fmu*.c``. This module prints the constants that they need of a system.
+The functions of FMI are in ``templates/c/runtime/fmu*.c``. This module prints the constants of a system for them.
 """
 
 from __future__ import annotations

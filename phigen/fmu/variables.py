@@ -1,4 +1,4 @@
-"""The variables of an FMU, which the importing simulator reads and sets by their numbers."""
+"""Variables of an FMU, which the importing simulator reads and sets by number."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Variable:
 
 
 def first_run(spec: Spec) -> Run:
-    """Return the run that supplies the initial state, parameters and step of an FMU: the first that goes forward.
+    """Return the run with the initial state, parameters and step of an FMU: the first one with a positive step.
 
     Raises `SpecError` for lattices, and for a spec without such a run.
     """
@@ -73,7 +73,7 @@ def variables_of(compilation: Compilation) -> tuple[Variable, ...]:
 
 
 def first_numbers(compilation: Compilation) -> dict[str, int]:
-    """Return the number of the first variable of each kind. An absent kind has the number of the kind after it."""
+    """Return the number of the first variable of each kind. An absent kind has the number of the next kind."""
     numbers, number = {}, 0
     for kind, listed in _kinds(compilation).items():
         numbers[kind] = number

@@ -1,9 +1,8 @@
 """Gauss collocation in JAX: the step of a bracket with any function as H.
 
-The unknowns, the sweeps and the predictor are those of `phigen.gauss`. The stages of a step are the solution of an
-equation, and JAX differentiates them as such: tangents and cotangents solve its linearisation, and its transpose, by
-sweeps of their own. So derivatives are those of the step, exact to round-off, and the sweeps themselves are not
-differentiated.
+The unknowns, the sweeps and the predictor are those of `phigen.gauss`. JAX differentiates the stages of a step as the
+solution of an equation: tangents solve the linearised equation and cotangents its transpose, by separate sweeps.
+Derivatives are therefore those of the step, exact to round-off; the sweeps of the step are not differentiated.
 """
 
 from __future__ import annotations
@@ -27,47 +26,48 @@ from phigen.symbolic.arrays import Arrays
 from phigen.symbolic.expression import Expression, symbol
 from phigen.symbolic.symbols import Symbol
 
-#: The kind of symbols of the components of ∇H.
+#: Kind of the symbols of the components of ∇H.
 GRADIENT = "gradient"
 
-#: Largest number of sweeps in the solve of a step, or of its linearisation: those of a step of a spec.
+#: Largest number of sweeps for a step or for its linearisation, the same as in generated code.
 MAX_SWEEPS = 100
 
-#: Thresholds of the sweeps of a step, and of those of linear equations, in double precision.
+#: Thresholds of the sweeps of a step and of linear equations, in double precision.
 POLICY, LINEAR_POLICY = GaussPolicy(), GaussAdjointPolicy()
 
-#: The state of a run between two steps: x, its compensation term, and the moves of the last step as seen from x.
+#: State of a run between two steps: x, its compensation term, and the increments of the last step in the frame of x.
 Carry = tuple[Any, Any, Any]
 
 
 class _Traced(Arrays):
-    """Arrays of JAX."""
+    """Evaluation of expressions on arrays of JAX."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         super().__init__(values, jnp)
 
     def power(self, base: Any, exponent: Fraction) -> Any:
-        """Return an array to a rational power, with products and roots where these do."""
+        """Return an array to a rational power, by products and roots where possible."""
         if exponent.denominator == 1:
             return base ** int(exponent)
         return jnp.sqrt(base) ** exponent.numerator if exponent.denominator == 2 else super().power(base, exponent)
 
 
 def rounding_of(dtype: Any) -> float:
-    """Return the unit of rounding of a floating-point type in that of double precision."""
+    """Return the rounding unit of a floating-point type, in rounding units of double precision."""
     return float(jnp.finfo(dtype).eps) / float(np.finfo(np.float64).eps)
 
 
 def tableau_of(dtype: Any, stages: int) -> Tableau:
-    """Return the coefficients of a method; types shorter than double precision take those of single precision."""
+    """Return the coefficients of a method; shorter types than double precision use those of single precision."""
     return tableau(stages, DOUBLE if rounding_of(dtype) == 1 else SINGLE)
 
 
 @dataclass(frozen=True, eq=False)
 class Collocation:
-    """A step of size ``h`` by a method with this number of ``stages``.
+    """Step of size ``h`` by a Gauss method with this number of ``stages``.
 
-    ``points`` are those of a system whose H is not used: ``slope`` is ∇H as a function of x and further arguments.
+    ``points`` are the stage equations of a system whose own H is not used; ``slope`` is ∇H as a function of x and
+    further arguments.
     """
 
     points: StageMap
@@ -103,11 +103,11 @@ class Collocation:
         }
 
     def start(self, x: Any) -> Carry:
-        """Return the state of a run at its start, where nothing is predicted."""
+        """Return the state of a run at its start, without prediction."""
         return x, jnp.zeros_like(x), jnp.zeros((len(self.points.unknowns), self.stages), x.dtype)
 
     def moves(self, table: Tableau, x: Any, moves: Any, arguments: Any, parameters: Mapping[str, Any]) -> Any:
-        """Return h b_j times the derivatives of the unknowns at all stages (unknowns, stages), at these moves."""
+        """Return h b_j times the derivatives of the unknowns at all stages (unknowns, stages), for these increments."""
         z = moves @ jnp.asarray(table.mixing, x.dtype).T
         values = self._values(x, z, parameters)
         places = _stacked(_Traced(values).values(self._places), self.stages, x.dtype)
@@ -117,7 +117,7 @@ class Collocation:
         return weights * _stacked(_Traced(values).values(self._derivatives), self.stages, x.dtype)
 
     def advance(self, carry: Carry, arguments: Any, parameters: Mapping[str, Any]) -> Carry:
-        """Return the state of a run after a step; x is not a number if the step failed."""
+        """Return the state of a run after a step; x is NaN if the step failed."""
         x, compensation, seen = carry
         table, unit = tableau_of(x.dtype, self.stages), rounding_of(x.dtype)
 
@@ -139,7 +139,7 @@ class Collocation:
         return following, lost, jax.lax.stop_gradient(self._from_the_end(end, moves, parameters))
 
     def _scale(self, x: Any) -> Any:
-        """Return the sizes of the unknowns (unknowns, 1): of coordinates that of x, of group elements 1."""
+        """Return the scales of the unknowns (unknowns, 1): |x| for coordinates, 1 for group elements."""
         size = jnp.sqrt(jnp.sum(x**2))
         size = jnp.where(size > 0, size, 1)
         plain = len(self.points.moved)
@@ -147,7 +147,7 @@ class Collocation:
         return jnp.concatenate([jnp.broadcast_to(size, (plain,)), ones])[:, None]
 
     def _from_the_end(self, end: Any, moves: Any, parameters: Mapping[str, Any]) -> Any:
-        """Return the moves of a step in the frame of its end."""
+        """Return the increments of a step in the frame of its end."""
         if self._seen is None:
             return moves
         symbols, roots = self._seen
@@ -163,19 +163,19 @@ def _stacked(values: Sequence[Any], stages: int | None, dtype: Any) -> Any:
 
 
 def _inverse_mixing(table: Tableau, dtype: Any) -> Any:
-    """Return the transpose of μ⁻¹, which gives the moves that a prediction of the unknowns at the stages comes from."""
+    """Return the transpose of μ⁻¹, which converts predicted unknowns at the stages into increments."""
     return jnp.asarray(np.linalg.inv(np.array(table.mixing)).T, dtype)
 
 
 def _largest(change: Any, scale: Any) -> Any:
-    """Return the largest size at any stage."""
+    """Return the largest norm of a change over the stages, relative to the scales."""
     return jnp.sqrt(jnp.max(jnp.sum((change / scale) ** 2, axis=0)))
 
 
 def _solved(equation: Callable[[Any], Any], start: Any, scale: Any, unit: float) -> Any:
-    """Return the zero L of F(L) − L, given as ``equation``, by sweeps L ← F(L); not a number if they do not converge.
+    """Return the zero L of F(L) − L, given as ``equation``, by sweeps L ← F(L); NaN if they do not converge.
 
-    Sweeps that diverge from ``start`` begin once more at 0.
+    Sweeps that diverge from ``start`` restart once at 0.
     """
     solved, rounding, near = (unit * v for v in (POLICY.solved, POLICY.rounding, POLICY.nearly_rounding))
     stages, infinity = start.shape[1], jnp.asarray(jnp.inf, start.dtype)
@@ -216,7 +216,7 @@ def _solved_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
 
 
 def _swept_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
-    """Return the same by sweeps L ← F′L − side."""
+    """Return the solution of (F′ − 1) L = side by sweeps L ← F′L − side."""
     solved, rounding = unit * LINEAR_POLICY.adjoint_solved, unit * LINEAR_POLICY.adjoint_rounding
     floor = jnp.finfo(side.dtype).tiny
 

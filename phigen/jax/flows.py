@@ -41,17 +41,18 @@ def flow(
     stride: int | None = None,
     structure: str = "exact",
 ) -> Callable[..., Any]:
-    """The run of ẋ = π∇H as ``f(x0, *arguments, **parameters)``, with π of a system, and H a function of JAX.
+    """Return the run of ẋ = π∇H as ``f(x0, *arguments, **parameters)``, with π of a system and H a function of JAX.
 
     ``hamiltonian(x, *arguments)`` returns a number; x is (DIM,), and arguments are arrays or trees of arrays, such as
-    the weights of a network. The H of the system, and its runs, are not used. ``parameters`` are those in π, by name;
-    what is not passed has its default. f returns the last state, of the shape (…, DIM) of x0, with a ``stride`` all
-    rows of `Solver.integrate`, (…, rows, DIM). Steps are those of ``scheme: gauss`` of this order: Poisson maps, for
-    any H and step size, if the bracket is constant or that of a Lie algebra that phigen knows; ``structure="to
-    truncation"`` takes every bracket, and is no Poisson map. All of f is in JAX, in the precision of x0: it runs under
-    `jit` and `vmap`, on every device of XLA, and has derivatives in both modes, which solve the linearised equations of
-    a step. A step that fails, since h is too large, gives NaN from there on. H should be smooth: the order rests on its
-    derivatives. Raises `SpecError` for brackets without exact steps, and `CheckError` if π is not a Poisson tensor.
+    the weights of a network. H and the runs of the system are not used. ``parameters`` are those in π, by name; missing
+    ones have their defaults. f returns the last state, of the shape (…, DIM) of x0, or with a ``stride`` all rows of
+    `Solver.integrate`, (…, rows, DIM). Steps are those of ``scheme: gauss`` of this order: Poisson maps, for any H and
+    step size, if the bracket is constant or that of a Lie algebra that phigen knows. ``structure="to truncation"``
+    accepts every bracket, but the step is then not a Poisson map. All of f is in JAX, in the precision of x0: it runs
+    under `jit` and `vmap`, on every device of XLA, and has derivatives in both modes, which solve the linearised
+    equations of a step. A step that fails because h is too large gives NaN from there on. H should be smooth, as the
+    order depends on its derivatives. Raises `SpecError` for brackets without exact steps, and `CheckError` if π is not
+    a Poisson tensor.
     """
     arguments.step_size(h)
     arguments.count(steps, "steps", 0)
@@ -112,7 +113,7 @@ def _run_of(method: Collocation, bracket: System, steps: int, stride: int | None
 
 
 def _state(x0: Any, bracket: System) -> Any:
-    """Return x0 as an array of real numbers of a precision of its own, of that of JAX if it has none."""
+    """Return x0 as a real array in its own precision, or in the default precision of JAX if x0 has none."""
     x = jnp.asarray(x0)
     if jnp.iscomplexobj(x):
         raise TypeError("x0 must be real")
@@ -122,7 +123,7 @@ def _state(x0: Any, bracket: System) -> Any:
 
 
 def _system_of(source: str | PathLike[str] | Spec | System | LatticeSystem) -> System:
-    """Return the system of a source. Raises `SpecError` if its motion is not that of π and H alone."""
+    """Return the system of a source. Raises `SpecError` if its motion is not defined by π and H alone."""
     system = load(source) if isinstance(source, str | PathLike) else source
     system = system_from_spec(system) if isinstance(system, Spec) else system
     if not isinstance(system, System):
@@ -156,7 +157,7 @@ def _realised(system: System, structure: str) -> Realisation:
 
 
 def _expect_proved(system: System, realisation: Realisation, stages: int) -> None:
-    """Raise `CheckError` if π is not a Poisson tensor, or the step is not what it should be."""
+    """Raise `CheckError` if π is not a Poisson tensor, or if a proof about the step fails."""
     listed = [s for group in statements.tensor(system).values() for s in group]
     if not any(s.verdict == REFUTED for s in listed):
         listed += gauss_statements.check(system, system, realisation, tableau(stages))

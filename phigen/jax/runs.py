@@ -1,7 +1,7 @@
 """Runs of solvers as functions of JAX: with derivatives, under `jit` and `vmap`.
 
-The solver runs on the CPU, in double precision, as a callback. Derivatives are those of `Solver.pullback`; second ones
-are not offered.
+The solver runs on the CPU, in double precision, as a callback. Derivatives are those of `Solver.pullback`; second
+derivatives are not offered.
 """
 
 from __future__ import annotations
@@ -29,16 +29,17 @@ def propagator(
     forward: bool = False,
     **shared: Any,
 ) -> Callable[..., Any]:
-    """The run of a solver as ``f(x0, parameters={})``: the last state, of the shape (…, DIM) of ``x0``.
+    """Return the run of a solver as ``f(x0, parameters={})``, which returns the last state, shaped (…, DIM) like
+    ``x0``.
 
-    With a ``stride`` all rows of `Solver.integrate`, (…, rows, DIM). ``parameters`` are arrays by name, of shapes that
-    broadcast to (…); what is not given has its default. Results have the precision of x0, which is single unless
-    ``jax_enable_x64`` is set. Under `vmap` members are those of one ensemble. A step that fails raises where the result
-    is asked for. Derivatives are exact to round-off, and ask for a solver compiled with ``adjoint=True``: those of
-    `jax.grad` and `jax.vjp` take one run back; those of `jax.jvp` and `jax.jacfwd` are by the tangent map, one run back
-    for each number of a result, as all are with ``forward``. Of a lattice, which has no tangent map here, DIM is
-    (coordinates, *sizes), parameters at sites have axes of theirs, and further arguments, such as ``bonds=``, are those
-    of all its runs.
+    With a ``stride``, f returns all rows of `Solver.integrate`, (…, rows, DIM). ``parameters`` are arrays by name, of
+    shapes that broadcast to (…); missing ones have their defaults. Results have the precision of x0, which is single
+    unless ``jax_enable_x64`` is set. Under `vmap` members are those of one ensemble. A failed step raises its exception
+    where the result is used. Derivatives are exact to round-off and need a solver compiled with ``adjoint=True``.
+    `jax.grad` and `jax.vjp` need one reverse pass. `jax.jvp` and `jax.jacfwd`, and all derivatives with ``forward``,
+    use the Jacobian, which needs one reverse pass for each number of the result. For lattices, which have no tangent
+    map here, DIM is (coordinates, *sizes), parameters at sites have site axes, and further arguments, such as
+    ``bonds=``, apply to all runs.
     """
     runs = Propagation(solver, h, steps, stride, t0, shared)
     shaped = partial(jax.pure_callback, vmap_method="broadcast_all")
@@ -61,9 +62,8 @@ def propagator(
     def moved(at: Any, directions: Any) -> Any:
         batch, (x0, parameters), (along, changes) = _Axes(runs, *at), at, directions
         if runs.axes > 1:
-            return shaped(
-                runs.jacobian, jax.ShapeDtypeStruct(runs.shape(x0.shape), x0.dtype), *at
-            )  # which refuses them
+            # `jacobian` raises the refusal for lattices.
+            return shaped(runs.jacobian, jax.ShapeDtypeStruct(runs.shape(x0.shape), x0.dtype), *at)
         states = runs.shape(x0.shape)
 
         def jacobian(x: Any, p: Any) -> Any:
@@ -100,7 +100,7 @@ def propagator(
 
 
 def _real(value: Any, what: str) -> Any:
-    """An array of real numbers of a precision of its own, of that of JAX if it has none."""
+    """Return a real array in its own precision, or in the default precision of JAX if the argument has none."""
     array = jnp.asarray(value)
     if jnp.iscomplexobj(array):
         raise TypeError(f"{what} must be real")
@@ -108,11 +108,11 @@ def _real(value: Any, what: str) -> Any:
 
 
 def _linear(apply: Callable[[Any], Any], transpose: Callable[[Any], Any], at: Any, shape: tuple[int, ...]) -> Any:
-    """A linear map at a place, of results of that shape, whose transpose is known.
+    """Return the value of a linear map with known transpose; ``shape`` is that of the result.
 
-    JAX lets the transpose of a solution be given: here that of (u, y) = (v, A v), with nothing to solve.
+    JAX accepts a transpose only for linear solves, so the map is the trivial solve (u, y) = (v, A v).
     """
-    zero = sum(0 * jnp.sum(leaf) for leaf in jax.tree.leaves(at))  # linear in v, as all that is solved for has to be
+    zero = sum(0 * jnp.sum(leaf) for leaf in jax.tree.leaves(at))  # linear in v, as JAX requires of solutions
     at, nothing = jax.tree.map(lambda leaf: leaf + zero, at), jnp.broadcast_to(zero, shape)
 
     def solve(_: Any, right: Any) -> Any:
@@ -126,7 +126,7 @@ def _linear(apply: Callable[[Any], Any], transpose: Callable[[Any], Any], at: An
 
 @jax.custom_jvp  # type: ignore[untyped-decorator]
 def _derived_once(at: Any) -> Any:
-    """The same; where it is differentiated, a derivative is."""
+    """Identity whose differentiation means that a derivative is differentiated; this is refused."""
     return at
 
 
@@ -136,7 +136,7 @@ def _derived_twice(*_: Any) -> Any:
 
 
 class _Axes:
-    """Numbers of axes of the arguments of a function, from which those that `vmap` puts before them follow."""
+    """Numbers of axes of the arguments of a function, which determine the axes that `vmap` adds in front."""
 
     def __init__(self, runs: Propagation, x0: Any, parameters: Mapping[str, Any]) -> None:
         self._leading = x0.ndim - runs.axes
@@ -144,7 +144,7 @@ class _Axes:
         self._sites = {name: runs.axes_of(name) for name in parameters}
 
     def aligned(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """The parameters with axes of length 1 where states have more of their own."""
+        """Return the parameters with axes of length 1 inserted where states have additional axes."""
         aligned = {}
         for name, value in parameters.items():
             array, axes = np.asarray(value), self._axes[name]

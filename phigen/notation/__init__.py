@@ -1,1 +1,1 @@
-"""Formulas to read: in text, LaTeX and MathML."""
+"""Formulas for readers: in text, LaTeX and MathML."""

@@ -1,4 +1,4 @@
-"""The formulas of a cell: brackets at a site, the density of H, Casimirs, invariants, and the field at a site."""
+"""Formulas of a cell: brackets at a site, the density of H, Casimirs, invariants, and the vector field at a site."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.neighbours import Offset, steps
 from phigen.symbolic.readable import SHOWN, readable
 
-#: A formula: its left side as text and as markup, and its right side.
+#: Formula: its left side as text and as markup, and its right side.
 Named = tuple[str, str, Expression]
 
 KINDS = {"sites": "", "sum": "Σ ", "product": "Π "}
 
 
 def described(cell: Cell) -> str:
-    """The relation between sites, in words."""
+    """Return a description of the relation between sites."""
     if cell.relation == GRID:
         axes = ", ".join(f"{a} ({b})" for a, b in zip(cell.axes, cell.boundary, strict=True))
         return f"grid with the axes {axes}" if len(cell.axes) > 1 else f"chain along {axes}"
@@ -27,7 +27,7 @@ def described(cell: Cell) -> str:
 
 
 def brackets(cell: Cell) -> list[tuple[str, Expression]]:
-    """The brackets that are not 0, {a, b} or {b, a}: those of fields of one site first, then with neighbours."""
+    """Return the non-zero brackets, {a, b} or {b, a}: first those of fields of one site, then with neighbours."""
     entries: list[tuple[str, Expression]] = []
     seen: set[tuple[str, str]] = set()
     for (f, other), value in (*cell.bracket.items(), *cell.bond_bracket.items()):
@@ -45,7 +45,7 @@ def _mirrored(cell: Cell, f: str, other: str) -> tuple[str, str]:
 
 
 def sections(cell: Cell, most: int | None = SHOWN) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Titles with lines (left, right) of text."""
+    """Yield titles with lines (left, right) of text."""
     contents = [
         ("Poisson tensor of a site" if cell.is_local else "Poisson tensor", brackets(cell)),
         ("Hamiltonian, the sum of", _densities(cell)),
@@ -79,7 +79,7 @@ def _densities(cell: Cell) -> list[tuple[str, Expression]]:
 
 
 def rates(cell: Cell) -> list[tuple[str, Expression]]:
-    """The vector field at a site of a grid; for bonds, the contribution of each to the gradient of H."""
+    """Return the vector field at a site of a grid; for bonds, the contribution of each bond to the gradient of H."""
     if cell.relation == GRID:
         return [(f"d{f}/dt", e) for f, e in vector_field(cell).items()]
     site_rates = [(f"∂h/∂{f}", e) for f, e in forces(cell).items() if not e.is_zero]
@@ -87,14 +87,14 @@ def rates(cell: Cell) -> list[tuple[str, Expression]]:
 
 
 def document(cell: Cell) -> str:
-    """The formulas as LaTeX, with all indices: {x_i, y_{i+1}}."""
+    """Return the formulas as LaTeX, with all indices: {x_i, y_{i+1}}."""
     blocks = [aligned(equations) for _, equations in formulas(cell)]
     head = f"% {cell.name}, {described(cell)}; needs amsmath"
     return "\n".join([head, "\\begingroup\\allowdisplaybreaks", *blocks, "\\endgroup"])
 
 
 def formulas(cell: Cell) -> Iterator[tuple[str, list[Equation]]]:
-    """Titles with equations, in MathML with all indices: {x_i, y_{i+1}}."""
+    """Yield titles with equations, in MathML with all indices: {x_i, y_{i+1}}."""
     if left := [(_bracket(cell, name), e) for name, e in brackets(cell)]:
         yield "Poisson tensor", _equations(cell, left)
     sums = {"sites": cell.axes or ("i",), "bonds": ("a", "b"), "pairs": ("a", "b")}
@@ -128,7 +128,7 @@ def _equations(cell: Cell, formulas: Sequence[tuple[str, Expression]]) -> list[E
 
 
 def _indexed(cell: Cell, e: Expression) -> Expression:
-    """The expression with all indices written, those of the site itself too."""
+    """Return the expression with explicit indices, also for the site itself."""
     moved = {name: symbol(_site(cell, *place)) for name, place in cell.places(e).items()}
     return substitute([e], moved)[0]
 

@@ -8,14 +8,14 @@ from phigen.symbolic.readable import readable
 
 
 def method(compilation: CompiledGauss) -> str:
-    """``order 8, 4 stages, exact``."""
+    """Return the description of a method, such as ``order 8, 4 stages, exact``."""
     stages, note = compilation.order.terms, compilation.order.note
     said = f"order {compilation.order.order}, {stages} stage{'s' * (stages > 1)}, structure {compilation.structure}"
     return said + (f" ({note})" if note else "")
 
 
 def equations() -> list[tuple[str, str]]:
-    """The equations of a step, as pairs of two sides."""
+    """Return the equations of a step, as pairs of two sides."""
     return [
         ("Z_i", "z + Σ_j μ_ij L_j"),
         ("L_j", "h b_j f(Z_j)"),
@@ -25,7 +25,7 @@ def equations() -> list[tuple[str, str]]:
 
 
 def lines(compilation: CompiledGauss) -> list[str]:
-    """Describe the unknowns, one line for each part, and the step."""
+    """Return lines that describe the unknowns, one line for each part, and the step."""
     listed_lines, names = [], compilation.system.coordinates
     for part in compilation.gauss.parts:
         listed = ", ".join(names[i] for i in part.indices)
@@ -48,7 +48,7 @@ def lines(compilation: CompiledGauss) -> list[str]:
 
 
 def described(compilation: CompiledGauss) -> dict[str, object]:
-    """The method for machines."""
+    """Return the method as plain data."""
     return {
         "scheme": "gauss",
         "structure": compilation.structure,

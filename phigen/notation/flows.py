@@ -13,19 +13,19 @@ from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.readable import readable
 from phigen.symbolic.symbols import Symbol, plain
 
-#: Letters of a matrix and of its exponential less 1. Where there are several, numbers follow.
+#: Letters of a matrix and of its exponential minus 1; numbers follow if there are several.
 RATES, EXPONENTIAL = "A", "E"
 
 
 def method(compilation: CompiledSplitting) -> str:
-    """``order 4, 2 parts with exact flows``."""
+    """Return the description of a method, such as ``order 4, 2 parts with exact flows``."""
     count = len(compilation.splitting.flows)
     note = f" ({compilation.order.note})" if compilation.order.note else ""
     return f"order {compilation.order.order}, {count} part{'s' * (count > 1)} with exact flows{note}"
 
 
 def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
-    """Images of the coordinates that a flow changes, after the time ``h:``.
+    """Return the images, after the time ``h:``, of the coordinates that a flow changes.
 
     Entries of matrix exponentials have the names of `matrices`.
     """
@@ -41,32 +41,32 @@ def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
 
 
 def matrices(compilation: CompiledSplitting) -> list[tuple[str, MatrixExponential]]:
-    """The matrix exponentials of all flows, each once, with a number, empty if there is one."""
+    """Return the distinct matrix exponentials of all flows with numbers; the number of a single one is empty."""
     listed = list(dict.fromkeys(e for flow in compilation.splitting.flows for e in flow.exponentials))
     return [(str(k) if len(listed) > 1 else "", e) for k, e in enumerate(listed, 1)]
 
 
 def rates(number: str, matrix: MatrixExponential) -> dict[Symbol, Expression]:
-    """The non-zero entries of A, for exp(hA) − 1, by their names."""
+    """Return the non-zero entries of A in exp(hA) − 1, by name."""
     return {Symbol(f"{RATES}{number}", _place(matrix, k)): e for k, e in enumerate(matrix.rates) if not e.is_zero}
 
 
 def _place(matrix: MatrixExponential, k: int) -> str:
-    """The row and the column of an entry, from 1: ``12``, or ``1_12`` of matrices of ten rows or more."""
+    """Return row and column of an entry, from 1: ``12``, or ``1_12`` for matrices of ten rows or more."""
     return ("_" * (matrix.size > 9)).join(str(i + 1) for i in divmod(k, matrix.size))
 
 
 def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expression]]:
-    """The generator of a flow: its Hamiltonian, or the non-zero components of a force, by coordinates."""
+    """Return the generator of a flow: its Hamiltonian, or the non-zero components of a force by coordinate."""
     if not flow.force:
         return [("", flow.hamiltonian)]
     return [(c, f) for c, f in zip(coordinates, flow.force, strict=True) if not f.is_zero]
 
 
 def formulas(compilation: CompiledSplitting, most: int | None) -> list[tuple[str, str]]:
-    """The parts of H and the images of the coordinates under the flow of each, as pairs of a name and a text.
+    """Return the parts of H and the images of the coordinates under their flows, as pairs of a name and a text.
 
-    Parts that occur more than once in long formulas have names, σ with a number, and come last.
+    Repeated subexpressions of long formulas have names, σ with a number, and come last.
     """
     listed: list[tuple[str, str]] = []
     for k, flow in enumerate(compilation.splitting.flows, 1):
@@ -83,13 +83,13 @@ def formulas(compilation: CompiledSplitting, most: int | None) -> list[tuple[str
 
 
 def schedule(step: Step) -> list[tuple[int, float]]:
-    """The flows of a splitting in order, as pairs of a part and a fraction of the step; none for other steps."""
+    """Return the flows of a splitting in order, as pairs of a part and a fraction of the step; empty for others."""
     schedule = step.flow_schedule
     return [(part, schedule.times[row]) for part, row in schedule.flows] if schedule else []
 
 
 def described(compilation: CompiledSplitting) -> dict[str, object]:
-    """The parts, and the flows of a step as pairs of a part, counted from 1, and a fraction of the step.
+    """Return as plain data the parts, and the flows of a step as pairs of a part, from 1, and a step fraction.
 
     ``generators`` are the matrices A of exponentials E = exp(hA) − 1, row by row.
     """

@@ -1,4 +1,4 @@
-"""The generating function of a compilation: the reason for its order, and S_1 … S_k as formulas."""
+"""Generating function of a compilation: the reason for its order, and S_1 … S_k as formulas."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.modified import corrections, expect_modified, powers
 from phigen.symbolic.readable import Formula, of_polynomial
 
-#: The leading term of the modified Hamiltonian costs one more coefficient of the series; beyond this it is left out.
+#: Limit for showing the leading term of the modified Hamiltonian, which needs one more coefficient of the series.
 _MODIFIED_UP_TO = 6
 
 
 def method(compilation: CompiledSeries) -> str:
-    """``order 6 from S_1 … S_5, symmetric: the even terms vanish``."""
+    """Return the method in words, as in ``order 6 from S_1 … S_5, symmetric: the even terms vanish``."""
     plan, stage = compilation.order, compilation.stage
     terms = "S_1" if stage.terms == 1 else f"S_1 … S_{stage.terms}"
     system = compilation.system
@@ -30,10 +30,10 @@ def method(compilation: CompiledSeries) -> str:
 
 @dataclass(frozen=True)
 class Generating:
-    """The S_i that do not vanish, with their index, and −S_{p+1}, the leading term of the modified Hamiltonian.
+    """Non-zero S_i with their indices, and −S_{p+1}, the leading term of the modified Hamiltonian.
 
     The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series. S_i from
-    ``beyond`` on have too many terms to be written out; the code has them as expressions that share parts.
+    ``beyond`` on have too many terms to be written out; the code has them with common subexpressions.
     """
 
     listed: list[tuple[int, Formula]]
@@ -42,12 +42,14 @@ class Generating:
 
     @property
     def missing(self) -> str:
-        """The remark on the terms that are not listed."""
+        """The remark on terms that are not listed."""
         return f"from S_{self.beyond} on there are too many terms to be written out; the code shares their parts"
 
 
 def series_formulas(compilation: CompiledSeries, most: int | None) -> Generating:
-    """The generating function of a series, as far as it can be written out; ``most`` bounds the terms shown of each."""
+    """Return the generating function of a series as far as it can be written out; ``most`` limits the terms of each
+    S_i.
+    """
     plan = compilation.stage
     pushed = compilation.system.forces or compilation.system.noise
     more = not pushed and plan is compilation.order and plan.order <= _MODIFIED_UP_TO
@@ -55,15 +57,15 @@ def series_formulas(compilation: CompiledSeries, most: int | None) -> Generating
     listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
     known = len(series.terms)
     leading = of_polynomial(series.tower, -series.terms[plan.order], most) if more and known > plan.order else None
-    following = known + 1 + (compilation.symmetric and known % 2 == 1)  # index of the next term that does not vanish
+    following = known + 1 + (compilation.symmetric and known % 2 == 1)  # index of the next non-zero term
     return Generating(listed, leading, following if known < plan.terms else None)
 
 
 def modified_formulas(compilation: Compilation, count: int, most: int | None) -> list[tuple[int, Formula]]:
-    """The first ``count`` terms h^j H_j of the modified Hamiltonian H̃ = H + h^p H_p + …, as pairs of j and H_j.
+    """Return pairs (j, H_j) of the first ``count`` terms h^j H_j of the modified Hamiltonian H̃ = H + h^p H_p + …
 
-    With a count of 0 the leading one, where it costs little. Raises `SpecError` for a splitting, a composition and an
-    approximate bi-realisation if more are asked for.
+    A count of 0 selects the leading term if it is cheap. A larger count raises `SpecError` for a splitting, a
+    composition and an approximate bi-realisation.
     """
     if not count:
         leading = series_formulas(compilation.by_series(), most).leading if compilation.has_series else None

@@ -1,4 +1,4 @@
-"""The formulas of a compilation as LaTeX, for a paper: a fragment that needs amsmath."""
+"""Formulas of a compilation as LaTeX for a paper: a fragment that needs amsmath."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from phigen.splitting.matrices import MatrixExponential
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import SHOWN, Formula
 
-#: The left side of an equation and the pieces of its right side, all of them markup.
+#: Left side of an equation and the parts of its right side, as markup.
 Equation = tuple[str, Sequence[str]]
 
 _PLUS, _EQUALS, _TIMES = "<mo>+</mo>", "<mo>=</mo>", "<mo>&#x2062;</mo>"
@@ -22,9 +22,9 @@ _DOTS = f"{_PLUS}<mo>…</mo>"
 #: The function φ of the exponential bi-realisation, and β of a symmetric pair.
 _PHI = "  \\varphi(s) &= \\frac{1}{s} \\left( 1 - \\frac{\\sqrt{s}}{2} \\cot \\frac{\\sqrt{s}}{2} \\right)"
 _BETA = "  \\beta(x, p) &= \\alpha(x, -p)"
-#: The width of an equals sign, and of the space between columns of a matrix.
+#: Width of an equals sign and of the space between columns of a matrix, in em.
 _RELATION, _COLUMN = 1.4, 1.2
-#: amsmath has matrices of ten columns.
+#: Largest number of columns of a matrix in amsmath.
 _COLUMNS = 10
 
 
@@ -36,11 +36,11 @@ _COLLOCATION = r"""\begin{align*}
 
 
 def document(compilation: Compilation, modified: int = 0, most: int | None = SHOWN) -> str:
-    """Equations for π, H, the Casimirs, α, β, S_1 … S_k, or the parts and flows of a splitting, and H̃.
+    """Return equations for π, H, Casimirs, α, β, S_1 … S_k, or the parts and flows of a splitting, and H̃.
 
     Lines are broken to fit the text of an article. ``most`` bounds the terms shown of S_i and H̃, None shows all.
-    ``modified`` is the number of corrections; with 0, the leading one is shown where it costs little. Raises
-    `SpecError` where they are asked for and not computed.
+    ``modified`` is the number of corrections; with 0, the leading one is shown if it is cheap. Raises
+    `SpecError` for a method without corrections if some are requested.
     """
     blocks = system_blocks(compilation.system)
     blocks += compilation.by_kind(
@@ -57,7 +57,7 @@ def document(compilation: Compilation, modified: int = 0, most: int | None = SHO
 
 
 def system_blocks(system: System) -> list[str]:
-    """Displayed equations for π, H, and the Casimirs and invariants if there are any."""
+    """Return displayed equations for π, H, and for Casimirs and invariants if there are any."""
     blocks = [_tensor(system), aligned(_assigned(["H"], [system.hamiltonian]))]
     if first_integrals := {**system.casimirs, **system.invariants}:
         blocks.append(aligned(_assigned(list(first_integrals), list(first_integrals.values()))))
@@ -65,7 +65,7 @@ def system_blocks(system: System) -> list[str]:
 
 
 def _tensor(system: System) -> str:
-    """π as a matrix, or its brackets if that is too wide."""
+    """Return π as a matrix, or as brackets if the matrix is too wide."""
     names, n = system.coordinates, system.dimension
     cells = [[mathml.expression(e) for e in row] for row in system.poisson]
     across = sum(max(width(row[j]) for row in cells) + _COLUMN for j in range(n))
@@ -78,13 +78,13 @@ def _tensor(system: System) -> str:
 
 
 def _flows(compilation: CompiledSplitting) -> list[str]:
-    """The parts of H with their flows, then the matrices whose exponentials are in these."""
+    """Return the parts of H with their flows, then the matrices of the exponentials in the flows."""
     parts = [_flow(compilation, k) for k in range(1, len(compilation.splitting.flows) + 1)]
     return [*parts, *(_exponential(number, matrix) for number, matrix in flows.matrices(compilation))]
 
 
 def _flow(compilation: CompiledSplitting, k: int) -> str:
-    """A part of H, and the images of the coordinates that its flow changes, after the time h."""
+    """Return a part of H, and the images after the time h of the coordinates that its flow changes."""
     flow = compilation.splitting.flows[k - 1]
     moved = flows.images(compilation, flow)
     pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"
@@ -94,13 +94,13 @@ def _flow(compilation: CompiledSplitting, k: int) -> str:
 
 
 def _exponential(number: str, matrix: MatrixExponential) -> str:
-    """A matrix exponential less 1, and the entries of its matrix that are not 0."""
+    """Return a matrix exponential minus 1, and the non-zero entries of its matrix."""
     entries = flows.rates(number, matrix)
     return aligned([mathml.exponential(number), *_equations([mathml.name(s) for s in entries], list(entries.values()))])
 
 
 def _maps(compilation: CompiledSeries) -> Iterator[str]:
-    """α and β, and φ if they contain it; of a path they are series, of which this is the beginning."""
+    """Return α and β, and φ if they contain it; for a path, the first terms of the series of α and β."""
     realisation, names = compilation.realisation, compilation.system.coordinates
     more = [_DOTS] if realisation.path else []
     letters = {"α": realisation.alpha} if realisation.symmetric else {"α": realisation.alpha, "β": realisation.beta}
@@ -114,7 +114,7 @@ def _maps(compilation: CompiledSeries) -> Iterator[str]:
 
 
 def _gauged(compilation: CompiledSeries) -> str:
-    """The Hamiltonian of the series, if Casimirs are subtracted; precedes the formula of S_1."""
+    """Return the Hamiltonian of the series if Casimirs are subtracted; it precedes the formula of S_1."""
     gauge = compilation.gauge
     factors = [mathml.name(s) for s in gauge.multiples] + [mathml.grouped(value) for value in gauge.fixed.values()]
     parts = zip(factors, (*gauge.free, *gauge.fixed), strict=True)
@@ -136,14 +136,14 @@ def _assigned(names: Sequence[str], expressions: Sequence[Expression]) -> list[E
 
 
 def _equations(left: Sequence[str], expressions: Sequence[Expression], more: Sequence[str] = ()) -> list[Equation]:
-    """Equations for expressions; shared parts get names and equations of their own at the end."""
+    """Return equations for expressions, followed by equations for named common subexpressions."""
     formulas = named_parts.readable(expressions)
     listed = [(name, [*mathml.pieces(form), *more]) for name, form in zip(left, formulas.forms, strict=True)]
     return [*listed, *((mathml.name(name), mathml.pieces(e)) for name, e in formulas.parts)]
 
 
 def _pieces(formula: Formula) -> list[str]:
-    """A polynomial with its divisor before it; if terms are left out, their total number follows."""
+    """Return a polynomial after its divisor; if terms are left out, the number of all terms follows."""
     first, *others = mathml.pieces(replace(formula, divisor=1))
     pieces = [first, *others]
     if formula.divisor != 1:
@@ -154,7 +154,7 @@ def _pieces(formula: Formula) -> list[str]:
 
 
 def aligned(equations: Sequence[Equation] | Iterator[Equation]) -> str:
-    """Equations below one another, long ones in lines."""
+    """Return equations below one another, with long equations broken into lines."""
     listed = list(equations)
     room = LINE - max(width(left) for left, _ in listed) - _RELATION
     written = []
@@ -174,6 +174,6 @@ def _indexed(letter: str, index: int | str) -> str:
 
 
 def _scaled(letter: str, i: int) -> str:
-    """``h^i S_i``."""
+    """Return ``h^i S_i``."""
     power = "<mi>h</mi>" if i == 1 else f"<msup><mi>h</mi><mn>{i}</mn></msup>"
     return f"{power}{_TIMES}{_indexed(letter, i)}"

@@ -1,8 +1,8 @@
-"""Formulas as MathML Core, which browsers show without any script or font of ours.
+"""Formulas as MathML Core, which browsers show without additional scripts or fonts.
 
-An expression becomes a sum of terms, a term a coefficient and factors above and below a fraction line: so
-associativity, signs and quotients look as on paper, whatever the tree. Markup is always exactly one element, unless
-it says otherwise, and all text in it is escaped.
+An expression becomes a sum of terms. A term is a coefficient with factors above and below a fraction line. Signs and
+quotients therefore look as on paper, whatever the structure of the expression tree. Markup is exactly one element
+unless stated otherwise, and all text in it is escaped.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.readable import Formula
 from phigen.symbolic.symbols import GAUGE, PART, Symbol
 
-#: Characters of markup beyond which a part of a formula is left out; shared parts of such length have names.
+#: Number of characters of markup above which a part of a formula is left out; shared parts of this length have names.
 LONGEST = 60_000
 
-#: Polynomials of more terms keep their order, even if it begins with a minus.
+#: Largest number of terms of a polynomial that is reordered to begin without a minus.
 FEW = 4
 
-#: An exponent longer than this makes exp(…) of a power of e.
+#: Number of characters of an exponent above which a power of e is written as exp(…).
 _LONG_EXPONENT = 250
 
 _GREEK = {
@@ -36,19 +36,20 @@ _GREEK = {
     "upsilon": "υ", "phi": "φ", "chi": "χ", "psi": "ψ", "omega": "ω", "Gamma": "Γ", "Delta": "Δ", "Theta": "Θ",
     "Lambda": "Λ", "Xi": "Ξ", "Pi": "Π", "Sigma": "Σ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω",
 }  # fmt: skip
-#: Symbols of phigen's own, ``p:x1`` and the like: the letter before the index.
+#: Letters of internal symbols such as ``p:x1``, written before the index.
 _OWN = {GAUGE: "λ", PART: "σ"}
 
-_TIMES, _APPLY = "<mo>&#x2062;</mo>", "<mo>&#x2061;</mo>"  # both invisible
+_TIMES, _APPLY = "<mo>&#x2062;</mo>", "<mo>&#x2061;</mo>"  # both operators are invisible
 _DOT, _DOTS = "<mo>·</mo>", "<mo>…</mo>"
 
 
 @dataclass(frozen=True)
 class Factor:
-    """``base`` carries ``index`` and exponents; ``tail`` follows, as the argument of a function does.
+    """Factor of a term: ``base`` with ``index`` and exponents, followed by ``tail``, such as the argument of a
+    function.
 
-    ``terms`` are those of a sum in parentheses. ``word`` tells a name of several letters, to be set apart;
-    ``raised`` a power, which takes no further exponent as it stands; ``key`` sorts names and their powers.
+    ``terms`` are those of a sum in parentheses. ``word`` marks a name of several letters, which needs space around it;
+    ``raised`` marks a power, which needs parentheses before a further exponent; ``key`` sorts names and their powers.
     """
 
     base: str
@@ -71,7 +72,7 @@ class Factor:
         return summed(self.terms) if self.terms else self.markup
 
     def power(self, exponent: str) -> Factor:
-        """The factor with an exponent."""
+        """Return the factor with an exponent."""
         if self.raised:
             return Factor(_parentheses(self.markup)).power(exponent)
         kind, index = ("msubsup", self.index) if self.index else ("msup", "")
@@ -80,7 +81,7 @@ class Factor:
 
 @dataclass(frozen=True)
 class FractionTerm:
-    """coefficient · above / below."""
+    """Term of a sum: coefficient · above / below."""
 
     coefficient: Fraction
     above: tuple[Factor, ...] = ()
@@ -93,7 +94,7 @@ class FractionTerm:
         top, bottom = (c, Fraction(1)) if _is_decimal(c) else (Fraction(c.numerator), Fraction(c.denominator))
         above = _product(top, self.above)
         if len(self.above) == 1 and self.above[0].terms and "<mfrac" in above and not self.below and bottom != 1:
-            return _row(number(top / bottom) + _TIMES + self.above[0].markup)  # no fraction in a fraction
+            return _row(number(top / bottom) + _TIMES + self.above[0].markup)  # avoid a fraction in a fraction
         return f"<mfrac>{above}{_product(bottom, self.below)}</mfrac>" if self.below or bottom != 1 else above
 
 
@@ -101,12 +102,12 @@ Sum = tuple[FractionTerm, ...]
 
 
 def terms_of(e: Expression) -> Sum:
-    """The expression as a sum of terms; empty if it is 0."""
+    """Return the expression as a sum of terms; empty if it is 0."""
     return fold(familiar([e]), _visit)[0]
 
 
 def terms_of_formula(formula: Formula) -> Sum:
-    """The terms of a formula, its divisor left out."""
+    """Return the terms of a formula without its divisor."""
     terms: list[FractionTerm] = []
     for c, monomial in formula.terms:
         terms += _times((FractionTerm(c),), *(_power(terms_of(base), exponent) for base, exponent in monomial))
@@ -115,12 +116,12 @@ def terms_of_formula(formula: Formula) -> Sum:
 
 
 def expression(e: Expression) -> str:
-    """An expression."""
+    """Return the markup of an expression."""
     return summed(terms_of(e))
 
 
 def summed(terms: Sequence[FractionTerm]) -> str:
-    """A sum."""
+    """Return the markup of a sum."""
     if not terms:
         return number(Fraction(0))
     first, *rest = terms
@@ -131,9 +132,9 @@ def summed(terms: Sequence[FractionTerm]) -> str:
 
 
 def pieces(e: Expression | Formula) -> list[str]:
-    """A formula in pieces between which a line may break: one for each term of its outermost sum.
+    """Return a formula in parts between which a line may break: one for each term of its outermost sum.
 
-    Each is the content of an element ``<math>`` of its own; set one after the other, they are the formula.
+    Each part is the content of a separate element ``<math>``; the sequence of these elements shows the formula.
     """
     if isinstance(e, Expression):
         return _pieces(terms_of(e))
@@ -142,17 +143,17 @@ def pieces(e: Expression | Formula) -> list[str]:
 
 
 def math(markup: str) -> str:
-    """The element that shows markup as a formula."""
+    """Return the element that shows markup as a formula."""
     return f'<math displaystyle="true">{markup}</math>'
 
 
 def name(identifier: str) -> str:
-    """A name: ``omega_1`` as ω with index 1, ``x12`` as x with index 12, ``p:x1`` as p with index x_1."""
+    """Return the markup of a name: ``omega_1`` is ω with index 1, ``p:x1`` is p with index x_1."""
     return _name(identifier).markup
 
 
 def dotted(identifier: str) -> str:
-    """The derivative of a name by the time, with a dot over its letter; of a word as a quotient."""
+    """Return the time derivative of a name: a dot over a letter, a quotient for a word."""
     factor = _name(identifier)
     if factor.word:
         return f"<mfrac>{_row('<mi>d</mi>' + factor.markup)}{_row('<mi>d</mi><mi>t</mi>')}</mfrac>"
@@ -160,7 +161,7 @@ def dotted(identifier: str) -> str:
 
 
 def number(value: Fraction) -> str:
-    """A number ≥ 0; a decimal of many digits stays one."""
+    """Return the markup of a number ≥ 0; decimals of many digits are not converted to fractions."""
     if value.denominator == 1:
         return f"<mn>{value.numerator}</mn>"
     if not _is_decimal(value):
@@ -171,31 +172,31 @@ def number(value: Fraction) -> str:
 
 
 def grouped(e: Expression) -> str:
-    """An expression as a factor: in parentheses if it is a sum or negative."""
+    """Return an expression as a factor: in parentheses if it is a sum or negative."""
     terms = terms_of(e)
     return summed(terms) if len(terms) == 1 and terms[0].coefficient > 0 else _parentheses(summed(terms))
 
 
 def matrix(rows: Sequence[Sequence[Expression]]) -> str:
-    """A matrix in parentheses."""
+    """Return a matrix in parentheses."""
     body = "".join("<mtr>" + "".join(f"<mtd>{expression(e)}</mtd>" for e in row) + "</mtr>" for row in rows)
     return _parentheses(f"<mtable>{body}</mtable>")
 
 
 def indexed(letter: str, index: str) -> str:
-    """A letter with a name as its index: α_{x_1}."""
+    """Return a letter with a name as its index: α_{x_1}."""
     return f"<msub><mi>{escape(letter)}</mi>{name(index)}</msub>"
 
 
 def component(letter: str, k: int, c: str) -> str:
-    """A letter with an index, for a vector field also with a coordinate: H_2, F_3^{x}."""
+    """Return a letter with an index, and for a vector field with a coordinate: H_2, F_3^{x}."""
     if not c:
         return f"<msub><mi>{escape(letter)}</mi><mn>{k}</mn></msub>"
     return f"<msubsup><mi>{escape(letter)}</mi><mn>{k}</mn>{name(c)}</msubsup>"
 
 
 def bracket(a: str, b: str) -> str:
-    """The Poisson bracket of two coordinates, {a, b}."""
+    """Return the Poisson bracket of two coordinates, {a, b}."""
     return _row(f'<mo stretchy="false">{{</mo>{name(a)}<mo>,</mo>{name(b)}<mo stretchy="false">}}</mo>')
 
 
@@ -234,7 +235,7 @@ def _called(function: str, args: Sequence[Sum]) -> Sum:
 def _power(base: Sum, exponent: Fraction) -> Sum:
     if exponent < 0:
         below = _single(_power(base, -exponent))
-        if below.coefficient == 0:  # as the user wrote it
+        if below.coefficient == 0:  # in the form of the spec
             return _one(Factor("<mfrac><mn>1</mn><mn>0</mn></mfrac>"))
         return (FractionTerm(1 / below.coefficient, below.below, below.above),)
     if exponent == 1 or not base:
@@ -258,21 +259,21 @@ def _times(*factors: Sum) -> Sum:
 
 
 def _collected(factors: Sequence[Factor]) -> tuple[Factor, ...]:
-    """Equal factors as a power, where that is no power of a power."""
+    """Combine equal factors into a power, except where this gives a power of a power."""
     counts = Counter(factors)
     powers = {f: f.power(f"<mn>{n}</mn>") for f, n in counts.items() if n > 1 and not f.raised}
     return tuple(powers.get(f, f) for f, n in counts.items() for _ in range(1 if f in powers else n))
 
 
 def _single(terms: Sum) -> FractionTerm:
-    """The sum as one term, in parentheses if it has several."""
+    """Return the sum as one term, in parentheses if it has several terms."""
     if len(terms) == 1:
         return terms[0]
     return FractionTerm(Fraction(1), (_enclosed(terms),)) if terms else FractionTerm(Fraction(0))
 
 
 def _base(terms: Sum) -> Factor:
-    """The base of a power, in parentheses if necessary."""
+    """Return the base of a power, in parentheses if necessary."""
     if len(terms) == 1 and not terms[0].below:
         c, above = terms[0].coefficient, terms[0].above
         if len(above) == 1 and c == 1:
@@ -287,7 +288,7 @@ def _enclosed(terms: Sum) -> Factor:
 
 
 def _sorted(terms: Sum) -> Sum:
-    """Monomials in the order of their names, as people write them; then other terms, in the order given; one number."""
+    """Sort monomials by their names, then other terms in the given order; numbers are added up."""
     sums: dict[tuple[tuple[Factor, ...], tuple[Factor, ...]], Fraction] = {}
     for t in terms:
         sums[t.above, t.below] = sums.get((t.above, t.below), Fraction(0)) + t.coefficient
@@ -300,7 +301,7 @@ def _sorted(terms: Sum) -> Sum:
 
 
 def _positive_first(terms: list[FractionTerm]) -> Sum:
-    """The first positive term moved to the front: b − a rather than −a + b."""
+    """Move the first positive term to the front: b − a rather than −a + b."""
     place = next((i for i, t in enumerate(terms) if t.coefficient > 0), 0)
     return (*terms[place : place + 1], *terms[:place], *terms[place + 1 :])
 
@@ -324,7 +325,7 @@ def _one(factor: Factor) -> Sum:
 
 
 def exponential(number: str) -> tuple[str, list[str]]:
-    """The two sides of E = exp(hA) − 1, with the number of the matrix."""
+    """Return the two sides of E = exp(hA) − 1, with the number of the matrix."""
     left, rates = (f"<mi>{letter}{number}</mi>" for letter in "EA")
     return left, [f"<msup><mi>e</mi><mrow><mi>h</mi>{_TIMES}{rates}</mrow></msup>", "<mo>−</mo><mn>1</mn>"]
 
@@ -346,7 +347,7 @@ def _name(identifier: str) -> Factor:
 
 
 def _at_neighbour(identifier: str, key: Any) -> Factor:
-    """``x[i+1,j]`` as x with the index i+1, j; an index of the name itself comes before."""
+    """Return ``x[i+1,j]`` as x with the index i+1, j after an index of the name itself."""
     name_, _, index = identifier[:-1].partition("[")
     base = _name(name_)
     signs = {"+": "<mo>+</mo>", "-": "<mo>−</mo>", ",": "<mo>,</mo>"}
@@ -366,7 +367,7 @@ def _product(coefficient: Fraction, factors: Sequence[Factor]) -> str:
 
 
 def _pieces(terms: Sum) -> list[str]:
-    """The terms; of a sum in parentheses with a factor, the factor and the terms inside."""
+    """Return the terms; for a factor times a sum in parentheses, the factor and the terms of the sum."""
     inner = next((f for f in terms[0].above if len(f.terms) > 3), None) if len(terms) == 1 else None
     if inner is None:
         return [summed(terms[:1]), *(f'<mo form="infix">{_sign(t)}</mo>{t.magnitude}' for t in terms[1:])]
@@ -384,7 +385,7 @@ def _sign(term: FractionTerm) -> str:
 
 
 def _is_decimal(value: Fraction) -> bool:
-    """Whether the value is a decimal of many digits: 0.6667 is hard to read as 6667/10000."""
+    """Return whether the value is a decimal of many digits: 0.6667 is hard to read as 6667/10000."""
     rest = value.denominator
     for prime in (2, 5):
         while rest % prime == 0:

@@ -1,4 +1,4 @@
-"""Formulas with names for parts that occur more than once, so that large expressions are readable."""
+"""Formulas with names for common subexpressions, so that large expressions are readable."""
 
 from __future__ import annotations
 
@@ -11,23 +11,26 @@ from phigen.symbolic.readable import LONGEST, Formula, expanded
 from phigen.symbolic.readable import readable as as_text
 from phigen.symbolic.symbols import MOMENTUM, PART, Symbol, kind_of, plain
 
-#: A part with fewer leaves than this gets no name, nor one whose name saves fewer leaves.
+#: Least number of leaves of a named subexpression, and least number of leaves that a name must save.
 SMALL, WORTH = 3, 4
 
-#: Names are used if they shorten the whole to this fraction.
+#: Names are used if they shorten the formulas to this fraction of their length.
 WORTH_NAMES = 0.75
 
-#: Expressions with fewer leaves get no names for shared parts.
+#: Expressions with at most this number of leaves get no names for common subexpressions.
 SHORT = 40
 
-#: The name of a shared part in a text.
+#: Name of a common subexpression in a text.
 _SHARED = re.compile(r"σ_\d+\b")
 
 
 @dataclass(frozen=True)
 class Readable:
-    """``forms`` of the expressions that were given, in the symbols ``part:1``, ``part:2``, … whose meaning is in
-    ``parts``. ``size`` counts the names and numbers of all of them."""
+    """Formulas with named common subexpressions.
+
+    ``forms`` are the formulas in the symbols ``part:1``, ``part:2``, …, which ``parts`` defines. ``size`` is the total
+    number of names and numbers.
+    """
 
     parts: tuple[tuple[str, Expression], ...]
     forms: tuple[Formula | Expression, ...]
@@ -35,7 +38,7 @@ class Readable:
 
 
 def readable(expressions: Sequence[Expression]) -> Readable:
-    """The expressions expanded, as they stand, or with names for shared parts: the shortest form."""
+    """Return the shortest form of expressions: expanded, unchanged, or with names for common subexpressions."""
     plain, named = _partly_named(expressions), _all_named(expressions)
     return named if plain.size > SHORT and named.size < WORTH_NAMES * plain.size else plain
 
@@ -46,7 +49,7 @@ def _all_named(expressions: Sequence[Expression]) -> Readable:
 
 
 def _partly_named(expressions: Sequence[Expression]) -> Readable:
-    """Short expressions expanded or as they stand; names for the shared parts of long ones."""
+    """Return short expressions expanded or unchanged, and long ones with names for common subexpressions."""
     trees = fold(expressions, lambda e, sizes: sum(sizes) or 1)
     forms: dict[int, Formula | Expression] = {}
     for i, (e, form) in enumerate(zip(expressions, expanded(expressions, None), strict=True)):
@@ -62,9 +65,9 @@ def _partly_named(expressions: Sequence[Expression]) -> Readable:
 
 
 def texts(named: Mapping[str, Expression], most: int | None) -> list[tuple[str, str]]:
-    """Expressions as pairs of a name and a text of ``most`` terms, as they stand or expanded.
+    """Return expressions as pairs of a name and a text of at most ``most`` terms, unchanged or expanded.
 
-    If names for shared parts shorten the whole, they are used: σ_1, σ_2, …, with their texts at the end.
+    Names σ_1, σ_2, … for common subexpressions are used if they shorten the texts; their definitions are at the end.
     """
     expressions = [*named.values()]
     plainly = as_text(expressions, most)
@@ -79,7 +82,7 @@ def texts(named: Mapping[str, Expression], most: int | None) -> list[tuple[str, 
 
 
 def vanishing(shared: Sequence[tuple[str, Expression]]) -> list[str]:
-    """The names of those shared parts that are 0 where all covectors are."""
+    """Return the names of the subexpressions that vanish where all covectors are 0."""
     zeros: dict[str, Expression] = {}
     for name, part in shared:
         zeros |= {s: ZERO for s in symbols_of(part) if kind_of(s) == MOMENTUM}
@@ -89,7 +92,7 @@ def vanishing(shared: Sequence[tuple[str, Expression]]) -> list[str]:
 
 
 def _met(listed: Sequence[tuple[str, str]], count: int) -> list[tuple[str, str]]:
-    """The first ``count`` texts, followed by the parts that occur in them, directly or not, renumbered."""
+    """Return the first ``count`` texts, followed by the renumbered subexpressions on which they depend."""
     met = {name for _, text in listed[:count] for name in _SHARED.findall(text)}
     for name, text in reversed(listed[count:]):
         if name in met:
@@ -101,13 +104,13 @@ def _met(listed: Sequence[tuple[str, str]], count: int) -> list[tuple[str, str]]
 
 
 def short(expressions: Sequence[Expression]) -> list[Formula | Expression]:
-    """The expressions as they stand, or expanded where that is shorter."""
+    """Return the expressions unchanged, or expanded where that is shorter."""
     forms = zip(expressions, expanded(expressions, None), strict=True)
     return [form if form is not None and leaves(form) < leaves(e) else e for e, form in forms]
 
 
 def leaves(form: Formula | Expression) -> int:
-    """The number of names and numbers in a formula as it is written."""
+    """Return the number of names and numbers in a formula."""
     if isinstance(form, Expression):
         return fold([form], lambda e, sizes: sum(sizes) or 1)[0]
     return (form.divisor != 1) + sum(
@@ -116,7 +119,7 @@ def leaves(form: Formula | Expression) -> int:
 
 
 def with_names(roots: Sequence[Expression]) -> tuple[tuple[tuple[str, Expression], ...], list[Expression]]:
-    """Names for long parts that occur more than once, and the roots in terms of these."""
+    """Return names for long common subexpressions, and the roots in terms of these names."""
     uses: dict[int, int] = {}
     order = topological(roots)
     for e in order:

@@ -1,6 +1,6 @@
 """Representations of systems, compilations and trajectories in notebooks: LaTeX and HTML with MathML.
 
-The HTML has no style sheet and no script, so that it looks like the notebook it stands in.
+The HTML has no style sheet and no script, so that it adopts the style of the notebook.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from phigen.runtime.trajectory import Trajectory
 
 
 def system_latex(system: System) -> str:
-    """π, H, Casimirs and invariants as displayed equations."""
+    """Return π, H, Casimirs and invariants as displayed equations."""
     return "\n".join(latex.system_blocks(system))
 
 
 def system_html(system: System) -> str:
-    """The brackets that do not vanish, H, Casimirs, invariants, and the parameters with their defaults."""
+    """Return the non-zero brackets, H, Casimirs, invariants, and the parameters with their defaults."""
     names, n = system.coordinates, system.dimension
     rows = [(mathml.name("H"), mathml.expression(system.hamiltonian))]
     for i in range(n):
@@ -42,7 +42,7 @@ def system_html(system: System) -> str:
 
 
 def compilation_html(compilation: Compilation) -> str:
-    """The system and its method."""
+    """Return the system and its method."""
     program = compilation.program
     said = f"compiled to order {program.order}: {compilation.label}, {program.step.kind.manner}"
     about = _cell_html(compilation.by_sweeps().cell) if compilation.spec.lattice else system_html(compilation.system)
@@ -50,7 +50,7 @@ def compilation_html(compilation: Compilation) -> str:
 
 
 def _cell_html(cell: Cell) -> str:
-    """The brackets, the density of H, Casimirs and invariants of a lattice."""
+    """Return the brackets, the density of H, Casimirs and invariants of a lattice."""
     lines = [
         _formula(left, "".join(right)) for _, equations in cell_formulas.formulas(cell) for left, right in equations
     ]
@@ -58,7 +58,7 @@ def _cell_html(cell: Cell) -> str:
 
 
 def trajectory_html(trajectory: Trajectory) -> str:
-    """First and last state, and the largest errors of energy and Casimirs."""
+    """Return first and last state, and the largest errors of energy and Casimirs."""
     head = ["", "t", *trajectory.coordinates, "energy", *trajectory.casimirs]
     table = trajectory.rows()
     body = [["start", *map(_number, table[0])], ["end", *map(_number, table[-1])]]
@@ -70,7 +70,7 @@ def trajectory_html(trajectory: Trajectory) -> str:
 
 
 def lattice_trajectory_html(trajectory: LatticeTrajectory) -> str:
-    """Means of the fields and the energy in the first and last frame, and the largest errors of energy and Casimirs."""
+    """Return field means and energy of the first and last frame, and the largest errors of energy and Casimirs."""
     changes = trajectory.changes()
     head = ["", "t", *(f"mean {c}" for c in trajectory.coordinates), "energy", *[*changes][1:]]
     body = []

@@ -1,4 +1,4 @@
-"""Casimirs of log-canonical structures in their usual form: logarithms of products of powers."""
+"""Casimirs of log-canonical structures in the usual form: logarithms of products of powers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from phigen.symbolic.readable import readable
 
 
 def as_powers(casimir: Expression) -> str | None:
-    """½ Σ u log x² as ``log|x**u*…|``; None for an expression of another form."""
+    """Return ½ Σ u log x² as ``log|x**u*…|``; None for an expression of another form."""
     exponents = fold([casimir], _exponents)[0]
     if not exponents or None in exponents:
         return None
@@ -15,12 +15,12 @@ def as_powers(casimir: Expression) -> str | None:
     return f"log|{'*'.join(factors)}|"
 
 
-#: Coefficients of log x² by the name of x; that of 1 by None.
+#: Coefficients of log x² by the name of x; the constant has the key None.
 _Sum = dict[str | None, Expression] | None
 
 
 def _exponents(node: Expression, args: list[_Sum]) -> _Sum:
-    """The node as a linear combination of logarithms of squares of symbols, None where it is none."""
+    """Return a node as a linear combination of logarithms of squares of symbols, or None if it is not one."""
     if any(a is None for a in args) and node.op != "log":
         return None
     parts = [a for a in args if a is not None]

@@ -1,4 +1,4 @@
-"""The formulas of a compilation in sympy: the Hamiltonian that is discretised, α, β and S_1 … S_k."""
+"""Formulas of a compilation in sympy: the discretised Hamiltonian, α, β and S_1 … S_k."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from phigen.symbolic.symbols import STEP, momentum
 
 @dataclass(frozen=True)
 class SympyFormulas:
-    """The formulas of a method in sympy.
+    """Formulas of a method in sympy.
 
-    ``hamiltonian`` is the function that is discretised: H less λ C for each Casimir C of the gauge, whose λ is in
-    ``gauge``. α and β are n expressions in the coordinates of ``system`` and in ``covector``; where they are series in
-    it, ``degree`` is their degree, else None. ``series`` has S_1 … S_k with S_h = Σ h^i S_i.
+    ``hamiltonian`` is the discretised function: H minus λ C for each Casimir C of the gauge, with λ in ``gauge``. α and
+    β are n expressions in the coordinates of ``system`` and in ``covector``. ``degree`` is their degree if they are
+    truncated series in the covector, else None. ``series`` has S_1 … S_k with S_h = Σ h^i S_i.
     """
 
     system: SympySystem
@@ -37,7 +37,7 @@ class SympyFormulas:
 
 
 class Dictionary:
-    """The symbols of a compilation in sympy, and the translation of its expressions."""
+    """Symbols of a compilation in sympy, with the translation of its expressions."""
 
     def __init__(self, compilation: Compilation) -> None:
         system, gauge = compilation.system, compilation.gauge
@@ -53,12 +53,12 @@ class Dictionary:
         self._symbols = {**known, **momenta, **dict(zip(gauge.symbols, free, strict=True)), STEP: self.step}
 
     def expression(self, e: Expression, special: Callable[[int, Any], Any] = closed_function) -> Any:
-        """The expression in sympy; ``special`` is that of `to_sympy`."""
+        """Return the expression in sympy; ``special`` is an argument of `to_sympy`."""
         return to_sympy(e, self._symbols, special)
 
 
 def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyFormulas:
-    """The formulas of a compilation, with S_1 … S_terms, by default those of the method.
+    """Return the formulas of a compilation, with S_1 … S_terms, by default those of the method.
 
     Raises `SpecError` for a splitting, `LimitError` if the terms are too many to be written out.
     """
@@ -93,7 +93,7 @@ def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyF
 def _ends_of_paths(
     compilation: CompiledSeries, dictionary: Dictionary, degree: int
 ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """α and β = α(x, −p) up to a degree in p; the compiler's terms of higher degree do not belong to the series."""
+    """Return α and β = α(x, −p) up to a degree in p; terms of higher degree do not belong to the series."""
     formal = formal_alpha(compilation.discretised, compilation.realisation, degree + 1)
     parts = closed_form([dictionary.expression(e) for e in formal], dictionary.covector)(degree)
 

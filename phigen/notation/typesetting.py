@@ -1,7 +1,7 @@
 """Formulas in LaTeX, broken into lines: the markup of `phigen.notation.mathml`, with an estimate of its width.
 
-Widths are in em, for the fonts of TeX, and on the safe side. A line breaks before a plus or a minus, at an outer one
-if that leaves no large hole, else inside parentheses; and between factors where nothing else helps.
+Widths are upper estimates in em for the fonts of TeX. A line breaks before an outer plus or minus, if this leaves no
+large gap; else before one inside parentheses; and between factors only if no other break fits.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-#: The width of a line: a little less than that of the text of an article at 10, 11 and 12 points.
+#: Width of a line in em: slightly less than that of the text of an article at 10, 11 and 12 points.
 LINE = 31.0
-#: The indentation of continued lines, and its width.
+#: Indentation of continued lines, and its width.
 INDENT, INDENTED = "\\quad ", 1.0
-#: A line may be shorter by this fraction, to avoid a break one level of parentheses deeper.
+#: Fraction by which a line may be shorter to avoid a break one level of parentheses deeper.
 _SHORTER = 0.35
-#: A break between factors counts as this number of levels deeper.
+#: Number of levels by which a break between factors counts as deeper.
 _FACTORS = 4
-#: A fraction, root or exponent wider than this fraction of a line is written inline, so that it can be broken.
+#: Fraction of a line above which a fraction, root or exponent is written inline, so that it can be broken.
 _WIDE = 0.6
 
 _GREEK = {
@@ -43,7 +43,7 @@ _TALL = ("mfrac", "msqrt", "mroot", "mtable")
 
 @dataclass(frozen=True)
 class Atom:
-    """A part of a formula that no line ends in; ``level`` is that of the break before it, None for no break."""
+    """Unbreakable part of a formula; ``level`` is that of the break before it, None if no break is possible there."""
 
     text: str
     width: float
@@ -51,17 +51,17 @@ class Atom:
 
 
 def latex(*markup: str) -> str:
-    """Elements side by side as LaTeX on one line."""
+    """Return elements side by side as LaTeX on one line."""
     return _joined(_atoms(_elements(markup), whole=True))
 
 
 def width(*markup: str) -> float:
-    """Their estimated width on one line."""
+    """Return the estimated width of elements on one line."""
     return _width(_atoms(_elements(markup), whole=True))
 
 
 def lines(markup: Sequence[str], room: float) -> list[str]:
-    """Elements side by side as lines of LaTeX of the given width; all but the first are indented by `INDENTED`."""
+    """Return elements side by side as lines of LaTeX of the given width; `INDENTED` indents all but the first."""
     elements = _elements(markup)
     whole = _atoms(elements, whole=True)
     if _width(whole) <= room:
@@ -76,7 +76,7 @@ def lines(markup: Sequence[str], room: float) -> list[str]:
 
 
 def _end(atoms: Sequence[Atom], begin: int, room: float) -> int:
-    """End of the line that begins at an atom: the best break within the width, else the first break beyond."""
+    """Return the end of the line that begins at an atom: the best break within the width, else the first after."""
     used, best, least = 0.0, len(atoms), float("inf")
     for place in range(begin, len(atoms)):
         level = atoms[place].level
@@ -113,7 +113,7 @@ def _flattened(elements: Sequence[Element]) -> Iterator[Element]:
 
 
 def _atoms(elements: Sequence[Element], depth: int = 0, *, whole: bool) -> list[Atom]:
-    """Elements side by side as atoms; ``whole`` forbids breaks."""
+    """Return elements side by side as atoms; ``whole`` forbids breaks."""
     flat, listed_atoms, bars = list(_flattened(elements)), list[Atom](), 0
     tall = _tall_parentheses(flat)
     for place, element in enumerate(flat):
@@ -144,7 +144,7 @@ def _parenthesis(text: str, *, tall: bool, whole: bool) -> Atom:
 
 
 def _tall_parentheses(flat: Sequence[Element]) -> set[int]:
-    """The places of the parentheses with something tall between."""
+    """Return the positions of parentheses with tall content."""
     tall, opened = set(), list[int]()
     for place, element in enumerate(flat):
         if element.tag == "mo" and element.text == "(":
@@ -184,7 +184,7 @@ def _of_element(element: Element, depth: int, *, called: bool, whole: bool) -> l
 
 
 def _one(elements: Sequence[Element]) -> Atom:
-    """Elements as a part that stays on one line."""
+    """Return elements as a part that stays on one line."""
     atoms = _atoms(elements, whole=True)
     return Atom(_joined(atoms), _width(atoms))
 
@@ -205,7 +205,7 @@ def _identifier(name: str, *, called: bool) -> Atom:
 
 
 def _scripts(kind: str, parts: Sequence[Element], depth: int, *, called: bool, whole: bool) -> list[Atom]:
-    """A base with an index or an exponent; a sum in parentheses may be broken, and so may exp of a long sum."""
+    """Return a base with an index or an exponent; a sum in parentheses and exp of a long sum may be broken."""
     base, *scripts = parts
     written = [_one([s]) for s in scripts]
     if not whole and kind == "msup" and base.text == "e" and written[0].width > 0.75 * _WIDE * LINE:
@@ -231,13 +231,13 @@ def _fraction(parts: Sequence[Element], depth: int, *, whole: bool) -> list[Atom
 
 
 def _enclosed(elements: Sequence[Element], depth: int) -> list[Atom]:
-    """Elements in parentheses."""
+    """Return elements in parentheses."""
     tall = any(part.tag in _TALL for e in elements for part in e.iter())
     opened, closed = (_parenthesis(sign, tall=tall, whole=False) for sign in "()")
     return [opened, *_atoms(elements, depth + 1, whole=False), closed]
 
 
 def _factor(elements: Sequence[Element], depth: int) -> list[Atom]:
-    """Elements as a factor: a sum in parentheses."""
+    """Return elements as a factor, with parentheses around a sum."""
     plain = _atoms(elements, depth, whole=False)
     return _enclosed(elements, depth) if any(a.level == depth for a in plain) else plain

@@ -1,1 +1,1 @@
-"""The figures of the paper, redrawn and with measured numbers: one module per example of the paper."""
+"""Figures of the paper, redrawn with measured numbers: one module per example of the paper."""

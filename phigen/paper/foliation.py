@@ -23,7 +23,7 @@ SPHERES, PARABOLOIDS, PLANES = (0.1, 0.4, 1.0), (0.25, 1.5), (-2.0, 0.0, 2.0)
 
 
 def foliation_plate() -> Plate:
-    """Three foliations side by side."""
+    """Return the figure of three foliations side by side."""
     systems = [system_from_spec(spec.load(resources.bundled_specs() / f"{name}.yaml")) for name in SYSTEMS]
     parameters = {p.name: float(p.value) for p in systems[0].parameters}
 
@@ -61,7 +61,7 @@ def _draw(systems: list[System]) -> Figure:
 
 
 def _draw_spheres(axes: Any, system: System) -> None:
-    """Nets of spheres, without what lies in front of the middle, so that the inner ones are seen."""
+    """Draw nets of spheres, without the front octants, so that the inner spheres are visible."""
     casimir, names = system.casimirs["C"], system.coordinates
     box, gap = np.array([[-1.0] * 3, [1.0] * 3]), np.full((1, 3), np.nan)
     for level, colour in zip(SPHERES, SERIES, strict=False):
@@ -74,10 +74,10 @@ def _draw_spheres(axes: Any, system: System) -> None:
 
 
 def _draw_paraboloids(axes: Any, system: System) -> None:
-    """x2 = x1 x3/C in the positive octant."""
+    """Draw x2 = x1 x3/C in the positive octant."""
     for level, colour in zip(PARABOLOIDS, SERIES, strict=False):
         first, share = np.meshgrid(np.linspace(0.02, 1, 8), np.linspace(0.02, 1, 8))
-        # Up to x2 = 1.
+        # The surface ends at x2 = 1.
         third = share * np.minimum(1.0, level / first)
         _draw_surface(axes, first, first * third / level, third, colour)
     axes.view_init(24, -40)

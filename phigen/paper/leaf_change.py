@@ -1,4 +1,4 @@
-"""A map that preserves a Poisson structure and leaves its leaves, beside one that is a Hamiltonian flow."""
+"""Comparison of a Poisson map that changes symplectic leaves with one that is a Hamiltonian flow."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, START = "poisson_not_hamiltonian", (1.0, 1.0, 2.0)
-#: The k of the map, the step of the paper, and one with which its effect can be seen after a few turns.
+#: Exponent k of the map; step of the paper; a larger step, whose effect is visible after a few turns.
 K, PAPER_STEP, STEP, TURNS = 2, 1e-4, 0.05, 3
 PERIOD, ELSEWHERE = 2 * math.pi, (1.0, 2.0, 4.0)
 
 
 def printed_map(state: Floats, h: float) -> Floats:
-    """The map that the paper prints, on states (…, 3): its flow, and a dilation across the leaves by exp(h^k)."""
+    """Return the image of states (…, 3) under the map of the paper: flow and dilation across leaves by exp(h^k)."""
     x, y, z = np.moveaxis(state, -1, 0)
     u, v, w = x - y + z, x + y - z, -x + y + z
     angle, stretched = h * (u**2 + v**2) / 4, w * np.exp(h**K)
@@ -38,7 +38,7 @@ def printed_map(state: Floats, h: float) -> Floats:
 
 
 def printed_field(state: Floats) -> Floats:
-    """The equations that the paper prints for this system, at one state (3,)."""
+    """Return the vector field that the paper prints for this system, at one state (3,)."""
     x, y, z = state
     u, v = x - y + z, x + y - z
     return np.array([-v / 8 * (v**2 + v**2), (z - y) / 4 * (u**2 + v**2), u / 8 * (u**2 + v**2)])
@@ -54,7 +54,7 @@ def _rows(state: Floats, h: float, steps: int, stride: int) -> Floats:
 
 
 def leaf_change_plate() -> Plate:
-    """The two maps in space, and the function that labels the leaves along them."""
+    """Return the figure of the two maps in space and of the leaf label along them."""
     compilation, solver = compiled(SPEC, 4)
     steps = round(TURNS * PERIOD / STEP)
     trajectory = solver.integrate(START, STEP, steps)
@@ -90,7 +90,7 @@ def _findings(compilation: Compilation, trajectory: Trajectory, start: Floats) -
 
 
 def _flow(state: Floats, t: float) -> Floats:
-    """The exact flow: the map without its dilation."""
+    """Return the exact flow: the map without dilation."""
     label = state @ (-1, 1, 1)
     image = printed_map(state, t)
     flow: Floats = image - label * (math.exp(t**K) - 1) / 2 * np.array([0.0, 1.0, 1.0])

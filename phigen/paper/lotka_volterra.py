@@ -1,4 +1,4 @@
-"""Lotka–Volterra up to its singularity: the errors of four methods, and which of them notice the end."""
+"""Lotka–Volterra up to its singularity: the errors of four methods, and which of them detect the singularity."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "lotka_volterra", "blow_up"
-#: Labels: the method of the paper, its variant with one option, and classical methods.
+#: Labels: the method of the paper, its variant with one changed option, and classical methods.
 OWN = {"phigen, order 2": 2, "phigen, order 8": 8}
 CLASSICAL = {"RK2": "rk2", "RK4": "rk4"}
 PHI, RK2, RK4 = "phigen, order 2", "RK2", "RK4"
 COLOURS = dict(zip([*OWN, *CLASSICAL], (SERIES[0], PALETTE["ink"], SERIES[1], SERIES[3]), strict=True))
-#: The time at which errors are read, and the coarse step and the end of the figure of the singularity.
+#: Time of the tabulated errors; step size and end time of the figure of the singularity.
 TIME, COARSE, END = 0.254, 1e-3, 0.262
 
 
 @dataclass(frozen=True)
 class Approach:
-    """Trajectories by their labels up to just before the singularity, and the exact states (rows, DIM)."""
+    """Trajectories by label, up to just before the singularity, and the exact states (rows, DIM)."""
 
     compilation: Compilation
     solver: Solver
@@ -46,14 +46,14 @@ class Approach:
     exact: Floats
 
     def errors(self, label: str) -> Floats:
-        """Errors (rows,) of the solution, relative to its largest coordinate."""
+        """Return the errors (rows,) of the solution, relative to its largest coordinate."""
         off = np.max(np.abs(self.trajectories[label].x - self.exact), axis=1)
         errors: Floats = off / np.max(np.abs(self.exact), axis=1)
         return errors
 
 
 def approach() -> Approach:
-    """The run of the spec by all methods."""
+    """Return the run of the spec by all methods."""
     trajectories = {}
     for label, order in reversed(OWN.items()):
         compilation, solver = compiled(SPEC, order)
@@ -72,7 +72,7 @@ def approach() -> Approach:
 
 
 def errors_plate() -> Plate:
-    """Errors of the solution, the Casimir and the energy."""
+    """Return the figure of the errors of the solution, the Casimir and the energy."""
     course = approach()
     row = int(np.searchsorted(course.trajectories[PHI].t, TIME - 1e-9))
     off = {label: float(course.errors(label)[row]) for label in COLOURS}
@@ -93,7 +93,7 @@ def errors_plate() -> Plate:
 
 
 def _order(course: Approach) -> float:
-    """The observed order of the method of the paper, at t = 0.2."""
+    """Return the observed order of the method of the paper, at t = 0.2."""
     x0, errors = [float(v) for v in course.run.initial], []
     for steps in (200, 400):
         trajectory = course.solver.integrate(x0, 0.2 / steps, steps, steps)
@@ -126,7 +126,7 @@ def _draw_errors(course: Approach) -> Figure:
 
 
 def singularity_plate() -> Plate:
-    """The methods at the singularity itself, with a step large enough to be seen."""
+    """Return the figure of the methods at the singularity, with steps large enough to be visible."""
     course = approach()
     x0, steps = [float(v) for v in course.run.initial], round(END / COARSE)
     orbit, stopped = _until_it_fails(course.solver, x0, COARSE, steps)
@@ -150,7 +150,7 @@ def _left(course: Approach, t: float) -> float:
 
 
 def _until_it_fails(solver: Solver, x0: list[float], h: float, steps: int) -> tuple[Trajectory, float]:
-    """The trajectory and the time of its last good step."""
+    """Return the trajectory and the time of its last successful step."""
     try:
         trajectory = solver.integrate(x0, h, steps)
     except StepError as error:

@@ -1,4 +1,4 @@
-"""A redrawn figure of the paper, and measured numbers to compare with those of the paper."""
+"""Redrawn figure of the paper, with measured numbers for comparison with those of the paper."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Finding:
-    """One measured number, and the paper's statement about it, paraphrased."""
+    """Measured number with a paraphrase of the paper's statement about it."""
 
     quantity: str
     paper: str
@@ -30,7 +30,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Plate:
-    """A figure with its title and its findings."""
+    """Figure with its title and its findings."""
 
     title: str
     figure: Figure
@@ -38,7 +38,7 @@ class Plate:
 
 
 def compiled(name: str, order: int, birealisation: str | None = None) -> tuple[Compilation, Solver]:
-    """A system of the corpus and its solver in C, of this order, with another bi-realisation if one is named.
+    """Return a system of the corpus and its C solver of this order, with the named bi-realisation or the default.
 
     Raises `ToolchainError` without a C compiler: the runs of the paper are long.
     """
@@ -50,7 +50,7 @@ def compiled(name: str, order: int, birealisation: str | None = None) -> tuple[C
 
 
 def trajectory_of(solver: Solver, t: Floats, x: Floats, h: float, parameters: Mapping[str, float]) -> Trajectory:
-    """States (rows, DIM) of another method at times (rows,), with energy and Casimirs as the solver has them."""
+    """Return states (rows, DIM) of another method at times (rows,) as a trajectory with energy and Casimirs."""
     backend, names = solver.backend, solver.interface
     energy, values = backend.hamiltonian(x, parameters), backend.casimirs(x, parameters)
     casimirs = {name: values[:, i] for i, name in enumerate(names.casimirs)}
@@ -58,6 +58,6 @@ def trajectory_of(solver: Solver, t: Floats, x: Floats, h: float, parameters: Ma
 
 
 def relative(values: Floats) -> Floats:
-    """Errors relative to the first value."""
+    """Return errors relative to the first value."""
     errors: Floats = np.abs(values / values[0] - 1)
     return errors

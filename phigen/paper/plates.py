@@ -1,4 +1,4 @@
-"""All figures of the paper by the names of their files."""
+"""Figures of the paper by file name."""
 
 from __future__ import annotations
 

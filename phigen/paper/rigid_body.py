@@ -1,4 +1,4 @@
-"""The rigid body: errors over a long run, its trajectory, a Poincaré section, and where Runge–Kutta ends."""
+"""Rigid body: errors over a long run, trajectory, Poincaré section, and the final state of Runge–Kutta."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "rigid_body_paper", "paper"
-#: The steps of the long run and of the first part of it, about which there are findings as well; rows of each run.
+#: Numbers of steps of the long run and of its first part, for separate findings; rows of each run.
 LONG, EARLY, ROWS = 10**8, 10**6, 20_000
 #: PHI-2 of the paper is the Cayley realisation at order 2.
 PHI, RK4, BETTER = "phigen, order 2, Cayley", "RK4", "phigen, order 4"
-#: The step of the section, at which the drift of RK4 can be seen, and the time that it covers.
+#: Step size of the section, with visible drift of RK4, and its duration.
 COARSE, SECTION_STEPS = 0.004, 75_000
-#: Further steps after which RK4 stands still, and the crossings that are drawn.
+#: Number of further steps after which RK4 is at rest, and number of drawn crossings.
 _REST, _DOTS = 10**6, 500
 
 
 @dataclass(frozen=True)
 class Bodies:
-    """The solvers, and the numbers of the run of the spec."""
+    """Solvers, and the numbers of the run of the spec."""
 
     compilation: Compilation
     solver: Solver
@@ -48,7 +48,7 @@ class Bodies:
 
 
 def bodies() -> Bodies:
-    """PHI-2 of the paper and phigen's choice at order 4."""
+    """Return PHI-2 of the paper and phigen's choice at order 4."""
     compilation, solver = compiled(SPEC, 2, "cayley")
     run = compilation.spec.runs[RUN]
     parameters = compilation.spec.parameters_of(run)
@@ -62,7 +62,7 @@ def _runge_kutta(body: Bodies, h: float, steps: int, stride: int) -> Trajectory:
 
 
 def errors_plate(steps: int = LONG) -> Plate:
-    """The errors of energy and Casimir over a number of steps of the paper's size."""
+    """Return the figure of the errors of energy and Casimir over a number of steps of the paper's size."""
     body = bodies()
     stride = max(1, steps // ROWS)
     methods = {
@@ -76,7 +76,7 @@ def errors_plate(steps: int = LONG) -> Plate:
 
 
 def _early_findings(body: Bodies) -> tuple[Finding, ...]:
-    """Findings from the first million steps."""
+    """Return the findings from the first million steps."""
     stride = EARLY // ROWS
     poisson, double, better = (
         solver.integrate(body.x0, factor * body.h, EARLY // factor, stride)
@@ -126,7 +126,7 @@ def _draw_errors(methods: dict[str, Trajectory], zoom: Trajectory) -> Figure:
 
 
 def section_plate() -> Plate:
-    """A trajectory, its section, and the sections of both methods."""
+    """Return the figure of a trajectory with its section, and of the sections of both methods."""
     body = bodies()
 
     def height(states: Floats) -> Floats:

@@ -15,7 +15,7 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass
 class ClassicalCourse:
-    """See `phigen.runtime.session.Course`. The runner makes its steps from what stands in ``place``."""
+    """Course (`phigen.runtime.session.Course`) of a classical method, whose runner starts from the array ``place``."""
 
     runner: race.Runner
     place: Floats
@@ -41,6 +41,6 @@ class ClassicalCourse:
 
 
 def started(method: str, compilation: Compilation, x0: Floats, parameters: Mapping[str, float]) -> ClassicalCourse:
-    """The course of a method from x0 (DIM,). Raises `ToolchainError`."""
+    """Return the course of a method from x0 (DIM,). Raises `ToolchainError`."""
     place = np.array(x0, dtype=np.float64)
     return ClassicalCourse(race.compiled(compilation, [method], place, parameters).runners[method], place, place.copy())

@@ -43,9 +43,8 @@ def make(store: str, digest: str, number: int) -> tuple[int, int]:
     for name, values in results.items():
         if name != "status":
             job.root[name][region] = values.reshape(sizes + values.shape[1:])
-    job.root["status"][region] = results["status"].reshape(
-        sizes
-    )  # written last, so that members with a status are complete
+    # The status is written last, so that members with a status are complete.
+    job.root["status"][region] = results["status"].reshape(sizes)
     return count, int(np.count_nonzero(results["status"]))
 
 

@@ -126,9 +126,8 @@ def _fill(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str
 
     def along(name: str, values: Any) -> None:
         about = {"_ARRAY_DIMENSIONS": [name]}
-        root.create_array(
-            name, data=np.asarray(values), fill_value=None, attributes=about
-        )  # 0 is a valid value, not a mark of missing data
+        # Without a fill value 0 is a valid value, not a mark of missing data.
+        root.create_array(name, data=np.asarray(values), fill_value=None, attributes=about)
 
     for axis in plan.grid if not plan.members else ():
         values = values_of(axis)
