@@ -80,7 +80,8 @@ def _changes(x: Vector, factors: Vector) -> list[Expression]:
     s, c, _ = functions_of(kappa, p, q)
     square, z = s**2, p * kappa**2
     roots = [sqrt(c**2 + e * square) for e in above]
-    sigma = _at_smallest(levels, [c] * 3, roots)
+    # On the separatrix C > 0, but may be negative by rounding.
+    sigma = _at_smallest(levels, [call("choose", p - q, c, root) for root in roots], roots)
     versine = 8 * z * power(1 + z, -2)  # 1 − C
     losses = _at_smallest(levels, [versine] * 3, [d * square / (1 + r) for d, r in zip(below, roots, strict=True)])
     divisor = c**2 - low * square
