@@ -107,6 +107,7 @@ def _values(compilation: Compilation, language: BindingLanguage) -> dict[str, ob
         "noise": bool(about.noise),
         "element": about.element,
         "rotation": about.element - 3 * about.position,
+        "after_rotation": about.element - 3 * about.position + 1,
         "position": about.position,
         "kicks": program.offers("kicks"),
         "real": language.reals[about.single],

@@ -126,14 +126,19 @@ def remainder_values(names: Sequence[str]) -> dict[str, object]:
     places = {name: k for k, name in enumerate((*remainders.REMAINDERS, *remainders.QUOTIENTS))}
     reach = remainders.MAX_ROOT
     return {
-        "names": [(name, places[name]) for name in names],
+        "names": [(name, places[name], _described(places[name])) for name in names],
         "terms": remainders.TERMS,
+        "end": remainders.TERMS + 1,
         "reach": repr(reach),
         **{f"reach{k}": repr(reach**k) for k in (2, 3, 4)},
         "most": MOST_HALVINGS,
-        "lane_doublings": remainders.LANE_DOUBLINGS,
         "lane_part": repr(2.0**-remainders.LANE_DOUBLINGS),
     }
+
+
+def _described(place: int) -> str:
+    """The purpose of a function of `phigen.symbolic.remainders`, as a comment."""
+    return f"Coefficient {place % 4} of the {'remainder' if place < 4 else 'quotient'}."
 
 
 #: The integrals of `ELLIPTIC`: their meaning, and the arguments of Carlson's R_D for them and for half a turn, from the

@@ -185,7 +185,8 @@ def test_steps_and_what_is_seen_are_those_of_numpy_to_roundoff(case: str, answer
         np.testing.assert_allclose(np.reshape(mine, theirs.shape), theirs, rtol=part, atol=part * np.abs(theirs).max())
 
     assert found["done"] == {"value": STEPS}
-    assert found["t"] == pytest.approx(end, rel=1e-14)
+    if not compilation.program.is_monitored:  # whose times tests/lattice/test_monitor.py compares
+        assert found["t"] == pytest.approx(end, rel=1e-14)
     np.testing.assert_allclose(np.reshape(found["x"], x.shape), x, rtol=0, atol=1e-13 * size)
     assert found["energy"] == pytest.approx(module.hamiltonian(x, **then), rel=1e-12)
     agrees(found["density"], module.density(x, **then), 1e-11)

@@ -10,11 +10,12 @@ from support import series_of
 
 from phigen import resources, spec
 from phigen.compiler import compile_spec
+from phigen.geometry import conservation
 from phigen.geometry.system import system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.spec.model import BirealisationChoice
 from phigen.spec.names import SPEC_FUNCTIONS
-from phigen.study import classical, conservation, dop853, summary
+from phigen.study import classical, dop853, summary
 from phigen.study.summary import WINDOWS, _windows
 from phigen.symbolic import arrays, readable
 from phigen.symbolic.expression import PI, call, number, power, symbol, text

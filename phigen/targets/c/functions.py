@@ -16,7 +16,7 @@ from phigen.symbolic.economised import economised
 from phigen.symbolic.elliptic import ELLIPTIC
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import topological
-from phigen.symbolic.remainders import QUOTIENTS, REMAINDERS
+from phigen.symbolic.remainders import LANE_DOUBLINGS, QUOTIENTS, REMAINDERS
 from phigen.symbolic.special import (
     LANE_REACH,
     MIDDLE,
@@ -120,7 +120,8 @@ def near(program: Program, names: Iterable[str]) -> list[str]:
 
 def _remainders(program: Program, names: Sequence[str], *, near: bool) -> list[str]:
     """Return the functions of exponentials of small matrices."""
-    values = {"NAME": program.name, "near": near, **special.remainder_values(names)}
+    doublings = LANE_DOUBLINGS if near else "halvings"
+    values = {"NAME": program.name, "near": near, "doublings": doublings, **special.remainder_values(names)}
     return [render("c", "remainders.c", values)] if names else []
 
 

@@ -78,11 +78,12 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
         "weights": _row(table.weights, width),
         "mixing": _columns(table.mixing, width),
         "predictors": len(predictions),
+        "predicted": "integrals up to the stages" if staged and step.reduced else "the stages",
         "predictions": [_columns(rows, width) for rows in predictions],
         "terms": _in_chains(terms) if staged else "",
         "terms_of_two": _in_chains([*terms, *older]) if staged else "",
         "total": _halved([f"values[{j}]" for j in range(table.stages)]),
-        "reduced": None,
+        "reduced": False,
         **(_reduced(step, table, width) if staged and step.reduced else {}),
     }
     return render("c", "gauss.c", values)
@@ -93,11 +94,20 @@ def _reduced(step: Gauss, table: Tableau, width: int) -> dict[str, object]:
     reduced = step.reduced
     assert reduced is not None
     return {
-        "reduced": reduced,
+        "reduced": True,
+        "iterated": _listed(reduced.iterated),
+        "iterated_count": len(reduced.iterated),
+        "followers": _listed(reduced.followers),
+        "follower_count": len(reduced.followers),
+        "read_count": len(reduced.integrated),
         "doubled": _columns(table.doubled, width),
         "times": _row(table.times, width),
-        "places": [reduced.iterated.index(k) for k in reduced.integrated],
+        "places": _listed([reduced.iterated.index(k) for k in reduced.integrated]),
     }
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers))
 
 
 def _in_chains(terms: Sequence[str]) -> str:

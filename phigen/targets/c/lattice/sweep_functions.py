@@ -74,14 +74,13 @@ def parameters(program: Program, step: Sweeps) -> str:
     """Print the function that copies parameters at sites and bonds to the arrays that loops read."""
     layout, member = layout_of(program, step), members(program)
     sites = [p for p in program.parameters if p.at == "sites"]
+    bonds = [p for p in program.parameters if p.at == "bonds"]
     values = {
         "NAME": program.name,
         "arrays": [(member[p.name], layout.arrays.index(p.name), repr(float(p.value))) for p in sites],
-        "at_bonds": [
-            (member[p.name], step.sites.at_bonds.index(p.name), repr(float(p.value)))
-            for p in program.parameters
-            if p.at == "bonds"
-        ],
+        "at_bonds": [(member[p.name], step.sites.at_bonds.index(p.name), repr(float(p.value))) for p in bonds],
+        "copied_arrays": " = ".join(f"s->params.{member[p.name]}" for p in sites),
+        "copied_at_bonds": " = ".join(f"s->params.{member[p.name]}" for p in bonds),
     }
     return render("c", "lattice_parameters.c", values)
 
