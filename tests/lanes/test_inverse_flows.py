@@ -24,8 +24,8 @@ TOP = """coordinates: [x1, x2, x3]
 poisson: {lie_algebra: {name: so(3)}}
 hamiltonian: x1**2/2 + x2**2/4
 scheme: splitting
-order: 2
-composition: strang
+order: 4
+composition: suzuki
 adjoint: true
 """
 

@@ -80,7 +80,9 @@ def test_plot_draws_the_orbit_and_what_was_conserved(trajectory):
     assert any("Casimir C" in label for label in labels)
 
 
-@pytest.mark.parametrize(("name", "said"), [("pendulum", "relative error of the energy"), ("duffing", "energy")])
+@pytest.mark.parametrize(
+    ("name", "said"), [("pendulum", "relative error of the energy"), ("duffing", "change of the energy, H(t)")]
+)
 def test_values_are_drawn_of_an_energy_that_the_time_changes(name, said):
     pytest.importorskip("matplotlib")
     from phigen import api
