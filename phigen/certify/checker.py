@@ -8,6 +8,7 @@ import math
 import operator
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
 from functools import cache, reduce
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -19,7 +20,6 @@ Balls: TypeAlias = Any
 Matrix: TypeAlias = Any
 BITS = 80  # precision of the balls in bits, far above that of doubles
 U, TINY, BALL, ZERO, ONE, HALF = arb(2) ** -53, arb(2) ** -1074, arb(0, 1), arb(0), arb(1), arb(0.5)
-CARRY = U * arb("1.01")  # largest compensation term of a coordinate of size 1
 ROUNDED = arb("1.000001")  # factor for the rounding of a size that the C computes and compares
 KRAWCZYK = "Krawczyk's test does not show that the equation of a step has one solution"
 POINTS = (0.318309886, 0.577215665, 0.869604401)  # places in a box at which derivatives are compared
@@ -36,7 +36,7 @@ OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # operations with
     "mul": lambda x, y: (x * y, y, x), "square": lambda x, _: (square(x), x, x), "max": lambda x, y: (x.max(y),),
     "div": lambda x, y: (x / y, 1 / y, -x / (y * y)), "abs": lambda x: (x.abs_lower().union(x.abs_upper()),),
 }  # fmt: skip
-TERMS = 90  # the coefficients of all series are at most 2^(1-n), so for |s| <= 1 the rest is at most 2^(2-TERMS)
+TERMS = 90  # the coefficients of all series are at most 2^(1-n), so for |s| < ROUNDED the rest is at most 2^(3-TERMS)
 SERIES: Mapping[str, Callable[[int], fmpq]] = {  # coefficient n of functions that the C computes by polynomials
     "cosroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n)),
     "sinroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n + 1)),
@@ -129,16 +129,18 @@ class Evaluation:
         self.x: list[Ball] = []
         self.inputs = dict[tuple[str, int], int]()
         self.error, self.slopes = list[Ball](), list[list[tuple[int, Ball]]]()
+        self.kinks = [k for k, (op, *_) in enumerate(operations) if op in ("abs", "max")]
         powers, v = set[int](), self.x
         for k, (op, *a) in enumerate(operations):
             error, slopes = ZERO, list[tuple[int, Ball]]()
             if op in ("number", "exact", "constant"):  # literals, rounded if long; constants of the C
                 value = a[0] if op != "constant" else c[a[0]] if len(a) == 1 else c[a[0]][a[1]]
-                x, error = arb(value), U * abs(value) if op == "number" and len(repr(value)) > 15 else ZERO
+                x, error = arb(value), U * abs(value) * (op == "number" and Fraction(repr(value)) != value)
                 powers |= {k} if abs(math.frexp(value)[0]) == 0.5 else set()  # powers of 2 multiply exactly
             elif op in inputs:
+                demand((op, a[0]) not in self.inputs, "an input is read twice")
                 x, self.inputs[op, a[0]] = inputs[op][a[0]], k
-                error = CARRY * mag(x) if op == "x" else ZERO  # the C reads x without its compensation term
+                error = c["carry"] * U * mag(x) if op == "x" else ZERO  # the C reads x without its compensation term
             elif op in OPERATIONS:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
@@ -149,7 +151,7 @@ class Evaluation:
             elif op in LIBM:
                 x, slopes = LIBM[op][0](v[a[0]]), [(a[0], LIBM[op][1](v[a[0]]))]
                 ulps = 0.5 if op == "sqrt" else c["ulps"] * (2 if op in LESS_ACCURATE else 1) * (1 + 9 * U)
-                error = U * mag(x) * 2 * ulps + TINY
+                error = U * mag(x) * 2 * ulps + 2 * ulps * TINY
             else:
                 x, slope, error = polynomial(c, c["series"][op], v[a[0]])
                 slopes = [(a[0], slope)]
@@ -165,6 +167,7 @@ class Evaluation:
             for k in range(output, -1, -1):
                 for i, slope in self.slopes[k] if not row[k].is_zero() else ():
                     row[i] += row[k] * slope
+            demand(all(row[k].is_zero() for k in self.kinks), "a size is differentiated")
             rows.append(row)
             errors.append(sum((mag(d) * e for d, e in zip(row, self.error, strict=False) if not e.is_zero()), ZERO))
         read = [[self.inputs.get((name, i), len(self.x)) for i in range(count)] for name, count in by.items()]
@@ -178,10 +181,13 @@ def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
     if beyond and mag(s) >= series["radius"]:  # there the C calls the function of libm
         x, slope, ulps = LIBM[name][0](s), LIBM[name][1](s), c["ulps"] * (1 + 9 * U)
         inside = s.intersection(BALL * arb(series["radius"])) if s.overlaps(BALL * arb(series["radius"])) else None
-        error = polynomial(c, {**series, "beyond": False}, inside)[2] if inside is not None else ZERO
+        error = polynomial(c, {**series, "beyond": False, "inside": True}, inside)[2] if inside is not None else ZERO
         return x, slope, error.max(2 * U * ulps * mag(x) + TINY)
-    r, exact, rest, v = mag(s), coefficients(series["name"]), arb(2) ** (2 - TERMS), list[Any]()
-    demand(r < min(series["radius"], 1) * ROUNDED, f"the argument of {series['name']} reaches {float(r):.3g}")
+    r, exact, rest, v = mag(s), coefficients(series["name"]), arb(2) ** (3 - TERMS), list[Any]()
+    demand(
+        r < ROUNDED and (r < series["radius"] or "inside" in series),
+        f"the argument of {series['name']} reaches {float(r):.3g}",
+    )
     for op, *a in series["operations"]:
         literal = [0, 1] if op == "s" else [fmpq(*a[0].as_integer_ratio())] if op == "number" else None
         v.append(fmpq_poly(literal) if literal else -v[a[0]] if op == "neg" else EXACT[op](v[a[0]], v[a[1]]))
@@ -190,12 +196,14 @@ def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
     for n in reversed(range(TERMS)):
         terms = (arb(exact[n]), arb((n + 1) * exact[n + 1]) if n + 1 < TERMS else ZERO, arb(abs(v[-1][n] - exact[n])))
         sums = [total * at + term for total, at, term in zip(sums, (s, s, r), terms, strict=True)]
-    return sums[0] + BALL * rest, sums[1] + BALL * TERMS * rest, rounding[0, 0] + sums[2] + rest
+    return sums[0] + BALL * rest, sums[1] + BALL * (TERMS + 1) * rest, rounding[0, 0] + sums[2] + rest
 
 
 def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exact: bool = False) -> Evaluation:
     """Evaluate the operations of a stage for states in X, times in T and unknowns u, with rests of Taylor series."""
-    carry, tail, along = [BALL * CARRY * mag(x) for x in X], [ZERO] * len(X), "path" in stage and not exact
+    rests = [op[3] for op in stage["operations"] if op[0] == "rest"]
+    demand("path" in stage or not rests, "a Taylor series has no path")
+    carry, tail, along = [BALL * c["carry"] * U * mag(x) for x in X], [ZERO] * len(X), "path" in stage and not exact
     if along:  # the path dm/dt = field from x stays in the box P
         P, path = [interval(p) for p in leaf["path"]], stage["path"]
         run = Evaluation(c, path["operations"], {"m": P, "u": u, "t": [T]})
@@ -205,6 +213,8 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
     run = Evaluation(
         c, stage["operations"], {"x": X, "start": X, "carry": carry, "t": [T], "u": u, "tail": tail}, exact
     )
+    demand(not along or len(stage["hidden"]) == 2 * len(X), "a Taylor series may end late")
+    demand(not along or bool(stage["seen"]) or max(rests) <= 4, "a Taylor series may end early")
     hidden = [(mag(run.x[a]), run.x[b].abs_lower() / ROUNDED) for a, b in stage["hidden"]] if along else []
     demand(all(a < b for a, b in hidden), "a Taylor series may end late")  # the C stops after two such terms
     return run
@@ -223,8 +233,10 @@ def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Ba
     """Demand that matrices that the C computes as derivatives are these derivatives, to 20 digits at some points."""
     precision, ctx.prec = ctx.prec, 300
     for point in POINTS:
-        at = [arb((v.lower() + (v.upper() - v.lower()) * point).mid()) for v in box]
-        run = run_of(c, stage, X, arb(T.mid()), leaf, at, exact=True)
+        *at, t = (
+            arb((v.lower() + (v.upper() - v.lower()) * (point * k % 1)).mid()) for k, v in enumerate((*box, T), 1)
+        )
+        run = run_of(c, stage, X, t, leaf, at, exact=True)
         A, S = (run.outputs(stage[name], {"u": len(box)})[2] for name in ("equation", "change"))
         printed = [run.x[k] for k in (*stage["matrix"], *stage["gain"])]
         pairs = zip((identity(len(box)) + A).entries() + S.entries(), printed, strict=True)
@@ -247,7 +259,9 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     bends, reach, low = arb_mat(m * m, m), column(map(arb, leaf["reach"])), each(arb.abs_lower, scale)
     if solves:
         J, errors, bends = run.outputs(matrix, {"u": m})
-        pivots = top(map(mag, J.entries())) * 4 * m * m * 2 ** (m - 1) * U  # backward error of elimination
+        pivots = (
+            top(map(mag, (*J.entries(), *A.entries()))) * 4 * m * m * 2 ** (m - 1) * U
+        )  # backward error of elimination
         M, M_error = arb_mat(m, m, J.entries()), each(lambda e: e + pivots, arb_mat(m, m, errors.entries()))
     if derived:
         expect_derivatives(c, stage, X, T, leaf, box)
@@ -262,8 +276,8 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
 
     def residual_error(e: Matrix) -> Matrix:
         """Return bounds for rounding errors of the residual, at a distance e from the solution."""
-        first = d_error + U * (size + e + CARRY * Y) * based
-        return first + 2 * U * (A_size * e + first + U * size + CARRY * Y * based) if solves else first
+        first = d_error + U * (size + e + c["carry"] * U * Y) * based
+        return first + 2 * U * (A_size * e + first + U * size + c["carry"] * U * Y * based) if solves else first
 
     def missed(e: Matrix) -> Matrix:
         """Return the error of u after a correction of an error e."""
@@ -277,9 +291,9 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     C = each(middle, each(middle, A).inv())
     values = run_of(c, stage, X, T, leaf, centre.entries()).x
     at = column(values[k] for k in stage["equation"])
-    base = column(x + BALL * CARRY * mag(x) for x in X) if based else column([ZERO] * m)
+    base = column(x + BALL * c["carry"] * U * mag(x) for x in X) if based else column([ZERO] * m)
     K = centre - C * (centre - base + at) + (identity(m) - C * A) * (column(box) - centre)
-    away = each(mag, centred(c, stage, X, T, leaf, box, run, "away")) + (2 * CARRY + arb(2) ** -30) * Y
+    away = each(mag, centred(c, stage, X, T, leaf, box, run, "away")) + (2 * c["carry"] * U + arb(2) ** -30) * Y
     demand(below(away, reach), "a start is out of reach")
     beyond = reach + each(mag, C) * d_error + high * stage.get("difference", 0)
     inside = zip(box, K.entries(), beyond.entries(), strict=True)
@@ -297,6 +311,7 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
         before = [share * stop["before"]] if "before" in stop else []
         before += [share * shaken / (stop["part"] - q)] if q < arb(stop.get("part", 0)) else []
         errors += [missed(worst_of(v)) + U * Y * solves for v in before]
+        demand(bool(errors), "a rule to stop bounds nothing")
         e = each(arb.max, e, reduce(lambda a, b: each(arb.min, a, b), errors))
     rest, small, x_u = missed(e), column([ZERO] * n), A.inv() * (d_x - based * identity(m) if based else d_x)
     if stage["gain"]:
@@ -317,6 +332,7 @@ def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matri
     q = top(b / a for a, b in zip(low.entries(), high.entries(), strict=True)) * ROUNDED
     noises = [v / s for v, s in zip(noise.entries(), low.entries(), strict=True)]
     if stage["share"]:
+        demand(all(v > 0 for v in low.entries()), "the unknowns, in whose sizes changes are measured, may be 0")
         return q * (across * down).sqrt(), sum((v * v for v in noises), ZERO).sqrt() / share, share
     return q * across, top(noises), share
 
@@ -328,12 +344,14 @@ def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
         if "equation" in stage:
             change, error, slope, small = solved(c, stage, X, T, part)
         else:
-            change, error, slope = run_of(c, stage, X, T, part).outputs(stage["change"], {"x": n})
-            slope, small = identity(n) + slope, column([ZERO] * n)
+            change, error, by_x, by_start = run_of(c, stage, X, T, part).outputs(stage["change"], {"x": n, "start": n})
+            slope, small = identity(n) + by_x + by_start, column([ZERO] * n)
         parts = [*zip(X, change.entries(), small.entries(), strict=True)]
-        lost = column(8 * U * (U * mag(x + v) + w + CARRY * mag(x)) for x, v, w in parts)  # by the compensated sum
+        lost = column(
+            8 * U * (U * mag(x + v) + w + c["carry"] * U * mag(x)) for x, v, w in parts
+        )  # by the compensated sum
         total = error + lost + each(mag, slope) * total
-        X = [x + v + BALL * (e + CARRY * mag(x)) for (x, v, _), e in zip(parts, total.entries(), strict=True)]
+        X = [x + v + BALL * (e + c["carry"] * U * mag(x)) for (x, v, _), e in zip(parts, total.entries(), strict=True)]
     return total.entries(), X
 
 
@@ -372,5 +390,5 @@ if __name__ == "__main__":
     ctx.prec = BITS
     try:
         print(replayed(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")), Path(sys.argv[2]).read_bytes()))
-    except RefusedError as refusal:
+    except (RefusedError, ArithmeticError, LookupError, TypeError, ValueError) as refusal:
         sys.exit(f"refused: {refusal}")

@@ -27,7 +27,7 @@ from phigen.certify.checker import (
     step,
 )
 from phigen.certify.reader import read
-from phigen.certify.stages import stages_of
+from phigen.certify.stages import CARRY, stages_of
 
 #: Largest number of passes in which the box of the unknowns of a stage grows until it is proved to contain the
 #: solution.
@@ -36,6 +36,10 @@ PASSES = 8
 #: Growth factor of that box per pass: a smaller factor needs more passes, a larger one makes contraction harder to
 #: prove.
 GROWTH = 1.25
+
+#: Largest compensation term after a Gauss step, in 2^-53 of the largest value of the coordinate. It contains the
+#: rounding of the state and that of its change, which is at most twice as large.
+GAUSS_CARRY = 3.03
 
 #: Least reach of iterates of an unknown in Gauss steps, relative to the largest reach, as sweeps couple all unknowns.
 LEAST_REACH = 0.05
@@ -97,6 +101,7 @@ def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
         "domain": [list(d) for d in problem.domain],
         "time": list(problem.time),
         "ulps": problem.ulps,
+        "carry": GAUSS_CARRY if facts["kind"] == "gauss" else CARRY,
         "kind": facts["kind"],
         "series": facts["series"],
         "stages": stages_of(facts, problem.text, problem.name, box, exact),

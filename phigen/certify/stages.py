@@ -11,6 +11,9 @@ from flint import arb
 from phigen.certify.checker import Evaluation, RefusedError, column
 from phigen.certify.reader import GeneratedC, PathReader
 
+#: Largest compensation term after a step, in 2^-53 of the largest value of the coordinate.
+CARRY = 1.01
+
 #: Smallest contraction rate that certificates assume in the stopping criterion of a Gauss solver, which estimates the
 #: rate from its sweeps; in runs of the corpus the rate is between 0.05 and 0.5.
 LEAST_RATE = 0.05
@@ -303,7 +306,7 @@ def _orders(facts: Mapping[str, Any], kernel: Any, n: int, k: int, box: Sequence
     terms = _series(facts, kernel, listing, k, x, p)
     limit = len(terms[0])
     pairs = _measured(facts, listing, x, terms, range(1, limit + 1))
-    c = {"step": facts["step"], "parameters": facts["parameters"], "gauge": facts["gauge"], "ulps": 1.0,
+    c = {"step": facts["step"], "parameters": facts["parameters"], "gauge": facts["gauge"], "ulps": 1.0, "carry": CARRY,
          "series": facts["series"]}  # fmt: skip
     time = [arb(facts["start"])]
     run = Evaluation(c, listing.operations, {"x": list(box), "t": time}, exact=True)

@@ -450,7 +450,7 @@ def test_truncation_of_a_polynomial_counts() -> None:
         "operations": [["s", 0], ["number", -0.5], ["mul", 1, 0], ["number", 1.0], ["add", 3, 2]],
     }  # fmt: skip
     with precise():
-        c = {"ulps": 1.0, "series": {"series:cosroot": polynomial}}
+        c = {"ulps": 1.0, "carry": 1.01, "series": {"series:cosroot": polynomial}}
         run = Evaluation(c, [["start", 0], ["series:cosroot", 0]], {"start": [arb("0.5")]})
         error = run.outputs([1], {})[1][0, 0]
         assert math.cos(math.sqrt(0.5)) - 0.75 <= float(error) < 1.1 * 0.5**2 / 24
@@ -459,10 +459,23 @@ def test_truncation_of_a_polynomial_counts() -> None:
 def test_kernels_that_read_the_state_without_its_carry_are_wrong_by_it() -> None:
     """The increment x - 1 has no rounding near 1, but the C computes it from x, and the map of x + carry differs."""
     operations = [["x", 0], ["number", 1.0], ["sub", 0, 1]]
-    c = {"series": {}, "ulps": 1.0, "step": 1.0, "stages": [{"operations": operations, "change": [2]}]}
+    c = {"series": {}, "ulps": 1.0, "carry": 1.01, "step": 1.0, "stages": [{"operations": operations, "change": [2]}]}
     with precise():
         (bound,), _ = step(c, [interval((1.0, 1.001))], arb(0), {"stages": [{}]})
         assert 2.0**-53 <= float(bound) < 1.1 * 2.0**-53
+
+
+def test_errors_of_a_stage_reach_flows_of_the_next_that_read_what_flows_before_them_moved() -> None:
+    """A coordinate q with a large error, then a drift q += p and a kick p -= 4q, which reads start + moved."""
+    first = [["x", 0], ["number", 1e6], ["add", 0, 1], ["sub", 2, 1], ["number", 0.0]]
+    drift = [["x", 1], ["carry", 0], ["add", 1, 0], ["start", 0], ["add", 3, 2]]
+    kick = [["number", -4.0], ["mul", 4, 5], ["carry", 1], ["add", 7, 6]]
+    stages = [{"operations": first, "change": [3, 4]}, {"operations": drift + kick, "change": [2, 8]}]
+    c = {"series": {}, "ulps": 1.0, "carry": 1.01, "step": 1.0, "stages": stages}
+    with precise():
+        (of_q, of_p), _ = step(c, [interval((1.0, 1.1)), interval((1.0, 1.1))], arb(0), {"stages": [{}, {}]})
+        assert float(of_q) > 1e-10
+        assert float(of_p) > 3.99 * float(of_q)
 
 
 def test_functions_of_libm_beyond_their_polynomials_are_covered() -> None:
@@ -576,6 +589,45 @@ def test_schedules_with_other_statements_are_refused(line: str) -> None:
 def test_schedules_of_endless_loops_are_refused() -> None:
     with pytest.raises(RefusedError):
         _block(iter(["for (int k = 0; k < 99999999999; ++k) {", "}"]))
+
+
+def test_the_runtime_is_the_one_that_the_theorems_are_about() -> None:
+    """Functions of the runtime that docs/certify.md proves things about. After a change read that page again."""
+    expect_phrases(
+        "pendulum",
+        {
+            "attempt": ("((y[i] - s->x[i]) + displacement[i]) - s->carry[i]", "size * size *", "small[i] -= slope"),
+            "advance": ("(s->x[i] - (sum - added)) + (change[i] - added)", "lost - (x[i] - sum)"),
+            "solve": ("factor = matrix[i * DIM + k] / pivot", "side[i] -= factor * side[k]"),
+            "size": ("fabs(delta[i]) / (fabs(y[i]) + FLOOR * norm + DBL_MIN)",),
+        },
+    )
+    expect_phrases(
+        "kowalevski_gauss",
+        {
+            "collocate": ("square * (past->rate * past->rate) <= SOLVED * SOLVED",),
+            "judge": (
+                "slow && change <= ROUNDING",
+                "rate > fmax(STALLED, 1.5 * past->rate)",
+                "change <= NEARLY_ROUNDING",
+            ),
+            "change_of": ("(now[lane] - old[lane]) * (now[lane] - old[lane])", "return total(sum) / (double)NODES"),
+        },
+    )
+    expect_phrases(
+        "guiding_centre",
+        {
+            "attempt": (
+                "previous < NEARLY_SOLVED && size > SHRINKING * previous",
+                "if (size <= SOLVED || stalled)",
+                "p[i] -= residual[i]",
+            ),
+            "piece": (
+                "fabs(start[i]) + fabs(change[i]) + LEAST_SHARE * norm",
+                "if (small >= 2 && holds(coef, p, end, slope)) return 1",
+            ),
+        },
+    )
 
 
 def expect_phrases(name: str, phrases: dict[str, tuple[str, ...]]) -> None:
