@@ -7,7 +7,8 @@ third, S, C and κ of `phigen.symbolic.elliptic` give, by the addition theorem o
 
 where σ_i > 0, but σ_i = C for the smallest E_i. An error of κ gives the motion of another time, and does not change the
 energy and |x|. No step has a phase, and nothing is divided by the difference of two moments: the separatrix, rotations
-about an axis and symmetric bodies are no special cases.
+about an axis and symmetric bodies are no special cases. Within 1e-8 of the separatrix Q rounds to P, and a step of more
+than 20/√P may miss the next turn-over.
 
 C. G. J. Jacobi, Sur la rotation d'un corps, Crelle's Journal 39 (1850); R. van Zon, J. Schofield, Numerical
 implementation of the exact dynamics of free rigid bodies, Journal of Computational Physics 225 (2007).
