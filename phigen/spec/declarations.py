@@ -231,7 +231,7 @@ class Declarations:
         return (TIMED_ARGUMENTS if self.time else ARGUMENTS) | (NOISY_ARGUMENTS if self.noisy else frozenset())
 
     def declare(self, node: Scalar, what: str) -> bool:
-        """Whether a name is free; an error is reported if not."""
+        """Whether expressions may use the name; an error is reported if it is not free."""
         name, first = node.text, self.nodes.get(node.text)
         if name in SPEC_FUNCTIONS:
             self.reader.error(node, f"the {what} {name!r} has the name of a function", RENAME)
@@ -240,6 +240,8 @@ class Declarations:
             self.reader.error(node, f"the name {name!r} is declared twice; the first is in {where}")
         elif what == "parameter" and name in self.arguments:
             self.reader.error(node, f"a parameter cannot be called {name!r}", ARGUMENT_HINT)
+            self.nodes[name] = node  # so that its uses are no errors too
+            return True
         elif self.lattice and name in (*self.lattice.indices, *(f"N_{i}" for i in self.lattice.indices)):
             self.reader.error(node, f"the {what} {name!r} has the name of an index or size of the lattice", RENAME)
         elif self.lattice and self.lattice.graph and name in (self.lattice.graph, "bonds"):  # an argument of solvers
