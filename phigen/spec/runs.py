@@ -95,11 +95,13 @@ def run(
 
 
 def _box(
-    raw: Mapping[str, tuple[Scalar, Sequence[Scalar | None]]], declared: Declarations
+    raw: Mapping[str, tuple[Scalar, Sequence[Scalar | None] | None]], declared: Declarations
 ) -> dict[str, tuple[Fraction, Fraction]]:
     """The ranges of coordinates of ``box``."""
     box = {}
     for name, (key, nodes) in raw.items():
+        if not nodes:
+            continue  # the reader reported it
         ends = [declared.number(node, declared.numbers()) for node in nodes]
         known = declared.coordinate(key) is not None
         if len(ends) != 2 or None in ends or ends[0] > ends[1]:  # type: ignore[operator]
