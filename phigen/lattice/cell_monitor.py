@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from phigen.errors import SpecError
 from phigen.geometry.positivity import POSITIVE, sign_of
 from phigen.lattice.cell import PAIRS, Cell
 from phigen.lattice.site_kernels import site_kernel
 from phigen.lattice.site_parts import BondSum, CellFlow
-from phigen.lattice.states import start_of
 from phigen.lattice.variations import along, varied_sum
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.logarithmic import fact_of
@@ -23,7 +20,6 @@ from phigen.scheme.steps import PartRates
 from phigen.spec.model import Spec
 from phigen.spec.names import LOGARITHMIC
 from phigen.splitting.ring import TIME
-from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.expression import Expression, gradient, symbol, total
 from phigen.symbolic.neighbours import ENDS
 from phigen.symbolic.readable import shortened
@@ -80,6 +76,11 @@ def _positive(cell: Cell, e: Expression) -> set[str]:
 
 def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
     """Return the energy of a part at the start of a run."""
+    import numpy as np  # which takes as long to import as a small system takes to compile
+
+    from phigen.lattice.states import start_of
+    from phigen.symbolic.arrays import evaluate
+
     start = start_of(spec, spec.runs[run])
     arrays = {**start.parameters, **dict(zip(cell.fields, start.state, strict=True))}
     first, second = np.triu_indices(start.sizes[0], 1)
