@@ -305,7 +305,7 @@ def _spec_of(system: System) -> Spec:
 
 
 def _expect_names(system: System) -> None:
-    """sympy accepts any text as a name; the generated code does not."""
+    """Raise for names that sympy accepts and generated code cannot have."""
     problems = [objection(system.name)] if re.fullmatch(SPEC_NAME, system.name) else [_malformed(system.name, _HINT)]
     problems += [
         _malformed(name, "letters, digits and _, not starting with a digit")

@@ -468,7 +468,7 @@ class CompiledLattice(_Compiled):
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
 
     def named(self, method: str) -> str:
-        """A line that names the method, and why it is the series, or has more colours, where sizes of runs ask it."""
+        """Return a line that names the method; if the sizes of the runs decide it, with the reason."""
         if not self.sweeps.since:
             return method
         colours = self.sweeps.colouring.count

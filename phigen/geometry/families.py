@@ -148,7 +148,7 @@ def named(family: str, size: int) -> LieAlgebra:
 
 
 def families_of_dimension(dimension: int) -> list[tuple[str, int]]:
-    """All (family, size) of that dimension, the dimensions growing with the size in each family."""
+    """All (family, size) of that dimension; in each family the dimension increases with the size."""
     families = []
     for name, (smallest, dimension_of, _) in FAMILIES.items():
         step = 2 if name == "sp" else 1

@@ -149,7 +149,7 @@ def _monomial(x: Expression, g: Expression, u: Expression, degree: Fraction) -> 
 
 
 def _constant(e: Expression, c: str) -> Expression | None:
-    """The expression without the coordinate, if it does not depend on it."""
+    """The same expression without the symbol of the coordinate; None if it depends on the coordinate."""
     simple = _simplified(e)
     return None if c in symbols_of(simple) else simple
 

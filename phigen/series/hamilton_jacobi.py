@@ -128,7 +128,7 @@ class HamiltonJacobi:
         return PolynomialSeries(self._polynomials.ring, self._polynomials.first(terms))
 
     def written(self, terms: int) -> PolynomialSeries:
-        """S_1 … S_terms in a tower, without the terms from the first one that is too large."""
+        """S_1 … S_terms in a tower, up to the last one before the first that is too large."""
         with suppress(OverflowError):
             return self.polynomial(terms)
         with suppress(OverflowError):
