@@ -234,7 +234,7 @@ def test_generated_c_has_no_warnings(name, compiler, tmp_path):
 
 def test_splittings_that_turn_an_attitude_have_tangents_too():
     """The derivative is that of the same steps without."""
-    text = f"{BODY}profile: small\nscheme: splitting\norder: 2\n"
+    text = f"{BODY}profile: small\nscheme: splitting\norder: 4\ncomposition: suzuki\n"
     found = [
         solver(text_with_tangent(text + more), "c").step_tangent([0.4, 0.9, 0.3], 0.1)
         for more in ("", "reconstruct: quaternion\n")
