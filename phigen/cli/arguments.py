@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from phigen.cli.completion import runs, specs
+from phigen.cli.existing import expect_replaceable
 from phigen.registry import RUNNABLE
 from phigen.spec import limits
 from phigen.spec.names import PROFILES, SCHEMES
@@ -77,6 +78,7 @@ def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str
             expect_writable(Path(value) / "zarr")  # a store is a folder, which is replaced as a whole
         else:
             expect_writable(Path(value))
+            expect_replaceable(Path(value))
         return Path(value)
 
     return checked

@@ -10,6 +10,7 @@ import click
 
 from phigen.cli.arguments import FIGURES, file_ending, one_spec, run_option, settings_option
 from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
+from phigen.cli.existing import force_option, wrote
 from phigen.cli.sources import load_one
 from phigen.cli.tune import initial_value_problem
 from phigen.errors import SpecError
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw errors against cost: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print all measurements as JSON.")
+@force_option
 @verbosity
 @pass_console
 def command(
@@ -79,7 +81,7 @@ def command(
         from phigen.drawing import comparison, figures
 
         figures.save(comparison.figure(result, f"{spec.name}, run {run.name}"), plot)
-        console.note(f"wrote {plot}")
+        console.note(wrote(plot))
 
 
 def _orders(text: str) -> tuple[int, ...]:

@@ -11,6 +11,7 @@ import click
 
 from phigen.cli.arguments import FILMS
 from phigen.cli.console import Console, counted, heading, out, out_json, table
+from phigen.cli.existing import wrote
 from phigen.cli.experiment import expect_positive, setting_of
 from phigen.cli.run_summary import counted_crossings, described_averages, described_spectrum, finite, print_averages
 from phigen.errors import StepError
@@ -88,7 +89,7 @@ def run_lattice(
     trajectory, series = (whole.ends, whole) if isinstance(whole, LatticeSeries) else (whole, series_of(whole))
     for file in (output, section):
         if file and not failure:
-            console.note(f"wrote {file}")
+            console.note(wrote(file))
     spectrum = None
     if lyapunov and not failure:
         spectrum = exponents_of(console, spec, run, solver, start, start.arguments | parameters)
@@ -142,7 +143,7 @@ def run_lattice(
         console.warn(warning)
     if plot:
         _draw(spec, run, whole, errors, spectrum, plot)
-        console.note(f"wrote {plot}")
+        console.note(wrote(plot))
     if failure:
         raise failure
 

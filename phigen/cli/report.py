@@ -10,6 +10,7 @@ import click
 
 from phigen.cli.arguments import expect_writable, one_spec, order_option, run_option, scheme_option
 from phigen.cli.console import Console, out_document, pass_console, verbosity
+from phigen.cli.existing import expect_replaceable, force_option, wrote
 from phigen.cli.experiment import prepared, run_of
 from phigen.cli.sources import load_one
 from phigen.errors import CheckError
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 @click.option("--lyapunov", is_flag=True, help="Also compute Lyapunov exponents of the run.")
 @click.option("--quick", is_flag=True, help="Use fewer steps and fewer repetitions.")
 @click.option("--panel", is_flag=True, help="Write the live panel alone, for an <iframe> in a page of yours.")
+@force_option
 @verbosity
 @pass_console
 def command(
@@ -62,6 +64,7 @@ def command(
     target = output if output and output != "-" else f"{spec.name}.html"
     if output != "-":
         expect_writable(Path(target), "--output")
+        expect_replaceable(Path(target), "--output")
     run = run_of(spec, name) if spec.runs or name or lyapunov else None
     if run is None:
         console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
@@ -98,12 +101,13 @@ def write_panel(spec: Spec, name: str | None, output: str | None, measuring: boo
     target = output if output and output != "-" else f"{spec.name}-panel.html"
     if output != "-":
         expect_writable(Path(target), "--output")
+        expect_replaceable(Path(target), "--output")
     html = panel_page(compile_proved(spec), run_of(spec, name))
     if output == "-":
         out_document(html)
         return
     write(Path(target), html)
-    console.note(f"wrote {target} ({len(html) // 1000} kB)")
+    console.note(f"{wrote(Path(target))} ({len(html) // 1000} kB)")
 
 
 def command_of(
@@ -126,4 +130,4 @@ def write_page(text: str, figures: bool, output: str | None, target: str, consol
         out_document(text)
         return
     write(Path(target), text)
-    console.note(f"wrote {target} ({len(text) // 1000} kB)")
+    console.note(f"{wrote(Path(target))} ({len(text) // 1000} kB)")

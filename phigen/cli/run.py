@@ -22,6 +22,7 @@ from phigen.cli.arguments import (
     target_option,
 )
 from phigen.cli.console import Console, out_json, pass_console, verbosity
+from phigen.cli.existing import force_option, wrote
 from phigen.cli.experiment import changed, loaded, prepared, with_seed
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.lattice_run import run_lattice
@@ -87,6 +88,7 @@ _TABLES = (".csv", ".npz")
     help="Compute Lyapunov exponents from the exact derivative of each step; for a lattice the largest.",
 )
 @click.option("--resume", is_flag=True, help="Continue an interrupted run that was writing the same files.")
+@force_option
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 @verbosity
 @pass_console
@@ -165,7 +167,7 @@ def command(
     failure, interrupted = record(recorder, console)
     for file in (output, section):
         if file:
-            console.note(f"wrote {file}" + (", as far as the run came" if failure or interrupted else ""))
+            console.note(f"{wrote(file)}" + (", as far as the run came" if failure or interrupted else ""))
     summaries, drawn = [recorder.watch.summary()], {recorder.label: recorder.trajectory(failure is not None)}
     comparable = not (failure or interrupted or extend)
     for method in experiment.run.compare if comparable else ():
@@ -180,7 +182,7 @@ def command(
         console.warn(warning)
     if plot:
         _draw(plot, recorder, drawn, compilation.system.casimirs, summaries[0])
-        console.note(f"wrote {plot}")
+        console.note(wrote(plot))
     if failure:
         raise failure
     if interrupted:

@@ -17,6 +17,7 @@ from phigen.cli.arguments import (
     target_option,
 )
 from phigen.cli.console import Console, out_json, pass_console, verbosity
+from phigen.cli.existing import force_option, wrote
 from phigen.cli.sources import load_one
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
 )
 @click.option("--show", "shown", metavar="VARIABLE", help="The variable to draw.  [default: the first of keep]")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+@force_option
 @verbosity
 @pass_console
 def command(
@@ -111,7 +113,7 @@ def command(
         from phigen.drawing.sweep_map import draw
 
         draw(setting.output, plot, shown)
-        console.note(f"wrote {plot}")
+        console.note(wrote(plot))
 
 
 def _sweep_of(spec: Spec, name: str | None) -> SweepSettings:

@@ -10,6 +10,7 @@ import click
 
 from phigen.cli.arguments import FIGURES, file_ending, one_spec, profile_option, run_option, settings_option
 from phigen.cli.console import Console, out_json, pass_console, verbosity
+from phigen.cli.existing import force_option, wrote
 from phigen.cli.experiment import loaded, prepared, run_of
 from phigen.cli.sources import load_one
 from phigen.cli.tune_summary import described, print_monitors, print_tuning, unreached
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw error against time: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print all measurements as JSON.")
+@force_option
 @verbosity
 @pass_console
 def command(
@@ -103,7 +105,7 @@ def command(
         from phigen.drawing import figures
 
         figures.save(figures.tuning_figure(tuning, f"{spec.name}, run {run.name}"), str(plot))
-        console.note(f"wrote {plot}")
+        console.note(wrote(plot))
     if not tuning.winner:
         raise CheckError(unreached(tuning))
 

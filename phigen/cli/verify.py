@@ -21,6 +21,7 @@ from phigen.cli.arguments import (
     scheme_option,
 )
 from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
+from phigen.cli.existing import force_option, wrote
 from phigen.cli.experiment import Experiment, expect_system, prepared
 from phigen.cli.failures import Collector
 from phigen.cli.resizing import resized, sizes_option
@@ -48,6 +49,7 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw the constancy of one modified Hamiltonian: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, one object for each spec.")
+@force_option
 @verbosity
 @pass_console
 def command(
@@ -111,7 +113,7 @@ def _draw(path: Path, compilation: Compilation, experiment: Experiment, console:
     except (NotOfferedError, StepError) as error:
         console.warn(f"{compilation.spec.name}: the modified Hamiltonian cannot be drawn: {error}")
         return
-    console.note(f"wrote {path}")
+    console.note(wrote(path))
 
 
 def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:

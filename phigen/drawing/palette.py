@@ -119,11 +119,11 @@ def styled(draw: Callable[P, T]) -> Callable[P, T]:
 
 @styled
 def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure to a file, PNG, SVG or PDF by its suffix; the bytes contain no date, name or random id."""
+    """Write a figure to a file, PNG, SVG or PDF by its suffix; the bytes name phigen, and have no date or random id."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise ValueError(f"cannot draw {str(path)!r}: the suffix must be one of {', '.join(SUFFIXES)}")
-    write(Path(path), _rendered(figure, suffix[1:]))
+    write(Path(path), _rendered(figure, suffix[1:], creator="phigen"))
 
 
 @styled
@@ -153,11 +153,11 @@ def svg(figure: Figure) -> str:
     return _rendered(figure, "svg", transparent=True).decode("utf-8")
 
 
-def _rendered(figure: Figure, kind: str, transparent: bool = False) -> bytes:
-    nothing = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None},
-               "pdf": {"CreationDate": None, "Creator": None, "Producer": None}}  # fmt: skip
+def _rendered(figure: Figure, kind: str, transparent: bool = False, creator: str | None = None) -> bytes:
+    metadata = {"png": {"Software": creator}, "svg": {"Date": None, "Creator": creator},
+                "pdf": {"CreationDate": None, "Creator": creator, "Producer": None}}  # fmt: skip
     buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, metadata=nothing[kind], transparent=transparent)
+    figure.savefig(buffer, format=kind, metadata=metadata[kind], transparent=transparent)
     return _shortened(buffer.getvalue()) if kind == "svg" else buffer.getvalue()
 
 

@@ -1,0 +1,59 @@
+"""Files that exist where a command writes: files written by phigen are replaced, others with ``--force`` only."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import click
+
+_FORCE, _REPLACED = "phigen.force", "phigen.replaced"
+
+
+def _keep(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
+    ctx.meta[_FORCE] = value
+
+
+#: The option that allows to replace files that phigen did not write. It is read before the options that name files.
+force_option = click.option(
+    "--force",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_keep,
+    help="Replace files that were not written by phigen.",
+)
+
+
+def expect_replaceable(path: Path, option: str | None = None) -> None:
+    """Raise `click.BadParameter` for a file that phigen did not write, unless ``--force`` was given."""
+    if not path.is_file() or path.stat().st_size == 0:
+        return
+    meta = click.get_current_context().meta
+    if not meta.get(_FORCE) and not _is_of_phigen(path):
+        message = f"{str(path)!r} exists, and phigen cannot see that it wrote it; --force replaces it"
+        raise click.BadParameter(message, param_hint=option)
+    meta.setdefault(_REPLACED, set()).add(path)
+
+
+def wrote(path: Path) -> str:
+    """Return the note on a file: that it was written, or replaced if it existed and the run does not continue it."""
+    ctx: Any = click.get_current_context()
+    continued = ctx.params.get("resume") or ctx.params.get("extend")
+    return f"{'replaced' if path in ctx.meta.get(_REPLACED, ()) and not continued else 'wrote'} {path}"
+
+
+def _is_of_phigen(path: Path) -> bool:
+    """Whether a file has the form of phigen's: tables begin with the time, figures and pages name phigen."""
+    match path.suffix.lower():
+        case ".csv":
+            with path.open("rb") as file:
+                return file.readline(1 << 16).strip().split(b",")[0] == b"t"
+        case ".npz":
+            if not zipfile.is_zipfile(path):
+                return False
+            with zipfile.ZipFile(path) as archive:
+                return "t.npy" in archive.namelist()
+        case _:
+            return b"phigen" in path.read_bytes()
