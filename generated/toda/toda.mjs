@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e2863b1b9197f3b60e30da73d4e02d9368838251020d0533eb90ec8aac2aea7a
+ * body-sha256: 3a890eb1779e49bb3628942743ebe5a01aa6a78cf9f6d9ac8d84d815b14c3b1b
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -188,17 +188,6 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 
 // ---- The solver ----
 
-/** The sum of values, compensated after A. Neumaier. */
-function sumOf(values) {
-  let sum = 0, rest = 0;
-  for (const value of values) {
-    const total = sum + value;
-    rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
-    sum = total;
-  }
-  return sum + rest;
-}
-
 /** The coefficients of all flows or stages of a step: a row for each time. */
 function prepareStep(params, h, rows) {
   TIMES.forEach((time, k) => prepareRow(params, time, h, rows[k], k));
@@ -358,6 +347,17 @@ function prepareRow(params, time, h, row) {
 }
 
 // ---- The sites ----
+
+/** The sum of values, compensated after A. Neumaier. */
+function sumOf(values) {
+  let sum = 0, rest = 0;
+  for (const value of values) {
+    const total = sum + value;
+    rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
+    sum = total;
+  }
+  return sum + rest;
+}
 
 /** The sites of a lattice: their parameters, and tables of the neighbours that kernels read. */
 class Sites {

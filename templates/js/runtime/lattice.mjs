@@ -9,22 +9,11 @@ import { takeDraws } from "./philox.mjs";
 import { expectFewSteps } from "./site_noise.mjs";
 import { renewRows } from "./rows_renewed.mjs";
 import { takeTime } from "./sites_timed.mjs";
-import { Sites } from "./sites.mjs";
+import { Sites, sumOf } from "./sites.mjs";
 import { beginLevel } from "./site_level.mjs";
 import { makeStep } from "./flows.mjs";
 
 // ---- The solver ----
-
-/** The sum of values, compensated after A. Neumaier. */
-function sumOf(values) {
-  let sum = 0, rest = 0;
-  for (const value of values) {
-    const total = sum + value;
-    rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
-    sum = total;
-  }
-  return sum + rest;
-}
 
 /** The coefficients of all flows or stages of a step: a row for each time. */
 function prepareStep(params, h, rows) {

@@ -1,19 +1,14 @@
 import { StepError } from "./errors.mjs";
 import { NEGATIVE, part1, part2 } from "./model.mjs";
+import { sumOf } from "./sites.mjs";
 
 // ---- Steps equal in tau: those of K = log(A + e) - log(-B), where H = A + B ----
 
-/** The sum of the densities that a function computes at sites, compensated after A. Neumaier. */
+/** The sum of the densities that a function computes at sites. */
 export function totalOf(density, params, sites, ...at) {
   const values = new Float64Array(sites.count);
   density(params, ...at, sites, values);
-  let sum = 0, rest = 0;
-  for (const value of values) {
-    const total = sum + value;
-    rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
-    sum = total;
-  }
-  return sum + rest;
+  return sumOf(values);
 }
 
 /** A part of H. */

@@ -11,6 +11,17 @@ import { BY_COLOUR } from "./model.mjs";
 
 // ---- The sites ----
 
+/** The sum of values, compensated after A. Neumaier. */
+export function sumOf(values) {
+  let sum = 0, rest = 0;
+  for (const value of values) {
+    const total = sum + value;
+    rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
+    sum = total;
+  }
+  return sum + rest;
+}
+
 /** The sites of a lattice: their parameters, and tables of the neighbours that kernels read. */
 export class Sites {
   /** Initialise from the options of a solver, with the sizes; throws StepError for values not allowed. */
