@@ -7,12 +7,26 @@ from typing import TYPE_CHECKING
 
 from phigen.certify.prove import StepProblem
 from phigen.errors import SpecError
+from phigen.symbolic.elliptic import ELLIPTIC
+from phigen.symbolic.expression import topological
 from phigen.symbolic.numeric import evaluate
+from phigen.symbolic.remainders import QUOTIENTS, REMAINDERS
+from phigen.symbolic.universal import ANOMALY
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
     from phigen.scheme.program import Program
     from phigen.spec.model import Spec
+
+#: Functions of exact flows, with the motions that they follow.
+_FLOWS = {
+    **dict.fromkeys(ELLIPTIC, "a free rigid body"),
+    **dict.fromkeys((*REMAINDERS, *QUOTIENTS), "linear equations with conserved coefficients"),
+    ANOMALY: "a Kepler motion",
+}
+
+#: Motions that a named composition splits further.
+_SPLIT = ("a free rigid body", "a Kepler motion")
 
 
 def problem_of(
@@ -48,12 +62,16 @@ def problem_of(
 
 
 def _expect_covered(program: Program, spec: Spec) -> None:
-    """Refuse noise and single precision."""
+    """Refuse noise, single precision, and flows by functions for which the checker has no enclosures."""
     refusals = list[tuple[tuple[str, ...], str, str]]()
     if program.noise:
         refusals.append((("noise",), "certificates do not cover noise", "a spec without it"))
     if program.single:
         refusals.append((("solver",), "certificates are of C in double precision", "leave out real: float"))
+    flows = {_FLOWS[e.op] for kernel in program.kernels for e in topological(kernel.roots) if e.op in _FLOWS}
+    for flow in sorted(flows):
+        hint = "scheme: series, or composition: suzuki, which splits it" if flow in _SPLIT else "scheme: series"
+        refusals.append((("scheme",), f"certificates do not cover the exact flow of {flow}", hint))
     if refusals:
         raise SpecError([spec.diagnostic(path, message, hint) for path, message, hint in refusals])
 

@@ -486,6 +486,13 @@ def test_functions_of_libm_beyond_their_polynomials_are_covered() -> None:
     assert all(e <= b for e, b in zip(observed(c, c, library(files), 40), c["bound"], strict=True))
 
 
+@pytest.mark.parametrize(("name", "motion"), [("rigid_body", "free rigid body"), ("kepler", "Kepler motion")])
+def test_exact_flows_without_enclosures_are_refused_by_name(name: str, motion: str) -> None:
+    spec = spec_of(name).overridden(scheme="splitting", order=4)
+    with pytest.raises(SpecError, match=f"do not cover the exact flow of a {motion}"):
+        problem_of_spec(spec)
+
+
 def test_steps_with_a_corrector_are_those_of_a_run_of_one() -> None:
     spec = loads(CORRECTED)
     stated, files = problem_of_spec(spec)
