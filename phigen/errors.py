@@ -69,6 +69,12 @@ def _excerpt(line: str, column: int, width: int = 100) -> tuple[str, int]:
     return ("…" + part, column - start + 1) if start else (part, column)
 
 
+def missing_attribute(owner: object, name: str) -> AttributeError:
+    """Return the error of an attribute that a system does not have; runs belong to solvers."""
+    hint = f"; solver = phigen.compile(system) has {name}" if name in ("run", "runs", "integrate") else ""
+    return AttributeError(f"{type(owner).__name__!r} object has no attribute {name!r}{hint}")
+
+
 class PhigenError(Exception):
     """Base class of all errors that the user can correct; any other exception is a bug of phigen."""
 

@@ -235,3 +235,10 @@ def test_bundled_specs_have_names_here_too(tmp_path, monkeypatch):
     (tmp_path / "rigid_body").write_text("phigen: 1\n")  # a file comes first
     with pytest.raises(phigen.SpecError):
         phigen.load("rigid_body")
+
+
+@pytest.mark.parametrize("name", ["pendulum", "dnls"])
+def test_a_system_says_that_runs_are_those_of_its_solver(name):
+    with pytest.raises(AttributeError, match=r"phigen\.compile\(system\) has runs"):
+        phigen.load(name).runs  # noqa: B018
+    assert not hasattr(phigen.load(name), "no_such_name")

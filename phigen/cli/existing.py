@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from phigen.runtime.origin import Origin
 
 _FORCE, _REPLACED = "phigen.force", "phigen.replaced"
 
@@ -22,7 +26,7 @@ force_option = click.option(
     is_eager=True,
     expose_value=False,
     callback=_keep,
-    help="Replace files that were not written by phigen.",
+    help="Replace files of other runs, and those that phigen did not write.",
 )
 
 
@@ -35,6 +39,30 @@ def expect_replaceable(path: Path, option: str | None = None) -> None:
         message = f"{str(path)!r} exists, and phigen cannot see that it wrote it; --force replaces it"
         raise click.BadParameter(message, param_hint=option)
     meta.setdefault(_REPLACED, set()).add(path)
+
+
+def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, continued: bool = False) -> None:
+    """Raise `click.BadParameter` for a file by option that another run wrote, unless ``--force`` was given.
+
+    A run that is ``continued`` in its file may find it without an origin.
+    """
+    from phigen.runtime.origin import companion, read_origin
+
+    force = click.get_current_context().meta.get(_FORCE) and not continued
+    for option, path in files.items():
+        if path is None or force or not path.exists() or not (path.is_dir() or path.is_file()):
+            continue
+        if path.with_name(f"{path.name}.checkpoint").exists() or (path.is_file() and path.stat().st_size == 0):
+            continue  # of an interrupted run
+        stored = read_origin(path)
+        hint = "" if continued else "; --force replaces it"
+        if stored is None and not continued:
+            if path.suffix.lower() == ".csv":
+                hint = f" (there is no {companion(path)} to it){hint}"
+            message = f"{str(path)!r} exists, and does not say which run of phigen wrote it{hint}"
+            raise click.BadParameter(message, param_hint=option)
+        if stored is not None and (difference := origin.difference(stored)):
+            raise click.BadParameter(f"{str(path)!r} holds {difference}{hint}", param_hint=option)
 
 
 def wrote(path: Path) -> str:

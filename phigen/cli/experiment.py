@@ -202,6 +202,19 @@ def with_seed(spec: Spec, run: Run, seed: int | None) -> Run:
     return replace(run, seed=seed)
 
 
+def with_stop(spec: Spec, run: Run, text: str | None) -> Run:
+    """The run with the expression of ``--stop``, by which it ends."""
+    from phigen.spec.stops import stop_of
+
+    if text is None:
+        return run
+    try:
+        return replace(run, stop=stop_of(spec, run.name, text, "--stop"))
+    except SpecError as error:
+        message = "\n".join(str(diagnostic).removeprefix("--stop:") for diagnostic in error.diagnostics)
+        raise click.BadParameter(message, param_hint="--stop") from None
+
+
 def expect_positive(spec: Spec, parameters: Mapping[str, Any]) -> None:
     """Refuse numbers beyond the bounds of parameters; arrays are checked elsewhere."""
     for p in spec.parameters:

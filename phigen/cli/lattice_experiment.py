@@ -33,9 +33,13 @@ _UNREADABLE = (OSError, ValueError, KeyError, EOFError, IndexError, zipfile.BadZ
 
 @dataclass(frozen=True)
 class LatticeExperiment(Experiment):
-    """An `Experiment` of a lattice: its ``start`` has the state, ``past`` is a `phigen.runtime.lattice_rows.Past`."""
+    """An `Experiment` of a lattice: its ``start`` has the state, ``past`` is a `phigen.runtime.lattice_rows.Past`.
+
+    ``origin`` is a text for its files.
+    """
 
     start: Start | None = None
+    origin: str = ""
 
     @property
     def begin(self) -> float:
@@ -72,7 +76,8 @@ class LatticeExperiment(Experiment):
         else:
             rows = timed(at.h, run.steps, self.spans, self.end)
         section, transforms = solver.section_of(run, at.values), solver.transforms_of(run)
-        return IntegrationPlan(at, rows, self.begin, section=section, transforms=transforms, past=self.past)
+        further: Any = {"section": section, "transforms": transforms, "past": self.past, "origin": self.origin}
+        return IntegrationPlan(at, rows, self.begin, **further)
 
 
 def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) -> tuple[Run, Start]:

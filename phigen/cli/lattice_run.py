@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from phigen.lattice.states import Start
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.runtime.lattice_series import LatticeSeries
+    from phigen.runtime.origin import Origin
     from phigen.spec.model import Run, Spec
     from phigen.study.lyapunov import Spectrum
 
@@ -46,6 +47,7 @@ def run_lattice(
     extend: bool = False,
     every: float | None = None,
     at: str | None = None,
+    origin: Origin,
 ) -> None:
     """Integrate a run, and print the errors of conserved quantities. Then raises `StepError` if the run did not
     reach its end.
@@ -60,6 +62,7 @@ def run_lattice(
     from phigen.cli.lattice_experiment import LatticeExperiment, extended, started_from
     from phigen.lattice.states import start_of
     from phigen.runtime.lattice_series import LatticeSeries, series_of
+    from phigen.runtime.origin import mark
     from phigen.study.averages import averages_of
     from phigen.study.lattice_errors import BALANCE, CHANGE, ENERGY, errors_of, units_of
 
@@ -77,7 +80,7 @@ def run_lattice(
     if source:
         run, start = started_from(run, start, source, solver)
     _expect_files(run, start, {"--output": output, "--section": section})
-    experiment = LatticeExperiment(run, (), start.arguments | parameters, start=start)
+    experiment = LatticeExperiment(run, (), start.arguments | parameters, start=start, origin=str(origin))
     if extend:
         if output is None or not output.exists():
             raise click.UsageError("--extend continues a finished run: name its file by --output")
@@ -89,6 +92,7 @@ def run_lattice(
     trajectory, series = (whole.ends, whole) if isinstance(whole, LatticeSeries) else (whole, series_of(whole))
     for file in (output, section):
         if file and not failure:
+            mark(file, origin)
             console.note(wrote(file))
     spectrum = None
     if lyapunov and not failure:
@@ -142,7 +146,7 @@ def run_lattice(
     if warning and not failure:
         console.warn(warning)
     if plot:
-        _draw(spec, run, whole, errors, spectrum, plot)
+        _draw(spec, run, whole, errors, spectrum, plot, str(origin))
         console.note(wrote(plot))
     if failure:
         raise failure
@@ -211,6 +215,7 @@ def _draw(
     errors: Mapping[str, Any],
     spectrum: Spectrum | None,
     plot: Path,
+    origin: str,
 ) -> None:
     """A film or a figure, by the suffix of the file."""
     from phigen.runtime.lattice_series import LatticeSeries
@@ -220,17 +225,17 @@ def _draw(
         from phigen.drawing.figures import save
         from phigen.drawing.lattice_figures import series_figure
 
-        save(series_figure(result, title), plot)
+        save(series_figure(result, title), plot, origin)
     elif plot.suffix.lower() in FILMS:
         from phigen.drawing.films import film
 
-        film(result, title, plot)
+        film(result, title, plot, origin)
     else:
         from phigen.drawing.figures import save
         from phigen.drawing.lattice_figures import lattice_figure
 
         names = run.lattice.names if run.lattice else ()
-        save(lattice_figure(result, errors, title, spectrum=spectrum, site_names=names), plot)
+        save(lattice_figure(result, errors, title, spectrum=spectrum, site_names=names), plot, origin)
 
 
 def exponents_of(

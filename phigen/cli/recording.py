@@ -25,6 +25,7 @@ from phigen.runtime.checkpoint import Checkpoint, MismatchError, objection
 from phigen.runtime.crossings import CrossingFinder, section_columns
 from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.march import Piece, march, march_at, standing
+from phigen.runtime.origin import origin_of
 from phigen.runtime.sections import function_of
 from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
@@ -70,6 +71,7 @@ class Recorder:
         listed = [name for column in columns_of(names) for name in column.names]
         self._columns = recorded_columns(names, run.record)
         self._places = [listed.index(name) for column in self._columns for name in column.names]
+        self.origin = origin_of(compilation.spec, run)
         self.growth = FrameGrowth(names.dimension, experiment.h) if lyapunov else None
         self.points = Thinned(1 + names.dimension, POINTS)
         self.finder = None
@@ -260,7 +262,7 @@ class Recorder:
             before = run.past.last(["tau"])[0] if self.solver.interface.monitored else run.past.t - run.t0
         steps, h = round(before / run.h) + self.steps, run.h
         parameters = {f"parameter_{name}": value for name, value in self.experiment.parameters.items()}
-        about = {"coordinates": names}
+        about = {"coordinates": names, "origin": np.array(str(self.origin))}
         scalars: dict[str, dict[str, Any]] = {
             "output": {**about, "steps": steps, "h": h, **parameters},
             "section": about,

@@ -22,8 +22,8 @@ from phigen.cli.arguments import (
     target_option,
 )
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.existing import force_option, wrote
-from phigen.cli.experiment import changed, loaded, prepared, with_seed
+from phigen.cli.existing import expect_same_origin, force_option, wrote
+from phigen.cli.experiment import changed, loaded, prepared, with_seed, with_stop
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.lattice_run import run_lattice
 from phigen.cli.resizing import resized, sizes_option
@@ -60,6 +60,7 @@ _TABLES = (".csv", ".npz")
     "--every", metavar="DT", type=float, help="Store states at intervals DT of time, instead of every stride-th step."
 )
 @click.option("--at", metavar="T,…", help="Store states at these times, or at the times listed in a file.")
+@click.option("--stop", metavar="EXPR", help="The run ends where EXPR passes through 0, as with stop: in the spec.")
 @click.option(
     "--seed", metavar="N", type=SEED, help="Seed of the random numbers of the noise; overrides that of the run."
 )
@@ -106,6 +107,7 @@ def command(
     until: float | None,
     every: float | None,
     at: str | None,
+    stop: str | None,
     seed: int | None,
     source: Path | None,
     extend: bool,
@@ -128,6 +130,7 @@ def command(
     from phigen.cli.energy_warning import summary_warning
     from phigen.cli.past import extended, past_of, started_from
     from phigen.cli.recording import Files, Recorder, compared, opened_recorder, record
+    from phigen.runtime.origin import mark, origin_of
 
     if plot:
         from phigen.drawing.palette import require_matplotlib
@@ -138,13 +141,16 @@ def command(
         {"--until": until, "--every": every, "--at": at, "--extend": extend},
         {"--steps": steps, "--from": source, "--section": section, "--lyapunov": lyapunov},
     )
-    chosen = with_seed(spec, changed(spec, name, step, steps, until), seed)
+    chosen = with_stop(spec, with_seed(spec, changed(spec, name, step, steps, until), seed), stop)
+    origin = origin_of(spec, chosen)
+    expect_same_origin({"--output": output, "--section": section}, origin, continued=resume or extend)
+    expect_same_origin({"--plot": plot}, origin)
     if section and chosen.section is None:
         raise click.BadParameter(f"the run {chosen.name} of the spec has no section", param_hint="--section")
     if spec.lattice:
         method: Any = {"target": target, "order": order, "scheme": scheme, "profile": profile, "lyapunov": lyapunov}
         written: Any = {"output": output, "section": section, "plot": plot, "resume": resume, "as_json": as_json}
-        rows: Any = {"source": source, "extend": extend, "every": every, "at": at}
+        rows: Any = {"source": source, "extend": extend, "every": every, "at": at, "origin": origin}
         run_lattice(console, spec, chosen, settings=settings, **method, **written, **rows)
         return
     if output and output.suffix.lower() == ".zarr":
@@ -167,6 +173,7 @@ def command(
     failure, interrupted = record(recorder, console)
     for file in (output, section):
         if file:
+            mark(file, origin)
             console.note(f"{wrote(file)}" + (", as far as the run came" if failure or interrupted else ""))
     summaries, drawn = [recorder.watch.summary()], {recorder.label: recorder.trajectory(failure is not None)}
     comparable = not (failure or interrupted or extend)
@@ -213,4 +220,4 @@ def _draw(path: Path, recorder: Recorder, drawn: dict[str, Trajectory], casimirs
     sections = {f"{recorder.section_text} = 0": recorder.points.rows[:, 1:]} if recorder.finder else {}
     title = f"{recorder.solver.interface.name}, {recorder.experiment.run.name}"
     figure = figures.run_figure(drawn, casimirs, sections, title, recorder.spectrum, summary.units)
-    figures.save(figure, path)
+    figures.save(figure, path, str(recorder.origin))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from phigen.cli.recording import Recorder
     from phigen.compilation import Compilation
     from phigen.spec.model import Run
-    from phigen.study.averages import Averages
+    from phigen.study.averages import Average, Averages
     from phigen.study.lyapunov import Spectrum
     from phigen.study.summary import Drift, Summary
 
@@ -23,7 +23,7 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
 
     run, solver = recorder.experiment.run, recorder.solver
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
-    chosen = f"{compilation.method}, target {solver.target}"
+    chosen = f"{compilation.method}, target {solver.target}, 1 thread"
     times = f"{recorder.experiment.t0:.9g} … {recorder.time:.9g}"
     past = " beyond what there was" if recorder.experiment.past else ""
     out(f"  {told_steps(recorder)}{past}, t = {times}; {chosen}")
@@ -100,14 +100,22 @@ def print_averages(names: Sequence[str], averages: Averages, of: Sequence[str] =
         return
     first, last = averages.times
     out(f"\n  observables, means over {counted(averages.count, 'row')} from t = {first:.9g} to {last:.9g}")
+    shown = {n: a for n, a in zip(names, averages.results(), strict=True) if n in (of or names)}
     header = ["", "mean", "standard error", "least", "largest", "correlation time"]
     rows = [
-        [name, f"{a.mean:.6g}", f"{a.error:.1g}", f"{a.least:.6g}", f"{a.largest:.6g}", f"{a.correlation_time:.2g}"]
-        for name, a in zip(names, averages.results(), strict=True)
-        if name in (of or names)
+        [name, f"{a.mean:.6g}", f"{a.error:.1g}", f"{a.least:.6g}", f"{a.largest:.6g}", _time_shown(a)]
+        for name, a in shown.items()
     ]
     for line in table([header, *rows], right=range(1, 6)):
         out(f"  {line}")
+    if short := [name for name, a in shown.items() if not a.resolved and math.isfinite(a.error)]:
+        longer = "blocks of rows are not much longer than their correlation time; average over a longer time"
+        out(f"  The standard errors of {', '.join(short)} are too small: {longer}.")
+
+
+def _time_shown(average: Average) -> str:
+    """``0.12``, or ``> 0.12`` for an estimate that is too small."""
+    return "> " * (not average.resolved and math.isfinite(average.error)) + f"{average.correlation_time:.2g}"
 
 
 def _print_means(recorder: Recorder) -> None:
@@ -135,6 +143,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "birealisation": compilation.birealisation,
         **compilation.described,
         "profile": compilation.program.profile,
+        "threads": 1,
         "exact": compilation.exact,
         "step": experiment.h,
         "steps": recorder.steps,

@@ -19,13 +19,17 @@ MOST_PICTURES, RATE, DOTS = 400, 20, 80
 
 
 @styled
-def film(run: LatticeTrajectory, title: str, path: Path) -> None:
-    """Write a film of the coordinates, ``.gif`` or ``.mp4``. Raises `MissingPackageError` if ffmpeg is missing."""
+def film(run: LatticeTrajectory, title: str, path: Path, origin: str = "") -> None:
+    """Write a film of the coordinates, ``.gif`` or ``.mp4``, with the text ``origin`` as a comment.
+
+    Raises `MissingPackageError` if ffmpeg is missing.
+    """
     from matplotlib.animation import FFMpegWriter, PillowWriter
     from matplotlib.figure import Figure
 
     expect_writer(path)
-    writer: Any = PillowWriter(fps=RATE) if path.suffix.lower() == ".gif" else FFMpegWriter(fps=RATE)
+    is_gif = path.suffix.lower() == ".gif"
+    writer: Any = PillowWriter(fps=RATE) if is_gif else FFMpegWriter(fps=RATE, metadata={"comment": origin})
     names = run.coordinates[:MOST_PANELS]
     figure = Figure(figsize=(3.0 * len(names), 3.0), layout="constrained")
     panels = np.atleast_1d(figure.subplots(1, len(names)))
@@ -41,6 +45,8 @@ def film(run: LatticeTrajectory, title: str, path: Path) -> None:
                 for change, name in zip(shown, names, strict=True):
                     change(_flat(run.column(name)[k]))
                 writer.grab_frame()
+        if is_gif:
+            part.write_bytes(_commented(part.read_bytes(), origin.encode()))
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
@@ -52,6 +58,13 @@ def expect_writer(path: Path) -> None:
 
     if path.suffix.lower() != ".gif" and not FFMpegWriter.isAvailable():
         raise MissingPackageError(f"{path.name} needs ffmpeg, which was not found; a .gif film does not")
+
+
+def _commented(gif: bytes, comment: bytes) -> bytes:
+    """Return a GIF with a comment extension of up to 255 bytes before its trailer, the last byte."""
+    if not 0 < len(comment) < 256:
+        return gif
+    return gif[:-1] + b"\x21\xfe" + bytes([len(comment)]) + comment + b"\x00" + gif[-1:]
 
 
 def _flat(values: Floats) -> Floats:

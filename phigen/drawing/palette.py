@@ -118,12 +118,15 @@ def styled(draw: Callable[P, T]) -> Callable[P, T]:
 
 
 @styled
-def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure to a file, PNG, SVG or PDF by its suffix; the bytes name phigen, and have no date or random id."""
+def save(figure: Figure, path: str | Path, origin: str = "") -> None:
+    """Write a figure to a file, PNG, SVG or PDF by its suffix; the bytes name phigen, and have no date or random id.
+
+    The text ``origin`` goes into its metadata.
+    """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise ValueError(f"cannot draw {str(path)!r}: the suffix must be one of {', '.join(SUFFIXES)}")
-    write(Path(path), _rendered(figure, suffix[1:], creator="phigen"))
+    write(Path(path), _rendered(figure, suffix[1:], creator="phigen", origin=origin or None))
 
 
 @styled
@@ -153,9 +156,12 @@ def svg(figure: Figure) -> str:
     return _rendered(figure, "svg", transparent=True).decode("utf-8")
 
 
-def _rendered(figure: Figure, kind: str, transparent: bool = False, creator: str | None = None) -> bytes:
-    metadata = {"png": {"Software": creator}, "svg": {"Date": None, "Creator": creator},
-                "pdf": {"CreationDate": None, "Creator": creator, "Producer": None}}  # fmt: skip
+def _rendered(
+    figure: Figure, kind: str, transparent: bool = False, creator: str | None = None, origin: str | None = None
+) -> bytes:
+    metadata = {"png": {"Software": creator} | ({"Description": origin} if origin else {}),
+                "svg": {"Date": None, "Creator": creator, "Description": origin},
+                "pdf": {"CreationDate": None, "Creator": creator, "Producer": None, "Subject": origin}}  # fmt: skip
     buffer = io.BytesIO()
     figure.savefig(buffer, format=kind, metadata=metadata[kind], transparent=transparent)
     return _shortened(buffer.getvalue()) if kind == "svg" else buffer.getvalue()

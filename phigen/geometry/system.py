@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, cast
 
 from phigen.display import display
-from phigen.errors import Diagnostic, Location, SpecError
+from phigen.errors import Diagnostic, Location, SpecError, missing_attribute
 from phigen.geometry.casimirs import found_casimirs
 from phigen.geometry.forces import Forces, forces_of
 from phigen.geometry.forms import structure
@@ -55,6 +55,12 @@ class System:
     notes: tuple[str, ...] = ()
     locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
     spec: Spec | None = field(default=None, repr=False, compare=False)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Raise an `AttributeError` that says where runs are."""
+            raise missing_attribute(self, name)
 
     def __repr__(self) -> str:
         shown = text(self.hamiltonian)

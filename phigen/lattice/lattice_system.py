@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import cast
+from typing import TYPE_CHECKING, Any, cast
 
 from phigen.display import display
+from phigen.errors import missing_attribute
 from phigen.lattice.cell import Cell
 from phigen.lattice.cell_building import cell_from_spec
 from phigen.spec.model import Spec
@@ -20,6 +21,12 @@ class LatticeSystem:
 
     spec: Spec = field(repr=False)
     cell: Cell
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Raise an `AttributeError` that says where runs are."""
+            raise missing_attribute(self, name)
 
     def __repr__(self) -> str:
         relation = f"on axes {', '.join(self.axes)}" if self.axes else f"related by {self.cell.relation}"

@@ -188,7 +188,7 @@ class LatticeTrajectory:
     is crossed, ``retried`` the steps that were made in parts. With a monitor, ``h`` is a step in τ, and ``tau``
     (frames,) has the values of τ; it is None without one, and where the run continues another. ``joined`` tells whether
     the run continues another. ``structure_factor`` and ``correlated`` are the results of ``spectrum`` and
-    ``correlation`` of a run.
+    ``correlation`` of a run, ``origin`` a text for its files.
     """
 
     t: Floats
@@ -207,6 +207,7 @@ class LatticeTrajectory:
     joined: bool = False
     structure_factor: DynamicSpectrum | None = field(default=None, repr=False)
     correlated: Correlation | None = field(default=None, repr=False)
+    origin: str = field(default="", repr=False)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -345,6 +346,7 @@ class LatticeTrajectory:
 
     def _further(self) -> dict[str, Any]:
         about = {"t": self.t, "energy": self.energy, "steps": self.steps, "h": self.h}
+        about |= {"origin": np.array(self.origin)} if self.origin else {}
         about |= {} if self.tau is None else {"tau": self.tau}
         about |= {f"observable_{name}": values for name, values in self.observables.items()}
         about |= {name: values for name, (_, values) in self.transforms().items()}
@@ -467,7 +469,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             crossed = np.array(run.crossed)
             crossings = self._trajectory(crossed, grown.whole(shape), met, steps, plan) if plan.section else None
             retried, joined = tuple(run.course.retried), plan.past is not None
-            trajectory = self._trajectory(t, x, rows, steps, plan)
+            crossings = crossings and replace(crossings, origin=plan.origin)
+            trajectory = replace(self._trajectory(t, x, rows, steps, plan), origin=plan.origin)
             return replace(trajectory, crossings=crossings, retried=retried, tau=run.tau, joined=joined)
 
         try:
@@ -643,7 +646,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
         def made(steps: int, last: Floats) -> LatticeSeries:
             at, first = plan.at, plan.at.x if plan.past is None else plan.past.first
-            series = LatticeSeries(run.times, rows.columns, first, last, steps, at.h, at.values, self)
+            settings = steps, at.h, at.values
+            series = LatticeSeries(run.times, rows.columns, first, last, *settings, self, origin=plan.origin)
             crossings = replace(series, t=np.array(run.crossed), columns=met.columns) if plan.section else None
             return replace(series, crossings=crossings)
 

@@ -258,6 +258,8 @@ def _write_store(path: Path, trajectory: LatticeTrajectory) -> None:
         else:
             root.attrs[str(name)] = values.tolist()
     root.attrs.update({str(name): value for name, value in data.attrs.items()})
+    if trajectory.origin:
+        root.attrs["origin"] = trajectory.origin
     if path.exists():
         shutil.rmtree(path)
     part.rename(path)

@@ -113,7 +113,7 @@ class IntegrationPlan:
     """An integration: its start, its rows, and the number of halvings allowed for a failing step.
 
     ``begin`` is the time of its start, also where `Beginning` has no time because H does not depend on it.
-    ``transforms`` are the spectra and correlations computed from its frames.
+    ``transforms`` are the spectra and correlations computed from its frames, ``origin`` the text that files say it by.
     """
 
     at: Beginning
@@ -123,6 +123,7 @@ class IntegrationPlan:
     section: Crossed | None = None
     transforms: Transforms | None = None
     past: Past | None = field(default=None, compare=False)
+    origin: str = ""
 
     @property
     def times(self) -> Floats:

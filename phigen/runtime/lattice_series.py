@@ -27,7 +27,7 @@ class LatticeSeries:
 
     ``first`` and ``last`` are the states (coordinates, *sizes) at the start and at the end, after ``steps`` steps of
     size ``h`` and possibly a part of a step. ``crossings`` are the same numbers at the zeros of the section of a
-    run.
+    run. ``origin`` is a text for its files.
     """
 
     t: Floats
@@ -39,6 +39,7 @@ class LatticeSeries:
     parameters: Mapping[str, Any]
     solver: LatticeSolver = field(repr=False)
     crossings: LatticeSeries | None = field(default=None, repr=False)
+    origin: str = field(default="", repr=False)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -69,6 +70,7 @@ class LatticeSeries:
         columns += [Column(key_of(name, about), (name,), flat=True) for name in self.columns]
         scalars = {"first": self.first, "last": self.last}
         scalars |= {"coordinates": np.array(about.coordinates), "axes": np.array(about.axes)}
+        scalars |= {"origin": np.array(self.origin)} if self.origin else {}
         scalars |= {"steps": np.array(self.steps), "h": np.array(self.h)}
         scalars |= {f"parameter_{name}": np.asarray(value) for name, value in self.parameters.items()}
         write(path, columns, np.column_stack([self.t, *self.columns.values()]), scalars)

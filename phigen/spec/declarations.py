@@ -198,6 +198,9 @@ class Declarations:
             return None
 
         def report(message: str, index: int, hint: str = "", *, limit: bool = False) -> None:
+            line = self.reader.problems.lines[node.location.line - 1 : node.location.line]
+            if "never closed" in message and node.plain and any("{" in text[: node.location.column] for text in line):
+                hint = hint or "inside { } a comma ends an expression: write an expression with commas between quotes"
             self.reader.problems.add(message, node.at(index), hint, limit=limit)
 
         if node.plain and re.fullmatch(r"[-+]?\.(inf|Inf|INF|nan|NaN|NAN)", node.text):

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -75,13 +75,22 @@ _ABSENT_IN_RUNS = {
 }
 
 
-def scope_of_states(declared: Declarations, observables: Mapping[str, Expression]) -> AllowedNames:
+def watched_names(
+    declared: Declarations, observables: Mapping[str, Expression], numbers: Collection[str]
+) -> AllowedNames:
+    """The names that sections and stops of runs may use; ``numbers`` are the observables that are one number each."""
+    if declared.lattice is None:
+        return _scope_of_states(declared, observables)
+    return _scope_of_numbers(declared, numbers, [name for name in observables if name not in numbers])
+
+
+def _scope_of_states(declared: Declarations, observables: Mapping[str, Expression]) -> AllowedNames:
     """The names of functions of a state of an ordinary system, with its observables: for sections and stops of runs."""
     scope = declared.dated_scope()
     return replace(scope, names={**observables, **scope.names})
 
 
-def scope_of_numbers(declared: Declarations, observables: Iterable[str], fields: Iterable[str]) -> AllowedNames:
+def _scope_of_numbers(declared: Declarations, observables: Iterable[str], fields: Iterable[str]) -> AllowedNames:
     """The names of numbers of a whole lattice: for sections and stops of runs.
 
     They are ``observables`` that are reduced to one number, parameters with one value, and the time. ``fields`` are

@@ -79,13 +79,13 @@ def run(
         start=start,
         exact=_exact(raw.get("exact", {}), declared),
         compare=without_repetition(raw.get("compare", ()), ("runs", name, "compare"), declared),
-        section=_crossed(name, "section", raw, declared, watched),
+        section=crossed(name, "section", raw, declared, watched),
         direction=raw.get("direction") or "rising",
         duration=duration,
         until=until,
         every=every,
         at=listed,
-        stop=_crossed(name, "stop", raw, declared, replace(watched, piecewise=True)),
+        stop=crossed(name, "stop", raw, declared, replace(watched, piecewise=True)),
         average=_average(name, raw.get("average"), declared, averaged),
         record=_recorded(name, raw.get("record"), declared, recordable),
         box=_box(raw.get("box", {}), declared),
@@ -187,7 +187,7 @@ def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
         declared.reader.problems.add(message, place, "the average is over the rows from that time on")
 
 
-def _crossed(
+def crossed(
     name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: AllowedNames
 ) -> Expression | None:
     """An expression whose zeros are looked for along the run, so that it has to change."""

@@ -14,7 +14,7 @@ from phigen.spec.fields import SPEC
 from phigen.spec.grammar import AllowedNames
 from phigen.spec.kinds import Reader
 from phigen.spec.lattice_sections import casimirs as read_casimirs
-from phigen.spec.lattice_sections import densities, scope_of_numbers, scope_of_states, with_kinds
+from phigen.spec.lattice_sections import densities, watched_names, with_kinds
 from phigen.spec.model import (
     DEFAULT_ORDER,
     NOISY_ORDER,
@@ -84,8 +84,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     # An observable with an error of its own is none of a run that records it.
     broken = [name for name in raw.get("observables", {}) if name not in observed]
     columns |= dict.fromkeys(["state", "energy", *summed, *numbers, *broken], "")
-    fields = [name for name in observed if name not in numbers]
-    watched = scope_of_states(declared, observed) if lattice is None else scope_of_numbers(declared, numbers, fields)
+    watched = watched_names(declared, observed, numbers)
     averaged = [*numbers, *broken]
     listed_runs = {n: r for n, (_, r) in raw.get("runs", {}).items() if r is not None}
     runs = {n: run(n, r, declared, columns, watched, averaged) for n, r in listed_runs.items()}

@@ -19,6 +19,9 @@ from phigen.spec.model import Run
 #: Default number of blocks for the standard error. With 20 blocks, the standard error itself has a
 #: relative standard deviation of 1/sqrt(2·19) = 0.16.
 BLOCKS = 20
+#: Least length of blocks in correlation times τ. The variance of means of blocks of length L is estimated too small by
+#: the factor 1 − τ/L, which is 10 % here.
+LEAST_LENGTH = 10.0
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,8 @@ class Average:
     """Statistics of one observable over the rows of a run.
 
     ``error`` is the standard error of the mean, NaN with fewer than two blocks. ``correlation_time`` is the integrated
-    autocorrelation time in the time unit of the run. Both are estimated from blocks.
+    autocorrelation time in the time unit of the run. Both are estimated from blocks, and are ``resolved`` if blocks are
+    much longer than that time; else they are too small.
     """
 
     mean: float
@@ -35,6 +39,7 @@ class Average:
     least: float
     largest: float
     correlation_time: float
+    resolved: bool = False
 
 
 class Averages:
@@ -117,10 +122,11 @@ class Averages:
         """Return the statistics of each observable; NaN where there are too few rows."""
         state, n = self.state, self.count
         if not n:
-            return [Average(*[math.nan] * 6) for _ in state["mean"]]
+            return [Average(*(math.nan,) * 6) for _ in state["mean"]]
         variance = state["squares"] / (n - 1) if n > 1 else np.full_like(state["mean"], math.nan)
         blocks, size = len(state["sums"]), int(state["size"])
         error = time = np.full_like(state["mean"], math.nan)
+        resolved = np.full(time.shape, False)
         if blocks > 1:
             of_blocks = (state["sums"] / size).var(axis=0, ddof=1)
             error = np.sqrt(of_blocks / blocks)
@@ -128,8 +134,10 @@ class Averages:
             apart = abs(last - first) / max(1, n - 1)
             with np.errstate(all="ignore"):
                 time = np.where(variance > 0, 0.5 * apart * size * of_blocks / variance, 0.0)
+            resolved = LEAST_LENGTH * time <= apart * size
         columns = (state["mean"], error, variance, state["least"], state["largest"], time)
-        return [Average(*map(float, values)) for values in zip(*columns, strict=True)]
+        rows = zip(*(column.tolist() for column in columns), resolved.tolist(), strict=True)
+        return [Average(*row) for row in rows]
 
 
 def averages_of(run: Run, width: int) -> Averages:

@@ -168,7 +168,7 @@ def test_a_run_starts_where_another_ended(phigen, write):
 def test_times_beyond_a_stop_are_left_out_and_a_long_time_between_rows_leaves_both_ends(phigen, swing):
     ran(phigen, swing, "--run", "stopped", "--at", "0.5,7", "-o", "a.csv")
     assert table("a.csv")[:, 0] == pytest.approx([0, 0.5, np.pi / 3], abs=1e-11)
-    ran(phigen, swing, "--run", "steps", "--every", 9, "-o", "a.csv")
+    ran(phigen, swing, "--run", "steps", "--every", 9, "-o", "a.csv", "--force")
     assert table("a.csv")[:, 0] == pytest.approx([0, 6], abs=1e-14)
 
 
@@ -471,3 +471,32 @@ def test_the_command_and_python_have_the_same_rows(text, run, until, phigen, tmp
     assert len(stored["t"]) == len(trajectory.t)
     np.testing.assert_allclose(stored["t"], trajectory.t, rtol=1e-13)
     np.testing.assert_allclose(stored["x"], trajectory.x, rtol=0, atol=1e-12)
+
+
+CHAIN = """phigen: 1
+name: chain
+lattice: {axes: [i]}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + q**2/2
+observables: {M: {mean: q}}
+runs: {r: {sizes: [4], initial: {q: 1, p: 0}, step: 0.1, steps: 100}}
+"""
+
+
+@pytest.mark.parametrize(("text", "run", "name"), [(SWING, "steps", "q"), (CHAIN, "r", "M")])
+def test_a_stop_of_the_command_line_is_that_of_the_spec(phigen, write, text, run, name):
+    command = ("run", write("a.yaml", text), "--run", run, "-t", "numpy")
+    done = phigen(*command, "--steps", 100, "--stop", f"max({name}, -1) - 1/2", "--json")
+    assert json.loads(done.stdout)["time"] == pytest.approx(np.pi / 3, abs=1e-5)  # order 4 of the chain
+    assert "stop: is not met" in phigen(*command, "--stop", f"{name} - 2").stderr
+    for wrong, words in (("1/2", "depends neither"), (f"{name} -", "ends too early"), (f"{name}s", "did you mean")):
+        refused = phigen(*command, "--stop", wrong)
+        assert refused.exit_code == 2
+        assert words in refused.stderr
+
+
+def test_a_stop_with_noise_is_refused_on_the_command_line(phigen, in_tmp):
+    refused = phigen("run", "thermal_chain", "--stop", "x1")
+    assert refused.exit_code == 2
+    assert "not available with noise" in refused.stderr

@@ -10,7 +10,10 @@ lattice: {axes: [i]}
 coordinates: [q, p]
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: p**2/2 + q**2/2 + (q[i+1] - q)**2/2
-runs: {r: {sizes: [8], initial: {q: sin(i), p: 0}, step: 0.1, steps: 5}}
+observables: {M: {mean: q}}
+runs:
+  r: {sizes: [8], initial: {q: sin(i), p: 0}, step: 0.1, steps: 5}
+  s: {sizes: [8], initial: {q: 1, p: 0}, step: 0.1, steps: 5, record: [M], stop: M - 2}
 """
 MINE = b"my thesis, chapter 1\n"
 
@@ -53,3 +56,56 @@ def test_pages_of_others_are_replaced_by_force_only(phigen, in_tmp):
     (in_tmp / "page.html").write_bytes(MINE)
     assert phigen("report", "pendulum", "--panel", "-o", "page.html").exit_code == 2
     assert "replaced page.html" in phigen("report", "pendulum", "--panel", "-o", "page.html", "--force").stderr
+
+
+OSCILLATOR = """phigen: 1
+name: swing
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + q**2/2
+runs:
+  r: {initial: [1, 0], step: 0.1, steps: 5, section: p}
+  s: {initial: [1, 0], step: 0.1, steps: 5, section: q}
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "option", "file"),
+    [(OSCILLATOR, "-o", "a.csv"), (OSCILLATOR, "--section", "a.npz"), (OSCILLATOR, "--plot", "a.pdf"),
+     (LATTICE, "-o", "a.csv"), (LATTICE, "-o", "a.npz"), (LATTICE, "-o", "a.zarr"), (LATTICE, "--plot", "a.gif"),
+     (LATTICE, "--plot", "a.svg")],
+)  # fmt: skip
+def test_files_of_another_run_or_spec_are_replaced_by_force_only(phigen, write, text, option, file):
+    spec = write("spec.yaml", text)
+    other = write("other.yaml", text.replace("q**2/2", "q**2"))
+    assert phigen("run", spec, option, file).exit_code == 0
+    assert phigen("run", spec, option, file, "--steps", 7).exit_code == 0
+    for arguments, words in (((spec, "--run", "s"), "not the run s"), ((other,), "another spec")):
+        refused = phigen("run", *arguments, option, file)
+        assert refused.exit_code == 2
+        assert "holds the run r of" in refused.stderr
+        assert words in refused.stderr
+        assert "--force" in refused.stderr
+    assert phigen("run", other, option, file, "--force").exit_code == 0
+    assert phigen("run", other, option, file).exit_code == 0
+
+
+def test_a_table_without_its_companion_or_of_other_columns_is_not_known(phigen, write, in_tmp):
+    spec = write("spec.yaml", OSCILLATOR)
+    phigen("run", spec, "-o", "a.csv")
+    table = (in_tmp / "a.csv").read_text()
+    assert table.startswith("t,q,p,energy\n")  # readers find the columns in the first line
+    (in_tmp / "a.csv").write_text("t,temperature\n0,21.5\n")
+    assert phigen("run", spec, "-o", "a.csv").exit_code == 2
+    (in_tmp / "a.csv").write_text(table)
+    assert phigen("run", spec, "-o", "a.csv").exit_code == 0
+    (in_tmp / "a.csv-metadata.json").unlink()
+    assert "does not say which run" in phigen("run", spec, "-o", "a.csv").stderr
+
+
+def test_the_file_of_another_run_is_not_continued(phigen, write, in_tmp):
+    spec = write("spec.yaml", OSCILLATOR)
+    phigen("run", spec, "-o", "a.csv")
+    before = (in_tmp / "a.csv").read_text()
+    assert phigen("run", spec, "--run", "s", "-o", "a.csv", "--extend", "--steps", 5, "--force").exit_code == 2
+    assert (in_tmp / "a.csv").read_text() == before

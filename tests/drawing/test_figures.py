@@ -214,7 +214,7 @@ def test_observables_of_a_run_are_drawn_against_the_time_however_long_it_is(tmp_
     monkeypatch.setattr("phigen.study.sketch.ROWS", 50)
     Path("swing.yaml").write_text(SWING, encoding="utf-8")
     drawn = []
-    monkeypatch.setattr("phigen.drawing.figures.save", lambda figure, path: drawn.append(figure))
+    monkeypatch.setattr("phigen.drawing.figures.save", lambda figure, path, origin: drawn.append(figure))
     for more in ([], ["--extend", "--steps", "50"]):
         result = CliRunner().invoke(
             group, ["run", "swing.yaml", "-t", "numpy", "-o", "a.csv", "--plot", "a.svg", *more]

@@ -94,3 +94,16 @@ def test_averages_from_a_time_after_the_end_are_refused(end, message):
     with pytest.raises(phigen.SpecError, match=f"after: 3 is not before the end of the run, {message}"):
         phigen.spec.loads(text.replace("AFTER", "3"))
     assert float(phigen.spec.loads(text.replace("AFTER", "1.5")).runs["r"].average.after) == 1.5
+
+
+@pytest.mark.parametrize(("a", "resolved"), [(0.0, True), (0.9, True), (0.999, False)])
+def test_blocks_tell_whether_they_are_longer_than_the_correlation_time(a, resolved):
+    """The integrated correlation times are 0.5, 9.5 and 1000 rows, the blocks 128."""
+    (average,) = averages(autoregressive(np.random.default_rng(5), 4000, a)).results()
+    assert average.resolved is resolved
+
+
+@pytest.mark.parametrize("count", [12, 39, 1000])
+def test_an_observable_slower_than_the_run_is_not_resolved(count):
+    (average,) = averages(np.cos(np.linspace(0, 1, count))).results()
+    assert not average.resolved

@@ -1,0 +1,101 @@
+"""Origins of files: which run of which spec wrote a table, a store, a figure or a film.
+
+An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``. It is an array ``origin`` of a ``.npz``, an
+attribute of a Zarr store, and in the metadata of figures and films. A ``.csv`` has no place for it that all readers
+skip, so it is in the companion ``FILE-metadata.json``, where the W3C recommendation "Metadata Vocabulary for Tabular
+Data" has the metadata of a table.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote, unquote
+
+import numpy as np
+
+from phigen.spec.identity import digest
+from phigen.spec.model import Run, Spec
+from phigen.writing import write
+
+_FORM = re.compile(rb"phigen origin: (\S+) (\S+) ([0-9a-f]{16})(?![0-9a-f])")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A run of a spec, with a `phigen.spec.identity.digest` of the equations and observables of the spec."""
+
+    spec: str
+    run: str
+    digest: str
+
+    def __str__(self) -> str:
+        return f"phigen origin: {quote(self.spec)} {quote(self.run)} {self.digest}"
+
+    def difference(self, other: Origin) -> str:
+        """Return how another origin differs, as the end of the sentence "the file holds …"; "" if it does not."""
+        if (self.spec, self.run) != (other.spec, other.run):
+            return f"the run {other.run} of {other.spec}, not the run {self.run} of {self.spec}"
+        if self.digest != other.digest:
+            return f"the run {other.run} of another spec {other.spec}, with other equations, Casimirs or observables"
+        return ""
+
+
+def origin_of(spec: Spec, run: Run) -> Origin:
+    """Return the origin of the files of a run."""
+    return Origin(spec.name, run.name, digest(spec))
+
+
+def companion(path: Path) -> Path:
+    """Return the file with the metadata of a ``.csv``."""
+    return path.with_name(f"{path.name}-metadata.json")
+
+
+def mark(path: Path, origin: Origin) -> None:
+    """Write the companion of a ``.csv``; other files hold their origin."""
+    if path.suffix.lower() != ".csv":
+        return
+    columns = [{"titles": title, "datatype": "double"} for title in _header(path)]
+    table = {"url": path.name, "dc:source": str(origin), "tableSchema": {"columns": columns}}
+    text = json.dumps({"@context": "http://www.w3.org/ns/csvw", **table}, indent=1)
+    write(companion(path), text + "\n")
+
+
+def read_origin(path: Path) -> Origin | None:
+    """Return the origin of a file, or None if it does not say it."""
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        return _within((path / ".zattrs").read_bytes()) if (path / ".zattrs").is_file() else None
+    if suffix == ".csv":
+        return _of_table(path)
+    if suffix != ".npz":
+        return _within(path.read_bytes())
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return _within(str(stored["origin"]).encode())
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def _of_table(path: Path) -> Origin | None:
+    """Return the origin in the companion of a ``.csv``, if that describes a table with these columns."""
+    try:
+        described = json.loads(companion(path).read_text(encoding="utf-8"))
+        titles = [column["titles"] for column in described["tableSchema"]["columns"]]
+        source = described["dc:source"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return _within(str(source).encode()) if titles == _header(path) else None
+
+
+def _header(path: Path) -> list[str]:
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return file.readline().rstrip("\r\n").split(",")
+
+
+def _within(data: bytes) -> Origin | None:
+    match = _FORM.search(data)
+    return Origin(*(unquote(part.decode("ascii", "replace")) for part in match.groups())) if match else None
