@@ -48,6 +48,9 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
     """
     from phigen.runtime.origin import companion, read_origin
 
+    named = [(option, path.resolve()) for option, path in files.items() if path is not None]
+    if len(named) == 2 and named[0][1] == named[1][1]:
+        raise click.BadParameter(f"{named[0][0]} and {named[1][0]} name the same file", param_hint=named[1][0])
     force = click.get_current_context().meta.get(_FORCE) and not continued
     for option, path in files.items():
         if path is None or force or not path.exists() or not (path.is_dir() or path.is_file()):

@@ -109,8 +109,9 @@ def print_averages(names: Sequence[str], averages: Averages, of: Sequence[str] =
     for line in table([header, *rows], right=range(1, 6)):
         out(f"  {line}")
     if short := [name for name, a in shown.items() if not a.resolved and math.isfinite(a.error)]:
-        longer = "blocks of rows are not much longer than their correlation time; average over a longer time"
-        out(f"  The standard errors of {', '.join(short)} are too small: {longer}.")
+        out(
+            f"  The standard errors of {', '.join(short)} are too small: blocks of rows are shorter than ten correlation times."
+        )
 
 
 def _time_shown(average: Average) -> str:

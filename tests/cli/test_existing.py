@@ -109,3 +109,10 @@ def test_the_file_of_another_run_is_not_continued(phigen, write, in_tmp):
     before = (in_tmp / "a.csv").read_text()
     assert phigen("run", spec, "--run", "s", "-o", "a.csv", "--extend", "--steps", 5, "--force").exit_code == 2
     assert (in_tmp / "a.csv").read_text() == before
+
+
+def test_rows_and_crossings_do_not_go_to_the_same_file(phigen, write, in_tmp):
+    refused = phigen("run", write("spec.yaml", OSCILLATOR), "-o", "a.csv", "--section", "a.csv")
+    assert refused.exit_code == 2
+    assert "the same file" in refused.stderr
+    assert not (in_tmp / "a.csv").exists()

@@ -18,6 +18,15 @@ from differential.reference import Floats
 #: Names of parameters, some of them words of C or names that code may use itself.
 PARAMETERS = ("a", "mu", "lambda", "k", "c")
 
+#: Forms of observables of two expressions: as a spec has them, and as sympy has them.
+OBSERVED: Mapping[str, Callable[[Expr, Expr], Expr]] = {
+    "({0})*({1})": lambda a, b: a * b,
+    "atan2({0}, 2 + ({1})**2)": lambda a, b: sympy.atan2(a, 2 + b**2),
+    "max({0}, min({1}, 1/2))": lambda a, b: sympy.Max(a, sympy.Min(b, sympy.Rational(1, 2))),
+    "if({0} < {1}, {0}, sign({1}))": lambda a, b: sympy.Piecewise((a, a < b), (sympy.sign(b), True)),
+    "heaviside({0}) - abs({1})": lambda a, b: sympy.Piecewise((1, a >= 0), (0, True)) - sympy.Abs(b),
+}
+
 
 @dataclass(frozen=True)
 class Ordinary:
@@ -25,7 +34,8 @@ class Ordinary:
 
     H is the sum of ``terms``. ``parameters`` have a default, and say whether they are positive. ``covector``,
     ``vector``, ``damping``, ``monitor`` and ``noise`` (Hamiltonian and amplitude) act as docs/spec.md has it;
-    ``monitor`` may be "log", with ``attraction`` the negative part of H. ``options`` are further keys of the spec,
+    ``monitor`` may be "log", with ``attraction`` the negative part of H. ``observables``
+    are forms of `OBSERVED` with two expressions. ``options`` are further keys of the spec,
     ``asked`` what `phigen.compile` is asked for beside it.
     """
 
@@ -41,6 +51,7 @@ class Ordinary:
     attraction: Expr | None = None
     noise: Mapping[str, tuple[Expr, Expr]] = field(default_factory=dict)
     timed: bool = False
+    observables: Mapping[str, tuple[str, Expr, Expr]] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     asked: Mapping[str, Any] = field(default_factory=dict)
 
@@ -73,6 +84,9 @@ class Ordinary:
             yield "damping", text(self.damping)
         if self.monitor is not None:
             yield "monitor", self.monitor if isinstance(self.monitor, str) else text(self.monitor)
+        if self.observables:
+            seen = self.observables.items()
+            yield "observables", {n: form.format(text(a), text(b)) for n, (form, a, b) in seen}
         if self.noise:
             yield "noise", {n: {"hamiltonian": text(g), "amplitude": text(s)} for n, (g, s) in self.noise.items()}
         yield from self.options.items()
@@ -153,7 +167,7 @@ class Ordinary:
         for k in range(len(self.terms)):
             if len(self.terms) > 1:
                 yield replace(self, terms=self.terms[:k] + self.terms[k + 1 :])
-        for name in ("covector", "vector", "noise", "options", "asked"):
+        for name in ("covector", "vector", "noise", "observables", "options", "asked"):
             given = getattr(self, name)
             for key in given:
                 yield replace(self, **{name: {k: v for k, v in given.items() if k != key}})
@@ -176,6 +190,7 @@ class Ordinary:
     def _expressions(self) -> list[Expr]:
         more = [self.damping, None if isinstance(self.monitor, str) else self.monitor]
         noise = [e for pair in self.noise.values() for e in pair]
+        noise += [e for _, *pair in self.observables.values() for e in pair]
         return [
             *self.terms,
             *self.covector.values(),
@@ -193,6 +208,7 @@ class Ordinary:
             "vector": {k: e.xreplace(put) for k, e in self.vector.items()},
             "noise": {k: (g.xreplace(put), s.xreplace(put)) for k, (g, s) in self.noise.items()},
         }
+        new["observables"] = {k: (f, *(e.xreplace(put) for e in both)) for k, (f, *both) in self.observables.items()}
         new["damping"] = None if self.damping is None else self.damping.xreplace(put)
         new["monitor"] = self.monitor.xreplace(put) if isinstance(self.monitor, sympy.Basic) else self.monitor
         new["attraction"] = None if self.attraction is None else self.attraction.xreplace(put)
@@ -224,7 +240,22 @@ def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:
     drawn = replace(drawn, options=_options(source, drawn, scheme))
     drawn = _with_exact_flows(random.Random(f"flows {seed} {attempt}"), _extras(source, drawn))
     drawn = _collocated(random.Random(f"gauss {seed} {attempt}"), drawn)
-    return _chosen(random.Random(f"auto {seed} {attempt}"), drawn)
+    drawn = _chosen(random.Random(f"auto {seed} {attempt}"), drawn)
+    return _observed(random.Random(f"observables {seed} {attempt}"), drawn)
+
+
+def _observed(source: random.Random, drawn: Ordinary) -> Ordinary:
+    """The system, or with observables, of the time and of parameters too."""
+    if source.random() < 0.5:
+        return drawn
+    symbols = [*drawn.structure.coordinates, *(Symbol(name) for name in drawn.parameters), *([TIME] * drawn.timed)]
+
+    def operand() -> Expr:
+        """A function of coordinates, and perhaps of parameters and the time."""
+        return small(source) * bounded(source, linear(source, symbols)) + small(source) * source.choice(symbols) / 3
+
+    forms = source.sample(list(OBSERVED), source.randint(1, 3))
+    return replace(drawn, observables={f"seen{k}": (form, operand(), operand()) for k, form in enumerate(forms)})
 
 
 def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:

@@ -12,7 +12,7 @@ import numpy as np
 from differential import device_checks
 from differential.formulas import numeric
 from differential.inputs import as_cpp
-from differential.ordinary import Ordinary, draw_ordinary
+from differential.ordinary import OBSERVED, Ordinary, draw_ordinary
 from differential.reference import (
     Floats,
     derivative,
@@ -140,6 +140,23 @@ def functions(trial: Trial) -> None:
         for k in range(len(system.structure.casimirs)):
             value = np.array([casimirs(0.0, row)[k] for row in x])
             expect_close(named[f"C{k}"], value, part, f"{target}: Casimir C{k}", 1 + float(np.abs(value).max()))
+
+
+def observables(trial: Trial) -> None:
+    """Observables have the values of their formulas, at states and along a run, which ends at other times."""
+    system, x = trial.system, trial.x0 + 0.1 * trial.random.uniform(-1, 1, (5, len(trial.x0)))
+    formulas = system.function([OBSERVED[form](a, b) for form, a, b in system.observables.values()])
+    for target, solver in trial.solvers.items():
+        part = trial.part(target, 1e-12, 1e-4)
+        run = solver.integrate(trial.x0, trial.h, 5, 2, **trial.since)
+        expect(list(run.observables) == list(system.observables), f"{target}: observables {list(run.observables)}")
+        when = np.linspace(0.2, 0.6, len(x)) + trial.t0
+        at_states = solver.observables(x, **({"t": when} if system.timed else {}))
+        for named, states, times in ((at_states, x, when), (run.observables, run.x, run.t)):
+            values = np.array([formulas(t, row) for t, row in zip(times, states, strict=True)])
+            for k, name in enumerate(system.observables):
+                size = 1 + float(np.abs(values[:, k]).max())
+                expect_close(np.asarray(named[name]), values[:, k], part, f"{target}: observable {name}", size)
 
 
 def order(trial: Trial) -> None:
@@ -458,6 +475,10 @@ def _wants(name: str) -> Callable[[Trial], bool]:
     return lambda trial: getattr(trial.compilation.program.extras, name)
 
 
+def _is_observed(trial: Trial) -> bool:
+    return bool(trial.system.observables)
+
+
 def _always(trial: Trial) -> bool:
     return True
 
@@ -504,6 +525,7 @@ _ATTITUDE = "print(target, s.integrate(x, h, 11, **since).attitude[-1])"
 
 CHECKS = (
     Check("functions are those of the formulas", functions, _always, "print(s.vector_field(x), s.hamiltonian(x))"),
+    Check("observables are those of the formulas", observables, _is_observed, "print(s.observables(x))"),
     Check("order", order, _always, _RUN),
     Check("targets agree", targets, _always, _RUN),
     Check("strides and sessions keep the bits", bits, _is_plain, _RUN),
