@@ -109,9 +109,8 @@ def print_averages(names: Sequence[str], averages: Averages, of: Sequence[str] =
     for line in table([header, *rows], right=range(1, 6)):
         out(f"  {line}")
     if short := [name for name, a in shown.items() if not a.resolved and math.isfinite(a.error)]:
-        out(
-            f"  The standard errors of {', '.join(short)} are too small: blocks of rows are shorter than ten correlation times."
-        )
+        named = ", ".join(short)
+        out(f"  The standard errors of {named} are too small: blocks of rows are shorter than ten correlation times.")
 
 
 def _time_shown(average: Average) -> str:

@@ -48,6 +48,8 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol
 
 CONSTANTS = {"pi": PI, "E": EULER}
+#: Names of functions in other languages, and those in specs.
+OTHER_FUNCTIONS = {"ln": "log", "fabs": "abs", "arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2"}
 
 
 class Report(Protocol):
@@ -379,7 +381,7 @@ class Parser:
         if arity is None:
             declared = self.scope.lookup(token.text) is not None
             known = [*SPEC_FUNCTIONS, *(PIECEWISE_FUNCTIONS if self.scope.piecewise else ())]
-            guess = did_you_mean(token.text, known) or "functions are " + ", ".join(known)
+            guess = did_you_mean(token.text, known, OTHER_FUNCTIONS) or "functions are " + ", ".join(known)
             hint = f"products are written with *: {token.text}*(…)" if declared else guess
             raise self.abandon(f"{shown(token.text)} is not a function", token.index, hint)
         arguments = [] if self.here.text == ")" else [self.nested(self.sum, opening)]

@@ -50,8 +50,9 @@ def _numbered(word: str, choices: Iterable[str]) -> list[str]:
 
 
 def one_of(choices: Iterable[str]) -> str:
-    """``one of a, b, c``, for hints."""
-    return "one of " + ", ".join(choices)
+    """``one of a, b, c``, or ``write a`` if there is no other, for hints."""
+    listed = list(choices)
+    return f"write {listed[0]}" if len(listed) == 1 else "one of " + ", ".join(listed)
 
 
 def counted(number: int, noun: str, plural: str = "") -> str:

@@ -22,6 +22,8 @@ BLOCKS = 20
 #: Least length of blocks in correlation times τ. The variance of means of blocks of length L is estimated too small by
 #: the factor 1 − τ/L, which is 10 % here.
 LEAST_LENGTH = 10.0
+#: Observables with a smaller relative range are conserved but for the error of the method: their means need no blocks.
+CONSERVED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -135,6 +137,8 @@ class Averages:
             with np.errstate(all="ignore"):
                 time = np.where(variance > 0, 0.5 * apart * size * of_blocks / variance, 0.0)
             resolved = LEAST_LENGTH * time <= apart * size
+        magnitude = np.maximum(np.abs(state["least"]), np.abs(state["largest"]))
+        resolved |= state["largest"] - state["least"] <= CONSERVED * magnitude
         columns = (state["mean"], error, variance, state["least"], state["largest"], time)
         rows = zip(*(column.tolist() for column in columns), resolved.tolist(), strict=True)
         return [Average(*row) for row in rows]

@@ -5,6 +5,9 @@ from __future__ import annotations
 import pytest
 from spec.text_pairs import cases, complete, errors_of
 
+from phigen.errors import SpecError
+from phigen.spec import loads
+
 
 @pytest.mark.parametrize(("title", "spec", "expected"), [pytest.param(*c, id=c[0]) for c in cases()])
 def test_errors_are_reported_as_written(title: str, spec: str, expected: str) -> None:
@@ -14,12 +17,12 @@ def test_errors_are_reported_as_written(title: str, spec: str, expected: str) ->
 def test_functions_of_other_languages_are_recognised():
     text = "phigen: 1\nname: a\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: ln(q)\n"
     with pytest.raises(SpecError, match="did you mean 'log'"):
-        spec.loads(text)
+        loads(text)
 
 
 @pytest.mark.parametrize(("value", "hinted"), [("atan2(q, 1)", True), ('"atan2(q, 1"', False)])
 def test_commas_inside_of_braces_need_quotes(value, hinted):
     text = "phigen: 1\nname: a\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: q\n"
     with pytest.raises(SpecError, match="never closed") as caught:
-        spec.loads(f"{text}observables: {{angle: {value}}}\n")
+        loads(f"{text}observables: {{angle: {value}}}\n")
     assert ("between quotes" in str(caught.value)) is hinted

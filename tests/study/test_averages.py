@@ -107,3 +107,8 @@ def test_blocks_tell_whether_they_are_longer_than_the_correlation_time(a, resolv
 def test_an_observable_slower_than_the_run_is_not_resolved(count):
     (average,) = averages(np.cos(np.linspace(0, 1, count))).results()
     assert not average.resolved
+
+
+def test_a_conserved_observable_needs_no_blocks():
+    (average,) = averages(3 + 1e-9 * np.cos(np.linspace(0, 1, 100))).results()
+    assert average.resolved
