@@ -8,8 +8,9 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
- *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: ee9752a65b0c487a063c14801fb606a404555d992e600509e64a32fc480cc5ea
+ *   step, by Gauss collocation; The solver; Members of an ensemble; SIMD batches of members: Gauss
+ *   steps; Ensembles
+ * body-sha256: 1ae734dcd511fe2e516b81fc9c890d9fae1ecff85802475f521dc1dfb12dde40
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -309,6 +310,22 @@ static inline void kowalevski_gauss_mix_twice(const double matrix[kowalevski_gau
         * before[7]);
 }
 
+/* The unknowns of stage i for members in lanes: weighted sums of the increments of all stages. */
+static inline void kowalevski_gauss_mix_members(
+    const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], int i,
+    kowalevski_gauss_lanes moves[kowalevski_gauss_NODES][kowalevski_gauss_UNKNOWNS],
+    kowalevski_gauss_lanes z[restrict kowalevski_gauss_UNKNOWNS])
+{
+    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
+        kowalevski_gauss_EACH_LANE
+        for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane)
+            z[k][lane] = (matrix[0][i] * moves[0][k][lane] + matrix[2][i] * moves[2][k][lane] + matrix[4][i]
+            * moves[4][k][lane] + matrix[6][i] * moves[6][k][lane]) + (matrix[1][i] * moves[1][k][lane]
+            + matrix[3][i] * moves[3][k][lane] + matrix[5][i] * moves[5][k][lane] + matrix[7][i]
+            * moves[7][k][lane]);
+    }
+}
+
 enum {
     kowalevski_gauss_ITERATED = kowalevski_gauss_UNKNOWNS, /* unknowns that sweeps iterate */
     kowalevski_gauss_READS = kowalevski_gauss_UNKNOWNS,    /* values that they read */
@@ -380,6 +397,125 @@ static void kowalevski_gauss_next_frame_lanes(const double coef[1], const double
             - k[4][lane] * z[2]));
         seen[4][lane] = k[4][lane] + (k[4][lane] * z[0] + k[3][lane] * z[2] - (k[2][lane] * z[3]
             + k[0][lane] * z[4]));
+        seen[5][lane] = k[5][lane] + t2;
+        seen[6][lane] = k[6][lane] + t3;
+        seen[7][lane] = k[7][lane] + t4;
+    }
+}
+
+/* kowalevski_gauss_member_field in all lanes. */
+static void kowalevski_gauss_member_field_lanes(kowalevski_gauss_lanes coef[restrict 1],
+    kowalevski_gauss_lanes x[restrict 6], kowalevski_gauss_lanes z[restrict 8],
+    kowalevski_gauss_lanes w[restrict 1], kowalevski_gauss_lanes move[restrict 8])
+{
+    (void)coef;
+    kowalevski_gauss_EACH_LANE
+    for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
+        const double P1 = x[0][lane], P2 = x[1][lane], P3 = x[2][lane], G1 = x[3][lane], G2 = x[4][lane],
+            G3 = x[5][lane];
+        const double t1 = G3 * z[4][lane] + (G2 * z[3][lane] + G1 * z[2][lane]), t2 = G2 * z[4][lane];
+        const double t3 = 1.0 + z[0][lane], t4 = G3 * z[3][lane] + G1 * t3;
+        const double t5 = G1 * z[4][lane] + (G2 * t3 - G3 * z[2][lane]);
+        const double t6 = G3 * z[7][lane] + G2 * z[6][lane] + (P2 * z[3][lane] + P1 * z[2][lane]
+            + (P3 * z[4][lane] + G1 * z[5][lane]));
+        const double t7 = G1 * z[7][lane] - G3 * z[5][lane] + (P1 * z[4][lane] - P3 * z[2][lane]
+            + (G2 * z[1][lane] + P2 * t3));
+        const double t8 = G3 * z[6][lane] - G2 * z[7][lane] + (P3 * z[3][lane] - P2 * z[4][lane]
+            + (G1 * z[1][lane] + P1 * t3));
+        const double t9 = G2 * z[2][lane] + G3 * t3, t10 = G1 * z[3][lane], t11 = t9 - t10;
+        const double t12 = G2 * z[5][lane] - G1 * z[6][lane] + (P2 * z[2][lane] - P1 * z[3][lane]
+            + (G3 * z[1][lane] + P3 * t3));
+        const double t13 = z[7][lane] * t1 + z[6][lane] * (t2 - t4) + (z[5][lane] * t5 + z[4][lane] * t6)
+            + (z[2][lane] * t7 - z[3][lane] * t8 + (z[1][lane] * t11 + t3 * t12));
+        const double t14 = (-0.5) * (w[0][lane] * t13), t15 = t4 - t2;
+        const double t16 = z[6][lane] * t11 - z[7][lane] * t5 + (z[5][lane] * t1 - z[4][lane] * t7)
+            + (z[2][lane] * t6 + z[3][lane] * t12 + (z[1][lane] * t15 + t3 * t8));
+        const double t17 = (-0.25) * (w[0][lane] * t16);
+        const double t18 = z[6][lane] * t1 + z[7][lane] * t15 + (z[5][lane] * (t10 - t9) + z[4][lane] * t8)
+            + (z[1][lane] * t5 + t3 * t7 + (z[3][lane] * t6 - z[2][lane] * t12));
+        const double t19 = (-0.25) * (w[0][lane] * t18), t20 = (-0.5) * w[0][lane];
+        move[0][lane] = -(t14 * z[4][lane] + (t17 * z[2][lane] + t19 * z[3][lane]));
+        move[1][lane] = -(t19 * z[6][lane] + t14 * z[7][lane] + (t20 * z[2][lane] + t17 * z[5][lane]));
+        move[2][lane] = t19 * z[4][lane] + (t17 * t3 - t14 * z[3][lane]);
+        move[3][lane] = t14 * z[2][lane] + t19 * t3 - t17 * z[4][lane];
+        move[4][lane] = t17 * z[3][lane] + (t14 * t3 - t19 * z[2][lane]);
+        move[5][lane] = t19 * z[7][lane] - t14 * z[6][lane] + (t17 * z[1][lane] + t20 * t3);
+        move[6][lane] = t19 * z[1][lane] - t20 * z[4][lane] + (t14 * z[5][lane] - t17 * z[7][lane]);
+        move[7][lane] = t17 * z[6][lane] - t19 * z[5][lane] + (t20 * z[3][lane] + t14 * z[1][lane]);
+    }
+}
+
+/* kowalevski_gauss_member_change in all lanes. */
+static void kowalevski_gauss_member_change_lanes(kowalevski_gauss_lanes coef[restrict 1],
+    kowalevski_gauss_lanes x[restrict 6], kowalevski_gauss_lanes z[restrict 8],
+    kowalevski_gauss_lanes change[restrict 6])
+{
+    (void)coef;
+    kowalevski_gauss_EACH_LANE
+    for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
+        const double P1 = x[0][lane], P2 = x[1][lane], P3 = x[2][lane], G1 = x[3][lane], G2 = x[4][lane],
+            G3 = x[5][lane];
+        const double t1 = G3 * z[6][lane] - G2 * z[7][lane] + (P3 * z[3][lane] - P2 * z[4][lane]
+            + (G1 * z[1][lane] + P1 * z[0][lane]));
+        const double t2 = G2 * z[2][lane] + G3 * z[0][lane], t3 = G1 * z[3][lane], t4 = t2 - t3;
+        const double t5 = G1 * z[4][lane] + (G2 * z[0][lane] - G3 * z[2][lane]);
+        const double t6 = G3 * z[4][lane] + (G2 * z[3][lane] + G1 * z[2][lane]);
+        const double t7 = G1 * z[7][lane] - G3 * z[5][lane] + (G2 * z[1][lane] + P2 * z[0][lane]
+            + (P1 * z[4][lane] - P3 * z[2][lane]));
+        const double t8 = G1 * z[0][lane] + G3 * z[3][lane], t9 = G2 * z[4][lane], t10 = t8 - t9;
+        const double t11 = G2 * z[5][lane] - G1 * z[6][lane] + (P2 * z[2][lane] - P1 * z[3][lane]
+            + (P3 * z[0][lane] + G3 * z[1][lane]));
+        const double t12 = G3 * z[7][lane] + G2 * z[6][lane] + (P2 * z[3][lane] + P1 * z[2][lane]
+            + (P3 * z[4][lane] + G1 * z[5][lane]));
+        const double t13 = z[6][lane] * t4 - z[7][lane] * t5 + (z[5][lane] * t6 - z[4][lane] * t7)
+            + (z[1][lane] * t10 + z[0][lane] * t1 + (z[3][lane] * t11 + z[2][lane] * t12));
+        const double t14 = t3 - t2;
+        const double t15 = z[3][lane] * t12 - z[2][lane] * t11 + (z[1][lane] * t5 + z[0][lane] * t7)
+            + (z[6][lane] * t6 + z[7][lane] * t10 + (z[5][lane] * t14 + z[4][lane] * t1));
+        const double t16 = t9 - t8;
+        const double t17 = z[7][lane] * t6 + z[6][lane] * t16 + (z[5][lane] * t5 + z[4][lane] * t12)
+            + (z[1][lane] * t4 + z[0][lane] * t11 + (z[2][lane] * t7 - z[3][lane] * t1));
+        change[0][lane] = 2.0 * t1 + t13;
+        change[1][lane] = 2.0 * t7 + t15;
+        change[2][lane] = 2.0 * t11 + t17;
+        change[3][lane] = 2.0 * t10 + (z[0][lane] * t10 + z[2][lane] * t6 + (z[3][lane] * t4
+            - z[4][lane] * t5));
+        change[4][lane] = 2.0 * t5 + (z[2][lane] * t14 + z[0][lane] * t5 + (z[4][lane] * t10
+            + z[3][lane] * t6));
+        change[5][lane] = 2.0 * t4 + (z[3][lane] * t16 + z[4][lane] * t6 + (z[2][lane] * t5
+            + z[0][lane] * t4));
+    }
+}
+
+/* kowalevski_gauss_member_frame in all lanes. */
+static void kowalevski_gauss_member_frame_lanes(kowalevski_gauss_lanes coef[restrict 1],
+    kowalevski_gauss_lanes z[restrict 8], kowalevski_gauss_lanes k[restrict 8],
+    kowalevski_gauss_lanes seen[restrict 8])
+{
+    (void)coef;
+    kowalevski_gauss_EACH_LANE
+    for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
+        const double t1 = k[2][lane] * z[5][lane] + k[7][lane] * z[4][lane] + (k[4][lane] * z[7][lane]
+            + k[3][lane] * z[6][lane]) + (k[1][lane] * z[0][lane] + k[0][lane] * z[1][lane]
+            + (k[5][lane] * z[2][lane] + k[6][lane] * z[3][lane]));
+        const double t2 = k[7][lane] * z[3][lane] - k[1][lane] * z[2][lane] + (k[2][lane] * z[1][lane]
+            + k[5][lane] * z[0][lane]) + (k[4][lane] * z[6][lane] - k[3][lane] * z[7][lane]
+            - (k[0][lane] * z[5][lane] + k[6][lane] * z[4][lane]));
+        const double t3 = k[3][lane] * z[1][lane] + k[6][lane] * z[0][lane] - (k[7][lane] * z[2][lane]
+            + k[1][lane] * z[3][lane]) + (k[2][lane] * z[7][lane] - k[0][lane] * z[6][lane]
+            + (k[5][lane] * z[4][lane] - k[4][lane] * z[5][lane]));
+        const double t4 = k[7][lane] * z[0][lane] + k[4][lane] * z[1][lane] + (k[6][lane] * z[2][lane]
+            - k[5][lane] * z[3][lane]) + (k[3][lane] * z[5][lane] - k[1][lane] * z[4][lane]
+            - (k[2][lane] * z[6][lane] + k[0][lane] * z[7][lane]));
+        seen[0][lane] = k[0][lane] + (k[3][lane] * z[3][lane] + k[4][lane] * z[4][lane]
+            + (k[0][lane] * z[0][lane] + k[2][lane] * z[2][lane]));
+        seen[1][lane] = k[1][lane] + t1;
+        seen[2][lane] = k[2][lane] + (k[4][lane] * z[3][lane] - k[3][lane] * z[4][lane]
+            + (k[2][lane] * z[0][lane] - k[0][lane] * z[2][lane]));
+        seen[3][lane] = k[3][lane] + (k[2][lane] * z[4][lane] - k[0][lane] * z[3][lane]
+            + (k[3][lane] * z[0][lane] - k[4][lane] * z[2][lane]));
+        seen[4][lane] = k[4][lane] + (k[4][lane] * z[0][lane] + k[3][lane] * z[2][lane]
+            - (k[2][lane] * z[3][lane] + k[0][lane] * z[4][lane]));
         seen[5][lane] = k[5][lane] + t2;
         seen[6][lane] = k[6][lane] + t3;
         seen[7][lane] = k[7][lane] + t4;
@@ -584,25 +720,25 @@ enum {
 #define kowalevski_gauss_NEARLY_ROUNDING 2e-14
 
 /* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if they do not
-   converge. last is the change before the latest one; past->rate is updated to the factor by which changes
-   shrink. */
+   converge. last is the change before the latest one. *usual is updated to the factor by which changes
+   shrink, *first to the number of the first sweep of the next step whose change is measured. */
 typedef struct {
     double last;
     int rising, rises;
 } kowalevski_gauss_progress;
 
-static int kowalevski_gauss_judge(kowalevski_gauss_history *past, kowalevski_gauss_progress *sweeps,
-    int sweep, double change)
+static int kowalevski_gauss_judge(double *usual, int *first, kowalevski_gauss_progress *sweeps, int sweep,
+    double change)
 {
     const double rate = change / sweeps->last;
     if (rate > 0.0 && rate < 1.0 && change > kowalevski_gauss_NEARLY_ROUNDING)
-        past->rate = 0.7 * past->rate + 0.3 * rate;
-    const int slow = rate >= 1.0 || rate > fmax(kowalevski_gauss_STALLED, 1.5 * past->rate);
+        *usual = 0.7 * *usual + 0.3 * rate;
+    const int slow = rate >= 1.0 || rate > fmax(kowalevski_gauss_STALLED, 1.5 * *usual);
     if (rate >= 1.0 && change <= kowalevski_gauss_NEARLY_ROUNDING) ++sweeps->rises;
     sweeps->last = change;
     if ((slow && change <= kowalevski_gauss_ROUNDING) || sweeps->rises > 1) {
         /* or the first change was at rounding level */
-        past->sweeps = (sweep == past->sweeps || rate > 2.0 * past->rate ? past->sweeps : sweep) - 1;
+        *first = (sweep == *first || rate > 2.0 * *usual ? *first : sweep) - 1;
         return 1;
     }
     /* transients may grow for as many sweeps as there are stages */
@@ -640,7 +776,8 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
                 square = kowalevski_gauss_change_of(scale, kowalevski_gauss_ITERATED, now, next);
             const int solved = square * (past->rate * past->rate) <= kowalevski_gauss_SOLVED
                 * kowalevski_gauss_SOLVED;
-            const int judgement = solved ? 1 : kowalevski_gauss_judge(past, &progress, sweep, sqrt(square));
+            const int judgement = solved ? 1 : kowalevski_gauss_judge(&past->rate, &past->sweeps, &progress,
+                sweep, sqrt(square));
             memcpy(now, next, sizeof next);
             if (!isfinite(square)) return kowalevski_gauss_NOT_FINITE;
             if (judgement < 0) return kowalevski_gauss_NO_CONVERGENCE;
@@ -865,18 +1002,342 @@ static void kowalevski_gauss_put_member(const kowalevski_gauss_members *all, siz
     if (all->status != NULL) all->status[m] = (unsigned char)status;
 }
 
+/* ---- SIMD batches of members: Gauss steps ---- */
+enum {
+    kowalevski_gauss_GROUP = kowalevski_gauss_LANES, /* members, one in each lane */
+    /* measured: fewer members are faster one by one, with their stages in lanes */
+    kowalevski_gauss_FEWEST = kowalevski_gauss_LANES > 4 ? 6 : 3
+};
+
+/* Values of the unknowns of all members, for each stage. */
+typedef kowalevski_gauss_lanes kowalevski_gauss_batch[kowalevski_gauss_NODES][kowalevski_gauss_UNKNOWNS];
+
+/* Members of an ensemble, one in each lane. */
+typedef struct {
+    kowalevski_gauss_lanes x[kowalevski_gauss_DIM], carry[kowalevski_gauss_DIM],
+        coef[kowalevski_gauss_COEFFICIENTS];
+    kowalevski_gauss_lanes weights[kowalevski_gauss_NODES][1]; /* h b_j */
+    /* stage increments of the last steps, in the frame of the end of the last one */
+    kowalevski_gauss_batch moves[kowalevski_gauss_EARLIER];
+    int latest; /* index of the last step in moves */
+    int count; /* steps in moves */
+    int predictor; /* number of the predictor */
+    int age; /* steps since all predictors were compared for the first time */
+    int sweeps; /* number of the first sweep whose change is measured */
+    double rate; /* factor by which the changes of a sweep shrink from one sweep to the next */
+    int active[kowalevski_gauss_LANES]; /* whether the lane holds a member that has not failed */
+    size_t steps_left[kowalevski_gauss_LANES]; /* steps left to make, for lanes whose member has left */
+} kowalevski_gauss_group;
+
+/* Predict the unknowns of stage i by the increments of the last steps. */
+static void kowalevski_gauss_group_predict(kowalevski_gauss_group *group, int predictor, int i,
+    kowalevski_gauss_lanes z[kowalevski_gauss_UNKNOWNS])
+{
+    kowalevski_gauss_lanes older[kowalevski_gauss_UNKNOWNS];
+    kowalevski_gauss_mix_members(kowalevski_gauss_prediction[predictor], i, group->moves[group->latest], z);
+    if (predictor + 1 == kowalevski_gauss_PREDICTORS) return; /* the last predictor reads one step */
+    kowalevski_gauss_mix_members(kowalevski_gauss_prediction[predictor] + kowalevski_gauss_NODES, i,
+        group->moves[1 - group->latest], older);
+    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
+        kowalevski_gauss_EACH_LANE
+        for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) z[k][lane] += older[k][lane];
+    }
+}
+
+/* Add to sum the squares of the differences of two arrays of unknowns, those of coordinates multiplied by
+   scale. */
+static inline void kowalevski_gauss_group_compare(const kowalevski_gauss_lanes scale,
+    kowalevski_gauss_lanes before[kowalevski_gauss_UNKNOWNS],
+    kowalevski_gauss_lanes after[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_lanes sum)
+{
+    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
+        const double *old = before[k], *now = after[k];
+        if (k < kowalevski_gauss_PLAIN) {
+            kowalevski_gauss_EACH_LANE
+            for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane)
+                sum[lane] += scale[lane] * ((now[lane] - old[lane]) * (now[lane] - old[lane]));
+        } else {
+            kowalevski_gauss_EACH_LANE
+            for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane)
+                sum[lane] += (now[lane] - old[lane]) * (now[lane] - old[lane]);
+        }
+    }
+}
+
+/* The weights of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
+static void kowalevski_gauss_group_scale(const kowalevski_gauss_group *group, kowalevski_gauss_batch now,
+    kowalevski_gauss_lanes scale)
+{
+    for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
+        double square = DBL_MIN;
+        for (int i = 0; i < kowalevski_gauss_DIM; ++i) square += group->x[i][lane] * group->x[i][lane];
+        for (int i = 0; i < kowalevski_gauss_NODES && square <= DBL_MIN; ++i)
+            for (int k = 0; k < kowalevski_gauss_PLAIN; ++k) square += now[i][k][lane] * now[i][k][lane];
+        scale[lane] = 1.0 / square;
+    }
+}
+
+/* The predictor that would have come nearest to the unknowns of active members in the end. */
+static int kowalevski_gauss_group_best_predictor(kowalevski_gauss_group *group,
+    const kowalevski_gauss_lanes scale, kowalevski_gauss_batch z)
+{
+    kowalevski_gauss_lanes predicted[kowalevski_gauss_UNKNOWNS];
+    double least = HUGE_VAL;
+    int best = kowalevski_gauss_PREDICTORS - 1;
+    for (int predictor = 0; predictor < kowalevski_gauss_PREDICTORS; ++predictor) {
+        kowalevski_gauss_lanes sum = { 0.0 };
+        double change = 0.0;
+        for (int i = 0; i < kowalevski_gauss_NODES; ++i) {
+            kowalevski_gauss_group_predict(group, predictor, i, predicted);
+            kowalevski_gauss_group_compare(scale, predicted, z[i], sum);
+        }
+        for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane)
+            if (group->active[lane]) change = fmax(change, sum[lane]);
+        if (change < least) {
+            least = change;
+            best = predictor;
+        }
+    }
+    return best;
+}
+
+/* A sweep over all stages: the new increments, by the unknowns z. Changes are added to sum, if it is not
+   NULL. */
+static void kowalevski_gauss_group_sweep(kowalevski_gauss_group *group, const kowalevski_gauss_lanes scale,
+    kowalevski_gauss_batch z, kowalevski_gauss_batch now, double *sum)
+{
+    kowalevski_gauss_lanes next[kowalevski_gauss_UNKNOWNS];
+    for (int i = 0; i < kowalevski_gauss_NODES; ++i) {
+        if (sum == NULL) {
+            kowalevski_gauss_member_field_lanes(group->coef, group->x, z[i], group->weights[i], now[i]);
+            continue;
+        }
+        kowalevski_gauss_member_field_lanes(group->coef, group->x, z[i], group->weights[i], next);
+        kowalevski_gauss_group_compare(scale, now[i], next, sum);
+        memcpy(now[i], next, sizeof next);
+    }
+}
+
+/* Largest squared change of an active member, as a mean over the stages. Members with values that are not
+   finite leave. */
+static double kowalevski_gauss_group_change(kowalevski_gauss_group *group, const kowalevski_gauss_lanes sum)
+{
+    double largest = 0.0;
+    for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
+        group->active[lane] = group->active[lane] && isfinite(sum[lane]);
+        if (group->active[lane]) largest = fmax(largest, sum[lane]);
+    }
+    return largest / (double)kowalevski_gauss_NODES;
+}
+
+/* The values that the first sweep of a step reads. */
+static void kowalevski_gauss_group_begin(kowalevski_gauss_group *group, kowalevski_gauss_batch z)
+{
+    const int predictor = group->count < kowalevski_gauss_EARLIER ? kowalevski_gauss_PREDICTORS - 1
+        : group->predictor;
+    if (group->count == 0) {
+        memset(z, 0, sizeof(kowalevski_gauss_batch));
+        group->rate = 0.5;
+        group->sweeps = 2;
+        return;
+    }
+    for (int i = 0; i < kowalevski_gauss_NODES; ++i)
+        kowalevski_gauss_group_predict(group, predictor, i, z[i]);
+}
+
+/* Solve for the increments of all stages, as for a single trajectory, until the slowest member has converged.
+   Members that have not converged in the end leave. */
+static void kowalevski_gauss_group_solve(kowalevski_gauss_group *group, kowalevski_gauss_batch now)
+{
+    kowalevski_gauss_batch z;
+    kowalevski_gauss_lanes scale = { 0.0 }, sum;
+    kowalevski_gauss_progress progress = { HUGE_VAL, 0, 0 };
+    int judgement = 0;
+    kowalevski_gauss_group_begin(group, z);
+    for (int sweep = 1; sweep <= kowalevski_gauss_MAX_SWEEPS; ++sweep) {
+        const int tested = sweep >= group->sweeps;
+        if (tested && sweep == group->sweeps) kowalevski_gauss_group_scale(group, now, scale);
+        memset(sum, 0, sizeof sum);
+        kowalevski_gauss_group_sweep(group, scale, z, now, tested ? sum : NULL);
+        if (tested) {
+            const double square = kowalevski_gauss_group_change(group, sum);
+            const int solved = square * (group->rate * group->rate) <= kowalevski_gauss_SOLVED
+                * kowalevski_gauss_SOLVED;
+            judgement = solved ? 1 : kowalevski_gauss_judge(&group->rate, &group->sweeps, &progress, sweep,
+                sqrt(square));
+            if (solved)
+                group->sweeps = square <= 16.0 * kowalevski_gauss_SOLVED * kowalevski_gauss_SOLVED ? sweep - 1
+                : sweep;
+            if (group->sweeps < 2) group->sweeps = 2;
+            if (judgement != 0) break;
+        }
+        for (int i = 0; i < kowalevski_gauss_NODES; ++i)
+            kowalevski_gauss_mix_members(kowalevski_gauss_mixing, i, now, z[i]);
+    }
+    for (int lane = 0; lane < kowalevski_gauss_LANES && judgement <= 0; ++lane)
+        group->active[lane] = group->active[lane]
+            && sum[lane] <= (double)kowalevski_gauss_NODES * (kowalevski_gauss_NEARLY_ROUNDING
+            * kowalevski_gauss_NEARLY_ROUNDING);
+    if (group->count == kowalevski_gauss_EARLIER && group->age++ % kowalevski_gauss_TRIALS == 0)
+        group->predictor = kowalevski_gauss_group_best_predictor(group, scale, z);
+}
+
+/* Store the stage increments of a step with this end, to predict the next step. */
+static void kowalevski_gauss_group_remember(kowalevski_gauss_group *group,
+    kowalevski_gauss_lanes end[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_batch now)
+{
+    const int older = group->latest, latest = kowalevski_gauss_EARLIER - 1 - older;
+    kowalevski_gauss_lanes last[kowalevski_gauss_UNKNOWNS];
+    for (int i = 0; i < kowalevski_gauss_NODES; ++i) {
+        memcpy(last, group->moves[older][i], sizeof last);
+        kowalevski_gauss_member_frame_lanes(group->coef, end, last, group->moves[older][i]);
+        kowalevski_gauss_member_frame_lanes(group->coef, end, now[i], group->moves[latest][i]);
+    }
+    group->latest = latest;
+    if (group->count < kowalevski_gauss_EARLIER) ++group->count;
+}
+
+/* Add the changes in compensated arithmetic, as kowalevski_gauss_advance does. Members that failed, or whose
+   new state is not finite, keep the old state. */
+static void kowalevski_gauss_group_advance(kowalevski_gauss_group *group,
+    kowalevski_gauss_lanes change[kowalevski_gauss_DIM])
+{
+    kowalevski_gauss_lanes x[kowalevski_gauss_DIM], carry[kowalevski_gauss_DIM], zero = { 0.0 };
+    for (int i = 0; i < kowalevski_gauss_DIM; ++i) {
+        const double *was = group->x[i], *small = group->carry[i], *by = change[i];
+        kowalevski_gauss_EACH_LANE
+        for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
+            const double moved = by[lane] + small[lane], more = moved - by[lane];
+            const double sum = was[lane] + moved, added = sum - was[lane];
+            x[i][lane] = sum;
+            zero[lane] += sum - sum; /* a number less itself is 0, if it is finite */
+            carry[i][lane] = ((was[lane] - (sum - added)) + (moved - added)) + ((by[lane] - (moved - more))
+                + (small[lane] - more));
+        }
+    }
+    for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane)
+        group->active[lane] = group->active[lane] && zero[lane] == 0.0;
+    for (int i = 0; i < kowalevski_gauss_DIM; ++i)
+        for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
+            group->x[i][lane] = group->active[lane] ? x[i][lane] : group->x[i][lane];
+            group->carry[i][lane] = group->active[lane] ? carry[i][lane] : group->carry[i][lane];
+        }
+}
+
+/* Make one step of all active members. Returns the number of members that are still active. */
+static int kowalevski_gauss_group_step(kowalevski_gauss_group *group, size_t remaining)
+{
+    kowalevski_gauss_batch now;
+    kowalevski_gauss_lanes end[kowalevski_gauss_UNKNOWNS], change[kowalevski_gauss_DIM];
+    int active = 0;
+    memset(now, 0, sizeof now);
+    memset(end, 0, sizeof end);
+    kowalevski_gauss_group_solve(group, now);
+    for (int i = 0; i < kowalevski_gauss_NODES; ++i)
+        for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
+            kowalevski_gauss_EACH_LANE
+            for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) end[k][lane] += now[i][k][lane];
+        }
+    kowalevski_gauss_member_change_lanes(group->coef, group->x, end, change);
+    kowalevski_gauss_group_advance(group, change);
+    kowalevski_gauss_group_remember(group, end, now);
+    for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
+        if (!group->active[lane] && group->steps_left[lane] == 0) group->steps_left[lane] = remaining;
+        active += group->active[lane];
+    }
+    return active;
+}
+
+/* Assign a member to a lane: its state, its coefficients and its step. */
+static kowalevski_gauss_status kowalevski_gauss_group_join(kowalevski_gauss_group *group, int lane,
+    const kowalevski_gauss_members *all, size_t m)
+{
+    kowalevski_gauss_solver s;
+    double x[kowalevski_gauss_DIM];
+    const kowalevski_gauss_status status = kowalevski_gauss_take_member(all, m, x, &s);
+    for (int i = 0; i < kowalevski_gauss_DIM; ++i) group->x[i][lane] = x[i];
+    if (status != kowalevski_gauss_OK) return status;
+    for (int k = 0; k < kowalevski_gauss_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
+    for (int i = 0; i < kowalevski_gauss_NODES; ++i)
+        group->weights[i][0][lane] = s.h * kowalevski_gauss_weights[i];
+    group->active[lane] = 1;
+    return status;
+}
+
+/* Write the frames of active members after a number of steps. */
+static void kowalevski_gauss_group_frame(const kowalevski_gauss_group *group,
+    const kowalevski_gauss_members *all, size_t first, size_t done)
+{
+    double x[kowalevski_gauss_DIM];
+    for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
+        for (int i = 0; i < kowalevski_gauss_DIM; ++i) x[i] = group->x[i][lane];
+        if (group->active[lane]) kowalevski_gauss_put_frame(all, first + (size_t)lane, done, x);
+    }
+}
+
+/* Write the results of a member. Steps that the group did not make for it are made by single steps. */
+static kowalevski_gauss_status kowalevski_gauss_group_end(const kowalevski_gauss_group *group, int lane,
+    const kowalevski_gauss_members *all, size_t m, kowalevski_gauss_status status)
+{
+    kowalevski_gauss_solver s;
+    double x[kowalevski_gauss_DIM];
+    for (int i = 0; i < kowalevski_gauss_DIM; ++i) x[i] = group->x[i][lane];
+    if (status != kowalevski_gauss_OK) {
+        kowalevski_gauss_end_member(all, m, 0, NULL, status);
+    } else if (group->steps_left[lane] > 0) {
+        const kowalevski_gauss_status begun = kowalevski_gauss_begin_member(all, m, x, &s);
+        for (int i = 0; i < kowalevski_gauss_DIM && begun == kowalevski_gauss_OK; ++i)
+            s.carry[i] = group->carry[i][lane];
+        status = kowalevski_gauss_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
+        if (begun == kowalevski_gauss_OK) memcpy(x, s.x, sizeof x);
+    }
+    kowalevski_gauss_put_member(all, m, x, status);
+    return status;
+}
+
+/* Integrate one group, from member first on. Returns the first status that is not OK. */
+static kowalevski_gauss_status kowalevski_gauss_group_run(const kowalevski_gauss_members *all, size_t first)
+{
+    kowalevski_gauss_group group;
+    kowalevski_gauss_status result = kowalevski_gauss_OK, begun[kowalevski_gauss_LANES];
+    const int count = all->members - first < kowalevski_gauss_LANES ? (int)(all->members - first)
+        : kowalevski_gauss_LANES;
+    size_t left = all->steps;
+    memset(&group, 0, sizeof group);
+    for (int lane = 0; lane < count; ++lane)
+        begun[lane] = kowalevski_gauss_group_join(&group, lane, all, first + (size_t)lane);
+    for (int active = count; left > 0 && active >= kowalevski_gauss_FEWEST;) {
+        active = kowalevski_gauss_group_step(&group, left--);
+        if (all->frames != NULL) kowalevski_gauss_group_frame(&group, all, first, all->steps - left);
+    }
+    for (int lane = 0; lane < count; ++lane) {
+        if (group.active[lane]) group.steps_left[lane] = left;
+        const kowalevski_gauss_status status = kowalevski_gauss_group_end(&group, lane, all,
+            first + (size_t)lane, begun[lane]);
+        if (result == kowalevski_gauss_OK) result = status;
+    }
+    return result;
+}
+
 /* ---- Ensembles ---- */
 /* Integrate all members. Returns the first status that is not OK. */
 static kowalevski_gauss_status kowalevski_gauss_run(const kowalevski_gauss_members *all)
 {
     kowalevski_gauss_status result = kowalevski_gauss_OK;
-    for (size_t m = 0; m < all->members; ++m) {
-        kowalevski_gauss_solver s;
-        double x[kowalevski_gauss_DIM];
-        const kowalevski_gauss_status begun = kowalevski_gauss_take_member(all, m, x, &s);
-        const kowalevski_gauss_status status = kowalevski_gauss_end_member(all, m, 0, &s, begun);
-        kowalevski_gauss_put_member(all, m, begun == kowalevski_gauss_OK ? s.x : x, status);
-        if (result == kowalevski_gauss_OK) result = status;
+    size_t earliest = all->members;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic)
+#endif
+    for (size_t first = 0; first < all->members; first += kowalevski_gauss_GROUP) {
+        const kowalevski_gauss_status group = kowalevski_gauss_group_run(all, first);
+        if (group == kowalevski_gauss_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (first < earliest) {
+            earliest = first;
+            result = group;
+        }
     }
     return result;
 }

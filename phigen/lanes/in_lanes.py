@@ -40,6 +40,9 @@ MAX_STACK_BYTES = 256 * 1024
 #: Largest number of packs in a group; the runtime has the same number.
 PACKS_PER_GROUP = 4
 
+#: Arrays over stages and unknowns that a batch of members of a Gauss step needs: increments of three steps, unknowns.
+MEMBER_BATCHES = 4
+
 _DOUBLE = 8
 
 
@@ -131,11 +134,15 @@ class Traces:
 
 @dataclass(frozen=True)
 class Stages:
-    """The stages of a Gauss method, one in each lane; ``narrow`` if half of the lanes suffice."""
+    """The stages of a Gauss method, one in each lane; ``narrow`` if half of the lanes suffice.
+
+    ``batched`` are the kernels for members of an ensemble, one in each lane, if they are integrated in batches.
+    """
 
     kernels: tuple[LaneKernel, ...]
     calls: frozenset[str]
     narrow: bool
+    batched: tuple[LaneKernel, ...] = ()
 
     @property
     def lanes(self) -> int:
@@ -257,7 +264,16 @@ def _stages(program: Program, step: Gauss) -> Stages:
     others = [*step.stage_transposes, *(k.kernel for k in _elapsed(program))]
     kernels += [LaneKernel(kernel, ("coef", "x")) for kernel in others]
     called = with_formulas(operations([step.slope, *others]))
-    return Stages(tuple(kernels), called, step.tableau.stages <= LANES // 2)
+    return Stages(tuple(kernels), called, step.tableau.stages <= LANES // 2, _batched_stages(program, step))
+
+
+def _batched_stages(program: Program, step: Gauss) -> tuple[LaneKernel, ...]:
+    """Return the kernels of a Gauss step for members in lanes, or none if their working arrays are too large."""
+    arrays = MEMBER_BATCHES * step.tableau.stages * step.unknowns + 6 * program.dimension
+    if not _is_lowered(program) or program.time or program.monitor or _DOUBLE * LANES * arrays > MAX_STACK_BYTES:
+        return ()
+    named = {"member_field": step.slope, "member_change": step.change, "member_frame": step.frame}
+    return tuple(LaneKernel(replace(kernel, name=name)) for name, kernel in named.items() if kernel)
 
 
 def _newton(program: Program, step: Newton) -> Blocks | None:

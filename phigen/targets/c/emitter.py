@@ -135,7 +135,7 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
     texts = text_of(program).texts(program, step, lanes, has)
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"] or has["STAGED"]):
         packed = partial(text_of(program).packed, program, step)
-        texts["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes, packed))
+        texts["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes, packed, batched=has["STAGE_GROUPS"]))
     declarations = render("c", "declarations.h", declared_values(program, lanes, has))
     return {"declarations.h": declarations, "model.h": model(program, lanes, has, texts.values()), **texts}
 

@@ -62,8 +62,10 @@ def trail(program: Program, step: Gauss, lanes: Lanes | None) -> int:
     return program.dimension + step.unknowns * _width(step, lanes)
 
 
-def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
-    """The coefficients, and the function that computes unknowns from stage increments."""
+def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool) -> str:
+    """The coefficients, and the functions that compute unknowns from stage increments; ``batched`` adds the one for
+    members in lanes.
+    """
     table, width = step.tableau, _width(step, lanes)
     precision = SINGLE if program.single else DOUBLE
     if program.single:
@@ -72,6 +74,7 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
     predictions = predictors(table.stages, precision, integrated=bool(step.reduced)) if staged else (table.prediction,)
     terms = [f"matrix[{j}][lane] * move[{j}]" for j in range(table.stages)]
     older = [f"matrix[{table.stages + j}][lane] * before[{j}]" for j in range(table.stages)]
+    of_members = [f"matrix[{j}][i] * moves[{j}][k][lane]" for j in range(table.stages)]
     values = {
         "NAME": program.name,
         "nodes": _row(table.nodes, table.stages),
@@ -82,6 +85,7 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
         "predictions": [_columns(rows, width) for rows in predictions],
         "terms": _in_chains(terms) if staged else "",
         "terms_of_two": _in_chains([*terms, *older]) if staged else "",
+        "member_terms": _in_chains(of_members) if batched else "",
         "total": _halved([f"values[{j}]" for j in range(table.stages)]),
         "reduced": False,
         **(_reduced(step, table, width) if staged and step.reduced else {}),

@@ -63,13 +63,18 @@ def grouped(program: Program, lanes: Lanes | None) -> bool:
     return isinstance(lanes, Blocks) and lanes.grouped(values)
 
 
-def printed(program: Program, lanes: Lanes, packed: Callable[[Packs], list[str]]) -> list[str]:
-    """Return the kernels in SIMD lanes; ``packed`` prints those of packs."""
+def printed(
+    program: Program, lanes: Lanes, packed: Callable[[Packs], list[str]], *, batched: bool = False
+) -> list[str]:
+    """Return the kernels in SIMD lanes; ``packed`` prints those of packs, ``batched`` adds those of batches of Gauss
+    steps.
+    """
     texts = functions.phi_lanes(program, lanes.calls)
     if isinstance(lanes, Blocks | Stages | Traces):
+        of_members = lanes.batched if isinstance(lanes, Stages) and batched else ()
         return texts + [
             function(program, k.kernel, lanes=True, single=k.single, sparse=k.sparse, shared=k.shared)
-            for k in lanes.kernels
+            for k in (*lanes.kernels, *of_members)
         ]
     return texts + (packed(lanes) if isinstance(lanes, Packs) else [])
 

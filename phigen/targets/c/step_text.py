@@ -135,7 +135,7 @@ def _unused(expressions: Sequence[Expression], arrays: Sequence[str]) -> list[st
 
 
 def _gauss_texts(program: Program, step: Gauss, lanes: Lanes | None, has: Switches) -> dict[str, str]:
-    return {"gauss_tables.h": gauss.tables(program, step, lanes)}
+    return {"gauss_tables.h": gauss.tables(program, step, lanes, batched=has["STAGE_GROUPS"])}
 
 
 def _gauss_kernels(step: Gauss, has: Switches) -> list[Kernel | None]:

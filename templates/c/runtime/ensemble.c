@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "model.h"
-#include "groups.c"
+#include "group_run.c"
 #include "packs.c"
 #include "members.c"
 #include "solver.c"
@@ -12,7 +12,7 @@
 #if PHI_EACH || PHI_NOISE
 /* ---- Ensembles ---- */
 #endif
-#if PHI_GROUPS || PHI_PACKS
+#if PHI_GROUPS || PHI_PACKS || PHI_STAGE_GROUPS
 /* Integrate all members. Returns the first status that is not OK. */
 static phi_status phi_run(const phi_members *all)
 {
@@ -52,7 +52,7 @@ static phi_status phi_run(const phi_members *all)
 }
 
 #endif
-#if PHI_EACH || PHI_GROUPS || PHI_PACKS
+#if PHI_EACH || PHI_GROUPS || PHI_PACKS || PHI_STAGE_GROUPS
 phi_status PHI_ENSEMBLE_AT(const phi_params *params, double *x, size_t members PHI_AND_T0, double h, size_t steps,
     unsigned char *status)
 {

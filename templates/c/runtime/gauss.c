@@ -187,22 +187,23 @@ static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lane
 #include "gauss_policy.h"
 
 /* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if they do not converge. last
-   is the change before the latest one; past->rate is updated to the factor by which changes shrink. */
+   is the change before the latest one. *usual is updated to the factor by which changes shrink, *first to the number of
+   the first sweep of the next step whose change is measured. */
 typedef struct {
     double last;
     int rising, rises;
 } phi_progress;
 
-static int phi_judge(phi_history *past, phi_progress *sweeps, int sweep, double change)
+static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep, double change)
 {
     const double rate = change / sweeps->last;
-    if (rate > 0.0 && rate < 1.0 && change > PHI_NEARLY_ROUNDING) past->rate = 0.7 * past->rate + 0.3 * rate;
-    const int slow = rate >= 1.0 || rate > fmax(PHI_STALLED, 1.5 * past->rate);
+    if (rate > 0.0 && rate < 1.0 && change > PHI_NEARLY_ROUNDING) *usual = 0.7 * *usual + 0.3 * rate;
+    const int slow = rate >= 1.0 || rate > fmax(PHI_STALLED, 1.5 * *usual);
     if (rate >= 1.0 && change <= PHI_NEARLY_ROUNDING) ++sweeps->rises;
     sweeps->last = change;
     if ((slow && change <= PHI_ROUNDING) || sweeps->rises > 1) {
         /* or the first change was at rounding level */
-        past->sweeps = (sweep == past->sweeps || rate > 2.0 * past->rate ? past->sweeps : sweep) - 1;
+        *first = (sweep == *first || rate > 2.0 * *usual ? *first : sweep) - 1;
         return 1;
     }
     sweeps->rising = rate >= 1.0 ? sweeps->rising + 1 : 0; /* transients may grow for as many sweeps as there are stages */
@@ -233,7 +234,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
         if (tested) {
             const double scale = phi_scale(s->x, next), square = phi_change_of(scale, PHI_ITERATED, now, next);
             const int solved = square * (past->rate * past->rate) <= PHI_SOLVED * PHI_SOLVED;
-            const int judgement = solved ? 1 : phi_judge(past, &progress, sweep, sqrt(square));
+            const int judgement = solved ? 1 : phi_judge(&past->rate, &past->sweeps, &progress, sweep, sqrt(square));
             PHI_COPY_STAGES(now, next, next);
             if (!isfinite(square)) return PHI_NOT_FINITE;
             if (judgement < 0) return PHI_NO_CONVERGENCE;

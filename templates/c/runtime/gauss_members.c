@@ -1,0 +1,247 @@
+#ifndef PHI_FILE_GAUSS_MEMBERS
+#define PHI_FILE_GAUSS_MEMBERS
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "gauss.c"
+#include "members.c"
+#include "model.h"
+
+/* ---- SIMD batches of members: Gauss steps ---- */
+enum {
+    PHI_GROUP = PHI_LANES, /* members, one in each lane */
+    PHI_FEWEST = PHI_LANES > 4 ? 6 : 3 /* measured: fewer members are faster one by one, with their stages in lanes */
+};
+
+/* Values of the unknowns of all members, for each stage. */
+typedef phi_lanes phi_batch[PHI_NODES][PHI_UNKNOWNS];
+
+/* Members of an ensemble, one in each lane. */
+typedef struct {
+    phi_lanes x[PHI_DIM], carry[PHI_DIM], coef[PHI_COEFFICIENTS];
+    phi_lanes weights[PHI_NODES][1]; /* h b_j */
+    phi_batch moves[PHI_EARLIER];    /* stage increments of the last steps, in the frame of the end of the last one */
+    int latest;    /* index of the last step in moves */
+    int count;     /* steps in moves */
+    int predictor; /* number of the predictor */
+    int age;       /* steps since all predictors were compared for the first time */
+    int sweeps;    /* number of the first sweep whose change is measured */
+    double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
+    int active[PHI_LANES];        /* whether the lane holds a member that has not failed */
+    size_t steps_left[PHI_LANES]; /* steps left to make, for lanes whose member has left */
+} phi_group;
+
+/* Predict the unknowns of stage i by the increments of the last steps. */
+static void phi_group_predict(phi_group *group, int predictor, int i, phi_lanes z[PHI_UNKNOWNS])
+{
+    phi_lanes older[PHI_UNKNOWNS];
+    phi_mix_members(phi_prediction[predictor], i, group->moves[group->latest], z);
+    if (predictor + 1 == PHI_PREDICTORS) return; /* the last predictor reads one step */
+    phi_mix_members(phi_prediction[predictor] + PHI_NODES, i, group->moves[1 - group->latest], older);
+    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) z[k][lane] += older[k][lane];
+    }
+}
+
+/* Add to sum the squares of the differences of two arrays of unknowns, those of coordinates multiplied by scale. */
+static inline void phi_group_compare(const phi_lanes scale, phi_lanes before[PHI_UNKNOWNS], phi_lanes after[PHI_UNKNOWNS], phi_lanes sum)
+{
+    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
+        const double *old = before[k], *now = after[k];
+        if (k < PHI_PLAIN) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) sum[lane] += scale[lane] * ((now[lane] - old[lane]) * (now[lane] - old[lane]));
+        } else {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) sum[lane] += (now[lane] - old[lane]) * (now[lane] - old[lane]);
+        }
+    }
+}
+
+/* The weights of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
+static void phi_group_scale(const phi_group *group, phi_batch now, phi_lanes scale)
+{
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        double square = DBL_MIN;
+        for (int i = 0; i < PHI_DIM; ++i) square += group->x[i][lane] * group->x[i][lane];
+        for (int i = 0; i < PHI_NODES && square <= DBL_MIN; ++i)
+            for (int k = 0; k < PHI_PLAIN; ++k) square += now[i][k][lane] * now[i][k][lane];
+        scale[lane] = 1.0 / square;
+    }
+}
+
+/* The predictor that would have come nearest to the unknowns of active members in the end. */
+static int phi_group_best_predictor(phi_group *group, const phi_lanes scale, phi_batch z)
+{
+    phi_lanes predicted[PHI_UNKNOWNS];
+    double least = HUGE_VAL;
+    int best = PHI_PREDICTORS - 1;
+    for (int predictor = 0; predictor < PHI_PREDICTORS; ++predictor) {
+        phi_lanes sum = { 0.0 };
+        double change = 0.0;
+        for (int i = 0; i < PHI_NODES; ++i) {
+            phi_group_predict(group, predictor, i, predicted);
+            phi_group_compare(scale, predicted, z[i], sum);
+        }
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            if (group->active[lane]) change = fmax(change, sum[lane]);
+        if (change < least) {
+            least = change;
+            best = predictor;
+        }
+    }
+    return best;
+}
+
+/* A sweep over all stages: the new increments, by the unknowns z. Changes are added to sum, if it is not NULL. */
+static void phi_group_sweep(phi_group *group, const phi_lanes scale, phi_batch z, phi_batch now, double *sum)
+{
+    phi_lanes next[PHI_UNKNOWNS];
+    for (int i = 0; i < PHI_NODES; ++i) {
+        if (sum == NULL) {
+            phi_member_field_lanes(group->coef, group->x, z[i], group->weights[i], now[i]);
+            continue;
+        }
+        phi_member_field_lanes(group->coef, group->x, z[i], group->weights[i], next);
+        phi_group_compare(scale, now[i], next, sum);
+        memcpy(now[i], next, sizeof next);
+    }
+}
+
+/* Largest squared change of an active member, as a mean over the stages. Members with values that are not finite leave. */
+static double phi_group_change(phi_group *group, const phi_lanes sum)
+{
+    double largest = 0.0;
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        group->active[lane] = group->active[lane] && isfinite(sum[lane]);
+        if (group->active[lane]) largest = fmax(largest, sum[lane]);
+    }
+    return largest / (double)PHI_NODES;
+}
+
+/* The values that the first sweep of a step reads. */
+static void phi_group_begin(phi_group *group, phi_batch z)
+{
+    const int predictor = group->count < PHI_EARLIER ? PHI_PREDICTORS - 1 : group->predictor;
+    if (group->count == 0) {
+        memset(z, 0, sizeof(phi_batch));
+        group->rate = 0.5;
+        group->sweeps = 2;
+        return;
+    }
+    for (int i = 0; i < PHI_NODES; ++i) phi_group_predict(group, predictor, i, z[i]);
+}
+
+/* Solve for the increments of all stages, as for a single trajectory, until the slowest member has converged. Members
+   that have not converged in the end leave. */
+static void phi_group_solve(phi_group *group, phi_batch now)
+{
+    phi_batch z;
+    phi_lanes scale = { 0.0 }, sum;
+    phi_progress progress = { HUGE_VAL, 0, 0 };
+    int judgement = 0;
+    phi_group_begin(group, z);
+    for (int sweep = 1; sweep <= PHI_MAX_SWEEPS; ++sweep) {
+        const int tested = sweep >= group->sweeps;
+        if (tested && sweep == group->sweeps) phi_group_scale(group, now, scale);
+        memset(sum, 0, sizeof sum);
+        phi_group_sweep(group, scale, z, now, tested ? sum : NULL);
+        if (tested) {
+            const double square = phi_group_change(group, sum);
+            const int solved = square * (group->rate * group->rate) <= PHI_SOLVED * PHI_SOLVED;
+            judgement = solved ? 1 : phi_judge(&group->rate, &group->sweeps, &progress, sweep, sqrt(square));
+            if (solved) group->sweeps = square <= 16.0 * PHI_SOLVED * PHI_SOLVED ? sweep - 1 : sweep;
+            if (group->sweeps < 2) group->sweeps = 2;
+            if (judgement != 0) break;
+        }
+        for (int i = 0; i < PHI_NODES; ++i) phi_mix_members(phi_mixing, i, now, z[i]);
+    }
+    for (int lane = 0; lane < PHI_LANES && judgement <= 0; ++lane)
+        group->active[lane] = group->active[lane] && sum[lane] <= (double)PHI_NODES * (PHI_NEARLY_ROUNDING * PHI_NEARLY_ROUNDING);
+    if (group->count == PHI_EARLIER && group->age++ % PHI_TRIALS == 0)
+        group->predictor = phi_group_best_predictor(group, scale, z);
+}
+
+/* Store the stage increments of a step with this end, to predict the next step. */
+static void phi_group_remember(phi_group *group, phi_lanes end[PHI_UNKNOWNS], phi_batch now)
+{
+    const int older = group->latest, latest = PHI_EARLIER - 1 - older;
+#if PHI_FRAMED
+    phi_lanes last[PHI_UNKNOWNS];
+    for (int i = 0; i < PHI_NODES; ++i) {
+        memcpy(last, group->moves[older][i], sizeof last);
+        phi_member_frame_lanes(group->coef, end, last, group->moves[older][i]);
+        phi_member_frame_lanes(group->coef, end, now[i], group->moves[latest][i]);
+    }
+#else
+    (void)end;
+    memcpy(group->moves[latest], now, sizeof(phi_batch));
+#endif
+    group->latest = latest;
+    if (group->count < PHI_EARLIER) ++group->count;
+}
+
+/* Add the changes in compensated arithmetic, as phi_advance does. Members that failed, or whose new state is not finite,
+   keep the old state. */
+static void phi_group_advance(phi_group *group, phi_lanes change[PHI_DIM])
+{
+    phi_lanes x[PHI_DIM], carry[PHI_DIM], zero = { 0.0 };
+    for (int i = 0; i < PHI_DIM; ++i) {
+        const double *was = group->x[i], *small = group->carry[i], *by = change[i];
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double moved = by[lane] + small[lane], more = moved - by[lane];
+            const double sum = was[lane] + moved, added = sum - was[lane];
+            x[i][lane] = sum;
+            zero[lane] += sum - sum; /* a number less itself is 0, if it is finite */
+            carry[i][lane] = ((was[lane] - (sum - added)) + (moved - added)) + ((by[lane] - (moved - more)) + (small[lane] - more));
+        }
+    }
+    for (int lane = 0; lane < PHI_LANES; ++lane) group->active[lane] = group->active[lane] && zero[lane] == 0.0;
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            group->x[i][lane] = group->active[lane] ? x[i][lane] : group->x[i][lane];
+            group->carry[i][lane] = group->active[lane] ? carry[i][lane] : group->carry[i][lane];
+        }
+}
+
+/* Make one step of all active members. Returns the number of members that are still active. */
+static int phi_group_step(phi_group *group, size_t remaining)
+{
+    phi_batch now;
+    phi_lanes end[PHI_UNKNOWNS], change[PHI_DIM];
+    int active = 0;
+    memset(now, 0, sizeof now);
+    memset(end, 0, sizeof end);
+    phi_group_solve(group, now);
+    for (int i = 0; i < PHI_NODES; ++i)
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) end[k][lane] += now[i][k][lane];
+        }
+    phi_member_change_lanes(group->coef, group->x, end, change);
+    phi_group_advance(group, change);
+    phi_group_remember(group, end, now);
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        if (!group->active[lane] && group->steps_left[lane] == 0) group->steps_left[lane] = remaining;
+        active += group->active[lane];
+    }
+    return active;
+}
+
+/* Assign a member to a lane: its state, its coefficients and its step. */
+static phi_status phi_group_join(phi_group *group, int lane, const phi_members *all, size_t m)
+{
+    phi_solver s;
+    double x[PHI_DIM];
+    const phi_status status = phi_take_member(all, m, x, &s);
+    for (int i = 0; i < PHI_DIM; ++i) group->x[i][lane] = x[i];
+    if (status != PHI_OK) return status;
+    for (int k = 0; k < PHI_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
+    for (int i = 0; i < PHI_NODES; ++i) group->weights[i][0][lane] = s.h * phi_weights[i];
+    group->active[lane] = 1;
+    return status;
+}
+#endif

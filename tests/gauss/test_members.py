@@ -1,0 +1,54 @@
+"""Members of an ensemble with Gauss steps, one in each SIMD lane, beside trajectories by themselves."""
+
+import numpy as np
+import pytest
+from support import compile_text, solver
+
+from phigen.errors import StepError
+
+TOP = """
+coordinates: [P1, P2, P3, G1, G2, G3]
+parameters: {a: 0.7, c: 1}
+poisson:
+  brackets:
+    P1: {P2: -P3, P3: P2, G2: -G3, G3: G2}
+    P2: {P3: -P1, G3: -G1, G1: G3}
+    P3: {G1: -G2, G2: G1}
+hamiltonian: (P1**2/2 + a*P2**2 + P3**2)/2 + c*G1
+scheme: gauss
+"""
+OSCILLATOR = """
+coordinates: [q, p]
+parameters: {a: 0.7}
+poisson:
+  canonical: {q: [q], p: [p]}
+hamiltonian: p**2/2 + a*q**4/4
+scheme: gauss
+"""
+
+
+@pytest.mark.parametrize(("text", "order"), [(TOP, 4), pytest.param(OSCILLATOR, 16, marks=pytest.mark.slow)])
+def test_members_in_lanes_follow_their_own_trajectories(text, order):
+    """Eleven members with their own parameters and steps: full batches, and one with lanes that are left over."""
+    method = solver(compile_text(text + f"order: {order}\n"), "c")
+    draws = np.random.default_rng(order)
+    starts = draws.uniform(0.3, 1.0, (11, len(method.coordinates)))
+    starts[3] = 0.0  # an equilibrium of the oscillator; the scale of changes is not that of the state
+    steps, a = draws.uniform(0.05, 0.1, 11), draws.uniform(0.5, 1.0, 11)
+    frames = method.ensemble(starts, steps, 60, stride=20, parameters={"a": a})
+    for m in range(11):
+        alone = method.integrate(starts[m], steps[m], 60, stride=20, parameters={"a": a[m]})
+        np.testing.assert_allclose(frames[:, m], alone.x[-len(frames) :], rtol=0, atol=3e-14)
+
+
+def test_member_that_fails_does_not_stop_its_batch():
+    method = solver(compile_text(OSCILLATOR + "order: 4\n"), "c")
+    starts = np.array([[0.5 + 0.1 * m, 0.2] for m in range(8)])
+    starts[5] = 40.0, 0.0  # sweeps diverge
+    with pytest.raises(StepError) as failed:
+        method.ensemble(starts, 0.1, 50)
+    assert list(failed.value.members) == [5]
+    for m in {*range(8)} - {5}:
+        alone = method.integrate(starts[m], 0.1, 50).x[-1]
+        np.testing.assert_allclose(failed.value.trajectory[m], alone, rtol=0, atol=2e-14)
+    np.testing.assert_array_equal(failed.value.trajectory[5], starts[5])
