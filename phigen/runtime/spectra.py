@@ -43,6 +43,10 @@ class DynamicSpectrum:
     axes: tuple[str, ...]
     of: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        shape = " × ".join(map(str, self.values.shape))
+        return f"<DynamicSpectrum of {', '.join(self.of)}: q of {', '.join(self.axes)} and ω, {shape} values>"
+
     def variables(self, name: str, prefix: str = "") -> dict[str, tuple[tuple[str, ...], Floats]]:
         """Return dimensions and values of S under a ``name``, and of ``q_AXIS`` and ``omega`` with a ``prefix``."""
         names = [f"{prefix}q_{axis}" for axis in self.axes] + [f"{prefix}omega"]
