@@ -46,6 +46,7 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
 
     A run that is ``continued`` in its file may find it without an origin.
     """
+    from phigen.runtime.lattice_frames import is_store
     from phigen.runtime.origin import companion, read_origin
 
     named = [(option, path.resolve()) for option, path in files.items() if path is not None]
@@ -57,6 +58,8 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
             continue
         if path.with_name(f"{path.name}.checkpoint").exists() or (path.is_file() and path.stat().st_size == 0):
             continue  # of an interrupted run
+        if path.is_dir() and not is_store(path):
+            continue  # which no option replaces
         stored = read_origin(path)
         hint = "" if continued else "; --force replaces it"
         if stored is None and not continued:

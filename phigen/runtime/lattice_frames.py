@@ -236,9 +236,14 @@ def write_whole(path: Path, trajectory: LatticeTrajectory) -> None:
         _write_store(path, trajectory)
 
 
+def is_store(path: Path) -> bool:
+    """Whether a folder is a Zarr store."""
+    return any((path / name).is_file() for name in ("zarr.json", ".zgroup"))
+
+
 def expect_store(path: Path) -> None:
     """Raise `ValueError` if a Zarr store would replace something that is not a Zarr store."""
-    if path.exists() and not any((path / name).is_file() for name in ("zarr.json", ".zgroup")):
+    if path.exists() and not is_store(path):
         raise ValueError(f"{path} is there, and is no Zarr store")
 
 

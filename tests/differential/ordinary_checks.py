@@ -216,13 +216,19 @@ def targets(trial: Trial) -> None:
     if c.attitude is not None:
         expect_close(c.attitude, numpy.attitude, 10 * part, "attitudes of C and NumPy")
     options = [f"x0: {trial.x0.tolist()}"] + [f"{k}: {v}{'n' * (k == 'seed')}" for k, v in trial.since.items()]
-    value = "[[...s.x], s.t, s.hamiltonian(), [...(s.attitude ?? [])]]"
-    x, t, energy, attitude = javascript(trial.plain, ", ".join(options), f"s.integrate({trial.h!r}, {steps})", value)
+    value = "[[...s.x], s.t, s.hamiltonian(), [...(s.attitude ?? [])], [...(s.observables?.() ?? [])]]"
+    x, t, energy, attitude, seen = javascript(
+        trial.plain, ", ".join(options), f"s.integrate({trial.h!r}, {steps})", value
+    )
     expect_close(np.array(x), numpy.x[-1], 2e-13, "states of JavaScript and NumPy", scale)
     expect_close(np.array(t), numpy.t[-1], 2e-13, "time of JavaScript and NumPy", 1.0)
     expect_close(
         np.array(energy), numpy.energy[-1], 4e-12, "energy of JavaScript", 1 + float(np.abs(numpy.energy).max())
     )
+    for at_end, (name, rows) in zip(seen, numpy.observables.items(), strict=True):
+        expect_close(
+            np.array(at_end), rows[-1], 2e-11, f"observable {name} of JavaScript", 1 + float(np.abs(rows).max())
+        )
     if numpy.attitude is not None:
         expect_close(np.array(attitude), numpy.attitude[-1].ravel(), 2e-12, "attitude of JavaScript")
 
