@@ -10,7 +10,7 @@
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
  *   step, by Gauss collocation; The solver; Members of an ensemble; SIMD batches of members: Gauss
  *   steps; Ensembles
- * body-sha256: 1ae734dcd511fe2e516b81fc9c890d9fae1ecff85802475f521dc1dfb12dde40
+ * body-sha256: f0642b27321dd3289a241646d660659a1112550df47819391eaacca476e6f7a3
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -1006,7 +1006,7 @@ static void kowalevski_gauss_put_member(const kowalevski_gauss_members *all, siz
 enum {
     kowalevski_gauss_GROUP = kowalevski_gauss_LANES, /* members, one in each lane */
     /* measured: fewer members are faster one by one, with their stages in lanes */
-    kowalevski_gauss_FEWEST = kowalevski_gauss_LANES > 4 ? 6 : 3
+    kowalevski_gauss_FEWEST = kowalevski_gauss_LANES > 4 ? 7 : 3
 };
 
 /* Values of the unknowns of all members, for each stage. */

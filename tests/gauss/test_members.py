@@ -27,7 +27,7 @@ scheme: gauss
 """
 
 
-@pytest.mark.parametrize(("text", "order"), [(TOP, 4), pytest.param(OSCILLATOR, 16, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("text", "order"), [(TOP, 4), pytest.param(OSCILLATOR, 12, marks=pytest.mark.slow)])
 def test_members_in_lanes_follow_their_own_trajectories(text, order):
     """Eleven members with their own parameters and steps: full batches, and one with lanes that are left over."""
     method = solver(compile_text(text + f"order: {order}\n"), "c")

@@ -11,7 +11,7 @@
 /* ---- SIMD batches of members: Gauss steps ---- */
 enum {
     PHI_GROUP = PHI_LANES, /* members, one in each lane */
-    PHI_FEWEST = PHI_LANES > 4 ? 6 : 3 /* measured: fewer members are faster one by one, with their stages in lanes */
+    PHI_FEWEST = PHI_LANES > 4 ? 7 : 3 /* measured: fewer members are faster one by one, with their stages in lanes */
 };
 
 /* Values of the unknowns of all members, for each stage. */
