@@ -72,12 +72,12 @@ def measured_section(v: Verification) -> Markup:
     targets = " and ".join(TARGETS[t].title for t in v.targets)
     said = f"Run {v.run}: {v.made}, generated for {targets}. Solver: {v.label}."
     meanings = dict.fromkeys(meaning_of(check.name) for check in v.checks)
-    title = "What the solver shows" + ", and classical methods beside it" * bool(v.compared)
+    title = "Measured properties of the solver" + ", and of classical methods" * bool(v.compared)
     rows_explained = page.facts((m.row, page.typeset(_meaning(m))) for m in meanings)
     return page.joined(
         [page.paragraph(said), page.table(title, columns, rows),
          page.paragraph(page.typeset(v.said or stated(v.units)), "note"),
-         page.fold("What the rows mean", rows_explained)]
+         page.fold("Meaning of the rows", rows_explained)]
     )  # fmt: skip
 
 
@@ -95,7 +95,7 @@ def summary_table(summaries: Sequence[Summary]) -> Markup:
     if first.exact:
         rows.append(("solution, against the closed form", [_drift(s.exact) for s in summaries if s.exact]))
     if any(s.good < s.rows for s in summaries):
-        rows.append(("rows before it broke down", [("number", f"{s.good} of {s.rows}") for s in summaries]))
+        rows.append(("rows before the failure", [("number", f"{s.good} of {s.rows}") for s in summaries]))
     columns = [("", "quantity"), *(("number", s.method) for s in summaries)]
     listed = page.table("Largest errors along the run", columns, rows)
     return page.joined([listed, page.paragraph(page.typeset(stated(first.units)), "note")])
@@ -155,7 +155,7 @@ def _measured_tiles(v: Verification) -> Iterator[Tile]:
         ("energy balance: largest error", "largest error of the energy balance"),
         ("observed order", "observed order"),
         ("Poisson defect", "Poisson defect of a step"),
-        ("reversibility", "error of a step there and back"),
+        ("reversibility", "error after a step of h and one of −h"),
     ):
         for check in v.checks:
             if check.name.startswith(name) and not math.isnan(check.value):

@@ -96,7 +96,7 @@ def _method(compilation: CompiledLattice) -> Iterator[Markup]:
     yield page.facts((name if colon else "note", page.typeset(text or name)) for name, colon, text in facts)
     if flows := compilation.sweeps.flows:
         rows = [(page.typeset(f"H_{k}"), [("", flow.manner)]) for k, flow in enumerate(flows, 1)]
-        yield page.table("The parts of H, and how their flows move a site", [("", "part"), ("", "flow")], rows)
+        yield page.table("The parts of H, and how their flows update a site", [("", "part"), ("", "flow")], rows)
 
 
 def _run(material: LatticeMaterial, trajectory: LatticeTrajectory) -> Iterator[Markup]:
@@ -123,8 +123,8 @@ def _run(material: LatticeMaterial, trajectory: LatticeTrajectory) -> Iterator[M
     flat = trajectory.x.ndim == 3
     caption = "The fields over space, upwards, and time" if flat else "The fields at some times"
     if places_of(trajectory) is not None:
-        caption = "The fields at some times; sites are as far apart as there are bonds between them, nearly"
-    caption += ", and errors of what is conserved, on a logarithmic scale."
+        caption = "The fields at some times; distances are close to the number of bonds between sites"
+    caption += ", and errors of conserved quantities, on a logarithmic scale."
     worst = ", ".join(f"{name} {page.scientific(float(e.max()))}" for name, e in material.errors.items())
     title, run = "The fields over space and time", material.run
     names = run.lattice.names if run and run.lattice else ()
@@ -138,6 +138,6 @@ def _run(material: LatticeMaterial, trajectory: LatticeTrajectory) -> Iterator[M
     energies = material.energies
     if energies is not None:
         mean = float(np.mean(energies[-1]))
-        said = f"Energy per site at the end: {mean:.6g} in the mean, {np.std(energies[-1]):.2g} its spread."
-        caption = f"{said} Below, how far the Casimirs of the sites went: the farthest, and the spread."
+        said = f"Energy per site at the end: mean {mean:.6g}, standard deviation {np.std(energies[-1]):.2g}."
+        caption = f"{said} Below: the largest Casimir error of all sites, and the spread."
         yield picture("sites", sites_figure(trajectory, energies), "Energies and Casimirs of the sites", said, caption)

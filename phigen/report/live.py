@@ -30,11 +30,11 @@ FEW, COORDINATES = 4, 15
 STEP, SPEED, PARAMETER = 16, 20, 8
 
 HELP = """Drag a picture of space, or use the arrow keys, to turn both; + and − zoom; 0 resets. Between steps the curves
-are interpolated. The panel begins with a step that is large for RK4, if there is one that phigen takes with margin: at
-most half of the step with which it breaks down. With smaller steps both come closer to the true motion."""
+are interpolated. The panel begins with a step that is large for RK4, but at most half of the step with which phigen
+fails. With smaller steps both come closer to the exact solution."""
 
-NOISE = "RK4, which it has beside the solver, takes no noise"
-NOTHING = "Time or forces act on this system, so nothing is conserved that errors could be counted in."
+NOISE = "RK4, with which it compares the solver, does not apply to noise"
+NOTHING = "Nothing is conserved, because this system depends on the time or has forces: no errors are shown."
 
 _COMMENT = re.compile(r"^[ \t]*(/\*.*?\*/|//[^\n]*)[ \t]*\n", re.MULTILINE | re.DOTALL)
 _PRIVATE = Extras(without=frozenset({"ensemble"}))
@@ -248,15 +248,15 @@ def _leaf(system: System, group: Group) -> int | None:
 
 def _say(system: System, conserved: Sequence[Mapping[str, object]], drawn: bool) -> str:
     """Return the text above the panel that describes the picture."""
-    said = "Two solvers follow the motion from the same start, in your browser, now. "
-    properties = ["keeps its energy"] if any(q["name"] == "energy error" for q in conserved) else []
+    said = "Two solvers integrate the motion from the same start, in your browser. "
+    properties = ["conserves its energy"] if any(q["name"] == "energy error" for q in conserved) else []
     if drawn:
         properties.append(f"never leaves the {'curve' if system.dimension == 2 else 'surface'} drawn here")
     elif len(conserved) > len(properties):
-        properties.append("keeps its Casimirs")
+        properties.append("conserves its Casimirs")
     if not properties:
         return f"{said}{NOTHING}"
-    return f"{said}The true motion {' and '.join(properties)}. The numbers say how far each of the two is from that."
+    return f"{said}The exact solution {' and '.join(properties)}. The numbers are the errors of the two solvers."
 
 
 def general(live: Live) -> Iterable[Slider]:

@@ -40,13 +40,13 @@ FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
 MOST_NUMBERS = 20_000
 
 HELP = {
-    "diagram": "Sites go upwards, the time to the right; when the picture is full, every second moment goes.",
-    "plane": "Each square is a site; of three axes the plane in the middle of the first is drawn.",
-    "graph": "Each point is a site; lines are bonds. Sites are as far apart as there are bonds between them, nearly.",
-    "moving": "Each point is a site, with the way behind it.",
+    "diagram": "Sites are drawn upwards, the time to the right. A full picture drops every second column.",
+    "plane": "Each square is a site; for three axes the middle plane of the first is drawn.",
+    "graph": "Each point is a site; lines are bonds. Distances are close to the number of bonds between sites.",
+    "moving": "Each point is a site, with its recent path.",
 }
 _DRAWN = " The random start is drawn in the page, from the seed of the spec."
-_DIRECTION = " The hue is the direction in the plane of {}, {}; the lighter, the larger {}."
+_DIRECTION = " The hue is the direction in the plane of {}, {}; lighter colours mean larger {}."
 
 
 @dataclass(frozen=True)
@@ -290,10 +290,10 @@ def _quantities(compilation: CompiledLattice) -> list[dict[str, Any]]:
 
 
 def _say(compilation: CompiledLattice) -> str:
-    said = "Two solvers follow the motion from the same start, in your browser, now. "
+    said = "Two solvers integrate the motion from the same start, in your browser. "
     conserved = ["its invariants" if "invariants" in q else "its Casimirs" if q["casimirs"] else "its energy"
             for q in _quantities(compilation)]  # fmt: skip
     conserved_words = " and ".join([", ".join(conserved[:-1]), conserved[-1]] if len(conserved) > 1 else conserved)
     if not conserved_words:
         return f"{said}{NOTHING}"
-    return f"{said}The true motion keeps {conserved_words}. The numbers say how far each of the two is from that."
+    return f"{said}The exact solution conserves {conserved_words}. The numbers are the errors of the two solvers."

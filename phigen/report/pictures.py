@@ -40,7 +40,7 @@ def trajectory_picture(compilation: Compilation, trajectory: Trajectory) -> Mark
 def error_picture(material: Material) -> Markup:
     """Return the figure of the errors of energy and Casimirs against time."""
     caption = (
-        "Errors of what the flow conserves, over the time, on a logarithmic scale. The dotted line is one unit in the "
+        "Errors of conserved quantities against time, on a logarithmic scale. The dotted line is one unit in the "
         "last place of a double."
     )
     methods = {label: _with_few_casimirs(t) for label, t in material.methods.items()}
@@ -64,15 +64,15 @@ def section_picture(names: Sequence[str], function: str, points: Floats, count: 
 def constancy_picture(constancy: Constancy) -> Markup:
     """Return the figure of the changes of the modified Hamiltonian."""
     largest = page.listed({truncation(m): float(e.max()) for m, e in enumerate(constancy.errors)})
-    caption = "Changes of H and of H̃ with one and two corrections, relative to the energy. Thin lines have the slopes "
-    caption += "that they should have. The dotted line is one unit in the last place of a double."
+    caption = "Changes of H and of H̃ with one and two corrections, relative to the energy. Thin lines have the "
+    caption += "expected slopes. The dotted line is one unit in the last place of a double."
     figure, said = figures.constancy_figure(constancy), f"Largest changes at steps of {constancy.step:.4g}: {largest}."
     return picture("constancy", figure, "Constancy of the modified Hamiltonian", said, caption)
 
 
 def lyapunov_picture(spectrum: Spectrum) -> Markup:
     """Return the figure of the convergence of the Lyapunov exponents."""
-    caption = f"How the Lyapunov exponents converge, up to {spectrum.clock} = {spectrum.t:.9g}."
+    caption = f"Convergence of the Lyapunov exponents up to {spectrum.clock} = {spectrum.t:.9g}."
     exponents = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
     return picture(
         "lyapunov", figures.lyapunov_figure(spectrum), "Lyapunov exponents", f"At the end: {exponents}.", caption

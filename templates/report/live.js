@@ -148,7 +148,7 @@ if (document.getElementById("live-panel")) {
     } catch (error) {
       if (!error.status) throw error;
       race = null;
-      at("told").textContent = `No start: ${error.message}.`;
+      at("told").textContent = `Cannot start: ${error.message}.`;
     }
     linkHere();
     inputs.forEach(show);
@@ -193,7 +193,7 @@ if (document.getElementById("live-panel")) {
     [...(at(`${sides[k]}-observed`)?.children ?? [])].forEach((row, i) => {
       row.lastElementChild.textContent = i in observed ? String(shortened(observed[i])).replace("-", "−") : "–";
     });
-    const told = runner?.failed ? `Broke down after ${runner.steps} steps.` : "";
+    const told = runner?.failed ? `Failed after ${runner.steps} steps.` : "";
     if (at(`${sides[k]}-told`).textContent !== told) at(`${sides[k]}-told`).textContent = told;
   }
 

@@ -98,7 +98,7 @@ def expect_true(told, say):
     if told["names"]:
         assert told["ours"][-1][0] < 1  # the panel is about a motion that phigen follows
     else:
-        assert "nothing is conserved" in say
+        assert "Nothing is conserved" in say
 
 
 @pytest.mark.parametrize("name", slow_but(QUICK))

@@ -119,5 +119,5 @@ def test_panel_alone_is_a_page_for_a_frame(phigen):
 def test_system_with_noise_has_no_panel_and_the_reason_is_said(phigen):
     done = phigen("thermal_spin", "--panel")
     assert done.exit_code == 5
-    assert "thermal_spin has no live panel: RK4, which it has beside the solver, takes no noise" in done.stderr
+    assert "no live panel: RK4, with which it compares the solver, does not apply to noise" in done.stderr
     assert list(Path().glob("*.html")) == []

@@ -208,7 +208,7 @@ def test_panels_of_the_corpus_begin_with_half_of_a_step_that_works(browser, tmp_
     assert np.isfinite(wide.x).all(), "twice the first step is taken too"
     click(browser, "play")
     assert told(browser, "ours")["steps"] == 100
-    nothing = "nothing is conserved" in path.read_text(encoding="utf-8")
+    nothing = "Nothing is conserved" in path.read_text(encoding="utf-8")
     assert nothing == (not told(browser, "theirs")["errors"])
     assert browser.complaints == []
 
