@@ -1,4 +1,4 @@
-"""What is said of tests that are not made."""
+"""Messages about tests that are not run."""
 
 import subprocess
 import sys

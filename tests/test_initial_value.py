@@ -1,4 +1,4 @@
-"""``phigen.solve_ivp`` beside that of SciPy."""
+"""``phigen.solve_ivp`` compared with SciPy's."""
 
 from functools import cache
 

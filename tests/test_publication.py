@@ -1,4 +1,4 @@
-"""What is published states one version, and the dependencies of the package."""
+"""Published files state the same version, and the dependencies of the package."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Attitudes of bodies that are pushed, shaken, or followed in another time: against q̇ = ½ q ∇H beside the momentum."""
+"""Attitudes with forces, noise and monitors, compared with the integral of q̇ = ½ q ∇H."""
 
 from functools import cache
 

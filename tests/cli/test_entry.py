@@ -1,4 +1,4 @@
-"""What holds for every command: imports, exit codes, streams, colours, interrupts."""
+"""Properties of every command: imports, exit codes, streams, colours, interrupts."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""A comet that meets Jupiter: steps that a monitor makes short there, beside a Runge–Kutta method with step control."""
+"""A comet that meets Jupiter: steps with a monitor, compared with a Runge–Kutta method with step control."""
 
 import numpy as np
 import pytest

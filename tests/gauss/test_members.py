@@ -1,4 +1,4 @@
-"""Members of an ensemble with Gauss steps, one in each SIMD lane, beside trajectories by themselves."""
+"""Members of an ensemble with Gauss steps, one in each SIMD lane, compared with single trajectories."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What cannot be done is reported, and what was there before stands; members and copies are independent."""
+"""Failures are reported and leave earlier files unchanged; members and copies are independent."""
 
 import copy
 import ctypes

@@ -1,4 +1,4 @@
-"""Hamiltonians that depend on the time: the series, the order, the targets, beside the pair typed by hand."""
+"""Hamiltonians that depend on the time: series, order and targets, compared with a pair (t, e) written by hand."""
 
 from dataclasses import replace
 from functools import cache

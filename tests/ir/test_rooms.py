@@ -1,4 +1,4 @@
-"""What the loop IR and the targets may import."""
+"""Imports that the loop IR and the targets may have."""
 
 import ast
 from pathlib import Path

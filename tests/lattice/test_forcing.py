@@ -1,4 +1,4 @@
-"""Forces, damping and noise at the sites of lattices, beside the ordinary system of a few of them."""
+"""Forces, damping and noise at the sites of lattices, compared with the ordinary system of a few sites."""
 
 from __future__ import annotations
 

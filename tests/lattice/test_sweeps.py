@@ -1,4 +1,4 @@
-"""Lattices by sweeps over their sites, beside the ordinary system of a few of them: field, H, steps, orders, π."""
+"""Lattices by sweeps over sites, compared with the ordinary system of a few sites: field, H, steps, orders, π."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lattices whose Hamiltonian depends on the time, beside the ordinary system of a few of their sites."""
+"""Lattices whose Hamiltonian depends on the time, compared with the ordinary system of a few of their sites."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""LaTeX of whole systems, read once beside what they are, and kept in the files of the same name."""
+"""LaTeX of whole systems, compared with reviewed files of the same names."""
 
 from pathlib import Path
 

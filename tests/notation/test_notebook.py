@@ -1,4 +1,4 @@
-"""What notebooks show of systems, compilations and trajectories."""
+"""Displays of systems, compilations and trajectories in notebooks."""
 
 from xml.etree import ElementTree
 

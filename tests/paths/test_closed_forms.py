@@ -1,4 +1,4 @@
-"""Karasev's construction beside closed forms: both exact, of the same order; for linear brackets the exponential."""
+"""Karasev's construction compared with closed forms: both exact, of the same order; exponential for linear brackets."""
 
 from dataclasses import replace
 from itertools import product

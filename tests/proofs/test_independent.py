@@ -1,4 +1,4 @@
-"""What the compiler uses beside the second derivation by sympy: equal for the corpus, refuted with a planted bug."""
+"""Second derivation by sympy: equal to the compiler's for the corpus, and refuted with a planted bug."""
 
 import re
 import time

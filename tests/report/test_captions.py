@@ -1,4 +1,4 @@
-"""What the live panel says, by its own code in Node, against the errors of every step: over the corpus."""
+"""Captions of the live panel, run in Node, compared with the errors of every step, over the corpus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an accepted spec becomes."""
+"""Spec objects that accepted spec files become."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where H depends on the time: the balance of energy, and verification from any time on."""
+"""Energy balance and verification, for Hamiltonians that depend on the time."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Errors and times beside classical methods: the same arithmetic in C, orders as stated, honest floors."""
+"""Errors and times compared with classical methods: the same arithmetic in C, stated orders, rounding floors."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Symbols of phigen's own: of a kind, beside the names of the user."""
+"""Symbols that phigen makes: their kinds, and no clashes with names of the user."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""What is generated of the runtime in C is what a preprocessor makes of it, but for blocks without a head."""
+"""The generated runtime in C equals the output of a preprocessor, except for blocks without a head."""
 
 import re
 from dataclasses import replace
