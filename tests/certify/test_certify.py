@@ -615,7 +615,7 @@ def test_the_runtime_is_the_one_that_the_theorems_are_about() -> None:
             "collocate": ("square * (past->rate * past->rate) <= SOLVED * SOLVED",),
             "judge": (
                 "slow && change <= ROUNDING",
-                "rate > fmax(STALLED, 1.5 * past->rate)",
+                "rate > fmax(STALLED, 1.5 * *usual)",
                 "change <= NEARLY_ROUNDING",
             ),
             "change_of": ("(now[lane] - old[lane]) * (now[lane] - old[lane])", "return total(sum) / (double)NODES"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import random
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -18,13 +19,13 @@ from differential.reference import Floats
 #: Names of parameters, some of them words of C or names that code may use itself.
 PARAMETERS = ("a", "mu", "lambda", "k", "c")
 
-#: Forms of observables of two expressions: as a spec has them, and as sympy has them.
-OBSERVED: Mapping[str, Callable[[Expr, Expr], Expr]] = {
+#: Forms of observables of two expressions: as a spec has them, and as functions of their values.
+OBSERVED: Mapping[str, Callable[[float, float], float]] = {
     "({0})*({1})": lambda a, b: a * b,
-    "atan2({0}, 2 + ({1})**2)": lambda a, b: sympy.atan2(a, 2 + b**2),
-    "max({0}, min({1}, 1/2))": lambda a, b: sympy.Max(a, sympy.Min(b, sympy.Rational(1, 2))),
-    "if({0} < {1}, {0}, sign({1}))": lambda a, b: sympy.Piecewise((a, a < b), (sympy.sign(b), True)),
-    "heaviside({0}) - abs({1})": lambda a, b: sympy.Piecewise((1, a >= 0), (0, True)) - sympy.Abs(b),
+    "atan2({0}, 2 + ({1})**2)": lambda a, b: math.atan2(a, 2 + b**2),
+    "max({0}, min({1}, 1/2))": lambda a, b: max(a, min(b, 0.5)),
+    "if({0} < {1}, {0}, sign({1}))": lambda a, b: a if a < b else float(np.sign(b)),
+    "heaviside({0}) - abs({1})": lambda a, b: (a >= 0) - abs(b),
 }
 
 

@@ -145,7 +145,8 @@ def functions(trial: Trial) -> None:
 def observables(trial: Trial) -> None:
     """Observables have the values of their formulas, at states and along a run, which ends at other times."""
     system, x = trial.system, trial.x0 + 0.1 * trial.random.uniform(-1, 1, (5, len(trial.x0)))
-    formulas = system.function([OBSERVED[form](a, b) for form, a, b in system.observables.values()])
+    forms = [OBSERVED[form] for form, *_ in system.observables.values()]
+    operands = system.function([e for _, *pair in system.observables.values() for e in pair])
     for target, solver in trial.solvers.items():
         part = trial.part(target, 1e-12, 1e-4)
         run = solver.integrate(trial.x0, trial.h, 5, 2, **trial.since)
@@ -153,7 +154,8 @@ def observables(trial: Trial) -> None:
         when = np.linspace(0.2, 0.6, len(x)) + trial.t0
         at_states = solver.observables(x, **({"t": when} if system.timed else {}))
         for named, states, times in ((at_states, x, when), (run.observables, run.x, run.t)):
-            values = np.array([formulas(t, row) for t, row in zip(times, states, strict=True)])
+            pairs = [operands(t, row).reshape(-1, 2) for t, row in zip(times, states, strict=True)]
+            values = np.array([[form(*pair) for form, pair in zip(forms, row, strict=True)] for row in pairs])
             for k, name in enumerate(system.observables):
                 size = 1 + float(np.abs(values[:, k]).max())
                 expect_close(np.asarray(named[name]), values[:, k], part, f"{target}: observable {name}", size)
