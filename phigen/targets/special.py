@@ -72,6 +72,23 @@ def closed(order: int) -> tuple[str, ...]:
     return _CLOSED[: order + 1]
 
 
+def turns(*, single: bool) -> dict[str, object]:
+    """The constants that subtract multiples of π from w = √s/2: the upper part of π, the lower part, and 1/π.
+
+    The upper part has 33 bits, 8 in single precision. So its products with the first 2^20 (2^16) integers are exact,
+    and ``limit`` is the value of s for the last one.
+    """
+    bits, most = (6, 2.0**16) if single else (31, 2.0**20)
+    upper = math.floor(math.pi * 2.0**bits) / 2.0**bits
+    lower = (math.pi - upper) + _BEYOND_PI
+    limit = float(f"{0.95 * (2.0 * math.pi * most) ** 2:.1e}")  # rounded to two digits, downwards for both
+    return {"reciprocal": repr(1.0 / math.pi), "upper": repr(upper), "lower": repr(lower), "limit": repr(limit)}
+
+
+#: The difference of π and its double.
+_BEYOND_PI = 1.2246467991473532e-16
+
+
 class _Calls:
     """A math library whose functions occur in formulas."""
 

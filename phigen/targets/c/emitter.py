@@ -302,7 +302,7 @@ def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
 def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
     """Return the constants and the functions of the model; ``others`` are further texts printed for it."""
     step = program.step
-    body = functions.called(program)
+    body = functions.called(program, device=has["DEVICE"])
     kernels_of_step = text_of(program).kernels(step, has)
     kernels_of_step += program.choice
     kernels_of_step += [program.monitor.elapsed] if program.monitor and not has["STAGED"] else []

@@ -82,13 +82,16 @@ _SMALL = {
 }
 
 
-def called(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
+def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool = False) -> list[str]:
     """The special functions that kernels call, except the ``unprinted`` ones: φ and its derivatives, `ENTIRE`, and
-    for a splitting those that its flows call."""
+    for a splitting those that its flows call. For a ``device``, φ calls no tangent."""
     # loops over sites have versions of their own
     used = {e.op for e in topological([e for kernel in program.step.flow_kernels for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
-    phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program, unprinted)]
+    names = special.used(program, unprinted)
+    if device and names and SPECIAL[0] not in names:  # which the others call
+        names = [SPECIAL[0], *names]
+    phis = [render("c", "phi_device.c" if device else "phi.c", _phi(program, f, device=device)) for f in names]
     polynomial = [render("c", "polynomial.c", {"NAME": program.name})] if phis else []
     anomaly = [_anomaly(program)] if special.calls_anomaly(program) else []
     functions = [render("c", "small.c", _values(program, f)) for f in small]
@@ -184,14 +187,21 @@ def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
     return texts
 
 
-def _phi(program: Program, f: str) -> Mapping[str, object]:
+def _phi(program: Program, f: str, *, device: bool) -> Mapping[str, object]:
     near = needed(program, near_coefficients(order_of(f)), NEAR)
     rest = needed(program, rest_coefficients(order_of(f)), MIDDLE)
     tables = [line for name, numbers in (("near", near), ("rest", rest)) for line in _table(name, numbers)]
     values = dict(special.values(f, f)) | {"NAME": program.name, "function": f, "tables": tables}
     *closed, last = special.closed(order_of(f))
-    closed_form = {"closed": closed, "value": last.split(" = ")[1]}
-    return values | closed_form | {"near_count": len(near), "rest_count": len(rest)}
+    closed_form = {"closed": closed[1:] if device else closed, "value": last.split(" = ")[1]}
+    reduction = special.turns(single=program.single) if device else {}
+    return (
+        values
+        | closed_form
+        | reduction
+        | {"derivative": order_of(f) > 0}
+        | {"near_count": len(near), "rest_count": len(rest)}
+    )
 
 
 def needed(program: Program, coefficients: Sequence[C], reach: float) -> list[C]:

@@ -63,7 +63,7 @@ def body(program: Program, step: Sweeps, language: str) -> str:
         "arrays": list(comments.values()),
         "arguments": ", ".join(_argument(name, program.name) for name in arrays),
         "implicit": step.equation is not None,
-        "functions": functions.called(program),
+        "functions": functions.called(program, device=True),
         "kernels": [*_kernels(loops)],
     }
     return render("c", "device_lattice.h", values)
