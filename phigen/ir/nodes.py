@@ -37,24 +37,50 @@ class Type(Enum):
 
 @dataclass(frozen=True)
 class Pointer:
-    """Pointer to reals; a ``constant`` one is only read through, a ``restricted`` one has no alias that is written."""
+    """Pointer to reals, or to reals in SIMD ``lanes``.
+
+    A ``constant`` one is only read through, a ``restricted`` one has no alias that is written.
+    """
 
     constant: bool = True
     restricted: bool = False
+    lanes: bool = False
 
 
 @dataclass(frozen=True)
 class Vector:
-    """Local array of reals."""
+    """Array of reals, or of reals in SIMD ``lanes``; a matrix if it has several ``rows``.
+
+    As a parameter it is an address; a ``constant`` one is only read through.
+    """
+
+    length: Value
+    rows: Value | None = None
+    lanes: bool = False
+    constant: bool = False
+
+
+@dataclass(frozen=True)
+class Tape:
+    """Address of the next vector of a tape, or nothing if none are stored."""
 
     length: Value
 
 
 @dataclass(frozen=True)
 class RecordType:
-    """Record of the runtime, by its name: the solver, or a row segment. Parameters of this type are addresses."""
+    """Record of the runtime, by its name: the solver, or a row segment.
+
+    Parameters of this type are addresses, and so are local names if it is an ``address``. A function changes only
+    records that are ``mutable``.
+    """
 
     name: str
+    mutable: bool = False
+    address: bool = False
+
+
+ParameterType = Type | Pointer | Vector | Tape | RecordType
 
 
 class Storage(Enum):
@@ -342,6 +368,23 @@ class Clear:
 
 
 @dataclass(frozen=True)
+class Copy:
+    """Copy a vector to another one, or ``count`` elements."""
+
+    target: Value
+    source: Value
+    count: Value | None = None
+
+
+@dataclass(frozen=True)
+class Append:
+    """Append a vector to a tape, if there is one."""
+
+    tape: Value
+    vector: Value
+
+
+@dataclass(frozen=True)
 class Selection:
     """The sites that a sweep updates: those of one ``colour``, those away from boundary seams, or those on a seam.
 
@@ -455,6 +498,8 @@ Statement = (
     | Assign
     | Together
     | Clear
+    | Copy
+    | Append
     | Loop
     | Discard
     | If
@@ -475,7 +520,7 @@ _NUMBERED = dict.fromkeys(("first", "end", "unit"), Type.SIZE)
 _ARRAYS = dict.fromkeys(("x", "y", "v", "to", "bar", "handed", "given", "at_bonds"), Type.ARRAYS)
 _SUMMED = dict.fromkeys(("sums", "numbers"), Pointer(constant=False))
 #: The types of the parameters of functions by rows, by their names.
-TYPES: dict[str, Type | Pointer | RecordType] = {
+TYPES: dict[str, ParameterType] = {
     "s": RecordType("solver"),
     "row": RecordType("row"),
     "coef": Pointer(),
@@ -489,11 +534,20 @@ TYPES: dict[str, Type | Pointer | RecordType] = {
 
 
 @dataclass(frozen=True)
+class Table:
+    """Constants of the model: an array of integers with a name."""
+
+    name: str
+    values: tuple[int, ...]
+    length: Value
+
+
+@dataclass(frozen=True)
 class Function:
     """A function; ``doc`` is its purpose, ``role`` that of its kernel.
 
-    On the level of sites its parameters are some of `PARAMETERS`. In the lowering by rows they have the types of
-    `TYPES`.
+    On the level of sites its parameters are some of `PARAMETERS`. On the level of memory they have the types that are
+    listed in ``types``, or else those of `TYPES`.
     """
 
     name: str
@@ -501,6 +555,11 @@ class Function:
     role: Role
     parameters: tuple[str, ...]
     body: Block
+    types: tuple[tuple[str, ParameterType], ...] = ()
+
+    def type_of(self, parameter: str) -> ParameterType:
+        """Return the type of a parameter on the level of memory."""
+        return {**TYPES, **dict(self.types)}[parameter]
 
     def with_body(self, *body: Statement) -> Function:
         """Return the function with other statements."""

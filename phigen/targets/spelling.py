@@ -52,7 +52,8 @@ class Spelling:
         called = _words("\n".join(dialect.language.functions.values()))
         self.scope = Scope(dialect.language.reserved | {*reserved, *called, *_fixed(body)})
         declarations = [s for s in statements(body) if isinstance(s, ir.Declare) and not s.in_place]
-        records = {self.name(n) for s in declarations if isinstance(s.type, ir.RecordType) for n, _ in s.items}
+        of_records = (s for s in declarations if isinstance(s.type, ir.RecordType) and not s.type.address)
+        records = {self.name(n) for s in of_records for n, _ in s.items}
         self._pointers = dialect.pointers - records
         names = dict.fromkeys(name for s in declarations for name, _ in s.items)
         temporaries = (n for n in names if isinstance(n, Symbol) and n.kind == TEMPORARY)

@@ -30,6 +30,10 @@ def _lines(body: ir.Block, indent: str) -> Iterator[str]:
                 yield f"{indent}sum of {source}[{number}] += {_value(value)}"
             case ir.Clear(array, first, count):
                 yield f"{indent}clear {_value(count)} of {_value(array)}{f' from {_value(first)}' if first else ''}"
+            case ir.Copy(target, source, count):
+                yield f"{indent}copy {f'{_value(count)} of ' if count else ''}{_value(source)} to {_value(target)}"
+            case ir.Append(tape, vector):
+                yield f"{indent}append {_value(vector)} to {_value(tape)}"
             case ir.Loop():
                 bounds = f" {s.variable} in {_value(s.low)}..{_value(s.high)}" if s.low else ""
                 bounds += f" by {_value(s.step)}" if s.step else ""

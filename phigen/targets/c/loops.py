@@ -7,13 +7,20 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from phigen.ir import nodes as ir
+from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import Expression
 from phigen.targets.c.language import LANGUAGE, elementary_functions, reserved_variables
-from phigen.targets.c.layout import WIDTH
+from phigen.targets.c.layout import WIDTH, comment
 from phigen.targets.spelling import Dialect, Spelling
 
 #: Functions and sizes of the runtime, whose names begin with that of the solver.
-_RUNTIME = ("first", "LANES", "total", "added", "ADDED", "piece_of", "between", "units", "part_of_flow", "DIM", "SUMS")
+_RUNTIME = (
+    "first", "LANES", "total", "added", "ADDED", "piece_of", "between", "units", "part_of_flow", "DIM", "SUMS", "ROW",
+    "ELEMENT", "BACK_PACKS", "FLOWS",
+)  # fmt: skip
+
+#: Names of addresses of records.
+_POINTERS = frozenset({"row", "s", "group", "pack", "bar"})
 
 #: Types of values that are no pointers.
 _TYPES = {
@@ -25,18 +32,30 @@ _TYPES = {
 }
 
 #: Types of the variables of loops, by their kinds.
-_COUNTERS = {"segments": "size_t", "search": "size_t", "lanes": "int"}
+_COUNTERS = {"segments": "size_t", "search": "size_t", "lanes": "int", "packs": "int", "stages": "int"}
 
 #: Limits of a case of a switch that is printed on one line: statements, and letters, which leave room for the label and
 #: the indentation.
 _SHORT_CASE, _CASE_WIDTH = 2, WIDTH - 24
 
 
-def function(printed: ir.Function, name: str, *, inline: bool = False) -> str:
-    """Return a function by rows of a solver as text, without its comment."""
-    parameters = ", ".join(_parameter(p, name) for p in printed.parameters)
-    head = f"static {'inline ' * inline}void {name}_{printed.name}({parameters})"
-    return "\n".join([f"{head}\n{{", *statements(printed, name), "}\n"])
+def function(printed: ir.Function, name: str, linkage: str = "static") -> str:
+    """Return a function of a solver as text, without its comment."""
+    spelling = _spelling(printed, name)
+    parameters = ", ".join(_parameter(p, printed.type_of(p), name, spelling) for p in printed.parameters)
+    head = f"{linkage} void {name}_{printed.name}({parameters})"
+    return "\n".join([f"{head}\n{{", *_indented(_StatementPrinter(spelling, name, 0).lines(printed.body)), "}\n"])
+
+
+def commented(printed: ir.Function, name: str, linkage: str = "static") -> str:
+    """Return a function of a solver as text, below its purpose."""
+    return "\n".join([*comment(f"/* {printed.doc}. */"), function(printed, name, linkage)])
+
+
+def table(printed: ir.Table, name: str) -> str:
+    """Return the constants of a table of a solver as a line."""
+    length = _spelling(ir.Function("", "", Role.OTHER, (), ()), name)(printed.length)
+    return f"static const int {name}_{printed.name}[{length}] = {{ {', '.join(map(str, printed.values))} }};"
 
 
 def statements(printed: ir.Function, name: str, *, shared_line: int = 0) -> list[str]:
@@ -44,26 +63,35 @@ def statements(printed: ir.Function, name: str, *, shared_line: int = 0) -> list
 
     Declarations of computed values share lines that are not longer than ``shared_line``.
     """
+    return [*_indented(_StatementPrinter(_spelling(printed, name), name, shared_line).lines(printed.body))]
+
+
+def _spelling(printed: ir.Function, name: str) -> Spelling:
     dialect = Dialect(
         replace(LANGUAGE, reserved=reserved_variables(name), functions=elementary_functions(name)),
         operators={"and": "&&", "or": "||", "not": "!", "index": "ptrdiff_t", "size": "size_t"},
         functions={function: f"{name}_{function}" for function in _RUNTIME},
-        pointers=frozenset({"row", "s", *(p for p in printed.parameters if p == "params")}),
+        pointers=_POINTERS | {p for p in printed.parameters if p == "params"},
     )
-    spelling = Spelling(dialect, printed.parameters, printed.body)
-    return [*_indented(_StatementPrinter(spelling, name, shared_line).lines(printed.body))]
+    return Spelling(dialect, printed.parameters, printed.body)
 
 
-def _parameter(parameter: str, name: str) -> str:
-    kind = ir.TYPES[parameter]
-    text = f"const {name}_{kind.name} *" if isinstance(kind, ir.RecordType) else _type(kind)
-    return f"{text}{'' if text.endswith(('*', ' ')) else ' '}{parameter}"
+def _parameter(parameter: str, kind: ir.ParameterType, name: str, spell: Spelling) -> str:
+    match kind:
+        case ir.RecordType(record, mutable):
+            return f"{'const ' * (not mutable)}{name}_{record} *{parameter}"
+        case ir.Pointer(constant, restricted):
+            return f"{'const ' * constant}{_number(kind, name)} *{'restrict ' * restricted}{parameter}"
+        case ir.Vector(length, rows):
+            row = f"[{spell(rows)}]" if rows else ""
+            return f"{'const ' * kind.constant}{_number(kind, name)} {parameter}{row}[{spell(length)}]"
+        case ir.Tape(length):
+            return f"double (*{parameter})[{spell(length)}]"
+    return f"{_TYPES[kind]}{'' if _TYPES[kind].endswith('*') else ' '}{parameter}"
 
 
-def _type(kind: ir.Type | ir.Pointer) -> str:
-    if isinstance(kind, ir.Pointer):
-        return f"{'const ' * kind.constant}double *{'restrict ' * kind.restricted}"
-    return _TYPES[kind]
+def _number(kind: ir.Pointer | ir.Vector, name: str) -> str:
+    return f"{name}_lanes" if kind.lanes else "double"
 
 
 def _indented(lines: Iterable[str]) -> Iterator[str]:
@@ -131,6 +159,12 @@ class _StatementPrinter:
                 start = spell(ir.Binary("+", array, first) if first else array)
                 pointer = f"({spell(array)})" if isinstance(array, ir.Binary) else spell(array)
                 yield f"memset({start}, 0, {spell(ir.Cast(count, 'size'))} * sizeof *{pointer});"
+            case ir.Copy(target, source, count):
+                size = f"sizeof {spell(target)}"
+                size = f"{spell(count)} * {size}" if count else size
+                yield f"memcpy({spell(target)}, {spell(source)}, {size});"
+            case ir.Append(tape, vector):
+                yield f"if ({spell(tape)} != NULL) memcpy({spell(tape)}++, {spell(vector)}, sizeof *{spell(tape)});"
             case ir.Comment(text):
                 yield f"/* {text} */"
             case ir.Continue():
@@ -153,13 +187,14 @@ class _StatementPrinter:
         star, length = "", ""
         match s.type:
             case ir.Pointer(constant, restricted):
-                kind, star = f"{'const ' * constant}double", "*restrict " if restricted else "*"
+                kind = f"{'const ' * constant}{_number(s.type, self.name)}"
+                star = "*restrict " if restricted else "*"
             case ir.Vector(size):
-                kind, length = "double", f"[{self.spell(size)}]"
+                kind, length = _number(s.type, self.name), f"[{self.spell(size)}]"
             case ir.Type.ARRAYS:
                 kind, star, length = "double", "*const ", "[]"
-            case ir.RecordType(record):
-                kind = f"{'const ' * (not s.mutable)}{self.name}_{record}"
+            case ir.RecordType(record, mutable, address):
+                kind, star = f"{'const ' * (not (s.mutable or mutable))}{self.name}_{record}", "*" * address
             case kind_of_number:
                 kind = f"{'const ' * (not s.mutable)}{_TYPES[kind_of_number]}"
         items = (f"{star}{self.spell.name(symbol)}{length}{self._initial(value)}" for symbol, value in s.items)

@@ -1,0 +1,324 @@
+"""Builders of the functions of a splitting: its flows, the order of the flows in a step, and the transposes of both.
+
+A flow is a kernel that computes an increment, and a function that adds it. Variants for SIMD batches of members act on
+a group of members, which is divided into packs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from phigen.ir import nodes as ir
+from phigen.ir.passes.unread import discard_unread
+from phigen.scheme.alternation import Schedule
+from phigen.scheme.kernel import Role
+
+X, START, COEF, ROW, FLAG, PART, PACK, GROUP, BAR, K = (
+    ir.fixed(name) for name in ("x", "start", "coef", "row", "own", "part", "pack", "group", "bar", "k")
+)
+CHANGE, TURNED, BACK, SLOPES, BEFORE = (ir.fixed(name) for name in ("change", "turned", "back", "slopes", "before"))
+MOVED, TAPE, ELEMENT, ROW_SIZE = (ir.fixed(name) for name in ("moved", "kept", "element", "ROW"))
+PACKS, ELEMENTS, NONE = ir.Member(GROUP, "packs"), ir.fixed("ELEMENT"), ir.Constant(None)
+_PACK, _GROUP = ir.RecordType("pack", mutable=True, address=True), ir.RecordType("group", mutable=True)
+_LANES = ir.Pointer(constant=False, lanes=True)
+
+
+@dataclass(frozen=True)
+class FlowFunctions:
+    """The functions of the flows of one splitting.
+
+    Flows update ``along`` values: the ``dimension`` coordinates, and with a monitor two more. With ``turns`` they also
+    update a group element, the attitude. A state is stored on a tape before each flow if the solver has one
+    (``stores``).
+    """
+
+    dimension: int
+    along: int
+    turns: bool = False
+    stores: bool = False
+
+    @property
+    def arguments(self) -> tuple[ir.Value, ...]:
+        """The arguments of a flow after its coefficients."""
+        return (X, MOVED, START, *[ELEMENT] * self.turns)
+
+    def function(self, name: str, doc: str, parameters: Sequence[str], body: ir.Block) -> ir.Function:
+        """Return a function whose parameters are some of those of flows."""
+        state, length = ir.Vector(ir.Constant(self.along)), ir.Constant(self.dimension)
+        types: dict[str, ir.ParameterType] = {
+            "x": state,
+            "moved": state,
+            "start": replace(state, constant=True),
+            "element": ir.Vector(ELEMENTS),
+            "kept": ir.Tape(length),
+            "after": ir.Type.FLAG,
+            "slope": ir.Vector(ir.Constant(self.dimension**2)),
+        }
+        listed = tuple((p, types[p]) for p in parameters if p in types)
+        return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))
+
+    def flow(self, number: int, updated: Sequence[int]) -> ir.Function:
+        """Return the function that adds the increments of the ``updated`` values."""
+        count = ir.Constant(max(1, len(updated)))
+        body: list[ir.Statement] = [ir.Declare(ir.Vector(count), ((CHANGE.symbol, NONE),), mutable=True)]
+        called = (COEF, X, *[ELEMENT] * self.turns, CHANGE, *[TURNED] * self.turns)
+        if self.turns:
+            body.append(ir.Declare(ir.Vector(ELEMENTS), ((TURNED.symbol, NONE),), mutable=True))
+        body.append(ir.Call(f"change{number}", called))
+        body += [ir.Copy(ELEMENT, TURNED)] * self.turns
+        for place, i in enumerate(updated):
+            increment = ir.Entry(CHANGE, ir.Constant(place))
+            body.append(ir.Call("add", (X, MOVED, START, ir.Constant(i), increment)))
+        doc = f"Apply the flow of H_{number} to x, over the time for which coef was prepared"
+        parameters = ("coef", "x", "moved", "start", *["element"] * self.turns)
+        return self.function(f"flow{number}", doc, parameters, tuple(body))
+
+    def schedule(self, schedule: Schedule) -> ir.Function:
+        """Return the function of all flows of a step, each with its row of coefficients."""
+        parameters = ("coef", "x", "moved", "start", *["element"] * self.turns, *["kept"] * self.stores)
+        body = _in_order(schedule, COEF, ROW_SIZE, self._flow)
+        return self.function("flows", "The flows of one step, one after the other", parameters, tuple(body))
+
+    def _flow(self, part: int, coefficients: ir.Value) -> Iterator[ir.Statement]:
+        """Yield the statements that store the state and apply the flow of a part."""
+        if self.stores:
+            yield ir.Append(TAPE, X)
+        yield ir.Call(f"flow{part + 1}", (coefficients, *self.arguments))
+
+    def corrector(self, schedule: Schedule) -> ir.Function:
+        """Return the function of the flows before the first step and after the last one, of two parts in turn."""
+        (outer, first), *others = schedule.begin
+        (_, last), *_ = schedule.end
+        begin = ir.Select(ir.fixed("after"), ir.Constant(last), ir.Constant(first))
+        body = [ir.Assign(COEF, ir.Binary("*", begin, ROW_SIZE), adds=True), *self._flow(outer, COEF)]
+        if others:
+            pair = (*self._flow(others[0][0], _row(K)), *self._flow(outer, _row(ir.plus(K, 1))))
+            count, two = ir.Constant(len(schedule.begin)), ir.Constant(2)
+            body.append(ir.Loop("stages", pair, "k", ir.Constant(1), count, step=two))
+        doc = (
+            "Corrector: flows before the first step of a run, or after its last one; includes half a flow of the larger"
+        )
+        parameters = ("after", "coef", "x", "moved", "start", *["kept"] * self.stores)
+        return self.function("corrector", f"{doc} larger part", parameters, tuple(body))
+
+    def tangent(self, count: int) -> ir.Function:
+        """Return the function that applies one of ``count`` flows, after the derivative of its increment."""
+        cases = tuple(
+            (
+                ir.Call(f"tangent{k}", (COEF, X, ir.fixed("slope"))),
+                ir.Call(f"flow{k}", (COEF, *self.arguments)),
+            )
+            for k in range(1, count + 1)
+        )
+        body: list[ir.Statement] = [ir.Switch(PART, tuple(range(1, count + 1)), cases)]
+        if self.turns:
+            note, zeros = "attitude increments, already applied", ir.Listed((ir.Constant(0.0),))
+            body.insert(0, ir.Declare(ir.Vector(ELEMENTS), ((ELEMENT.symbol, zeros),), mutable=True, note=note))
+        doc = "Apply the flow of a part; slope is the derivative of its increment at the start"
+        return self.function("tangent_flow", doc, ("part", "coef", "x", "moved", "start", "slope"), tuple(body))
+
+
+def _row(number: ir.Value) -> ir.Value:
+    """Return the address of a row of coefficients."""
+    return ir.Binary("+", COEF, ir.Binary("*", number, ROW_SIZE))
+
+
+def _in_order(
+    schedule: Schedule, rows: ir.Name, size: ir.Value | None, flow: Callable[[int, ir.Value], Iterator[ir.Statement]]
+) -> Iterator[ir.Statement]:
+    """Yield the flows of a step: the first one, then a pattern that is repeated.
+
+    ``rows`` counts rows of coefficients or, if a row has a ``size``, is the address of one.
+    """
+
+    def further(count: int) -> ir.Value:
+        if size is None:
+            return ir.Constant(count)
+        return size if count == 1 else ir.Binary("*", ir.Constant(count), size)
+
+    yield from flow(0, rows)
+    if schedule.stages:
+        yield ir.Assign(rows, further(1), adds=True)
+        pattern = [
+            s for part, at in schedule.pattern for s in flow(part, ir.Binary("+", rows, further(at)) if at else rows)
+        ]
+        body = (*pattern, ir.Assign(rows, further(schedule.rows), adds=True))
+        yield ir.Loop("stages", body, "k", ir.Constant(0), ir.Constant(schedule.stages))
+
+
+# ---- SIMD batches: all members of a group
+
+
+def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
+    """Return the function that adds the increments of a flow to the ``updated`` values of all members of a group."""
+    count = ir.Constant(max(1, len(updated)))
+    x, start, compensation = (ir.Member(PACK, name) for name in ("x", "start", "carry"))
+    coefficients = ir.Entry(ir.Member(GROUP, "coef"), ir.Binary("*", FLAG, K))
+    row = ir.Binary("+", coefficients, ir.Binary("*", ROW, ROW_SIZE))
+    body: list[ir.Statement] = [
+        ir.Declare(_PACK, ((PACK.symbol, ir.Prefix("&", ir.Entry(ir.Member(GROUP, "pack"), K))),)),
+        ir.Declare(ir.Vector(count, lanes=True), ((CHANGE.symbol, NONE),), mutable=True),
+        ir.Call(f"change{number}{form}_lanes", (row, x, FLAG, CHANGE)),
+    ]
+    for place, i in enumerate(updated):
+        state = (ir.Entry(array, ir.Constant(i)) for array in (x, compensation, start))
+        body.append(ir.Call("add_lanes", (*state, ir.Entry(CHANGE, ir.Constant(place)))))
+    doc = f"The flow of H_{number} for all members of a group"
+    return _group_function(f"flow{number}{form}_lanes", doc, ("row", "own", "group"), (_over_packs(tuple(body)),))
+
+
+def group_schedule(schedule: Schedule, form: str) -> ir.Function:
+    """Return the function of all flows of a step, for all members of a group."""
+
+    def flow(part: int, row: ir.Value) -> Iterator[ir.Statement]:
+        yield ir.Call(f"flow{part + 1}{form}_lanes", (row, FLAG, GROUP))
+
+    doc, body = "The flows of one step, one after the other", tuple(_in_order(schedule, ROW, None, flow))
+    return _group_function(f"flows{form}_lanes", doc, ("row", "own", "group"), body)
+
+
+def _over_packs(body: ir.Block) -> ir.Loop:
+    return ir.Loop("packs", body, "k", ir.Constant(0), PACKS)
+
+
+def _group_function(
+    name: str, doc: str, parameters: Sequence[str], body: ir.Block, types: Mapping[str, ir.ParameterType] | None = None
+) -> ir.Function:
+    known: dict[str, ir.ParameterType] = {"row": ir.Type.FLAG, "own": ir.Type.FLAG, "group": _GROUP, **(types or {})}
+    listed = tuple((p, known[p]) for p in parameters if p in known)
+    return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))
+
+
+# ---- transposes
+
+
+@dataclass(frozen=True)
+class Transposed:
+    """The transpose of a flow: the numbers of the values that it computes, without those that are always zero.
+
+    These are cotangents of the ``state`` and of the ``row`` of coefficients, and the coordinates ``before`` the flow
+    that it recomputes. ``reads`` are the runs of coordinates that it reads, each with its length. ``far`` and
+    ``far_back`` say whether the flow and its transpose have a version with full-range functions.
+    """
+
+    state: Sequence[int]
+    row: Sequence[int]
+    before: Sequence[int]
+    reads: Sequence[tuple[int, int]]
+    far: bool
+    far_back: bool
+
+
+@dataclass(frozen=True)
+class FlowTransposes:
+    """The functions that pull cotangents back through the flows of a splitting, of ``dimension`` coordinates.
+
+    A row has ``row`` coefficients.
+    """
+
+    flows: Sequence[Transposed]
+    dimension: int
+    row: int
+
+    @property
+    def recomputes(self) -> bool:
+        """Whether the transposes recompute the states before flows, which need no tape."""
+        return any(flow.before for flow in self.flows)
+
+    def _switch(self, case: Callable[[int, Transposed], Iterator[ir.Statement]]) -> ir.Switch:
+        """Return the switch over the parts of H."""
+        cases = tuple(tuple(case(k, flow)) for k, flow in enumerate(self.flows, 1))
+        return ir.Switch(PART, tuple(range(1, len(cases) + 1)), cases)
+
+    def _results(self, *, lanes: bool = False) -> Iterator[ir.Declare]:
+        lengths = {BACK: self.dimension, SLOPES: self.row} | ({BEFORE: self.dimension} if self._restores(lanes) else {})
+        for name, length in lengths.items():
+            kind = ir.Vector(ir.Constant(length), lanes=lanes)
+            yield ir.Declare(kind, ((name.symbol, NONE),), mutable=True)
+
+    def _restores(self, lanes: bool) -> bool:
+        return lanes and self.recomputes
+
+    def back(self) -> ir.Function:
+        """Return the function for one member."""
+
+        def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
+            yield ir.Call(f"flow{k}_adjoint", (COEF, X, BAR, BACK, SLOPES))
+            for place, i in enumerate(flow.state):
+                yield ir.Assign(_at(BAR, i), _at(BACK, place), adds=True)
+            for place, i in enumerate(flow.row):
+                yield ir.Assign(_at(ir.fixed("coef_bar"), i), _at(SLOPES, place), adds=True)
+
+        state = ir.Vector(ir.Constant(self.dimension))
+        types = {"x": replace(state, constant=True), "bar": state, "coef_bar": ir.Vector(ir.Constant(self.row))}
+        doc = (
+            "Pull a cotangent back through the flow of a part that started at x; the cotangents of its coefficients are"
+        )
+        parameters = ("part", "coef", "x", "bar", "coef_bar")
+        body: ir.Block = (*self._results(), self._switch(case))
+        return _group_function("follow_back", f"{doc} are added to coef_bar", parameters, body, types)
+
+    @property
+    def _stored(self) -> dict[str, ir.ParameterType]:
+        """The coordinates on the tape, of all packs of a group."""
+        return {"kept": ir.Vector(ir.Constant(self.dimension), rows=ir.fixed("BACK_PACKS"), lanes=True)}
+
+    def group_flows(self) -> ir.Function:
+        """Return the function that applies a flow to all members of a group, and stores what its transpose reads."""
+
+        def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
+            pack = ir.Member(ir.Entry(ir.Member(GROUP, "pack"), K), "x")
+            copies = (
+                ir.Copy(_at(ir.Entry(TAPE, K), first), _at(pack, first), ir.Constant(count))
+                for first, count in flow.reads
+            )
+            if flow.reads:
+                yield _over_packs(tuple(copies))
+            yield _in_form(f"flow{k}", flow.far, (ROW, ir.Constant(1), GROUP))
+
+        doc = "Apply the flow of a part to all members of a group, after storing the coordinates that its reverse pass"
+        body = (self._switch(case),)
+        return _group_function("follow_lanes", f"{doc} reads", ("part", "row", "group", "kept"), body, self._stored)
+
+    def group_back(self) -> ir.Function:
+        """Return the function that pulls cotangents back through a flow, for all members of a group."""
+        bars, coefficients = ir.Entry(ir.Member(BAR, "x"), K), ir.Entry(ir.Member(BAR, "coef"), K)
+        first = ir.Binary("*", ROW, ROW_SIZE)
+
+        def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
+            results = (BACK, SLOPES, *[BEFORE] * self.recomputes)
+            yield _in_form(f"flow{k}_adjoint", flow.far_back, (COEF, X, bars, *results))
+            for place, i in enumerate(flow.before):
+                yield ir.Copy(_at(X, i), _at(BEFORE, place))
+            for place, i in enumerate(flow.state):
+                yield ir.Call("gain_lanes", (_at(bars, i), _at(BACK, place)))
+            for place, i in enumerate(flow.row):
+                entry = ir.Entry(coefficients, ir.Binary("+", first, ir.Constant(i)))
+                yield ir.Call("gain_lanes", (entry, _at(SLOPES, place)))
+
+        x = ir.Member(ir.Entry(ir.Member(GROUP, "pack"), K), "x") if self.recomputes else ir.Entry(TAPE, K)
+        coef = ir.Binary("+", ir.Entry(ir.Member(GROUP, "coef"), K), first)
+        places = (ir.Declare(_LANES, ((name.symbol, value),)) for name, value in ((COEF, coef), (X, x)))
+        body = _over_packs((*self._results(lanes=True), *places, self._switch(case)))
+        parameters = ("part", "row", "group", *["kept"] * (not self.recomputes), "bar")
+        types = {**self._stored, "bar": ir.RecordType("back_group", mutable=True)}
+        doc = "Pull cotangents back through the flow of a part, for all members of a group; "
+        doc += (
+            "also inverts the flow, which restores the states before it"
+            if self.recomputes
+            else "kept holds the stored coordinates of the states before the flow"
+        )
+        return _group_function("follow_back_lanes", doc, parameters, (body,), types)
+
+
+def _at(array: ir.Value, place: int) -> ir.Entry:
+    return ir.Entry(array, ir.Constant(place))
+
+
+def _in_form(name: str, has_far: bool, arguments: tuple[ir.Value, ...]) -> ir.Statement:
+    """Return the call of a function for lanes, with full-range functions for groups that need them."""
+    near = ir.Call(f"{name}_lanes", arguments)
+    if not has_far:
+        return near
+    return ir.If(ir.Member(GROUP, "far"), (ir.Call(f"{name}_far_lanes", arguments),), (near,))

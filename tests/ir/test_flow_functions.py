@@ -1,0 +1,65 @@
+"""The functions of splittings: their flows, the order of these in a step, and the reverse pass."""
+
+from __future__ import annotations
+
+from textwrap import dedent
+
+from ir.ir_text import text
+
+from phigen.ir import nodes as ir
+from phigen.ir.flow_functions import FlowFunctions, FlowTransposes, Transposed, group_schedule
+from phigen.scheme.alternation import Schedule
+from phigen.targets.c.loops import commented
+
+#: Kick, then three times drift and kick, with a row of coefficients each.
+SCHEDULE = Schedule((0.1, *[0.3, 0.3] * 3), 3, ((1, 0), (0, 1)))
+
+
+def expect(function: ir.Function, expected: str) -> None:
+    assert text(function) == dedent(expected).strip()
+
+
+def test_flows_of_a_step_follow_each_other_and_a_tape_receives_the_states_before_them():
+    expect(FlowFunctions(2, 2, stores=True).schedule(SCHEDULE), """
+        flows(coef, x, moved, start, kept)
+          append x to kept
+          flow1(coef, x, moved, start)
+          coef += ROW
+          stages k in 0..3:
+            append x to kept
+            flow2(coef, x, moved, start)
+            append x to kept
+            flow1((coef + ROW), x, moved, start)
+            coef += (2 * ROW)
+        """)  # fmt: skip
+
+
+def test_batches_count_rows_of_coefficients():
+    assert "    flow1_far_lanes((row + 1), own, group)\n    row += 2" in text(group_schedule(SCHEDULE, "_far"))
+
+
+def test_values_that_a_flow_does_not_update_are_left_out():
+    expect(FlowFunctions(2, 2).flow(1, [1]), """
+        flow1(coef, x, moved, start)
+          vector change = None
+          change1(coef, x, change)
+          add(x, moved, start, 1, change[0])
+        """)  # fmt: skip
+    assert text(FlowFunctions(2, 2).flow(1, [])).splitlines()[1:3] == ["  discard moved", "  discard start"]
+
+
+def test_cotangents_are_added_where_a_flow_has_read():
+    flow = Transposed(state=[1], row=[0], before=[], reads=[(0, 1)], far=True, far_back=False)
+    transposes = FlowTransposes([flow, flow], 2, 3)
+    assert "      bar[1] += back[0]\n      coef_bar[0] += slopes[0]" in text(transposes.back())
+    stored = commented(transposes.group_flows(), "top")
+    assert "top_lanes kept[top_BACK_PACKS][2])" in stored
+    assert "memcpy(kept[k][0], group->pack[k].x[0], 1 * sizeof kept[k][0]);" in stored
+    assert "if (group->far) top_flow2_far_lanes(row, 1, group);" in stored
+
+
+def test_an_inverse_flow_needs_no_tape():
+    flow = Transposed(state=[], row=[], before=[1], reads=[], far=False, far_back=False)
+    back = text(FlowTransposes([flow], 2, 1).group_back())
+    assert back.startswith("follow_back_lanes(part, row, group, bar)")
+    assert "copy before[0] to x[1]" in back
