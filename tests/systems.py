@@ -66,7 +66,7 @@ QUICK = (
 ALIKE = (
     "charged_particle", "cyclotron", "dzhanibekov", "engel_geodesics", "gaussian_moments", "guiding_centre",
     "harmonic_oscillator", "kowalevski_top", "predator_prey", "quaternion_top", "rigid_body_dual", "rigid_body_paper",
-    "satellite", "sir_epidemic", "so4_manakov", "toda3_quadratic", "volterra5",
+    "satellite", "sir_epidemic", "sklyanin_gyrostat", "so4_manakov", "spin_chain5", "toda3_quadratic", "volterra5",
 )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from phigen.runtime.gradients import Pullback
 from phigen.runtime.solver import Solver
 
 #: How many of each kind `make test-all` draws.
-ALL = 100
+ALL = 50
 #: Those of `make test`, which take half a second or so each: steps by Newton's method, by flows, and two by Gauss
 #: collocation; of lattices the second has one part, and the third is a series.
 QUICK = {"ordinary": (0, 7, 12, 80), "lattice": (4, 7, 5)}
