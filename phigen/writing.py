@@ -40,17 +40,17 @@ def write(path: Path, content: str | bytes) -> None:
 def write_all(contents: Mapping[Path, str | bytes]) -> None:
     """Replace files as wholes, all or none; folders are made. Raises `OSError` naming the file that was the reason."""
     pending: list[_Pending] = []
-    with ExitStack() as undone:
+    with ExitStack() as cleanup:
         for path, content in contents.items():
-            _make_folder(path.parent, undone)
+            _make_folder(path.parent, cleanup)
             pending.append(_Pending(path))
-            undone.callback(pending[-1].abandon)
+            cleanup.callback(pending[-1].abandon)
             with naming(path):
                 pending[-1].file.write(_encoded(content))
                 pending[-1].settle()
         for p in pending:
             p.take_place()
-        undone.pop_all()
+        cleanup.pop_all()
 
 
 @contextmanager
@@ -99,14 +99,14 @@ class _Pending:
             self._temporary.unlink()
 
 
-def _make_folder(folder: Path, undone: ExitStack) -> None:
+def _make_folder(folder: Path, cleanup: ExitStack) -> None:
     missing = []
     while not folder.exists() and folder != folder.parent:
         missing.append(folder)
         folder = folder.parent
     for new_folder in reversed(missing):
         new_folder.mkdir(exist_ok=True)
-        undone.callback(_remove_folder, new_folder)
+        cleanup.callback(_remove_folder, new_folder)
 
 
 def _remove_folder(folder: Path) -> None:

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: d5a0809be2e6367c049bfa7173350da72a4d0a4e0658b1137e6f6952dc608201
+ * body-sha256: 043c799002dc2a9b79a97433a45e2b98fdcb7da8aac78abdc38637653932efc4
  */
 #include "duffing.h"
 #include <float.h>
@@ -239,15 +239,15 @@ static void duffing_remember(duffing_history *history, const double value[duffin
    at another energy, and unrelated to the motion. */
 static int duffing_plausible(const duffing_solver *s, const double increment[duffing_DIM])
 {
-    double moved = 0.0, size = 0.0, field[duffing_DIM], point[duffing_DIM], H[3];
+    double distance = 0.0, size = 0.0, field[duffing_DIM], point[duffing_DIM], H[3];
     for (int i = 0; i < duffing_DIM; ++i) {
-        moved += fabs(increment[i]);
+        distance += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= duffing_PLAUSIBLE * size) return 1;
+    if (distance <= duffing_PLAUSIBLE * size) return 1;
     duffing_vector_field(&s->params, s->t, s->x, field);
     for (int i = 0; i < duffing_DIM; ++i) size += fabs(s->h * field[i]);
-    if (moved <= duffing_PLAUSIBLE * size) return 1;
+    if (distance <= duffing_PLAUSIBLE * size) return 1;
     for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < duffing_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = duffing_hamiltonian(&s->params, s->t, point);

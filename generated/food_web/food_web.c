@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: cc830eb88ba31f528f7999771387dc8bbf36780699e222c8208a99270659439d
+ * body-sha256: 0a57f93cbad3a597812cd85d5a335d9df39ec149022913917c73c05b34261ed8
  */
 #include "food_web.h"
 #include <limits.h>
@@ -263,16 +263,16 @@ static int food_web_connected(const food_web_bonds *bonds, size_t sites)
 }
 
 /* Greedy colouring: each site takes the first colour that none of its earlier neighbours has. */
-static void food_web_colour(food_web_solver *s, int *taken)
+static void food_web_colour(food_web_solver *s, int *used_by)
 {
     const int sites = (int)s->sites;
     s->colour_count = 2;
-    for (int i = 0; i < sites; ++i) taken[i] = -1;
+    for (int i = 0; i < sites; ++i) used_by[i] = -1;
     for (int i = 0; i < sites; ++i) {
         for (int k = s->bonds[i]; k < s->bonds[i + 1]; ++k)
-            if (s->other[k] < i) taken[s->colours[s->other[k]]] = i;
+            if (s->other[k] < i) used_by[s->colours[s->other[k]]] = i;
         int colour = 0;
-        while (taken[colour] == i) ++colour;
+        while (used_by[colour] == i) ++colour;
         s->colours[i] = colour;
         if (colour >= s->colour_count) s->colour_count = colour + 1;
     }
@@ -387,13 +387,13 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return food_web_BAD_ARGUMENT;
-    const food_web_params own = params != NULL ? *params : food_web_default_params;
+    const food_web_params solver_params = params != NULL ? *params : food_web_default_params;
     const size_t rows = food_web_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !food_web_connected(bonds, sites) || !food_web_finite(x0, food_web_DIM * sites)
-        || !food_web_allowed(&own, sites, bonds != NULL ? bonds->count : 0))
+        || !food_web_allowed(&solver_params, sites, bonds != NULL ? bonds->count : 0))
         return food_web_BAD_ARGUMENT;
     double coef[food_web_COEFFICIENTS] = { 0.0 };
-    food_web_prepare_step(&own, food_web_PROBE_STEP, coef);
+    food_web_prepare_step(&solver_params, food_web_PROBE_STEP, coef);
     if (!food_web_finite(coef, food_web_COEFFICIENTS)) return food_web_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -401,7 +401,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     s->rows = rows;
     s->length = (ptrdiff_t)length;
     s->width = width;
-    s->params = own;
+    s->params = solver_params;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = food_web_block(rows, width);
     food_web_connect(s, bonds, memory + food_web_RESERVED * block);
@@ -409,8 +409,8 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     for (size_t k = 0; k < food_web_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < food_web_GATHERED; ++k, memory += block) s->gathered[k] = memory;
     for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->x[k], x0 + k * sites);
-    food_web_put_parameters(s, &own);
-    food_web_put_at_bonds(s, &own);
+    food_web_put_parameters(s, &solver_params);
+    food_web_put_at_bonds(s, &solver_params);
     return food_web_OK;
 }
 
@@ -455,7 +455,7 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
 }
 
 /* Apply flow `number` of a step; number food_web_FLOWS is the last merged with the first. */
-static void food_web_make_flow(const food_web_solver *s, size_t steps, int number)
+static void food_web_apply_flow(const food_web_solver *s, size_t steps, int number)
 {
     (void)steps;
     food_web_sweep_part(s, food_web_flow_parts[number], s->coef + number * food_web_ROW);
@@ -464,10 +464,10 @@ static void food_web_make_flow(const food_web_solver *s, size_t steps, int numbe
 /* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
 static void food_web_steps(const food_web_solver *s, size_t steps)
 {
-    if (steps == 0) food_web_make_flow(s, s->steps - 1, food_web_FLOWS - 1);
+    if (steps == 0) food_web_apply_flow(s, s->steps - 1, food_web_FLOWS - 1);
     for (size_t step = s->steps; step < s->steps + steps; ++step) {
-        food_web_make_flow(s, step, food_web_FLOWS > 1 && (step > s->steps || s->open) ? food_web_FLOWS : 0);
-        for (int flow = 1; flow < food_web_FLOWS - 1; ++flow) food_web_make_flow(s, step, flow);
+        food_web_apply_flow(s, step, food_web_FLOWS > 1 && (step > s->steps || s->open) ? food_web_FLOWS : 0);
+        for (int flow = 1; flow < food_web_FLOWS - 1; ++flow) food_web_apply_flow(s, step, flow);
     }
 }
 

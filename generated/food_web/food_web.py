@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 441d1531b4c56fd766f3d1a910b7075563cbe081949e8f2e8106c2a7b47dcf3d
+# body-sha256: e70a53d7991b78c8534f1ba8ab89ee60c969ef5dfd295aa9c0d30813d95388ed
 import numpy as np
 
 VERSION = "0.1.0"
@@ -120,9 +120,9 @@ class _Graph(_Sites):
 
     def __init__(self, shape, parameters):
         parameters = dict(parameters)
-        given = np.asarray(parameters.pop("bonds", ()))
-        self.ends = given.reshape(-1, 2).astype(np.int64)
-        known = np.array_equal(self.ends, given.reshape(-1, 2)) and given.ndim < 3
+        bonds = np.asarray(parameters.pop("bonds", ()))
+        self.ends = bonds.reshape(-1, 2).astype(np.int64)
+        known = np.array_equal(self.ends, bonds.reshape(-1, 2)) and bonds.ndim < 3
         if not known or (self.ends < 0).any() or (self.ends >= shape[-1]).any() or (np.diff(self.ends) == 0).any():
             raise ValueError("bonds are pairs of different sites, counted from 0")
         super().__init__(shape, parameters)
@@ -140,8 +140,8 @@ class _Graph(_Sites):
             here, there = np.concatenate(ways).T
             bond = np.tile(np.arange(len(self.ends)), len(ways))
             if chosen:
-                wanted = self.colours[here if chosen == "here" else there] == self.colour
-                here, there, bond = here[wanted], there[wanted], bond[wanted]
+                of_colour = self.colours[here if chosen == "here" else there] == self.colour
+                here, there, bond = here[of_colour], there[of_colour], bond[of_colour]
             self._known[key] = here, there, bond
         return self._known[key]
 
@@ -165,8 +165,8 @@ class _Coloured(_Graph):
             beside[max(a, b)].append(min(a, b))
         self.colours = np.zeros(self.sizes, dtype=np.int64)
         for site, others in enumerate(beside):
-            taken = set(self.colours[others].tolist())
-            self.colours[site] = next(c for c in range(len(taken) + 1) if c not in taken)
+            colours_beside = set(self.colours[others].tolist())
+            self.colours[site] = next(c for c in range(len(colours_beside) + 1) if c not in colours_beside)
         count = max(2, self.colours.max() + 1)
         flows = [(part, c) for part, many in enumerate(BY_COLOUR) for c in range(count if many else 1)]
         kinds = flows[:1], flows[1:-1], flows[-1:], flows[-2:0:-1]

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: dbc3fcf8ad780ed8854abf4b11e9531bb7991e497c533be0cd9a3b1ff315a3e8
+ * body-sha256: 5ea8a98a29b3f9801ebcd0d191b1cc1709b3bc0cacf007fd9c3eea8b1f46ab81
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -222,16 +222,16 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
 static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
     const double increment[guiding_centre_DIM])
 {
-    double moved = 0.0, size = 0.0, field[guiding_centre_DIM], point[guiding_centre_DIM], H[3];
+    double distance = 0.0, size = 0.0, field[guiding_centre_DIM], point[guiding_centre_DIM], H[3];
     for (int i = 0; i < guiding_centre_DIM; ++i) {
-        moved += fabs(increment[i]);
+        distance += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= guiding_centre_PLAUSIBLE * size) return 1;
+    if (distance <= guiding_centre_PLAUSIBLE * size) return 1;
     guiding_centre_vector_field(&s->params, s->x, field);
     for (int i = 0; i < guiding_centre_DIM; ++i)
         size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
-    if (moved <= guiding_centre_PLAUSIBLE * size) return 1;
+    if (distance <= guiding_centre_PLAUSIBLE * size) return 1;
     for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < guiding_centre_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = guiding_centre_hamiltonian(&s->params, point);
@@ -514,7 +514,7 @@ static int guiding_centre_piece(const double *coef, const double p[guiding_centr
    pieces. */
 static int guiding_centre_path(const double *coef, const double x[guiding_centre_DIM],
     const double p[guiding_centre_DIM], double change[guiding_centre_DIM], double mean[guiding_centre_DIM],
-    int *made)
+    int *pieces_used)
 {
     for (int pieces = 1; pieces <= guiding_centre_LONGEST_PATH; pieces *= 2) {
         double q[guiding_centre_DIM], point[guiding_centre_DIM], shift[guiding_centre_DIM],
@@ -527,7 +527,7 @@ static int guiding_centre_path(const double *coef, const double x[guiding_centre
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < guiding_centre_DIM; ++i) point[i] = x[i] + change[i];
             good = guiding_centre_piece(coef, q, point, shift, piece_mean);
-            ++*made;
+            ++*pieces_used;
             for (int i = 0; i < guiding_centre_DIM; ++i) {
                 mean[i] += (change[i] + piece_mean[i]) / (double)pieces;
                 change[i] += shift[i];
@@ -542,10 +542,11 @@ static int guiding_centre_path(const double *coef, const double x[guiding_centre
    along the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
 static int guiding_centre_residual(guiding_centre_solver *s, const double *coef,
     const double p[guiding_centre_DIM], double y[guiding_centre_DIM], double residual[guiding_centre_DIM],
-    double change[guiding_centre_DIM], double jacobian[guiding_centre_DIM * guiding_centre_DIM], int *made)
+    double change[guiding_centre_DIM], double jacobian[guiding_centre_DIM * guiding_centre_DIM],
+    int *pieces_used)
 {
     double mean[guiding_centre_DIM];
-    if (!guiding_centre_path(coef, s->x, p, change, mean, made)) return 0;
+    if (!guiding_centre_path(coef, s->x, p, change, mean, pieces_used)) return 0;
     for (int i = 0; i < guiding_centre_DIM; ++i) y[i] = s->x[i] + mean[i];
     guiding_centre_generate(coef, y, residual, jacobian);
     for (int i = 0; i < guiding_centre_DIM; ++i) residual[i] = p[i] - residual[i];
@@ -556,17 +557,17 @@ static int guiding_centre_residual(guiding_centre_solver *s, const double *coef,
 /* Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
 static int guiding_centre_differences(guiding_centre_solver *s, const double *coef,
     const double p[guiding_centre_DIM], const double residual[guiding_centre_DIM],
-    double jacobian[guiding_centre_DIM * guiding_centre_DIM], int *made)
+    double jacobian[guiding_centre_DIM * guiding_centre_DIM], int *pieces_used)
 {
-    double q[guiding_centre_DIM], y[guiding_centre_DIM], moved[guiding_centre_DIM],
+    double q[guiding_centre_DIM], y[guiding_centre_DIM], shifted_residual[guiding_centre_DIM],
         change[guiding_centre_DIM], unused[guiding_centre_DIM * guiding_centre_DIM], norm = DBL_MIN;
     for (int i = 0; i < guiding_centre_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < guiding_centre_DIM; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += guiding_centre_DIFFERENCE * norm;
-        if (!guiding_centre_residual(s, coef, q, y, moved, change, unused, made)) return 0;
+        if (!guiding_centre_residual(s, coef, q, y, shifted_residual, change, unused, pieces_used)) return 0;
         for (int i = 0; i < guiding_centre_DIM; ++i)
-            jacobian[i * guiding_centre_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+            jacobian[i * guiding_centre_DIM + j] = (shifted_residual[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
@@ -580,9 +581,9 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
         change[guiding_centre_DIM], jacobian[guiding_centre_DIM * guiding_centre_DIM], previous = HUGE_VAL;
     if (!guiding_centre_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
     guiding_centre_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < guiding_centre_MAX_ITERATIONS
-        && made <= guiding_centre_MOST_PIECES; ++iteration) {
-        if (!guiding_centre_residual(s, coef, p, y, residual, change, jacobian, &made))
+    for (int iteration = 0, pieces_used = 0; iteration < guiding_centre_MAX_ITERATIONS
+        && pieces_used <= guiding_centre_MOST_PIECES; ++iteration) {
+        if (!guiding_centre_residual(s, coef, p, y, residual, change, jacobian, &pieces_used))
             return guiding_centre_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < guiding_centre_DIM; ++i) {
@@ -600,7 +601,7 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
             return guiding_centre_OK;
         }
         const int slow = iteration >= guiding_centre_PATIENCE && size > guiding_centre_CONTRACTING * previous;
-        if (slow && !guiding_centre_differences(s, coef, p, residual, jacobian, &made))
+        if (slow && !guiding_centre_differences(s, coef, p, residual, jacobian, &pieces_used))
             return guiding_centre_NO_CONVERGENCE;
         if (!guiding_centre_solve(jacobian, residual)) return guiding_centre_SINGULAR;
         for (int i = 0; i < guiding_centre_DIM; ++i) p[i] -= residual[i];

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 3ecde85c000162724f93fcf2f4a6ee1d41b1eebc4bcdffc65086f3e2f0504190
+ * body-sha256: c9a10f11905b7abf3a31d4c00cf1e31a3db36b7dd2a69fdc091e7295166f454d
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -531,10 +531,10 @@ int omp_get_thread_num(void);
 /* The share of a thread in a number of work items: from *first on; returns its end. */
 static size_t heisenberg_share(size_t units, size_t *first)
 {
-    const size_t threads = heisenberg_THREADS, own = heisenberg_THREAD, each = units / threads,
+    const size_t threads = heisenberg_THREADS, thread = heisenberg_THREAD, each = units / threads,
         more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
+    *first = each * thread + (thread < more ? thread : more);
+    return *first + each + (thread < more);
 }
 
 /* Wait for all threads. */
@@ -621,13 +621,14 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return heisenberg_BAD_ARGUMENT;
-    const heisenberg_params own = params != NULL ? *params : heisenberg_default_params;
+    const heisenberg_params solver_params = params != NULL ? *params : heisenberg_default_params;
     const size_t rows = heisenberg_shape(sizes, &width), length = sizes[heisenberg_AXES - 1],
         sites = rows * length;
-    if (rows == 0 || !heisenberg_finite(x0, heisenberg_DIM * sites) || !heisenberg_allowed(&own, sites))
+    if (rows == 0 || !heisenberg_finite(x0, heisenberg_DIM * sites) || !heisenberg_allowed(&solver_params,
+        sites))
         return heisenberg_BAD_ARGUMENT;
     double coef[heisenberg_COEFFICIENTS] = { 0.0 };
-    heisenberg_prepare_step(&own, heisenberg_PROBE_STEP, coef);
+    heisenberg_prepare_step(&solver_params, heisenberg_PROBE_STEP, coef);
     if (!heisenberg_finite(coef, heisenberg_COEFFICIENTS)) return heisenberg_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -635,14 +636,14 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     s->rows = rows;
     s->length = (ptrdiff_t)length;
     s->width = width;
-    s->params = own;
+    s->params = solver_params;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + heisenberg_LEAD;
     const size_t block = heisenberg_block(rows, width);
     heisenberg_find_all_lines(s, memory - heisenberg_LEAD + heisenberg_RESERVED * block);
     for (size_t k = 0; k < heisenberg_ARRAYS; ++k, memory += block) s->x[k] = memory;
     for (size_t k = 0; k < heisenberg_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < heisenberg_DIM; ++k) heisenberg_put(s, s->x[k], x0 + k * sites);
-    heisenberg_put_parameters(s, &own);
+    heisenberg_put_parameters(s, &solver_params);
     return heisenberg_OK;
 }
 
@@ -696,17 +697,17 @@ typedef struct {
 } heisenberg_flow;
 
 /* Set *flow to flow `number` of a step; number heisenberg_FLOWS is the last merged with the first. */
-static void heisenberg_find_flow(const heisenberg_solver *s, size_t steps, int number, heisenberg_flow *flow)
+static void heisenberg_set_flow(const heisenberg_solver *s, size_t steps, int number, heisenberg_flow *flow)
 {
     flow->part = heisenberg_flow_parts[number];
     flow->coef = s->coef + number * heisenberg_ROW;
     (void)steps;
 }
 
-static void heisenberg_make_flow(const heisenberg_solver *s, size_t steps, int number)
+static void heisenberg_apply_flow(const heisenberg_solver *s, size_t steps, int number)
 {
     heisenberg_flow flow;
-    heisenberg_find_flow(s, steps, number, &flow);
+    heisenberg_set_flow(s, steps, number, &flow);
     heisenberg_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
@@ -770,8 +771,7 @@ static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
         size_t count = 0;
         for (; count < depth && done < steps * each; ++count, ++done) {
             const int number = (int)(done % each), joined = number == 0 && (done > 0 || s->open);
-            heisenberg_find_flow(s, s->steps + done / each, joined ? heisenberg_FLOWS : number,
-                flows + count);
+            heisenberg_set_flow(s, s->steps + done / each, joined ? heisenberg_FLOWS : number, flows + count);
         }
         if (count > 1) heisenberg_make_wave(s, flows, count);
         else heisenberg_sweep_part(s, flows->part, flows->coef, s->far > 0);
@@ -781,7 +781,7 @@ static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
 /* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
 static void heisenberg_shared_steps(const heisenberg_solver *s, size_t steps)
 {
-    if (steps == 0) heisenberg_make_flow(s, s->steps - 1, heisenberg_FLOWS - 1);
+    if (steps == 0) heisenberg_apply_flow(s, s->steps - 1, heisenberg_FLOWS - 1);
     heisenberg_make_waves(s, steps);
 }
 
@@ -850,17 +850,17 @@ heisenberg_status heisenberg_step(heisenberg_solver *s, double h) { return heise
 
 void heisenberg_state(const heisenberg_solver *s, double *x) { heisenberg_take(s, s->x, x); }
 
-/* Set the state to x + kept * state. */
-static heisenberg_status heisenberg_move(heisenberg_solver *s, const double *x, double kept)
+/* Set the state to x + factor * state. */
+static heisenberg_status heisenberg_move(heisenberg_solver *s, const double *x, double factor)
 {
     if (s == NULL || x == NULL) return heisenberg_BAD_ARGUMENT;
     for (int moving = 0; moving < 2; ++moving) /* first check all values, then change them */
         for (size_t r = 0; r < heisenberg_DIM * s->rows; ++r) {
             double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
             for (ptrdiff_t i = 0; i < s->length; ++i) {
-                const double moved = kept * row[i] + x[(ptrdiff_t)r * s->length + i];
-                if (!isfinite(moved)) return heisenberg_BAD_ARGUMENT;
-                row[i] = moving ? moved : row[i];
+                const double new_value = factor * row[i] + x[(ptrdiff_t)r * s->length + i];
+                if (!isfinite(new_value)) return heisenberg_BAD_ARGUMENT;
+                row[i] = moving ? new_value : row[i];
             }
             heisenberg_ends(row, s->length, 0, s->length);
         }

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; Energy level e = -H(x0): K = monitor (H + e) is 0 along a
  *   monitored trajectory; The solver
- * body-sha256: 0e5ad0b6c80ac181b2c66d4c2214a03c31f797e217bcccc001ca46bd0e1ce46e
+ * body-sha256: dc3f64d773097a2f95a048f92f63fba8e33db7cd8aaa4ef2fbc993b9d79b10ef
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -114,20 +114,20 @@ double kepler_eccentric_solver_time(const kepler_eccentric_solver *s) { return s
 
 /* Within a step, moved holds the sum of the increments so far and the compensation term; x is start + moved,
    rounded. */
-static inline void kepler_eccentric_add(double x[kepler_eccentric_DIM], double moved[kepler_eccentric_DIM],
-    const double start[kepler_eccentric_DIM], int i, double change)
+static inline void kepler_eccentric_add(double x[kepler_eccentric_DIM],
+    double displacement[kepler_eccentric_DIM], const double start[kepler_eccentric_DIM], int i, double change)
 {
-    moved[i] += change;
-    x[i] = start[i] + moved[i];
+    displacement[i] += change;
+    x[i] = start[i] + displacement[i];
 }
 
 /* At the end of a step, add moved to x in compensated arithmetic. */
 static void kepler_eccentric_settle(double x[kepler_eccentric_DIM], double carry[kepler_eccentric_DIM],
-    const double moved[kepler_eccentric_DIM])
+    const double displacement[kepler_eccentric_DIM])
 {
     for (int i = 0; i < kepler_eccentric_DIM; ++i) {
-        const double sum = x[i] + moved[i], added = sum - x[i];
-        carry[i] = (x[i] - (sum - added)) + (moved[i] - added);
+        const double sum = x[i] + displacement[i], added = sum - x[i];
+        carry[i] = (x[i] - (sum - added)) + (displacement[i] - added);
         x[i] = sum;
     }
 }
@@ -154,15 +154,15 @@ static void kepler_eccentric_change1(const double coef[2], const double state[4]
 }
 
 /* Apply the flow of H_1 to x, over the time for which coef was prepared. */
-static inline void kepler_eccentric_flow1(const double *coef, double x[6], double moved[6],
+static inline void kepler_eccentric_flow1(const double *coef, double x[6], double displacement[6],
     const double start[6])
 {
     double change[4];
     kepler_eccentric_change1(coef, x, change);
-    kepler_eccentric_add(x, moved, start, 0, change[0]);
-    kepler_eccentric_add(x, moved, start, 1, change[1]);
-    kepler_eccentric_add(x, moved, start, 4, change[2]);
-    kepler_eccentric_add(x, moved, start, 5, change[3]);
+    kepler_eccentric_add(x, displacement, start, 0, change[0]);
+    kepler_eccentric_add(x, displacement, start, 1, change[1]);
+    kepler_eccentric_add(x, displacement, start, 4, change[2]);
+    kepler_eccentric_add(x, displacement, start, 5, change[3]);
 }
 
 /* The flow of H_2 = (-1/2)*(oblateness*(q2**2 + q1**2)**(-3/2)*(1 - 3*(q2**2/(q2**2 + q1**2)))) - (q2**2 +
@@ -179,25 +179,25 @@ static void kepler_eccentric_change2(const double coef[4], const double state[4]
 }
 
 /* Apply the flow of H_2 to x, over the time for which coef was prepared. */
-static inline void kepler_eccentric_flow2(const double *coef, double x[6], double moved[6],
+static inline void kepler_eccentric_flow2(const double *coef, double x[6], double displacement[6],
     const double start[6])
 {
     double change[3];
     kepler_eccentric_change2(coef, x, change);
-    kepler_eccentric_add(x, moved, start, 2, change[0]);
-    kepler_eccentric_add(x, moved, start, 3, change[1]);
-    kepler_eccentric_add(x, moved, start, 5, change[2]);
+    kepler_eccentric_add(x, displacement, start, 2, change[0]);
+    kepler_eccentric_add(x, displacement, start, 3, change[1]);
+    kepler_eccentric_add(x, displacement, start, 5, change[2]);
 }
 
 /* The flows of one step, one after the other. */
-static inline void kepler_eccentric_flows(const double *coef, double x[6], double moved[6],
+static inline void kepler_eccentric_flows(const double *coef, double x[6], double displacement[6],
     const double start[6])
 {
-    kepler_eccentric_flow1(coef, x, moved, start);
+    kepler_eccentric_flow1(coef, x, displacement, start);
     coef += kepler_eccentric_ROW;
     for (int k = 0; k < 17; ++k) {
-        kepler_eccentric_flow2(coef, x, moved, start);
-        kepler_eccentric_flow1(coef + kepler_eccentric_ROW, x, moved, start);
+        kepler_eccentric_flow2(coef, x, displacement, start);
+        kepler_eccentric_flow1(coef + kepler_eccentric_ROW, x, displacement, start);
         coef += 2 * kepler_eccentric_ROW;
     }
 }
@@ -220,17 +220,17 @@ enum { kepler_eccentric_TIME = kepler_eccentric_DIM, kepler_eccentric_DOMAIN, ke
    unchanged. */
 static kepler_eccentric_status kepler_eccentric_stages(kepler_eccentric_solver *s)
 {
-    double x[kepler_eccentric_ALONG] = { 0.0 }, moved[kepler_eccentric_ALONG] = { 0.0 },
+    double x[kepler_eccentric_ALONG] = { 0.0 }, displacement[kepler_eccentric_ALONG] = { 0.0 },
         start[kepler_eccentric_ALONG] = { 0.0 };
     memcpy(x, s->x, sizeof s->x);
     memcpy(start, s->x, sizeof s->x);
-    memcpy(moved, s->carry, sizeof s->carry);
-    kepler_eccentric_flows(s->coef, x, moved, start);
+    memcpy(displacement, s->carry, sizeof s->carry);
+    kepler_eccentric_flows(s->coef, x, displacement, start);
     ++s->evaluations;
     if (!kepler_eccentric_finite(x, kepler_eccentric_ALONG)) return kepler_eccentric_NOT_FINITE;
-    if (!(moved[kepler_eccentric_TIME] * s->h > 0.0)) return kepler_eccentric_NOT_FINITE;
-    kepler_eccentric_settle(s->x, s->carry, moved);
-    kepler_eccentric_pass(s, moved[kepler_eccentric_TIME]);
+    if (!(displacement[kepler_eccentric_TIME] * s->h > 0.0)) return kepler_eccentric_NOT_FINITE;
+    kepler_eccentric_settle(s->x, s->carry, displacement);
+    kepler_eccentric_pass(s, displacement[kepler_eccentric_TIME]);
     return kepler_eccentric_OK;
 }
 

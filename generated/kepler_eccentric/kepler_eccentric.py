@@ -7,7 +7,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 126839ab8cbee3ec6cc52f33fab64643b683dc03622b47261e99768dc59d17e3
+# body-sha256: 26e4a652d6ddcc5a160bdf51b0c8e0d8884827bb371db7010f92b8dcfa84cb01
 import numpy as np
 
 VERSION = "0.1.0"
@@ -53,8 +53,8 @@ def _at(coef, members):
 def _stage_at(stage, members):
     """Return a stage for some of its members."""
     coef, parameters, *times = stage
-    own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
-    return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
+    parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
+    return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):

@@ -10,7 +10,7 @@
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
  *   step, by Gauss collocation; The solver; Members of an ensemble; SIMD batches of members: Gauss
  *   steps; Ensembles
- * body-sha256: f0642b27321dd3289a241646d660659a1112550df47819391eaacca476e6f7a3
+ * body-sha256: ae995eff9c8484b78ab9de73086733425314b905991cff2a3d543c002c6a685e
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -112,11 +112,11 @@ static inline int kowalevski_gauss_advance(kowalevski_gauss_solver *s, const dou
     double x[kowalevski_gauss_DIM], carry[kowalevski_gauss_DIM], zero = 0.0;
     /* x is available after two additions; the others are off the critical path */
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) {
-        const double moved = change[i] + small[i], more = moved - change[i];
-        const double sum = s->x[i] + moved, added = sum - s->x[i];
+        const double total = change[i] + small[i], more = total - change[i];
+        const double sum = s->x[i] + total, added = sum - s->x[i];
         x[i] = sum;
         zero += sum - sum;
-        carry[i] = ((s->x[i] - (sum - added)) + (moved - added)) + ((change[i] - (moved - more))
+        carry[i] = ((s->x[i] - (sum - added)) + (total - added)) + ((change[i] - (total - more))
             + (small[i] - more));
     }
     if (!(zero == 0.0)) return 0;
@@ -277,52 +277,52 @@ static inline double kowalevski_gauss_total(const double values[kowalevski_gauss
 
 /* A value at each stage, each a weighted sum of the increments of one unknown at all stages. */
 static inline void kowalevski_gauss_mix(const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH],
-    const double move[kowalevski_gauss_WIDTH], double at[kowalevski_gauss_WIDTH])
+    const double increment[kowalevski_gauss_WIDTH], double at[kowalevski_gauss_WIDTH])
 {
     kowalevski_gauss_EACH_LANE
     for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
-        at[lane] = (matrix[0][lane] * move[0] + matrix[2][lane] * move[2] + matrix[4][lane] * move[4]
-        + matrix[6][lane] * move[6]) + (matrix[1][lane] * move[1] + matrix[3][lane] * move[3]
-        + matrix[5][lane] * move[5] + matrix[7][lane] * move[7]);
+        at[lane] = (matrix[0][lane] * increment[0] + matrix[2][lane] * increment[2] + matrix[4][lane]
+        * increment[4] + matrix[6][lane] * increment[6]) + (matrix[1][lane] * increment[1] + matrix[3][lane]
+        * increment[3] + matrix[5][lane] * increment[5] + matrix[7][lane] * increment[7]);
 }
 
 /* Unknowns of all stages: weighted sums of the stage increments. */
 static inline void kowalevski_gauss_mixed(const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH],
-    double moves[][kowalevski_gauss_WIDTH], kowalevski_gauss_lanes *z)
+    double increments[][kowalevski_gauss_WIDTH], kowalevski_gauss_lanes *z)
 {
     for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
-        kowalevski_gauss_mix(matrix, moves[k], z[k]);
+        kowalevski_gauss_mix(matrix, increments[k], z[k]);
     }
 }
 
 /* As kowalevski_gauss_mix, with the increments of two steps. */
 static inline void kowalevski_gauss_mix_twice(const double matrix[kowalevski_gauss_EARLIER
-    * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], const double move[kowalevski_gauss_WIDTH],
+    * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], const double increment[kowalevski_gauss_WIDTH],
     const double before[kowalevski_gauss_WIDTH], double at[kowalevski_gauss_WIDTH])
 {
     kowalevski_gauss_EACH_LANE
     for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
-        at[lane] = (matrix[0][lane] * move[0] + matrix[2][lane] * move[2] + matrix[4][lane] * move[4]
-        + matrix[6][lane] * move[6] + matrix[8][lane] * before[0] + matrix[10][lane] * before[2]
-        + matrix[12][lane] * before[4] + matrix[14][lane] * before[6]) + (matrix[1][lane] * move[1]
-        + matrix[3][lane] * move[3] + matrix[5][lane] * move[5] + matrix[7][lane] * move[7] + matrix[9][lane]
-        * before[1] + matrix[11][lane] * before[3] + matrix[13][lane] * before[5] + matrix[15][lane]
-        * before[7]);
+        at[lane] = (matrix[0][lane] * increment[0] + matrix[2][lane] * increment[2] + matrix[4][lane]
+        * increment[4] + matrix[6][lane] * increment[6] + matrix[8][lane] * before[0] + matrix[10][lane]
+        * before[2] + matrix[12][lane] * before[4] + matrix[14][lane] * before[6])
+        + (matrix[1][lane] * increment[1] + matrix[3][lane] * increment[3] + matrix[5][lane] * increment[5]
+        + matrix[7][lane] * increment[7] + matrix[9][lane] * before[1] + matrix[11][lane] * before[3]
+        + matrix[13][lane] * before[5] + matrix[15][lane] * before[7]);
 }
 
 /* The unknowns of stage i for members in lanes: weighted sums of the increments of all stages. */
 static inline void kowalevski_gauss_mix_members(
     const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], int i,
-    kowalevski_gauss_lanes moves[kowalevski_gauss_NODES][kowalevski_gauss_UNKNOWNS],
+    kowalevski_gauss_lanes increments[kowalevski_gauss_NODES][kowalevski_gauss_UNKNOWNS],
     kowalevski_gauss_lanes z[restrict kowalevski_gauss_UNKNOWNS])
 {
     for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
         kowalevski_gauss_EACH_LANE
         for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane)
-            z[k][lane] = (matrix[0][i] * moves[0][k][lane] + matrix[2][i] * moves[2][k][lane] + matrix[4][i]
-            * moves[4][k][lane] + matrix[6][i] * moves[6][k][lane]) + (matrix[1][i] * moves[1][k][lane]
-            + matrix[3][i] * moves[3][k][lane] + matrix[5][i] * moves[5][k][lane] + matrix[7][i]
-            * moves[7][k][lane]);
+            z[k][lane] = (matrix[0][i] * increments[0][k][lane] + matrix[2][i] * increments[2][k][lane]
+            + matrix[4][i] * increments[4][k][lane] + matrix[6][i] * increments[6][k][lane])
+            + (matrix[1][i] * increments[1][k][lane] + matrix[3][i] * increments[3][k][lane] + matrix[5][i]
+            * increments[5][k][lane] + matrix[7][i] * increments[7][k][lane]);
     }
 }
 
@@ -530,17 +530,17 @@ static void kowalevski_gauss_start(const kowalevski_gauss_solver *s, double poin
 }
 
 /* Sum of the increments of all stages. */
-static void kowalevski_gauss_end(kowalevski_gauss_lanes *moves, double end[kowalevski_gauss_UNKNOWNS])
+static void kowalevski_gauss_end(kowalevski_gauss_lanes *increments, double end[kowalevski_gauss_UNKNOWNS])
 {
-    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) end[k] = kowalevski_gauss_total(moves[k]);
+    for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) end[k] = kowalevski_gauss_total(increments[k]);
 }
 
 /* h b_j times the vector field at each stage, for unknowns z; the weights are h b_j. */
 static inline void kowalevski_gauss_slopes(const kowalevski_gauss_solver *s,
     double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *weights, kowalevski_gauss_lanes *z,
-    kowalevski_gauss_lanes *moves)
+    kowalevski_gauss_lanes *increments)
 {
-    kowalevski_gauss_stage_field_lanes(s->coef, point, z, weights, moves);
+    kowalevski_gauss_stage_field_lanes(s->coef, point, z, weights, increments);
 }
 
 /* Collocation polynomial: factors of the stage increments in the offsets of the unknowns from the end of a
@@ -589,16 +589,16 @@ static void kowalevski_gauss_predict_at(kowalevski_gauss_history *past, double r
         kowalevski_gauss_factors_at(1.0 + ratio * kowalevski_gauss_nodes[i], factor);
         for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k)
             for (int j = 0; j < kowalevski_gauss_NODES; ++j)
-                z[k][i] += factor[j] * past->moves[past->latest][k][j];
+                z[k][i] += factor[j] * past->increments[past->latest][k][j];
     }
 }
 
 /* The array that sweeps write. */
-static inline kowalevski_gauss_lanes *kowalevski_gauss_iterates(kowalevski_gauss_lanes *moves,
+static inline kowalevski_gauss_lanes *kowalevski_gauss_iterates(kowalevski_gauss_lanes *increments,
     kowalevski_gauss_lanes *apart)
 {
     (void)apart;
-    return moves;
+    return increments;
 }
 
 /* A sweep: the increments of the unknowns, by what it reads. */
@@ -616,13 +616,13 @@ static inline void kowalevski_gauss_read(kowalevski_gauss_lanes *now, kowalevski
 }
 
 /* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
-static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowalevski_gauss_lanes *moves)
+static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowalevski_gauss_lanes *increments)
 {
     double square = DBL_MIN;
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) square += x[i] * x[i];
     if (square <= DBL_MIN)
         for (int k = 0; k < kowalevski_gauss_PLAIN && k < kowalevski_gauss_ITERATED; ++k)
-            for (int i = 0; i < kowalevski_gauss_NODES; ++i) square += moves[k][i] * moves[k][i];
+            for (int i = 0; i < kowalevski_gauss_NODES; ++i) square += increments[k][i] * increments[k][i];
     return 1.0 / square;
 }
 
@@ -647,8 +647,8 @@ static inline double kowalevski_gauss_change_of(double scale, int count, kowalev
 static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predictor,
     kowalevski_gauss_lanes reads[kowalevski_gauss_READS])
 {
-    double(*last)[kowalevski_gauss_WIDTH] = past->moves[past->latest], (*older)[kowalevski_gauss_WIDTH] =
-        past->moves[1 - past->latest];
+    double(*last)[kowalevski_gauss_WIDTH] = past->increments[past->latest], (*older)[kowalevski_gauss_WIDTH] =
+        past->increments[1 - past->latest];
     if (predictor + 1 < kowalevski_gauss_PREDICTORS)
         for (int r = 0; r < kowalevski_gauss_READS; ++r)
             kowalevski_gauss_mix_twice(kowalevski_gauss_prediction[predictor], last[kowalevski_gauss_READ(r)],
@@ -678,18 +678,18 @@ static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, doubl
 }
 
 /* Stage increments in the frame of the end of a step, where the next step starts. */
-static void kowalevski_gauss_see(const kowalevski_gauss_solver *s,
-    const double end[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_lanes *moves,
-    double seen[kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH])
+static void kowalevski_gauss_to_next_frame(const kowalevski_gauss_solver *s,
+    const double end[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_lanes *increments,
+    double in_next_frame[kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH])
 {
-    kowalevski_gauss_lanes turned[kowalevski_gauss_UNKNOWNS];
-    kowalevski_gauss_next_frame_lanes(s->coef, end, moves, turned);
-    memcpy(seen, turned, sizeof turned); /* may be unaligned */
+    kowalevski_gauss_lanes in_frame[kowalevski_gauss_UNKNOWNS];
+    kowalevski_gauss_next_frame_lanes(s->coef, end, increments, in_frame);
+    memcpy(in_next_frame, in_frame, sizeof in_frame); /* may be unaligned */
 }
 
 /* Store the stage increments of a step with this end, to predict the next step. */
 static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, const double end[kowalevski_gauss_UNKNOWNS],
-    kowalevski_gauss_lanes *moves)
+    kowalevski_gauss_lanes *increments)
 {
     kowalevski_gauss_history *past = &s->history;
     const int older = past->latest, latest = kowalevski_gauss_EARLIER - 1 - older;
@@ -697,9 +697,9 @@ static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, const double e
     past->h = s->h;
     past->kicked = 0;
     kowalevski_gauss_lanes last[kowalevski_gauss_UNKNOWNS];
-    memcpy(last, past->moves[older], sizeof last);
-    kowalevski_gauss_see(s, end, last, past->moves[older]);
-    kowalevski_gauss_see(s, end, moves, past->moves[latest]);
+    memcpy(last, past->increments[older], sizeof last);
+    kowalevski_gauss_to_next_frame(s, end, last, past->increments[older]);
+    kowalevski_gauss_to_next_frame(s, end, increments, past->increments[latest]);
     past->latest = latest;
     if (past->count < kowalevski_gauss_EARLIER) ++past->count;
 }
@@ -749,12 +749,12 @@ static int kowalevski_gauss_judge(double *usual, int *first, kowalevski_gauss_pr
 /* Solve for the increments of all stages by fixed-point sweeps, starting from the prediction. Changes are
    measured only from the sweep on that is expected to be the last. */
 static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solver *s,
-    double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *moves)
+    double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *increments)
 {
     kowalevski_gauss_history *past = &s->history;
     kowalevski_gauss_lanes z[kowalevski_gauss_READS], apart[kowalevski_gauss_ITERATED],
         next[kowalevski_gauss_ITERATED], factors[kowalevski_gauss_FACTORS] = { { 0.0 } };
-    kowalevski_gauss_lanes *now = kowalevski_gauss_iterates(moves, apart);
+    kowalevski_gauss_lanes *now = kowalevski_gauss_iterates(increments, apart);
     kowalevski_gauss_progress progress = { HUGE_VAL, 0, 0 };
     kowalevski_gauss_set_factors(s->h, factors);
     if (past->count == 0 || memcmp(&s->h, &past->h, sizeof s->h) != 0) {
@@ -802,14 +802,14 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
 static kowalevski_gauss_status kowalevski_gauss_attempt(kowalevski_gauss_solver *s)
 {
     double point[kowalevski_gauss_POINT], end[kowalevski_gauss_UNKNOWNS], change[kowalevski_gauss_DIM];
-    kowalevski_gauss_lanes moves[kowalevski_gauss_UNKNOWNS];
+    kowalevski_gauss_lanes increments[kowalevski_gauss_UNKNOWNS];
     kowalevski_gauss_start(s, point);
-    const kowalevski_gauss_status status = kowalevski_gauss_collocate(s, point, moves);
+    const kowalevski_gauss_status status = kowalevski_gauss_collocate(s, point, increments);
     if (status != kowalevski_gauss_OK) return status;
-    kowalevski_gauss_end(moves, end);
+    kowalevski_gauss_end(increments, end);
     kowalevski_gauss_stage_change(s->coef, point, end, change);
     if (!kowalevski_gauss_advance(s, change, s->carry)) return kowalevski_gauss_NOT_FINITE;
-    kowalevski_gauss_remember(s, end, moves);
+    kowalevski_gauss_remember(s, end, increments);
     return kowalevski_gauss_OK;
 }
 
@@ -896,7 +896,7 @@ kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solv
         for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
             z[k] = 0.0;
             for (int j = 0; j < kowalevski_gauss_NODES; ++j)
-                z[k] += factor[j] * s->history.moves[s->history.latest][k][j];
+                z[k] += factor[j] * s->history.increments[s->history.latest][k][j];
         }
         kowalevski_gauss_stage_change(s->coef, point, z, change);
         for (int i = 0; i < kowalevski_gauss_DIM; ++i)
@@ -925,7 +925,7 @@ size_t kowalevski_gauss_solver_steps_done(const kowalevski_gauss_solver *s) { re
    have those of member 0. */
 typedef struct {
     double *x;
-    size_t members, steps, own;
+    size_t members, steps, per_member;
     const kowalevski_gauss_params *params; /* NULL for the defaults */
     const double *h;
     size_t stride;         /* 0 without frames */
@@ -951,9 +951,10 @@ static kowalevski_gauss_members kowalevski_gauss_asked(const kowalevski_gauss_pa
 static kowalevski_gauss_status kowalevski_gauss_begin_member(const kowalevski_gauss_members *all, size_t m,
     const double x[kowalevski_gauss_DIM], kowalevski_gauss_solver *s)
 {
-    const kowalevski_gauss_params *params = all->params != NULL ? all->params + m * all->own : NULL;
+    const kowalevski_gauss_params *params = all->params != NULL ? all->params + m * all->per_member : NULL;
     const kowalevski_gauss_status status = kowalevski_gauss_init(s, params, x);
-    return status == kowalevski_gauss_OK ? kowalevski_gauss_integrate(s, all->h[m * all->own], 0) : status;
+    return status == kowalevski_gauss_OK ? kowalevski_gauss_integrate(s, all->h[m * all->per_member], 0)
+        : status;
 }
 
 /* Initialise a member at its state in the ensemble, which is copied to x. */
@@ -1018,7 +1019,7 @@ typedef struct {
         coef[kowalevski_gauss_COEFFICIENTS];
     kowalevski_gauss_lanes weights[kowalevski_gauss_NODES][1]; /* h b_j */
     /* stage increments of the last steps, in the frame of the end of the last one */
-    kowalevski_gauss_batch moves[kowalevski_gauss_EARLIER];
+    kowalevski_gauss_batch increments[kowalevski_gauss_EARLIER];
     int latest; /* index of the last step in moves */
     int count; /* steps in moves */
     int predictor; /* number of the predictor */
@@ -1034,10 +1035,11 @@ static void kowalevski_gauss_group_predict(kowalevski_gauss_group *group, int pr
     kowalevski_gauss_lanes z[kowalevski_gauss_UNKNOWNS])
 {
     kowalevski_gauss_lanes older[kowalevski_gauss_UNKNOWNS];
-    kowalevski_gauss_mix_members(kowalevski_gauss_prediction[predictor], i, group->moves[group->latest], z);
+    kowalevski_gauss_mix_members(kowalevski_gauss_prediction[predictor], i, group->increments[group->latest],
+        z);
     if (predictor + 1 == kowalevski_gauss_PREDICTORS) return; /* the last predictor reads one step */
     kowalevski_gauss_mix_members(kowalevski_gauss_prediction[predictor] + kowalevski_gauss_NODES, i,
-        group->moves[1 - group->latest], older);
+        group->increments[1 - group->latest], older);
     for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
         kowalevski_gauss_EACH_LANE
         for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) z[k][lane] += older[k][lane];
@@ -1189,9 +1191,9 @@ static void kowalevski_gauss_group_remember(kowalevski_gauss_group *group,
     const int older = group->latest, latest = kowalevski_gauss_EARLIER - 1 - older;
     kowalevski_gauss_lanes last[kowalevski_gauss_UNKNOWNS];
     for (int i = 0; i < kowalevski_gauss_NODES; ++i) {
-        memcpy(last, group->moves[older][i], sizeof last);
-        kowalevski_gauss_member_frame_lanes(group->coef, end, last, group->moves[older][i]);
-        kowalevski_gauss_member_frame_lanes(group->coef, end, now[i], group->moves[latest][i]);
+        memcpy(last, group->increments[older][i], sizeof last);
+        kowalevski_gauss_member_frame_lanes(group->coef, end, last, group->increments[older][i]);
+        kowalevski_gauss_member_frame_lanes(group->coef, end, now[i], group->increments[latest][i]);
     }
     group->latest = latest;
     if (group->count < kowalevski_gauss_EARLIER) ++group->count;
@@ -1207,11 +1209,11 @@ static void kowalevski_gauss_group_advance(kowalevski_gauss_group *group,
         const double *was = group->x[i], *small = group->carry[i], *by = change[i];
         kowalevski_gauss_EACH_LANE
         for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
-            const double moved = by[lane] + small[lane], more = moved - by[lane];
-            const double sum = was[lane] + moved, added = sum - was[lane];
+            const double total = by[lane] + small[lane], more = total - by[lane];
+            const double sum = was[lane] + total, added = sum - was[lane];
             x[i][lane] = sum;
             zero[lane] += sum - sum; /* a number less itself is 0, if it is finite */
-            carry[i][lane] = ((was[lane] - (sum - added)) + (moved - added)) + ((by[lane] - (moved - more))
+            carry[i][lane] = ((was[lane] - (sum - added)) + (total - added)) + ((by[lane] - (total - more))
                 + (small[lane] - more));
         }
     }
@@ -1358,7 +1360,7 @@ kowalevski_gauss_status kowalevski_gauss_ensemble_each(const kowalevski_gauss_pa
     kowalevski_gauss_members all = kowalevski_gauss_asked(params, x, members, h, steps, status);
     if (members > 0 && (x == NULL || h == NULL)) return kowalevski_gauss_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return kowalevski_gauss_BAD_ARGUMENT;
-    all.own = 1;
+    all.per_member = 1;
     all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     return kowalevski_gauss_run(&all);

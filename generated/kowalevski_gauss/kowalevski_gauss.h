@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5d6ea4b871ea0df78957cad53d25463787ca441c6187cfb32bca61a0bee52e58
+ * body-sha256: d6e0ec366fb10d8f7f2bf46c6ca6965543a61f87fa5cd3bcbc4d4752d30cf65c
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -46,7 +46,7 @@ typedef struct {
     int kicked;    /* whether the state was changed since the last step */
     double h;      /* size of the last step */
     /* stage increments of the last steps, in the frame of the end of the last one */
-    double moves[kowalevski_gauss_EARLIER][kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
+    double increments[kowalevski_gauss_EARLIER][kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
 } kowalevski_gauss_history;
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */

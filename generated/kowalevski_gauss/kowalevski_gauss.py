@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 72 additions, 95 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 84e6d81d2c49d0eb4d784e4a07db3e14697fb36fca24291edf90b9ca5c08b5a0
+# body-sha256: c04edabaa57b47059d0c99dbc158014482641041f3acae3b3291fe13629437c7
 import numpy as np
 
 VERSION = "0.1.0"
@@ -51,8 +51,8 @@ def _at(coef, members):
 def _stage_at(stage, members):
     """Return a stage for some of its members."""
     coef, parameters, *times = stage
-    own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
-    return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
+    parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
+    return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
@@ -257,10 +257,10 @@ def _slopes(stage, point, z):
     return np.moveaxis(_stage_field(stage[0][:, :, np.newaxis], point, z, [weights]), -1, 0)
 
 
-def _change_of(x, change, moves):
+def _change_of(x, change, increments):
     """Return the largest change at any stage, relative to the size of the unknowns: (members,)."""
     size = np.sqrt(np.sum(x**2, axis=-1))[:, np.newaxis]
-    size = np.where(size > 0, size, np.sqrt(np.sum(moves[:PLAIN] ** 2, axis=0)) + np.finfo(float).tiny)
+    size = np.where(size > 0, size, np.sqrt(np.sum(increments[:PLAIN] ** 2, axis=0)) + np.finfo(float).tiny)
     plain, rest = np.sum(change[:PLAIN] ** 2, axis=0) / size**2, np.sum(change[PLAIN:] ** 2, axis=0)
     return np.sqrt(np.max(plain + rest, axis=-1))
 
@@ -270,14 +270,14 @@ def _solved(stage, x, z):
     member."""
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
     point = _point(stage, x)
-    found = _slopes(stage, point, z)
+    solved = _slopes(stage, point, z)
     open_, previous, rates = np.arange(len(x)), np.full(len(x), np.inf), np.full(len(x), 0.5)
     rising, rises = np.zeros(len(x), dtype=int), np.zeros(len(x), dtype=int)
     for _ in range(100):
-        moves = found[:, open_]
-        following = _slopes(_stage_at(stage, open_), point[open_], moves @ MIXING.T)
-        size = _change_of(x[open_], following - moves, following)
-        found[:, open_] = following
+        increments = solved[:, open_]
+        following = _slopes(_stage_at(stage, open_), point[open_], increments @ MIXING.T)
+        size = _change_of(x[open_], following - increments, following)
+        solved[:, open_] = following
         before = previous[open_]
         rate = size / np.maximum(before, np.finfo(float).tiny)
         rates[open_] = np.where((rate > 0) & (rate < 1) & (size > NEARLY_ROUNDING), 0.7 * rates[open_] + 0.3 * rate, rates[open_])
@@ -293,7 +293,7 @@ def _solved(stage, x, z):
         open_ = open_[~done & ~lost]
         if not len(open_):
             break
-    return found, status
+    return solved, status
 
 
 def _factors_at(fractions):
@@ -307,9 +307,9 @@ def _factors_at(fractions):
     return (x - 1) / 2 + 0.5 * (at[:, 2:] - at[:, :-2]) @ at_nodes[:, 1:-1].T
 
 
-def _interpolated(stage, x, moves, fractions):
+def _interpolated(stage, x, increments, fractions):
     """Return states at fractions of a step that ends at x, (fractions, DIM), from its increments in the frame of x."""
-    offsets = np.moveaxis(moves @ _factors_at(fractions).T, -1, 1)[:, :, 0]
+    offsets = np.moveaxis(increments @ _factors_at(fractions).T, -1, 1)[:, :, 0]
     return x + _stage_change(stage[0], _point(stage, np.repeat(x, len(fractions), axis=0))[:, 0], offsets)
 
 
@@ -328,17 +328,17 @@ def _advance(stage, x, carry, memory):
     predicted = memory[1].ndim > 2
     anew = np.zeros((8, len(x), len(WEIGHTS)))
     start = memory[1] @ PREDICTION.T if memory[1].ndim == 3 else memory[1][0] if predicted else anew
-    moves, status = _solved(stage, x, start)
+    increments, status = _solved(stage, x, start)
     failed = np.flatnonzero(status != "")
     if predicted and len(failed):
         # If a step fails from the prediction, it is tried again without one.
-        moves[:, failed], status[failed] = _solved(_stage_at(stage, failed), x[failed], anew[:, failed])
-    end = np.sum(moves, axis=-1)
+        increments[:, failed], status[failed] = _solved(_stage_at(stage, failed), x[failed], anew[:, failed])
+    end = np.sum(increments, axis=-1)
     following, rest = _sum(x, carry, _stage_change(stage[0], _point(stage, x)[:, 0], end))
     good = np.isfinite(following).all(axis=-1)
-    seen = np.array(_next_frame(stage[0][:, :, np.newaxis], end[:, :, np.newaxis], moves))
-    seen = np.where((good & (status == ""))[:, np.newaxis], seen, 0.0)
-    return following, rest, (moves, seen), np.where(good | (status != ""), status, "NOT_FINITE")
+    next_increments = np.array(_next_frame(stage[0][:, :, np.newaxis], end[:, :, np.newaxis], increments))
+    next_increments = np.where((good & (status == ""))[:, np.newaxis], next_increments, 0.0)
+    return following, rest, (increments, next_increments), np.where(good | (status != ""), status, "NOT_FINITE")
 
 
 def _choose_gauge(parameters, x):

@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 887c3f7476cfab77a20167862f803bd692c9f389608ff1bab8d77255287e11ea
+# body-sha256: 1e0d1edc947c61a7893d567d90c885b327c69f0b166d9641241edf96cefd9497
 import numpy as np
 
 VERSION = "0.1.0"
@@ -51,8 +51,8 @@ def _at(coef, members):
 def _stage_at(stage, members):
     """Return a stage for some of its members."""
     coef, parameters, *times = stage
-    own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
-    return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
+    parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
+    return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):

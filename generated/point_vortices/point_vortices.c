@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: edc7bfbd30ac9c4fe550ca176ee3e18c65afa2f56b83d9ad2559e9d8bf772f6e
+ * body-sha256: 17508859aec2b1c303dd767640dd573dd87df8434878fcba2d63409012b24a5b
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -352,13 +352,13 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return point_vortices_BAD_ARGUMENT;
-    const point_vortices_params own = params != NULL ? *params : point_vortices_default_params;
+    const point_vortices_params solver_params = params != NULL ? *params : point_vortices_default_params;
     const size_t rows = point_vortices_shape(sizes, &width), length = sizes[0], sites = rows * length;
-    if (rows == 0 || !point_vortices_finite(x0, point_vortices_DIM * sites) || !point_vortices_allowed(&own,
-        sites))
+    if (rows == 0 || !point_vortices_finite(x0, point_vortices_DIM * sites)
+        || !point_vortices_allowed(&solver_params, sites))
         return point_vortices_BAD_ARGUMENT;
     double coef[point_vortices_COEFFICIENTS] = { 0.0 };
-    point_vortices_prepare_step(&own, point_vortices_PROBE_STEP, coef);
+    point_vortices_prepare_step(&solver_params, point_vortices_PROBE_STEP, coef);
     if (!point_vortices_finite(coef, point_vortices_COEFFICIENTS)) return point_vortices_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -366,7 +366,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     s->rows = rows;
     s->length = (ptrdiff_t)length;
     s->width = width;
-    s->params = own;
+    s->params = solver_params;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = point_vortices_block(rows, width);
     for (size_t k = 0; k < point_vortices_ARRAYS; ++k, memory += block) s->x[k] = memory;
@@ -380,12 +380,12 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     for (int stage = 0; stage < point_vortices_STAGES; ++stage)
         for (int d = 0; d < point_vortices_DIFFERENCES; ++d)
             for (int k = 0; k < point_vortices_DIM; ++k, memory += block)
-                s->guess[stage].difference[d][k] = memory;
+                s->predictor[stage].difference[d][k] = memory;
     for (int d = 0; d <= point_vortices_DIRECTIONS; ++d)
         for (int k = 0; k < point_vortices_DIM; ++k, memory += block) s->space[d][k] = memory;
     s->sums = memory;
     for (size_t k = 0; k < point_vortices_DIM; ++k) point_vortices_put(s, s->x[k], x0 + k * sites);
-    point_vortices_put_parameters(s, &own);
+    point_vortices_put_parameters(s, &solver_params);
     return point_vortices_OK;
 }
 
@@ -439,16 +439,16 @@ static void point_vortices_measure(const point_vortices_solver *s, int now, size
     double *size)
 {
     const point_vortices_row row = point_vortices_piece_of(s, unit);
-    const ptrdiff_t whole = row.to - (row.to - row.from) % point_vortices_WIDTH;
+    const ptrdiff_t vectors_end = row.to - (row.to - row.from) % point_vortices_WIDTH;
     for (int k = 0; k < point_vortices_DIM; ++k) {
         const double *restrict before = s->y[now][k], *restrict after = s->y[1 - now][k];
         double changes[point_vortices_WIDTH] = { 0.0 }, sizes[point_vortices_WIDTH] = { 0.0 };
-        for (ptrdiff_t i = row.from; i < whole; i += point_vortices_WIDTH)
+        for (ptrdiff_t i = row.from; i < vectors_end; i += point_vortices_WIDTH)
             for (int l = 0; l < point_vortices_WIDTH; ++l) {
                 point_vortices_raise(changes + l, fabs(after[i + l] - before[i + l]));
                 point_vortices_raise(sizes + l, fabs(after[i + l]));
             }
-        for (ptrdiff_t i = whole; i < row.to; ++i) {
+        for (ptrdiff_t i = vectors_end; i < row.to; ++i) {
             point_vortices_raise(changes, fabs(after[i] - before[i]));
             point_vortices_raise(sizes, fabs(after[i]));
         }
@@ -470,7 +470,7 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
 {
     const size_t units = point_vortices_units(s);
     double change[point_vortices_DIM] = { 0.0 }, size[point_vortices_DIM] = { 0.0 }, largest = 0.0,
-        moved = 0.0;
+        largest_change = 0.0;
     point_vortices_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
         if (coef != NULL) point_vortices_stage_piece(s, coef, s->y[now], s->y[1 - now], unit);
@@ -480,9 +480,9 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
     for (int k = 0; k < point_vortices_DIM; ++k) {
         s->usual[k] = size[k] + point_vortices_LEAST_SIZE * largest + 1e-300;
         change[k] /= s->usual[k]; /* NaN if both are infinite */
-        moved = isnan(change[k]) || change[k] > moved ? change[k] : moved;
+        largest_change = isnan(change[k]) || change[k] > largest_change ? change[k] : largest_change;
     }
-    return moved;
+    return largest_change;
 }
 
 /* Predict: s->y[0] = x + extrapolated y - x, with the halo. */
@@ -493,8 +493,8 @@ static void point_vortices_predict(const point_vortices_solver *s, double *const
         for (int k = 0; k < point_vortices_DIM; ++k) {
             const ptrdiff_t first = (ptrdiff_t)row * s->width, end = first + s->length;
             for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
-            for (int d = 0; d < s->guess[stage].order; ++d) {
-                const double *difference = s->guess[stage].difference[d][k];
+            for (int d = 0; d < s->predictor[stage].order; ++d) {
+                const double *difference = s->predictor[stage].difference[d][k];
                 for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
             }
         }
@@ -504,35 +504,36 @@ static void point_vortices_predict(const point_vortices_solver *s, double *const
    difference; the order with the smallest error is used next. */
 static void point_vortices_remember(point_vortices_solver *s, double *const *from, int stage, int now)
 {
-    point_vortices_guess *guess = &s->guess[stage];
+    point_vortices_predictor *predictor = &s->predictor[stage];
     double size[point_vortices_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
     point_vortices_EACH_PIECE
     for (size_t row = 0; row < s->rows; ++row) {
-        double own[point_vortices_DIFFERENCES] = { 0.0 };
+        double largest[point_vortices_DIFFERENCES] = { 0.0 };
         for (int k = 0; k < point_vortices_DIM; ++k) {
             const ptrdiff_t first = (ptrdiff_t)row * s->width, end = first + s->length;
             const double *restrict y = s->y[now][k], *restrict x = from[k];
             for (ptrdiff_t i = first; i < end; ++i) {
                 double next = y[i] - x[i];
-                for (int d = 0; d < guess->count; ++d) {
-                    const double last = guess->difference[d][k][i];
-                    guess->difference[d][k][i] = next;
+                for (int d = 0; d < predictor->count; ++d) {
+                    const double last = predictor->difference[d][k][i];
+                    predictor->difference[d][k][i] = next;
                     next -= last;
-                    point_vortices_raise(own + d, fabs(next));
+                    point_vortices_raise(largest + d, fabs(next));
                 }
-                if (guess->count < point_vortices_DIFFERENCES) guess->difference[guess->count][k][i] = next;
+                if (predictor->count < point_vortices_DIFFERENCES)
+                    predictor->difference[predictor->count][k][i] = next;
             }
         }
         point_vortices_ONE_BY_ONE
-        for (int d = 0; d < point_vortices_DIFFERENCES; ++d) point_vortices_raise(size + d, own[d]);
+        for (int d = 0; d < point_vortices_DIFFERENCES; ++d) point_vortices_raise(size + d, largest[d]);
     }
-    guess->order = 1;
-    for (int d = 0; d < guess->count; ++d)
+    predictor->order = 1;
+    for (int d = 0; d < predictor->count; ++d)
         if (size[d] < least) {
             least = size[d];
-            guess->order = d + 1;
+            predictor->order = d + 1;
         }
-    if (guess->count < point_vortices_DIFFERENCES) ++guess->count;
+    if (predictor->count < point_vortices_DIFFERENCES) ++predictor->count;
 }
 
 /* Clear the predictors, and return to fixed-point sweeps. */
@@ -540,7 +541,7 @@ static void point_vortices_forget(point_vortices_solver *s)
 {
     s->stiff = 0;
     for (int stage = 0; stage < point_vortices_STAGES; ++stage)
-        s->guess[stage].count = s->guess[stage].order = 0;
+        s->predictor[stage].count = s->predictor[stage].order = 0;
 }
 
 /* ---- Krylov spaces ---- */
@@ -558,14 +559,14 @@ static double point_vortices_product(const point_vortices_solver *s, double *con
     point_vortices_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
         const point_vortices_row row = point_vortices_piece_of(s, unit);
-        const ptrdiff_t whole = row.to - (row.to - row.from) % point_vortices_WIDTH;
+        const ptrdiff_t vectors_end = row.to - (row.to - row.from) % point_vortices_WIDTH;
         s->sums[unit] = 0.0;
         for (int k = 0; k < point_vortices_DIM; ++k) {
             const double *one = x[k], *other = y[k];
             double lanes[point_vortices_WIDTH] = { 0.0 };
-            for (ptrdiff_t i = row.from; i < whole; i += point_vortices_WIDTH)
+            for (ptrdiff_t i = row.from; i < vectors_end; i += point_vortices_WIDTH)
                 for (int l = 0; l < point_vortices_WIDTH; ++l) lanes[l] += one[i + l] * other[i + l];
-            for (ptrdiff_t i = whole; i < row.to; ++i) *lanes += one[i] * other[i];
+            for (ptrdiff_t i = vectors_end; i < row.to; ++i) *lanes += one[i] * other[i];
             for (int l = 1; l < point_vortices_WIDTH; ++l) *lanes += lanes[l];
             s->sums[unit] += *lanes / s->usual[k] / s->usual[k];
         }
@@ -760,17 +761,17 @@ point_vortices_status point_vortices_step(point_vortices_solver *s, double h)
 
 void point_vortices_state(const point_vortices_solver *s, double *x) { point_vortices_take(s, s->x, x); }
 
-/* Set the state to x + kept * state. */
-static point_vortices_status point_vortices_move(point_vortices_solver *s, const double *x, double kept)
+/* Set the state to x + factor * state. */
+static point_vortices_status point_vortices_move(point_vortices_solver *s, const double *x, double factor)
 {
     if (s == NULL || x == NULL) return point_vortices_BAD_ARGUMENT;
     for (int moving = 0; moving < 2; ++moving) /* first check all values, then change them */
         for (size_t r = 0; r < point_vortices_DIM * s->rows; ++r) {
             double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
             for (ptrdiff_t i = 0; i < s->length; ++i) {
-                const double moved = kept * row[i] + x[(ptrdiff_t)r * s->length + i];
-                if (!isfinite(moved)) return point_vortices_BAD_ARGUMENT;
-                row[i] = moving ? moved : row[i];
+                const double new_value = factor * row[i] + x[(ptrdiff_t)r * s->length + i];
+                if (!isfinite(new_value)) return point_vortices_BAD_ARGUMENT;
+                row[i] = moving ? new_value : row[i];
             }
         }
     return point_vortices_OK;

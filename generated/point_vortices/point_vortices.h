@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2880603f540fbccd08f4198c665544deec91074c7867654c2a3c62e9cfbffffd
+ * body-sha256: 0be3f9f0148e5f94abce629050ee42b9e84919dded00f4e0a5f6d8a65c634d34
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -37,7 +37,7 @@ typedef enum { point_vortices_OK = 0, point_vortices_NO_CONVERGENCE, point_vorti
 typedef struct {
     int count, order; /* number of differences that are known, and of those that the extrapolation sums */
     double *difference[point_vortices_DIFFERENCES][point_vortices_DIM];
-} point_vortices_guess;
+} point_vortices_predictor;
 
 /* A solver, initialised by point_vortices_init. Its arrays lie in memory of the caller: a copy of the struct
    is no independent solver. A field lies in rows, all sites along the last axis, with a halo where steps read
@@ -51,7 +51,7 @@ typedef struct {
     double *gathered[point_vortices_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     /* solution of a stage before and after a sweep, with the parameters at sites */
     double *y[2][point_vortices_ARRAYS];
-    point_vortices_guess guess[point_vortices_STAGES]; /* predictor of each stage */
+    point_vortices_predictor predictor[point_vortices_STAGES]; /* predictor of each stage */
     size_t sweeps; /* number of sweeps of all stages since point_vortices_init */
     int stiff; /* 1 if fixed-point sweeps have failed, so that Newton's method is used */
     double usual[point_vortices_DIM]; /* magnitudes of the fields of y */

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 7d214094199002b40d8dea8e844f6b211affcbeef6fd711ac9b581e32fca0a9f
+# body-sha256: 20931a7545b91a680f0ea4c1b1e3391f6e3f77c7513af8f5cbf565682bce1e19
 import numpy as np
 
 VERSION = "0.1.0"
@@ -172,8 +172,8 @@ def _advance(sites, rows, x, past):
     """
     for stage, (_, row) in enumerate(SCHEDULE):
         order, differences = past.get(stage, (0, []))
-        guess = x + sum(differences[:order])
-        y = _middle(rows[row], x, guess, sites, past)
+        prediction = x + sum(differences[:order])
+        y = _middle(rows[row], x, prediction, sites, past)
         past[stage] = _remember(differences, y - x), differences
         x = _finite(x + _increment(rows[row], x, y, sites))
     return x
@@ -185,15 +185,15 @@ USEFUL = 0.9  # ... and the largest one that is accepted
 PLAUSIBLE = 1.5  # solutions farther from x than this, relative to x and its motion, are rejected
 
 
-def _middle(coef, x, guess, sites, past):
+def _middle(coef, x, prediction, sites, past):
     """Return the solution y of a stage: by fixed-point sweeps until they fail, then by Newton's method."""
     if "stiff" not in past:
         try:
-            return _by_sweeps(coef, x, guess, sites)
+            return _by_sweeps(coef, x, prediction, sites)
         except FailedError:
             past["stiff"] = True
     try:
-        return _newton(coef, x, guess, sites)
+        return _newton(coef, x, prediction, sites)
     except FailedError:
         raise FailedError("NO_CONVERGENCE") from None
 

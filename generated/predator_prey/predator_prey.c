@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 2c9324005708aa5cbab368539701940ac313837ff30f7d70ac2cb47c529d234e
+ * body-sha256: 4cc748874cddd4a95ce080f1881c3a5f3f3b3f490bbad10e8613e6f6a6235b02
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -213,15 +213,15 @@ static void predator_prey_remember(predator_prey_history *history, const double 
    at another energy, and unrelated to the motion. */
 static int predator_prey_plausible(const predator_prey_solver *s, const double increment[predator_prey_DIM])
 {
-    double moved = 0.0, size = 0.0, field[predator_prey_DIM], point[predator_prey_DIM], H[3];
+    double distance = 0.0, size = 0.0, field[predator_prey_DIM], point[predator_prey_DIM], H[3];
     for (int i = 0; i < predator_prey_DIM; ++i) {
-        moved += fabs(increment[i]);
+        distance += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= predator_prey_PLAUSIBLE * size) return 1;
+    if (distance <= predator_prey_PLAUSIBLE * size) return 1;
     predator_prey_vector_field(&s->params, s->x, field);
     for (int i = 0; i < predator_prey_DIM; ++i) size += fabs(s->h * field[i]);
-    if (moved <= predator_prey_PLAUSIBLE * size) return 1;
+    if (distance <= predator_prey_PLAUSIBLE * size) return 1;
     for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < predator_prey_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = predator_prey_hamiltonian(&s->params, point);

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 91f975a6721ea8f51992890315025728a7747eba344d59c026151ce7bdeae439
+# body-sha256: 0bc0f0baf9ac7607e532c68e80882c720afbcd481bb1c9f86c26fb00eb1c17b9
 import numpy as np
 
 VERSION = "0.1.0"
@@ -55,8 +55,8 @@ def _at(coef, members):
 def _stage_at(stage, members):
     """Return a stage for some of its members."""
     coef, parameters, *times = stage
-    own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
-    return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
+    parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
+    return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
@@ -213,19 +213,19 @@ def _plausible(stage, x, end):
     If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
     """
     _, parameters, h = stage
-    moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
-    near = moved <= PLAUSIBLE * size
+    distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
+    near = distance <= PLAUSIBLE * size
     if near.all():
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
     energy = np.abs(before) + np.abs(middle) + np.abs(after)
-    return (moved <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
+    return (distance <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
 
 
-def _solved(stage, x, carry, guess):
+def _solved(stage, x, carry, prediction):
     """Return the result of _attempt, with a status for implausible solutions."""
-    following, rest, value, status = _attempt(stage[0], x, carry, guess)
+    following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
 
@@ -277,8 +277,8 @@ def _attempt(coef, x, carry, y):
 
 def _advance(stage, x, carry, memory):
     """Make one stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
-    guess = x + (2 * memory[0] - memory[1])
-    following, rest, y, status = _solved(stage, x, carry, guess)
+    prediction = x + (2 * memory[0] - memory[1])
+    following, rest, y, status = _solved(stage, x, carry, prediction)
     guessed = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & guessed)
     if len(failed):

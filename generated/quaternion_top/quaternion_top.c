@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 7f8c036dd2c59f2a1311c180f2085880d07057b54390f0e8c541f5c7d8a68b8d
+ * body-sha256: 1fa2b0d65feceb550f327acf0da5807b2d5760b59db3d97a72c806cae860b9ec
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -387,15 +387,15 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
 static int quaternion_top_plausible(const quaternion_top_solver *s,
     const double increment[quaternion_top_DIM])
 {
-    double moved = 0.0, size = 0.0, field[quaternion_top_DIM], point[quaternion_top_DIM], H[3];
+    double distance = 0.0, size = 0.0, field[quaternion_top_DIM], point[quaternion_top_DIM], H[3];
     for (int i = 0; i < quaternion_top_DIM; ++i) {
-        moved += fabs(increment[i]);
+        distance += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= quaternion_top_PLAUSIBLE * size) return 1;
+    if (distance <= quaternion_top_PLAUSIBLE * size) return 1;
     quaternion_top_vector_field(&s->params, s->x, field);
     for (int i = 0; i < quaternion_top_DIM; ++i) size += fabs(s->h * field[i]);
-    if (moved <= quaternion_top_PLAUSIBLE * size) return 1;
+    if (distance <= quaternion_top_PLAUSIBLE * size) return 1;
     for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < quaternion_top_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = quaternion_top_hamiltonian(&s->params, point);
@@ -749,7 +749,7 @@ static int quaternion_top_piece(const double *coef, const double p[quaternion_to
    pieces. */
 static int quaternion_top_path(const double *coef, const double x[quaternion_top_DIM],
     const double p[quaternion_top_DIM], double change[quaternion_top_DIM], double mean[quaternion_top_DIM],
-    int *made)
+    int *pieces_used)
 {
     for (int pieces = 1; pieces <= quaternion_top_LONGEST_PATH; pieces *= 2) {
         double q[quaternion_top_DIM], point[quaternion_top_DIM], shift[quaternion_top_DIM],
@@ -762,7 +762,7 @@ static int quaternion_top_path(const double *coef, const double x[quaternion_top
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < quaternion_top_DIM; ++i) point[i] = x[i] + change[i];
             good = quaternion_top_piece(coef, q, point, shift, piece_mean);
-            ++*made;
+            ++*pieces_used;
             for (int i = 0; i < quaternion_top_DIM; ++i) {
                 mean[i] += (change[i] + piece_mean[i]) / (double)pieces;
                 change[i] += shift[i];
@@ -777,10 +777,11 @@ static int quaternion_top_path(const double *coef, const double x[quaternion_top
    along the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
 static int quaternion_top_residual(quaternion_top_solver *s, const double *coef,
     const double p[quaternion_top_DIM], double y[quaternion_top_DIM], double residual[quaternion_top_DIM],
-    double change[quaternion_top_DIM], double jacobian[quaternion_top_DIM * quaternion_top_DIM], int *made)
+    double change[quaternion_top_DIM], double jacobian[quaternion_top_DIM * quaternion_top_DIM],
+    int *pieces_used)
 {
     double mean[quaternion_top_DIM];
-    if (!quaternion_top_path(coef, s->x, p, change, mean, made)) return 0;
+    if (!quaternion_top_path(coef, s->x, p, change, mean, pieces_used)) return 0;
     for (int i = 0; i < quaternion_top_DIM; ++i) y[i] = s->x[i] + mean[i];
     quaternion_top_generate(coef, y, residual, jacobian);
     for (int i = 0; i < quaternion_top_DIM; ++i) residual[i] = p[i] - residual[i];
@@ -791,17 +792,17 @@ static int quaternion_top_residual(quaternion_top_solver *s, const double *coef,
 /* Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
 static int quaternion_top_differences(quaternion_top_solver *s, const double *coef,
     const double p[quaternion_top_DIM], const double residual[quaternion_top_DIM],
-    double jacobian[quaternion_top_DIM * quaternion_top_DIM], int *made)
+    double jacobian[quaternion_top_DIM * quaternion_top_DIM], int *pieces_used)
 {
-    double q[quaternion_top_DIM], y[quaternion_top_DIM], moved[quaternion_top_DIM],
+    double q[quaternion_top_DIM], y[quaternion_top_DIM], shifted_residual[quaternion_top_DIM],
         change[quaternion_top_DIM], unused[quaternion_top_DIM * quaternion_top_DIM], norm = DBL_MIN;
     for (int i = 0; i < quaternion_top_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < quaternion_top_DIM; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += quaternion_top_DIFFERENCE * norm;
-        if (!quaternion_top_residual(s, coef, q, y, moved, change, unused, made)) return 0;
+        if (!quaternion_top_residual(s, coef, q, y, shifted_residual, change, unused, pieces_used)) return 0;
         for (int i = 0; i < quaternion_top_DIM; ++i)
-            jacobian[i * quaternion_top_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+            jacobian[i * quaternion_top_DIM + j] = (shifted_residual[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
@@ -815,9 +816,9 @@ static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
         change[quaternion_top_DIM], jacobian[quaternion_top_DIM * quaternion_top_DIM], previous = HUGE_VAL;
     if (!quaternion_top_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     quaternion_top_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < quaternion_top_MAX_ITERATIONS
-        && made <= quaternion_top_MOST_PIECES; ++iteration) {
-        if (!quaternion_top_residual(s, coef, p, y, residual, change, jacobian, &made))
+    for (int iteration = 0, pieces_used = 0; iteration < quaternion_top_MAX_ITERATIONS
+        && pieces_used <= quaternion_top_MOST_PIECES; ++iteration) {
+        if (!quaternion_top_residual(s, coef, p, y, residual, change, jacobian, &pieces_used))
             return quaternion_top_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < quaternion_top_DIM; ++i) {
@@ -835,7 +836,7 @@ static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
             return quaternion_top_OK;
         }
         const int slow = iteration >= quaternion_top_PATIENCE && size > quaternion_top_CONTRACTING * previous;
-        if (slow && !quaternion_top_differences(s, coef, p, residual, jacobian, &made))
+        if (slow && !quaternion_top_differences(s, coef, p, residual, jacobian, &pieces_used))
             return quaternion_top_NO_CONVERGENCE;
         if (!quaternion_top_solve(jacobian, residual)) return quaternion_top_SINGULAR;
         for (int i = 0; i < quaternion_top_DIM; ++i) p[i] -= residual[i];

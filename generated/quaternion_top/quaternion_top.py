@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d4d35f921a7755ec66000275b34c877c3962b0bedb48ae88ec7c3d280b48aa92
+# body-sha256: cbf1727627fec7256d151ad8b4e21c20f7241035103ef33d1dcb4ec7172970a0
 import numpy as np
 
 VERSION = "0.1.0"
@@ -57,8 +57,8 @@ def _at(coef, members):
 def _stage_at(stage, members):
     """Return a stage for some of its members."""
     coef, parameters, *times = stage
-    own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
-    return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
+    parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
+    return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
@@ -755,13 +755,13 @@ def _path(coef, x, p):
 
     NaN if the path is too long or leaves the domain.
     """
-    change, mean, made = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
+    change, mean, pieces_used = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
     left = np.arange(len(x))
     for pieces in (1, 2, 4, 8, 16, 32, 64, 128):
         on, total, average = left, np.zeros((len(left), DIM)), np.zeros((len(left), DIM))
         for _ in range(pieces):
             shift, local, fine = _piece(_at(coef, on), p[on] / pieces, x[on] + total)
-            made[on] += 1
+            pieces_used[on] += 1
             on, total, average = on[fine], (total + shift)[fine], (average + (total + local) / pieces)[fine]
             if not len(on):
                 break
@@ -769,15 +769,15 @@ def _path(coef, x, p):
         left = left[~np.isin(left, on)]
         if not len(left):
             break
-    return change, mean, made
+    return change, mean, pieces_used
 
 
 def _residual(coef, x, p):
     """Return p - grad S_h(mean of the path from x with covector p), the change of x along the path, an approximate
     Jacobian, and the number of pieces."""
-    change, mean, made = _path(coef, x, p)
+    change, mean, pieces_used = _path(coef, x, p)
     slope, jacobian = _generate(coef, x + mean)
-    return p - slope, change, jacobian, made
+    return p - slope, change, jacobian, pieces_used
 
 
 def _differences(coef, x, p, residual):
@@ -786,7 +786,7 @@ def _differences(coef, x, p, residual):
 
     NaN where a path cannot be followed.
     """
-    jacobian, made = np.full((len(x), DIM, DIM), np.nan), np.zeros(len(x), dtype=int)
+    jacobian, pieces_used = np.full((len(x), DIM, DIM), np.nan), np.zeros(len(x), dtype=int)
     norm = np.max(np.abs(p), axis=-1) + np.finfo(float).tiny
     left = np.arange(len(x))
     for j in range(DIM):
@@ -794,11 +794,11 @@ def _differences(coef, x, p, residual):
         q[:, j] += DIFFERENCE * norm[left]
         shifted, change, _, pieces = _residual(_at(coef, left), x[left], q)
         jacobian[left, :, j] = (shifted - residual[left]) / (q[:, j] - p[left, j])[:, np.newaxis]
-        made[left] += pieces
+        pieces_used[left] += pieces
         left = left[~np.isnan(change).any(axis=-1)]
         if not len(left):
             break
-    return jacobian, made
+    return jacobian, pieces_used
 
 
 def _solve(matrix, side):
@@ -821,19 +821,19 @@ def _plausible(stage, x, end):
     If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
     """
     _, parameters, h = stage
-    moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
-    near = moved <= PLAUSIBLE * size
+    distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
+    near = distance <= PLAUSIBLE * size
     if near.all():
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
     energy = np.abs(before) + np.abs(middle) + np.abs(after)
-    return (moved <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
+    return (distance <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
 
 
-def _solved(stage, x, carry, guess):
+def _solved(stage, x, carry, prediction):
     """Return the result of _attempt, with a status for implausible solutions."""
-    following, rest, value, status = _attempt(stage[0], x, carry, guess)
+    following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
 
@@ -847,10 +847,10 @@ def _attempt(coef, x, carry, p):
     x, carry, p = x.copy(), carry.copy(), p.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
     previous = np.full(len(x), np.inf)
-    open_, made = np.arange(len(x)), np.zeros(len(x), dtype=int)
+    open_, pieces_used = np.arange(len(x)), np.zeros(len(x), dtype=int)
     for iteration in range(20):
         residual, change, jacobian, pieces = _residual(_at(coef, open_), x[open_], p[open_])
-        made[open_] += pieces
+        pieces_used[open_] += pieces
         norm = np.max(np.abs(p[open_]), axis=-1) + np.finfo(float).tiny
         size = np.max(np.abs(residual), axis=-1) / norm
         finite = np.isfinite(residual).all(axis=-1)
@@ -865,7 +865,7 @@ def _attempt(coef, x, carry, p):
         if len(slow):
             at = open_[slow]
             jacobian[slow], pieces = _differences(_at(coef, at), x[at], p[at], residual[slow])
-            made[at] += pieces
+            pieces_used[at] += pieces
             finite[slow] = ~np.isnan(jacobian[slow]).any(axis=(-1, -2))
         delta = _solve(jacobian, residual)
         singular = finite & ~done & ~np.isfinite(delta).all(axis=-1)
@@ -873,7 +873,7 @@ def _attempt(coef, x, carry, p):
         step = ~done & finite & ~singular
         p[open_[step]] -= delta[step]
         previous[open_] = size
-        open_ = open_[step & (made[open_] <= MOST_PIECES)]
+        open_ = open_[step & (pieces_used[open_] <= MOST_PIECES)]
         if not len(open_):
             break
     return x, carry, p, status

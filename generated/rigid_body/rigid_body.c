@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: several steps or members at once; Newton's method in
  *   lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members:
  *   implicit steps; Ensembles
- * body-sha256: 1f1e85e3ff7b27940141f7492c3297a58c1dcc2de74191c5b92343df9471c998
+ * body-sha256: c5e523aa32df7993bb9b98b52e898452a1db8480629a55da6d297f6748ea7bf5
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -591,7 +591,7 @@ static void rigid_body_judge(rigid_body_history *history, const double value[rig
 /* Drop the oldest values if the history has no room for `count` more. */
 static void rigid_body_make_room(rigid_body_history *history, int values)
 {
-    if (history->count + values <= rigid_body_KEPT) return;
+    if (history->count + values <= rigid_body_STORED_VALUES) return;
     memmove(history->past, history->past + history->count - rigid_body_REMEMBERED,
         rigid_body_REMEMBERED * sizeof history->past[0]);
     history->count = rigid_body_REMEMBERED;
@@ -601,20 +601,20 @@ static void rigid_body_make_room(rigid_body_history *history, int values)
    the recurrence predicts well. */
 static int rigid_body_fit(rigid_body_history *history)
 {
-    int found = 1;
+    int fitted = 1;
     history->recurrence_terms = 0;
-    for (int i = 0; i < rigid_body_DIM && found; ++i) {
+    for (int i = 0; i < rigid_body_DIM && fitted; ++i) {
         const int terms = rigid_body_train(history, i);
-        found = terms > 0;
+        fitted = terms > 0;
         if (terms > history->recurrence_terms) history->recurrence_terms = terms;
     }
-    if (!found) history->recurrence_terms = 0;
-    history->use_recurrence = found;
+    if (!fitted) history->recurrence_terms = 0;
+    history->use_recurrence = fitted;
     ++history->fits;
     history->slow_steps = 0;
     history->slow_steps_allowed = history->slow_steps_allowed < rigid_body_LONG_WAIT / 2
         ? 2 * history->slow_steps_allowed + rigid_body_REPAY : rigid_body_LONG_WAIT;
-    return found;
+    return fitted;
 }
 
 /* Update the predictor with a solution. A solve of one iteration needs no better prediction. */
@@ -636,15 +636,15 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
    at another energy, and unrelated to the motion. */
 static int rigid_body_plausible(const rigid_body_solver *s, const double increment[rigid_body_DIM])
 {
-    double moved = 0.0, size = 0.0, field[rigid_body_DIM], point[rigid_body_DIM], H[3];
+    double distance = 0.0, size = 0.0, field[rigid_body_DIM], point[rigid_body_DIM], H[3];
     for (int i = 0; i < rigid_body_DIM; ++i) {
-        moved += fabs(increment[i]);
+        distance += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= rigid_body_PLAUSIBLE * size) return 1;
+    if (distance <= rigid_body_PLAUSIBLE * size) return 1;
     rigid_body_vector_field(&s->params, s->x, field);
     for (int i = 0; i < rigid_body_DIM; ++i) size += fabs(s->h * field[i]);
-    if (moved <= rigid_body_PLAUSIBLE * size) return 1;
+    if (distance <= rigid_body_PLAUSIBLE * size) return 1;
     for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < rigid_body_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = rigid_body_hamiltonian(&s->params, point);
@@ -779,12 +779,12 @@ static double rigid_body_on_line(const double difference[rigid_body_DEGREE + 1],
 static double rigid_body_least_on_line(const rigid_body_params *params, const double gauge[rigid_body_GAUGES],
     int c, double width, double samples[][rigid_body_DIM])
 {
-    double moved[rigid_body_GAUGES], difference[rigid_body_DEGREE + 1], size = 0.0, best = 0.0,
+    double changed[rigid_body_GAUGES], difference[rigid_body_DEGREE + 1], size = 0.0, best = 0.0,
         mesh = rigid_body_MESH;
-    memcpy(moved, gauge, sizeof moved);
+    memcpy(changed, gauge, sizeof changed);
     for (int j = 0; j <= rigid_body_DEGREE; ++j) {
-        moved[c] = gauge[c] + (j - rigid_body_DEGREE / 2) * width;
-        difference[j] = rigid_body_gauge_error(params, moved, samples);
+        changed[c] = gauge[c] + (j - rigid_body_DEGREE / 2) * width;
+        difference[j] = rigid_body_gauge_error(params, changed, samples);
         size += difference[j];
     }
     for (int order = 1; order <= rigid_body_DEGREE; ++order)
@@ -822,12 +822,12 @@ static void rigid_body_choose_gauge(const rigid_body_params *params, const doubl
         gauge[c] = sums[1 + 2 * c] / norm;
         width[c] = sqrt(sums[0] / norm);
     }
-    for (int sweep = 0, moved = 1; sweep < rigid_body_SWEEPS && moved; ++sweep) {
-        moved = 0;
+    for (int sweep = 0, changed = 1; sweep < rigid_body_SWEEPS && changed; ++sweep) {
+        changed = 0;
         for (int c = 0; c < rigid_body_GAUGES; ++c) {
             const double best = rigid_body_least_on_line(params, gauge, c, width[c], samples);
             gauge[c] += best * width[c];
-            moved = moved || best != 0.0;
+            changed = changed || best != 0.0;
         }
     }
     if (!isfinite(rigid_body_gauge_error(params, gauge, samples)))
@@ -1235,7 +1235,7 @@ static double rigid_body_largest(const rigid_body_lanes size)
 }
 
 /* Replace each lane of most by the larger value, in the same order. */
-static void rigid_body_keep_largest(rigid_body_lanes most, const rigid_body_lanes size)
+static void rigid_body_update_largest(rigid_body_lanes most, const rigid_body_lanes size)
 {
     uint64_t bits[rigid_body_LANES], bits_of_most[rigid_body_LANES];
     memcpy(bits, size, sizeof bits);
@@ -1348,8 +1348,8 @@ static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[rest
         for (int i = 0; i < rigid_body_DIM; ++i) {
             const double change = model->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (model->displacement[i][after] - model->displacement[i][lane]) - change;
-            const double moved = (model->y[i][after] - model->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            const double y_change = (model->y[i][after] - model->y[i][lane]) + turn;
+            residual[i] = ((y_change + residual[i]) + odd[i]) + even[i];
             small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
@@ -1381,7 +1381,7 @@ static int rigid_body_near_lanes(rigid_body_model *model, const double last[rigi
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
             distance[lane] += fabs(model->y[i][lane] - last[i]);
     }
-    rigid_body_keep_largest(most, distance);
+    rigid_body_update_largest(most, distance);
     return rigid_body_largest(most) <= rigid_body_REACH * size;
 }
 
@@ -1464,7 +1464,7 @@ static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_mo
 
 /* Predictor without recurrences: points whose alpha and beta have the means of classical Runge-Kutta steps,
    to leading order. */
-static void rigid_body_guess_by_march(const rigid_body_solver *s, rigid_body_table *table,
+static void rigid_body_predict_by_march(const rigid_body_solver *s, rigid_body_table *table,
     rigid_body_model *model)
 {
     double x[rigid_body_DIM], mean[rigid_body_DIM];
@@ -1481,9 +1481,9 @@ static void rigid_body_guess_by_march(const rigid_body_solver *s, rigid_body_tab
 
 /* Predict the solutions of all stages and steps, by recurrences or else by approximate integration. Returns 0
    if they are not near the state. */
-static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid_body_model *model)
+static int rigid_body_predict_block(rigid_body_solver *s, rigid_body_table *table, rigid_body_model *model)
 {
-    if (!s->blocks.use_recurrences) rigid_body_guess_by_march(s, table, model);
+    if (!s->blocks.use_recurrences) rigid_body_predict_by_march(s, table, model);
     if (s->blocks.use_recurrences) rigid_body_foresee(&s->history, table->weight, model->y);
     return rigid_body_near_lanes(model, s->x);
 }
@@ -1497,7 +1497,7 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
     rigid_body_lanes unit[rigid_body_DIM], size, before, left;
     double x[rigid_body_DIM], carry[rigid_body_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!rigid_body_guess(s, table, &model)) return 0;
+    if (!rigid_body_predict_block(s, table, &model)) return 0;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) size[lane] = HUGE_VAL;
     while (!solved) {
         const int matrices = previous > rigid_body_FROZEN;
@@ -1548,7 +1548,7 @@ static void rigid_body_give_up(rigid_body_solver *s)
 
 /* Choose the predictor of the next block: recurrences, fitted as soon as the steps to come, or those already
    made, are enough to repay the fit. */
-static void rigid_body_choose_guess(rigid_body_solver *s, size_t steps)
+static void rigid_body_choose_predictor(rigid_body_solver *s, size_t steps)
 {
     if (s->history.count < rigid_body_REMEMBERED) {
         s->blocks.use_recurrences = 0;
@@ -1602,7 +1602,7 @@ rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t st
     rigid_body_status status = rigid_body_single_steps(s, h, 0);
     table.fits = -1;
     while (status == rigid_body_OK && steps > 0) {
-        if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) rigid_body_choose_guess(s, steps);
+        if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) rigid_body_choose_predictor(s, steps);
         if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) {
             rigid_body_refresh(s, &table);
             const int passes = rigid_body_block(s, &table,
@@ -1629,7 +1629,7 @@ rigid_body_status rigid_body_step(rigid_body_solver *s, double h)
    have those of member 0. */
 typedef struct {
     double *x;
-    size_t members, steps, own;
+    size_t members, steps, per_member;
     const rigid_body_params *params; /* NULL for the defaults */
     const double *h;
     const double *gauge;   /* gauges, or NULL to choose them at the start */
@@ -1656,9 +1656,9 @@ static rigid_body_members rigid_body_asked(const rigid_body_params *params, doub
 static rigid_body_status rigid_body_begin_member(const rigid_body_members *all, size_t m,
     const double x[rigid_body_DIM], const double *gauge, rigid_body_solver *s)
 {
-    const rigid_body_params *params = all->params != NULL ? all->params + m * all->own : NULL;
+    const rigid_body_params *params = all->params != NULL ? all->params + m * all->per_member : NULL;
     const rigid_body_status status = rigid_body_init_gauge(s, params, x, gauge);
-    return status == rigid_body_OK ? rigid_body_integrate(s, all->h[m * all->own], 0) : status;
+    return status == rigid_body_OK ? rigid_body_integrate(s, all->h[m * all->per_member], 0) : status;
 }
 
 /* Initialise a member at its state in the ensemble, which is copied to x. */
@@ -1822,19 +1822,19 @@ static void rigid_body_group_fit(rigid_body_group *group)
     rigid_body_history member;
     const int helped = group->fits == 0 || group->use_recurrences;
     member.count = rigid_body_REMEMBERED;
-    int found = 1;
+    int fitted = 1;
     group->recurrence_terms = 0;
     for (int lane = 0; lane < rigid_body_LANES; ++lane)
-        for (int i = 0; i < rigid_body_DIM && group->active[lane] && found; ++i) {
+        for (int i = 0; i < rigid_body_DIM && group->active[lane] && fitted; ++i) {
             for (int k = 0; k < rigid_body_REMEMBERED; ++k)
                 member.past[rigid_body_REMEMBERED - 1 - k][i] = rigid_body_group_past(group, k)[i][lane];
             const int terms = rigid_body_train(&member, i);
-            found = terms > 0;
+            fitted = terms > 0;
             if (terms > group->recurrence_terms) group->recurrence_terms = terms;
             for (int k = 0; k < rigid_body_WINDOW; ++k) group->weight[k][i][lane] = member.weight[k][i][0];
         }
-    if (!found) group->recurrence_terms = 0;
-    group->use_recurrences = found;
+    if (!fitted) group->recurrence_terms = 0;
+    group->use_recurrences = fitted;
     ++group->fits;
     group->slow_steps = 0;
     group->slow_steps_allowed = helped && group->slow_steps_allowed < rigid_body_LONG_WAIT / 2
@@ -1938,17 +1938,17 @@ static void rigid_body_group_advance(rigid_body_lanes x[restrict rigid_body_DIM]
 static int rigid_body_group_leave(rigid_body_group *group, rigid_body_lanes x[rigid_body_DIM],
     rigid_body_lanes carry[rigid_body_DIM], size_t remaining)
 {
-    rigid_body_lanes moved = { 0.0 }, size = { 0.0 }, bad;
+    rigid_body_lanes distance = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
     for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            distance[lane] += fabs(group->x[i][lane] - x[i][lane]);
             size[lane] += fabs(x[i][lane]);
         }
     }
     for (int lane = 0; lane < rigid_body_LANES; ++lane)
-        bad[lane] = moved[lane] <= rigid_body_REACH * size[lane] ? 0.0 : 1.0;
+        bad[lane] = distance[lane] <= rigid_body_REACH * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) active += group->active[lane];
     if (active == rigid_body_LANES && !(rigid_body_largest(bad) > 0.0)) return active;
     active = 0;
@@ -2097,7 +2097,7 @@ rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, doub
     if (members > 0 && (x == NULL || h == NULL)) return rigid_body_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return rigid_body_BAD_ARGUMENT;
     all.gauge = gauge;
-    all.own = 1;
+    all.per_member = 1;
     all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     return rigid_body_run(&all);

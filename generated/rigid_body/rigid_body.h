@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2d730988784e4a111b0e3a45caa952e193f0823f2997e7d37f7c46e245702c37
+ * body-sha256: 32969739894d7f4afc3c97e56da0f8258f353202aa473851900c20a9fc945cb3
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -36,7 +36,7 @@ typedef enum { rigid_body_OK = 0, rigid_body_NO_CONVERGENCE, rigid_body_SINGULAR
     rigid_body_BAD_ARGUMENT } rigid_body_status;
 const char *rigid_body_status_string(rigid_body_status status); /* the meaning of a status */
 
-enum { rigid_body_KEPT = 2 * rigid_body_REMEMBERED };
+enum { rigid_body_STORED_VALUES = 2 * rigid_body_REMEMBERED };
 
 /* Predictor: recent solutions of the implicit equation, from which the starting value of the next iteration
    follows by extrapolation, or by a linear recurrence fitted to the last rigid_body_REMEMBERED solutions. It
@@ -49,7 +49,7 @@ typedef struct {
     int fits; /* number of fits so far */
     int slow_steps; /* recent steps that took more than one iteration */
     int slow_steps_allowed; /* value of slow_steps at which the recurrence is fitted again */
-    double past[rigid_body_KEPT][rigid_body_DIM]; /* solutions, the latest last */
+    double past[rigid_body_STORED_VALUES][rigid_body_DIM]; /* solutions, the latest last */
     /* factors of past solutions, the latest first, for the next ones */
     double weight[rigid_body_WINDOW][rigid_body_DIM][rigid_body_AHEAD];
 } rigid_body_history;
@@ -65,7 +65,7 @@ typedef struct {
     int passes_without_recurrences;   /* iterations of the last block predicted by Runge-Kutta steps */
     size_t steps_without_recurrences; /* steps to wait before recurrences are tried again */
     size_t recurrences_from_step;     /* number of the step from which they are tried again */
-} rigid_body_learnt;
+} rigid_body_block_measurements;
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {
@@ -80,8 +80,8 @@ typedef struct {
     double coef[rigid_body_COEFFICIENTS]; /* functions of params and h, computed when h changes */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
-    rigid_body_history history; /* predictor of the starting value of the iteration */
-    rigid_body_learnt blocks;   /* measurements that decide when steps are made in blocks */
+    rigid_body_history history;           /* predictor of the starting value of the iteration */
+    rigid_body_block_measurements blocks; /* measurements that decide when steps are made in blocks */
 } rigid_body_solver;
 size_t rigid_body_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t rigid_body_solver_steps_done(const rigid_body_solver *s);

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 3868a028d7c262001c477dcfd17a0771319fba1fe7518944b6b9ef81ddbf2cf8
+# body-sha256: 3015f42161b2bfe64ce722f1ad0561ff55a6f46c3baa6e5d8498d676dbe6cbce
 import numpy as np
 
 VERSION = "0.1.0"
@@ -55,8 +55,8 @@ def _at(coef, members):
 def _stage_at(stage, members):
     """Return a stage for some of its members."""
     coef, parameters, *times = stage
-    own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
-    return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
+    parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
+    return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
@@ -465,19 +465,19 @@ def _plausible(stage, x, end):
     If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
     """
     _, parameters, h = stage
-    moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
-    near = moved <= PLAUSIBLE * size
+    distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
+    near = distance <= PLAUSIBLE * size
     if near.all():
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
     energy = np.abs(before) + np.abs(middle) + np.abs(after)
-    return (moved <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
+    return (distance <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
 
 
-def _solved(stage, x, carry, guess):
+def _solved(stage, x, carry, prediction):
     """Return the result of _attempt, with a status for implausible solutions."""
-    following, rest, value, status = _attempt(stage[0], x, carry, guess)
+    following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
 
@@ -529,8 +529,8 @@ def _attempt(coef, x, carry, y):
 
 def _advance(stage, x, carry, memory):
     """Make one stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
-    guess = x + (2 * memory[0] - memory[1])
-    following, rest, y, status = _solved(stage, x, carry, guess)
+    prediction = x + (2 * memory[0] - memory[1])
+    following, rest, y, status = _solved(stage, x, carry, prediction)
     guessed = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & guessed)
     if len(failed):
@@ -557,10 +557,10 @@ def _line(error_of, gauge, c, width):
 
     S_3 is cubic in H, so the error is a polynomial of degree six.
     """
-    moved, errors = gauge.copy(), []
+    shifted, errors = gauge.copy(), []
     for j in range(DEGREE + 1):
-        moved[:, c] = gauge[:, c] + (j - DEGREE / 2) * width
-        errors.append(error_of(moved))
+        shifted[:, c] = gauge[:, c] + (j - DEGREE / 2) * width
+        errors.append(error_of(shifted))
     return np.array([np.diff(errors, k, axis=0)[0] for k in range(DEGREE + 1)]), sum(errors)
 
 

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 1b5703adea2ed13c560731fcc7a0869861b8513b8cc64a6cf7ea0a81971d9c96
+ * body-sha256: 47068a45e4d6225cfd6d4ee1a2c75c37181e195bd77f179226bdecc76195f7d1
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -266,19 +266,19 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
    at another energy, and unrelated to the motion. */
 static int thermal_spin_plausible(const thermal_spin_solver *s, const double increment[thermal_spin_DIM])
 {
-    double moved = 0.0, size = 0.0, field[thermal_spin_DIM], point[thermal_spin_DIM], H[3];
+    double distance = 0.0, size = 0.0, field[thermal_spin_DIM], point[thermal_spin_DIM], H[3];
     for (int i = 0; i < thermal_spin_DIM; ++i) {
-        moved += fabs(increment[i]);
+        distance += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= thermal_spin_PLAUSIBLE * size) return 1;
+    if (distance <= thermal_spin_PLAUSIBLE * size) return 1;
     thermal_spin_vector_field(&s->params, s->x, field);
     for (int i = 0; i < thermal_spin_DIM; ++i) size += fabs(s->h * field[i]);
     double fields[thermal_spin_SOURCES * thermal_spin_DIM];
     thermal_spin_noise_fields(&s->params, s->x, fields);
     for (int k = 0; k < thermal_spin_SOURCES * thermal_spin_DIM; ++k)
         size += fabs(s->dw[k / thermal_spin_DIM] * fields[k]);
-    if (moved <= thermal_spin_PLAUSIBLE * size) return 1;
+    if (distance <= thermal_spin_PLAUSIBLE * size) return 1;
     for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < thermal_spin_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = thermal_spin_hamiltonian(&s->params, point);
@@ -391,10 +391,10 @@ static void thermal_spin_normals(uint64_t seed, uint32_t member, uint64_t step,
 }
 
 /* Increments of the next step: the given ones, or random ones. Returns 0 if one is not finite. */
-static int thermal_spin_draw(thermal_spin_solver *s, const double *given)
+static int thermal_spin_draw(thermal_spin_solver *s, const double *increments)
 {
-    if (given != NULL) {
-        memmove(s->dw, given, sizeof s->dw);
+    if (increments != NULL) {
+        memmove(s->dw, increments, sizeof s->dw);
     } else {
         thermal_spin_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
         /* so that a step of -h inverts one of h */

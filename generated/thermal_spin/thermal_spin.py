@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 90a4a4c8ba38730b4393a5ff6122d2a77dedc4612aae35faec772ac21fec727c
+# body-sha256: 66e0fbb68dd597d2af2c40e4b33d4c8f4a9048985ebaeb0ccbd95470b008d0fc
 import numpy as np
 
 VERSION = "0.1.0"
@@ -60,8 +60,8 @@ def _at(coef, members):
 def _stage_at(stage, members):
     """Return a stage for some of its members."""
     coef, parameters, *times = stage
-    own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
-    return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
+    parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
+    return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
@@ -307,8 +307,8 @@ def _plausible(stage, x, end):
     If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
     """
     _, parameters, h, dw = stage
-    moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
-    near = moved <= PLAUSIBLE * size
+    distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
+    near = distance <= PLAUSIBLE * size
     if near.all():
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
@@ -316,12 +316,12 @@ def _plausible(stage, x, end):
     size = size + np.abs(dw.T[..., np.newaxis] * fields).sum(axis=(1, 2))
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
     energy = np.abs(before) + np.abs(middle) + np.abs(after)
-    return (moved <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
+    return (distance <= PLAUSIBLE * size) | (np.abs(after - before) <= MAX_ENERGY_CHANGE * energy)
 
 
-def _solved(stage, x, carry, guess):
+def _solved(stage, x, carry, prediction):
     """Return the result of _attempt, with a status for implausible solutions."""
-    following, rest, value, status = _attempt(stage[0], x, carry, guess)
+    following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
 
@@ -417,12 +417,12 @@ def _two_normals(seed, counter):
 
 def _normals(seed, members, step):
     """Normal variates of variance 1: (increments in a step, members)."""
-    count, word, found = PARTS * len(SOURCES), 0xFFFFFFFF, []
+    count, word, normals = PARTS * len(SOURCES), 0xFFFFFFFF, []
     for pair in range((count + 1) // 2):
         counter = [np.full(members.shape, w, dtype=np.uint64) for w in (step & word, step >> 32, 0, pair)]
         counter[2] = members.astype(np.uint64)
-        found += _two_normals(seed, counter)
-    return np.array(found[:count])
+        normals += _two_normals(seed, counter)
+    return np.array(normals[:count])
 
 
 def _drawing(h, count, seed=0, member=0, step0=0, increments=None):

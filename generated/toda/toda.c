@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 174950ceeeffe2d3ad0ff5000c9e6e38e0e44e35fa5f1cf9ec4dced58f940693
+ * body-sha256: da43b5558b9e6fc67ea131b00d26222a9ddf3af68cf2e927e62372bb94af3e18
  */
 #include "toda.h"
 #include <math.h>
@@ -286,12 +286,12 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return toda_BAD_ARGUMENT;
-    const toda_params own = params != NULL ? *params : toda_default_params;
+    const toda_params solver_params = params != NULL ? *params : toda_default_params;
     const size_t rows = toda_shape(sizes, &width), length = sizes[0], sites = rows * length;
-    if (rows == 0 || !toda_finite(x0, toda_DIM * sites) || !toda_allowed(&own, sites))
+    if (rows == 0 || !toda_finite(x0, toda_DIM * sites) || !toda_allowed(&solver_params, sites))
         return toda_BAD_ARGUMENT;
     double coef[toda_COEFFICIENTS] = { 0.0 };
-    toda_prepare_step(&own, toda_PROBE_STEP, coef);
+    toda_prepare_step(&solver_params, toda_PROBE_STEP, coef);
     if (!toda_finite(coef, toda_COEFFICIENTS)) return toda_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -299,7 +299,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     s->rows = rows;
     s->length = (ptrdiff_t)length;
     s->width = width;
-    s->params = own;
+    s->params = solver_params;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
     const size_t block = toda_block(rows, width);
     for (size_t k = 0; k < toda_ARRAYS; ++k, memory += block) s->x[k] = memory;
@@ -341,7 +341,7 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 enum { toda_STRETCH = 32 }; /* steps between checks for finite values */
 
 /* Apply flow `number` of a step; number toda_FLOWS is the last merged with the first. */
-static void toda_make_flow(const toda_solver *s, size_t steps, int number)
+static void toda_apply_flow(const toda_solver *s, size_t steps, int number)
 {
     (void)steps;
     toda_sweep_part(s, toda_flow_parts[number], s->coef + number * toda_ROW);
@@ -350,10 +350,10 @@ static void toda_make_flow(const toda_solver *s, size_t steps, int number)
 /* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
 static void toda_steps(const toda_solver *s, size_t steps)
 {
-    if (steps == 0) toda_make_flow(s, s->steps - 1, toda_FLOWS - 1);
+    if (steps == 0) toda_apply_flow(s, s->steps - 1, toda_FLOWS - 1);
     for (size_t step = s->steps; step < s->steps + steps; ++step) {
-        toda_make_flow(s, step, toda_FLOWS > 1 && (step > s->steps || s->open) ? toda_FLOWS : 0);
-        for (int flow = 1; flow < toda_FLOWS - 1; ++flow) toda_make_flow(s, step, flow);
+        toda_apply_flow(s, step, toda_FLOWS > 1 && (step > s->steps || s->open) ? toda_FLOWS : 0);
+        for (int flow = 1; flow < toda_FLOWS - 1; ++flow) toda_apply_flow(s, step, flow);
     }
 }
 

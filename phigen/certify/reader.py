@@ -330,7 +330,7 @@ def _block(lines: Iterator[str]) -> list[tuple[str, Any]]:
     statements = list[tuple[str, Any]]()
     for line in itertools.takewhile(lambda line: line != "}", lines):
         loop = re.fullmatch(r"for \(int (\w+) = (\d+); \w+ < (\d+); (?:\+\+\w+|\w+ \+= (\d+))\) \{", line)
-        call = re.fullmatch(r"flow(\d+)\((.*), x, moved, start\);", line)
+        call = re.fullmatch(r"flow(\d+)\((.*), x, displacement, start\);", line)
         advance = re.fullmatch(r"coef \+= (.*);", line)
         if loop and int(loop[3]) <= MOST_FLOWS:
             statements.append(("loop", (loop[1], range(int(loop[2]), int(loop[3]), int(loop[4] or 1)), _block(lines))))
@@ -386,7 +386,7 @@ def _whole(text: str, names: Mapping[str, int]) -> int:
 def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
     """Return the coordinates to which a flow adds changes, with the indices of the changes."""
     _, body = _expect(source.function(f"flow{flow}"), f"flow{flow}")
-    added = re.findall(r"add\(x, moved, start, (\d+), change\[(\d+)\]\);", body)
+    added = re.findall(r"add\(x, displacement, start, (\d+), change\[(\d+)\]\);", body)
     if len(added) != body.count(";") - 2:
         raise RefusedError(f"flow {flow} of the C does more than to add its changes")
     return [[int(i), int(j)] for i, j in added]

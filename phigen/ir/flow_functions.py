@@ -14,11 +14,11 @@ from phigen.ir.passes.unread import discard_unread
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.kernel import Role
 
-X, START, COEF, ROW, FLAG, PART, PACK, GROUP, BAR, K = (
-    ir.fixed(name) for name in ("x", "start", "coef", "row", "own", "part", "pack", "group", "bar", "k")
+X, START, COEF, ROW, DISTINCT_COEF, PART, PACK, GROUP, BAR, K = (
+    ir.fixed(name) for name in ("x", "start", "coef", "row", "distinct_coef", "part", "pack", "group", "bar", "k")
 )
 CHANGE, TURNED, BACK, SLOPES, BEFORE = (ir.fixed(name) for name in ("change", "turned", "back", "slopes", "before"))
-MOVED, TAPE, ELEMENT, ROW_SIZE = (ir.fixed(name) for name in ("moved", "kept", "element", "ROW"))
+DISPLACEMENT, TAPE, ELEMENT, ROW_SIZE = (ir.fixed(name) for name in ("displacement", "tape", "element", "ROW"))
 PACKS, ELEMENTS, NONE = ir.Member(GROUP, "packs"), ir.fixed("ELEMENT"), ir.Constant(None)
 _PACK, _GROUP = ir.RecordType("pack", mutable=True, address=True), ir.RecordType("group", mutable=True)
 _LANES = ir.Pointer(constant=False, lanes=True)
@@ -41,17 +41,17 @@ class FlowFunctions:
     @property
     def arguments(self) -> tuple[ir.Value, ...]:
         """The arguments of a flow after its coefficients."""
-        return (X, MOVED, START, *[ELEMENT] * self.turns)
+        return (X, DISPLACEMENT, START, *[ELEMENT] * self.turns)
 
     def function(self, name: str, doc: str, parameters: Sequence[str], body: ir.Block) -> ir.Function:
         """Return a function whose parameters are some of those of flows."""
         state, length = ir.Vector(ir.Constant(self.along)), ir.Constant(self.dimension)
         types: dict[str, ir.ParameterType] = {
             "x": state,
-            "moved": state,
+            "displacement": state,
             "start": replace(state, constant=True),
             "element": ir.Vector(ELEMENTS),
-            "kept": ir.Tape(length),
+            "tape": ir.Tape(length),
             "after": ir.Type.FLAG,
             "slope": ir.Vector(ir.Constant(self.dimension**2)),
         }
@@ -69,14 +69,14 @@ class FlowFunctions:
         body += [ir.Copy(ELEMENT, TURNED)] * self.turns
         for place, i in enumerate(updated):
             increment = ir.Entry(CHANGE, ir.Constant(place))
-            body.append(ir.Call("add", (X, MOVED, START, ir.Constant(i), increment)))
+            body.append(ir.Call("add", (X, DISPLACEMENT, START, ir.Constant(i), increment)))
         doc = f"Apply the flow of H_{number} to x, over the time for which coef was prepared"
-        parameters = ("coef", "x", "moved", "start", *["element"] * self.turns)
+        parameters = ("coef", "x", "displacement", "start", *["element"] * self.turns)
         return self.function(f"flow{number}", doc, parameters, tuple(body))
 
     def schedule(self, schedule: Schedule) -> ir.Function:
         """Return the function of all flows of a step, each with its row of coefficients."""
-        parameters = ("coef", "x", "moved", "start", *["element"] * self.turns, *["kept"] * self.stores)
+        parameters = ("coef", "x", "displacement", "start", *["element"] * self.turns, *["tape"] * self.stores)
         body = _in_order(schedule, COEF, ROW_SIZE, self._flow)
         return self.function("flows", "The flows of one step, one after the other", parameters, tuple(body))
 
@@ -99,7 +99,7 @@ class FlowFunctions:
         doc = (
             "Corrector: flows before the first step of a run, or after its last one; includes half a flow of the larger"
         )
-        parameters = ("after", "coef", "x", "moved", "start", *["kept"] * self.stores)
+        parameters = ("after", "coef", "x", "displacement", "start", *["tape"] * self.stores)
         return self.function("corrector", f"{doc} larger part", parameters, tuple(body))
 
     def tangent(self, count: int) -> ir.Function:
@@ -116,7 +116,7 @@ class FlowFunctions:
             note, zeros = "attitude increments, already applied", ir.Listed((ir.Constant(0.0),))
             body.insert(0, ir.Declare(ir.Vector(ELEMENTS), ((ELEMENT.symbol, zeros),), mutable=True, note=note))
         doc = "Apply the flow of a part; slope is the derivative of its increment at the start"
-        return self.function("tangent_flow", doc, ("part", "coef", "x", "moved", "start", "slope"), tuple(body))
+        return self.function("tangent_flow", doc, ("part", "coef", "x", "displacement", "start", "slope"), tuple(body))
 
 
 def _row(number: ir.Value) -> ir.Value:
@@ -154,28 +154,30 @@ def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
     """Return the function that adds the increments of a flow to the ``updated`` values of all members of a group."""
     count = ir.Constant(max(1, len(updated)))
     x, start, compensation = (ir.Member(PACK, name) for name in ("x", "start", "carry"))
-    coefficients = ir.Entry(ir.Member(GROUP, "coef"), ir.Binary("*", FLAG, K))
+    coefficients = ir.Entry(ir.Member(GROUP, "coef"), ir.Binary("*", DISTINCT_COEF, K))
     row = ir.Binary("+", coefficients, ir.Binary("*", ROW, ROW_SIZE))
     body: list[ir.Statement] = [
         ir.Declare(_PACK, ((PACK.symbol, ir.Prefix("&", ir.Entry(ir.Member(GROUP, "pack"), K))),)),
         ir.Declare(ir.Vector(count, lanes=True), ((CHANGE.symbol, NONE),), mutable=True),
-        ir.Call(f"change{number}{form}_lanes", (row, x, FLAG, CHANGE)),
+        ir.Call(f"change{number}{form}_lanes", (row, x, DISTINCT_COEF, CHANGE)),
     ]
     for place, i in enumerate(updated):
         state = (ir.Entry(array, ir.Constant(i)) for array in (x, compensation, start))
         body.append(ir.Call("add_lanes", (*state, ir.Entry(CHANGE, ir.Constant(place)))))
     doc = f"The flow of H_{number} for all members of a group"
-    return _group_function(f"flow{number}{form}_lanes", doc, ("row", "own", "group"), (_over_packs(tuple(body)),))
+    return _group_function(
+        f"flow{number}{form}_lanes", doc, ("row", "distinct_coef", "group"), (_over_packs(tuple(body)),)
+    )
 
 
 def group_schedule(schedule: Schedule, form: str) -> ir.Function:
     """Return the function of all flows of a step, for all members of a group."""
 
     def flow(part: int, row: ir.Value) -> Iterator[ir.Statement]:
-        yield ir.Call(f"flow{part + 1}{form}_lanes", (row, FLAG, GROUP))
+        yield ir.Call(f"flow{part + 1}{form}_lanes", (row, DISTINCT_COEF, GROUP))
 
     doc, body = "The flows of one step, one after the other", tuple(_in_order(schedule, ROW, None, flow))
-    return _group_function(f"flows{form}_lanes", doc, ("row", "own", "group"), body)
+    return _group_function(f"flows{form}_lanes", doc, ("row", "distinct_coef", "group"), body)
 
 
 def _over_packs(body: ir.Block) -> ir.Loop:
@@ -185,7 +187,12 @@ def _over_packs(body: ir.Block) -> ir.Loop:
 def _group_function(
     name: str, doc: str, parameters: Sequence[str], body: ir.Block, types: Mapping[str, ir.ParameterType] | None = None
 ) -> ir.Function:
-    known: dict[str, ir.ParameterType] = {"row": ir.Type.FLAG, "own": ir.Type.FLAG, "group": _GROUP, **(types or {})}
+    known: dict[str, ir.ParameterType] = {
+        "row": ir.Type.FLAG,
+        "distinct_coef": ir.Type.FLAG,
+        "group": _GROUP,
+        **(types or {}),
+    }
     listed = tuple((p, known[p]) for p in parameters if p in known)
     return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))
 
@@ -262,7 +269,7 @@ class FlowTransposes:
     @property
     def _stored(self) -> dict[str, ir.ParameterType]:
         """The coordinates on the tape, of all packs of a group."""
-        return {"kept": ir.Vector(ir.Constant(self.dimension), rows=ir.fixed("BACK_PACKS"), lanes=True)}
+        return {"tape": ir.Vector(ir.Constant(self.dimension), rows=ir.fixed("BACK_PACKS"), lanes=True)}
 
     def group_flows(self) -> ir.Function:
         """Return the function that applies a flow to all members of a group, and stores what its transpose reads."""
@@ -279,7 +286,7 @@ class FlowTransposes:
 
         doc = "Apply the flow of a part to all members of a group, after storing the coordinates that its reverse pass"
         body = (self._switch(case),)
-        return _group_function("follow_lanes", f"{doc} reads", ("part", "row", "group", "kept"), body, self._stored)
+        return _group_function("follow_lanes", f"{doc} reads", ("part", "row", "group", "tape"), body, self._stored)
 
     def group_back(self) -> ir.Function:
         """Return the function that pulls cotangents back through a flow, for all members of a group."""
@@ -301,13 +308,13 @@ class FlowTransposes:
         coef = ir.Binary("+", ir.Entry(ir.Member(GROUP, "coef"), K), first)
         places = (ir.Declare(_LANES, ((name.symbol, value),)) for name, value in ((COEF, coef), (X, x)))
         body = _over_packs((*self._results(lanes=True), *places, self._switch(case)))
-        parameters = ("part", "row", "group", *["kept"] * (not self.recomputes), "bar")
+        parameters = ("part", "row", "group", *["tape"] * (not self.recomputes), "bar")
         types = {**self._stored, "bar": ir.RecordType("back_group", mutable=True)}
         doc = "Pull cotangents back through the flow of a part, for all members of a group; "
         doc += (
             "also inverts the flow, which restores the states before it"
             if self.recomputes
-            else "kept holds the stored coordinates of the states before the flow"
+            else "tape holds the stored coordinates of the states before the flow"
         )
         return _group_function("follow_back_lanes", doc, parameters, (body,), types)
 

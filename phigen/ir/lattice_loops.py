@@ -15,7 +15,7 @@ from phigen.ir import nodes as ir
 from phigen.ir.passes.loop_invariant import loop_invariant
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.reversal import UNDONE
+from phigen.scheme.reversal import STATE_BEFORE
 from phigen.scheme.steps import Ends, Gather, Sweep, Sweeps
 from phigen.symbolic import symbols
 from phigen.symbolic.expression import Expression, number, symbol
@@ -115,7 +115,7 @@ class LatticeLoops:
         """Yield the stores of a transposed kernel, without zeros; ``fields`` are the fields that it recomputes."""
         for output in kernel.outputs:
             array = output.name.removesuffix("_bar")
-            names = fields if array == UNDONE else kernel.inputs.get(array, [""] * len(output.values))
+            names = fields if array == STATE_BEFORE else kernel.inputs.get(array, [""] * len(output.values))
             for k, e in enumerate(output.values):
                 if not e.is_zero:
                     yield self._cotangent(array, k, names[k], e, sums)

@@ -517,7 +517,7 @@ Block = tuple[Statement, ...]
 PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "out")
 
 _NUMBERED = dict.fromkeys(("first", "end", "unit"), Type.SIZE)
-_ARRAYS = dict.fromkeys(("x", "y", "v", "to", "bar", "handed", "given", "at_bonds"), Type.ARRAYS)
+_ARRAYS = dict.fromkeys(("x", "y", "v", "to", "bar", "handed", "received", "at_bonds"), Type.ARRAYS)
 _SUMMED = dict.fromkeys(("sums", "numbers"), Pointer(constant=False))
 #: The types of the parameters of functions by rows, by their names.
 TYPES: dict[str, ParameterType] = {

@@ -130,7 +130,7 @@ class RowDrivers:
         inside = [ir.Entry(ir.Member(S, "inside"), ir.Constant(k)) for k in range(2)]
         low: ir.Value = ir.Constant((below + VECTOR - 1) // VECTOR * VECTOR if vectors else below)
         high = whole_vectors(ir.plus(LENGTH, -above)) if vectors else ir.plus(LENGTH, -above)
-        away: ir.Value = ir.Member(ROW, "whole")
+        away: ir.Value = ir.Member(ROW, "complete")
         if sites.seams:
             low, high = inside
             away = ir.Binary("==", ir.Member(ROW, "near"), ir.Constant(0))

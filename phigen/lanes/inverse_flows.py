@@ -11,13 +11,13 @@ from dataclasses import replace
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import expand_powers, with_numbers_shared
 from phigen.scheme.program import Program
-from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, over_negative_time
+from phigen.scheme.reversal import EVEN, STATE_BEFORE, before, of_coefficients, over_negative_time
 from phigen.scheme.steps import Splitting
 from phigen.symbolic.expression import ZERO, symbol, symbols_of
 
 
 def recomputing_transposes(program: Program, step: Splitting) -> tuple[Kernel, ...]:
-    """Return the transposes of the flows, which read the state after a flow and output that before, `UNDONE`.
+    """Return the transposes of the flows, which read the state after a flow and output that before, `STATE_BEFORE`.
 
     Empty where forces may damp, or where coefficients over −h differ from those over h by more than signs.
     """
@@ -36,5 +36,5 @@ def _recomputing(flow: Kernel, transpose: Kernel, parities: Mapping[str, int]) -
     nonzero = {s: change for s, change in inverse_changes.items() if not change.is_zero}
     expressions = before(transpose.roots, nonzero) + [symbol(s) + nonzero[s] if s in nonzero else ZERO for s in state]
     values = iter(with_numbers_shared(expand_powers(expressions)))
-    outputs = (*transpose.outputs, Output(UNDONE, tuple(ZERO for _ in state)))
+    outputs = (*transpose.outputs, Output(STATE_BEFORE, tuple(ZERO for _ in state)))
     return replace(transpose, outputs=tuple(replace(o, values=tuple(next(values) for _ in o.values)) for o in outputs))

@@ -94,10 +94,10 @@ class NumpyLatticeSession:
         """Make one step for each row of the increments of the noise (steps, parts, sources, *sizes)."""
         try:
             for row in increments:
-                self._sites.given = row
+                self._sites.increments = row
                 self.advance(h, 1)
         finally:
-            self._sites.given = None
+            self._sites.increments = None
 
     def prepare(self, h: float) -> None:
         """Compute the coefficients that depend on the step size. Raises `BackendError` if one is not finite."""

@@ -23,7 +23,7 @@ from phigen.symbolic.symbols import Symbol, coefficient
 from phigen.symbolic.verdict import PROVED, decide_zero
 
 #: The output of a transpose with the state before the flow, and its input with the values that it needs for that.
-UNDONE = "undone"
+STATE_BEFORE = "state_before"
 
 ODD, NEITHER, EVEN = -1, 0, 1
 

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
-from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, over_negative_time
+from phigen.scheme.reversal import EVEN, STATE_BEFORE, before, of_coefficients, over_negative_time
 from phigen.scheme.steps import BACK, Sites, Sweep, Sweeps
 from phigen.scheme.sweep_collecting import collecting
 from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, rebuild, substitute, symbol, symbols_of
@@ -93,7 +93,7 @@ def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
 
 
 def recomputing_transpose(program: Program, step: Sweeps, sweep: Sweep, transpose: Kernel) -> Kernel:
-    """Return the transpose of a sweep that reads the fields after the sweep and recomputes those before, `UNDONE`."""
+    """Return the transpose of a sweep, which reads the fields after it and recomputes those before, `STATE_BEFORE`."""
     updated = [program.coordinates[f] for f in sweep.moved]
     changes = _changes(program, sweep, of_coefficients(step))
     values = iter(before(transpose.roots, changes))
@@ -101,8 +101,8 @@ def recomputing_transpose(program: Program, step: Sweeps, sweep: Sweep, transpos
     unread = tuple(f for f in updated if f not in transpose.inputs["site"])
     return replace(
         transpose,
-        inputs={**transpose.inputs, UNDONE: unread},
-        outputs=(*outputs, Output(UNDONE, tuple(symbol(f) + change for f, change in changes.items()))),
+        inputs={**transpose.inputs, STATE_BEFORE: unread},
+        outputs=(*outputs, Output(STATE_BEFORE, tuple(symbol(f) + change for f, change in changes.items()))),
     )
 
 
@@ -132,13 +132,13 @@ def apart(transpose: Kernel) -> tuple[Kernel, Kernel] | None:
     None if the cotangents depend on sums over bonds or pairs. Otherwise only the second kernel reads these sums, so
     they can be computed together with the cotangents of bonds or pairs, by the same functions.
     """
-    cotangent_outputs = tuple(o for o in transpose.outputs if o.name != UNDONE)
-    state_outputs = tuple(o for o in transpose.outputs if o.name == UNDONE)
+    cotangent_outputs = tuple(o for o in transpose.outputs if o.name != STATE_BEFORE)
+    state_outputs = tuple(o for o in transpose.outputs if o.name == STATE_BEFORE)
     read = symbols_of(*(e for o in cotangent_outputs for e in o.values))
     if not state_outputs or not {*transpose.inputs["gathered"]}.isdisjoint(read):
         return None
     purpose = "the fields before the sweep, from sums over bonds or pairs"
-    name = transpose.name.removesuffix(BACK) + f"_{UNDONE}"
+    name = transpose.name.removesuffix(BACK) + "_inverse"
     return replace(transpose, outputs=cotangent_outputs), replace(
         transpose, name=name, purpose=purpose, outputs=state_outputs
     )

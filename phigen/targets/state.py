@@ -1,7 +1,7 @@
 """The state of a solver, block by block: its members, and how copies, rollback and a new step size treat them.
 
 A block belongs to the solvers whose switches satisfy its condition. The blocks determine, in C, the members of the
-struct, the copies by which a step of several stages is undone if a stage fails, and the statements for another step
+struct, the copies by which a step of several stages is reverted if a stage fails, and the statements for another step
 size; in JavaScript, the fields that a copy of a solver has.
 """
 
@@ -191,7 +191,7 @@ STATE = (
     StateBlock(
         "blocks",
         "BLOCKS",
-        ("phi_learnt blocks;     /* measurements that decide when steps are made in blocks */",),
+        ("phi_block_measurements blocks;     /* measurements that decide when steps are made in blocks */",),
         reset=(
             "memset(&s->blocks, 0, sizeof s->blocks);",
             "s->blocks.single_steps = 2 * PHI_AHEAD;",

@@ -466,7 +466,7 @@ def test_kernels_that_read_the_state_without_its_carry_are_wrong_by_it() -> None
 
 
 def test_errors_of_a_stage_reach_flows_of_the_next_that_read_what_flows_before_them_moved() -> None:
-    """A coordinate q with a large error, then a drift q += p and a kick p -= 4q, which reads start + moved."""
+    """A coordinate q with a large error, then a drift q += p and a kick p -= 4q, which reads start + displacement."""
     first = [["x", 0], ["number", 1e6], ["add", 0, 1], ["sub", 2, 1], ["number", 0.0]]
     drift = [["x", 1], ["carry", 0], ["add", 1, 0], ["start", 0], ["add", 3, 2]]
     kick = [["number", -4.0], ["mul", 4, 5], ["carry", 1], ["add", 7, 6]]
@@ -585,7 +585,8 @@ runs: {swing: {initial: [0.1, 0.4, 1, 0, 0.6, 0.8], step: 0.2, steps: 10}}
 
 
 @pytest.mark.parametrize(
-    "line", ["flow0(coef(), x, moved, start);", "flow0(coef + nothing, x, moved, start);", "coef += 2**9;"]
+    "line",
+    ["flow0(coef(), x, displacement, start);", "flow0(coef + nothing, x, displacement, start);", "coef += 2**9;"],
 )
 def test_schedules_with_other_statements_are_refused(line: str) -> None:
     statements = _block(iter([line]))

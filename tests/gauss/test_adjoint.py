@@ -143,7 +143,7 @@ def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
     whole = made.pullback(x, H, 30, bar, 10)
     monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 7 * 29)  # seven steps
     if target == "numpy":
-        monkeypatch.setattr(made.backend.module, "KEPT", 7 * 22)
+        monkeypatch.setattr(made.backend.module, "MAX_TAPE", 7 * 22)
     part = made.pullback(x, H, 30, bar, 10)
     assert part.x1 == pytest.approx(whole.x1, abs=1e-13)
     assert part.x0_bar == pytest.approx(whole.x0_bar, rel=0, abs=1e-12 * np.abs(whole.x0_bar).max())

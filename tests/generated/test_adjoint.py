@@ -226,7 +226,7 @@ def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
     whole = made.pullback(x, H, 150, bar[:6], 30)
     monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 3 * 47)  # 47 steps
     if target == "numpy":
-        monkeypatch.setattr(made.backend.module, "KEPT", 3 * 3 * 47)
+        monkeypatch.setattr(made.backend.module, "MAX_TAPE", 3 * 3 * 47)
     for stride in (30, 100):
         rows = bar[:6] if stride == 30 else bar[:3]
         part = made.pullback(x, H, 150, rows, stride)

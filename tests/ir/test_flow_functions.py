@@ -21,31 +21,33 @@ def expect(function: ir.Function, expected: str) -> None:
 
 def test_flows_of_a_step_follow_each_other_and_a_tape_receives_the_states_before_them():
     expect(FlowFunctions(2, 2, stores=True).schedule(SCHEDULE), """
-        flows(coef, x, moved, start, kept)
-          append x to kept
-          flow1(coef, x, moved, start)
+        flows(coef, x, displacement, start, tape)
+          append x to tape
+          flow1(coef, x, displacement, start)
           coef += ROW
           stages k in 0..3:
-            append x to kept
-            flow2(coef, x, moved, start)
-            append x to kept
-            flow1((coef + ROW), x, moved, start)
+            append x to tape
+            flow2(coef, x, displacement, start)
+            append x to tape
+            flow1((coef + ROW), x, displacement, start)
             coef += (2 * ROW)
         """)  # fmt: skip
 
 
 def test_batches_count_rows_of_coefficients():
-    assert "    flow1_far_lanes((row + 1), own, group)\n    row += 2" in text(group_schedule(SCHEDULE, "_far"))
+    assert "    flow1_far_lanes((row + 1), distinct_coef, group)\n    row += 2" in text(
+        group_schedule(SCHEDULE, "_far")
+    )
 
 
 def test_values_that_a_flow_does_not_update_are_left_out():
     expect(FlowFunctions(2, 2).flow(1, [1]), """
-        flow1(coef, x, moved, start)
+        flow1(coef, x, displacement, start)
           vector change = None
           change1(coef, x, change)
-          add(x, moved, start, 1, change[0])
+          add(x, displacement, start, 1, change[0])
         """)  # fmt: skip
-    assert text(FlowFunctions(2, 2).flow(1, [])).splitlines()[1:3] == ["  discard moved", "  discard start"]
+    assert text(FlowFunctions(2, 2).flow(1, [])).splitlines()[1:3] == ["  discard displacement", "  discard start"]
 
 
 def test_cotangents_are_added_where_a_flow_has_read():
@@ -53,8 +55,8 @@ def test_cotangents_are_added_where_a_flow_has_read():
     transposes = FlowTransposes([flow, flow], 2, 3)
     assert "      bar[1] += back[0]\n      coef_bar[0] += slopes[0]" in text(transposes.back())
     stored = commented(transposes.group_flows(), "top")
-    assert "top_lanes kept[top_BACK_PACKS][2])" in stored
-    assert "memcpy(kept[k][0], group->pack[k].x[0], 1 * sizeof kept[k][0]);" in stored
+    assert "top_lanes tape[top_BACK_PACKS][2])" in stored
+    assert "memcpy(tape[k][0], group->pack[k].x[0], 1 * sizeof tape[k][0]);" in stored
     assert "if (group->far) top_flow2_far_lanes(row, 1, group);" in stored
 
 

@@ -90,7 +90,7 @@ def test_lanes_are_an_inner_index_of_all_arrays_that_they_do_not_share() -> None
     expect(in_lanes(before, frozenset(), frozenset({"coef"})), """
         k(coef, at, params, out)
           lanes lane in 0..LANES:
-            real c:0 := coef[0][(own * lane)]
+            real c:0 := coef[0][(distinct_coef * lane)]
             real x = at[0][lane]
             out[0][lane] <- c:0*x
         """)  # fmt: skip

@@ -290,7 +290,7 @@ def test_long_runs_are_pulled_back_in_segments(monkeypatch):
     solver, x = made("fput"), beginning(made("fput"))
     bar = np.random.default_rng(8).normal(size=(4, *x.shape))
     whole = solver.pullback(x, H, 23, bar, 9)
-    monkeypatch.setattr(solver.backend._module, "KEPT", 5 * x.size)
+    monkeypatch.setattr(solver.backend._module, "MAX_TAPE", 5 * x.size)
     part = solver.pullback(x, H, 23, bar, 9)
     assert all(np.array_equal(a, b) for a, b in zip(whole[:2], part[:2], strict=True))
     assert whole.parameters_bar == part.parameters_bar

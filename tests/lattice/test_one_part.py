@@ -74,7 +74,7 @@ def test_gradients_of_one_part_are_differences_where_fields_are_stored(kind, mon
     """Not found again by the inverse of a flow, which all these have."""
     monkeypatch.setattr(sweep_inverse, "_changes", lambda *_: {})
     text, given = drawn(kind, 1)
-    assert "t_keep_steps(" in expect_gradients(phigen.spec.loads(text), given, 1, "fast")
+    assert "t_make_steps_with_tape(" in expect_gradients(phigen.spec.loads(text), given, 1, "fast")
 
 
 def expect_gradients(spec, given, seed, profile):

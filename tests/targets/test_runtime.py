@@ -144,7 +144,7 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
     """Parts of a file, which it includes in its midst, do so with all of it."""
     while whole := whole_of(path):
         path = whole
-    kinds = {"packs.c": "SPLITTING", "adjoint_segments.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH"}
+    kinds = {"batches.c": "SPLITTING", "adjoint_segments.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH"}
     kinds |= dict.fromkeys(("path_lanes.c", "expansion_lanes.c", "adjoint_lanes.c"), "PATH")
     kinds |= dict.fromkeys(("gauss.c", "adjoint_gauss.c"), "GAUSS")
     kinds |= {f"tangent_{kind.lower()}.c": kind for kind in ("EXPLICIT", "GAUSS", "PATH", "SPLITTING")}

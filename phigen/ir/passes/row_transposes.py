@@ -94,7 +94,7 @@ def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.
         head.append(_pointer(f"handed_{array}", WRITTEN, row(_entry("handed", array))))
         if colour is not None:
             head.append(ir.Clear(ir.fixed(f"handed_{array}"), FROM, ir.Binary("-", TO, FROM)))
-    received_pointers, added = _added_up("given", transpose.received, layout)
+    received_pointers, added = _added_up("received", transpose.received, layout)
     body = (*added, *rows.at_site(), *rows.computed, *stores)
     shares = [s for s in loop.body if isinstance(s, ir.Reduce)]
     loops = (
@@ -145,7 +145,7 @@ def _added_up(
     """Return the pointers to the cotangents that neighbours store for a site, and their additions."""
     sums: dict[int, ir.Value] = {}
     pointers: dict[str, ir.Statement] = {}
-    open_rows = prefix == "given" and any(layout.lattice.step.sites.open[:-1])
+    open_rows = prefix == "received" and any(layout.lattice.step.sites.open[:-1])
     for h in handed:
         opposite = tuple(-o for o in h.offset)
         line = layout.line(opposite)
@@ -264,13 +264,13 @@ def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
     inner = [*_bond_reads(transpose, rows, signed=bool(sign_changing)), *rows.computed]
     for k, s in enumerate(updates):
         value = ir.Binary("*", ir.fixed("side"), ir.Grouped(s.value)) if k in sign_changing else s.value
-        place: ir.Value = ir.fixed(f"own{k}")
+        place: ir.Value = ir.fixed(f"site_bar{k}")
         if k in at_bonds:
             place = ir.Entry(ir.fixed(f"bar_{at_bonds[k].number}"), BOND)
         inner.append(ir.Assign(place, value, adds=True))
     summed = [k for k in range(len(updates)) if k not in at_bonds]
-    zeros = (_zero(f"own{k}") for k in summed)
-    stores = (_into(updates[k], k, SITE, ir.fixed(f"own{k}")) for k in summed)
+    zeros = (_zero(f"site_bar{k}") for k in summed)
+    stores = (_into(updates[k], k, SITE, ir.fixed(f"site_bar{k}")) for k in summed)
     return over_sites((*together(rows.here), *zeros, bonds_of(loop, inner), *stores), "")
 
 
@@ -301,7 +301,7 @@ def _over_pairs(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
         (left.symbol, ir.Select(ir.Binary("<", rest, batch), rest, batch)),
         (count.symbol, ir.Binary("*", vectors, ir.Constant(8))),
     )
-    partial_sums = [ir.fixed(f"own{k}") for k in range(len(updates))]
+    partial_sums = [ir.fixed(f"site_bar{k}") for k in range(len(updates))]
     places = [ir.Entry(name, LANE) for name in partial_sums]
     site, same = ir.index(SITE, ir.Binary("+", first, LANE)), ir.Binary("==", SITE, OTHER)
     added = [ir.real(ir.fixed(f"add{k}").symbol, ir.Select(same, ZERO, s.value)) for k, s in enumerate(updates)]

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from phigen.ir import nodes as ir
 
-LANE, OWN, LANES = ir.fixed("lane"), ir.fixed("own"), ir.fixed("LANES")
+LANE, DISTINCT_COEF, LANES = ir.fixed("lane"), ir.fixed("distinct_coef"), ir.fixed("LANES")
 
 
 def in_lanes(
@@ -18,7 +18,8 @@ def in_lanes(
 ) -> ir.Function:
     """Return the function as a loop over all lanes; a ``single`` one is evaluated at the lane that callers pass.
 
-    Arrays that are ``shared`` have one value for all lanes; those ``alike`` have one if the argument ``own`` is 0.
+    Arrays that are ``shared`` have one value for all lanes; those ``alike`` have one if ``distinct_coef`` is 0, an
+    argument of the function.
     """
 
     def at_lane(value: ir.Value) -> ir.Value:
@@ -27,7 +28,7 @@ def in_lanes(
         name = value.array.symbol.key[0]  # type: ignore[attr-defined]
         if name in shared:
             return value
-        return ir.Entry(value, ir.Binary("*", OWN, LANE) if name in alike else LANE)
+        return ir.Entry(value, ir.Binary("*", DISTINCT_COEF, LANE) if name in alike else LANE)
 
     def lowered(s: ir.Statement) -> ir.Statement:
         match s:

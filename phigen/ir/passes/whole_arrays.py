@@ -24,7 +24,7 @@ _IN_PLACE = ir.Coefficient | ir.Time | ir.Inside | ir.HasColour | ir.OnSeam
 _READ_IN_PLACE = (Storage.START, Storage.SUM, Storage.SEED)
 
 #: The further parameters of transposed functions: cotangents, and where they are added.
-_TRANSPOSED = ("bar", "sites", "coef_bar", "own")
+_TRANSPOSED = ("bar", "sites", "coef_bar", "parameters_bar")
 
 
 def sums_name(kernel: str) -> str:
@@ -114,7 +114,7 @@ class WholeArrays:
         ]
         body += self._added_cotangents(_loop(function))
         body += self._transposed_sums(function, ir.Member(SITES, "parameters"))
-        parameters = ("coef", "start", "x", seed, "sites", "coef_bar", "own")
+        parameters = ("coef", "start", "x", seed, "sites", "coef_bar", "parameters_bar")
         return replace(function, parameters=parameters, body=(*body, ir.Return(ir.Several(both))))
 
     def transposed_sums(self, functions: Sequence[ir.Function], name: str) -> ir.Function:
@@ -135,7 +135,7 @@ class WholeArrays:
                 stores = [c for c in _stores(_loop(function)) if c.array.storage is Storage.SUM_COTANGENT]
                 values = {c.array.number: c.value for c in stores}
                 listed = (ir.Called("filled", (values.get(k, ir.Constant(0.0)),), SITES) for k in range(s.count))
-                rest = (BAR, SITES, ir.fixed("coef_bar"), ir.fixed("own"))
+                rest = (BAR, SITES, ir.fixed("coef_bar"), ir.fixed("parameters_bar"))
                 called = f"_{transposed_sums_name(s.functions[0])}"
                 yield ir.Assign(BAR, ir.Called(called, (source, X, ir.Listed(tuple(listed)), *rest)))
 
@@ -145,15 +145,15 @@ class WholeArrays:
             match s:
                 case ir.Reduce(source, number, name, value):
                     into = ir.Entry(ir.fixed("coef_bar"), ir.Constant(number))
-                    into = into if source == "coef" else ir.Entry(ir.fixed("own"), ir.Constant(name))
+                    into = into if source == "coef" else ir.Entry(ir.fixed("parameters_bar"), ir.Constant(name))
                     yield ir.Assign(into, ir.Called("sum", (), self._everywhere(loop, value)), adds=True)
                 case ir.Store(array, value, end="bond"):
-                    place = ir.Entry(ir.fixed("own"), ir.Constant(array.name))
+                    place = ir.Entry(ir.fixed("parameters_bar"), ir.Constant(array.name))
                     yield ir.Call("add.at", (place, BOND, value), NP)
                 case ir.Store(array, value) if array.storage in (Storage.COTANGENT, Storage.START_COTANGENT):
                     into = ir.Entry(ir.fixed(_ARRAYS[array.storage]), ir.Constant(array.number))
                     if array.number >= self.lattice.program.dimension:
-                        into = ir.Entry(ir.fixed("own"), ir.Constant(array.name))
+                        into = ir.Entry(ir.fixed("parameters_bar"), ir.Constant(array.name))
                     yield ir.Assign(into, self._returned(loop, s, value), adds=True)
 
     def _returned(self, loop: ir.Loop, s: ir.Store, value: ir.Value) -> ir.Value:

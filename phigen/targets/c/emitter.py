@@ -287,14 +287,14 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
         sizes += paths.sizes(lanes.path, lanes.slope_terms)
     if has["ALONG"] and step.back:
         sizes.append(("USED", len(step.back.used), "coefficients that the slope of a path depends on"))
-    if has["ABREAST"]:
+    if has["BATCHED"]:
         sizes.append(("BACK_PACKS", _packs_back(lanes, has), "packs of members that are pulled back together"))
     return sizes + text_of(program).last_constants(step)
 
 
 def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
     """Return the number of SIMD packs of members in one reverse pass, 0 if members are treated one by one."""
-    if not has["ABREAST"]:
+    if not has["BATCHED"]:
         return 0
     return lanes.reverse_packs if isinstance(lanes, Packs) else 1
 
@@ -342,7 +342,7 @@ def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others
         "multiples": ", ".join(map(repr, schedule.multiples)) if schedule else "",
         "path_slopes": ", ".join(map(str, step.path.slopes)) if step.path and (has["BLOCKS"] or has["TRACED"]) else "",
         "apart": not has["DEVICE"]
-        and (has["PACKS"] or has["ABREAST"] or any("_APART" in part for part in [text, *others])),
+        and (has["PACKS"] or has["BATCHED"] or any("_APART" in part for part in [text, *others])),
     }
     values["middles"] = ", ".join(map(repr, program.midpoints))
     values["moments"] = ", ".join(map(repr, schedule.moments)) if schedule else ""

@@ -50,8 +50,8 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("FAR", lambda p: packs and packs.small_argument, ("PACKS",))
     yield Feature("GROUPS", lambda p: not p.time and grouped(p, lanes), ("BLOCKS", "ENSEMBLE"))
     together = "PACKS" if packs else "GROUPS"
-    yield Feature("ABREAST", lambda p: packs.transposes if packs else True, (together, "ADJOINT", "EACH"))
-    yield Feature("UNDONE", lambda p: packs and packs.recomputed, ("ABREAST",))
+    yield Feature("BATCHED", lambda p: packs.transposes if packs else True, (together, "ADJOINT", "EACH"))
+    yield Feature("RECOMPUTED", lambda p: packs and packs.recomputed, ("BATCHED",))
     yield Feature("SPARSE", lambda p: blocks and blocks.factors, ("BLOCKS",))
     full = blocks and blocks.factors is None  # whether Newton matrices are inverted rather than factorised
     yield Feature("SWEPT", lambda p: full, ("BLOCKS", "COMPOSED"))

@@ -72,9 +72,9 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool)
         table = tableau(table.stages, SINGLE)  # rounded to float, their sums would differ from 1
     staged = isinstance(lanes, Stages)
     predictions = predictors(table.stages, precision, integrated=bool(step.reduced)) if staged else (table.prediction,)
-    terms = [f"matrix[{j}][lane] * move[{j}]" for j in range(table.stages)]
+    terms = [f"matrix[{j}][lane] * increment[{j}]" for j in range(table.stages)]
     older = [f"matrix[{table.stages + j}][lane] * before[{j}]" for j in range(table.stages)]
-    of_members = [f"matrix[{j}][i] * moves[{j}][k][lane]" for j in range(table.stages)]
+    of_members = [f"matrix[{j}][i] * increments[{j}][k][lane]" for j in range(table.stages)]
     values = {
         "NAME": program.name,
         "nodes": _row(table.nodes, table.stages),

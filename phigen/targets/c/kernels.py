@@ -107,7 +107,7 @@ def function(
         lines = [*_comment(f"{called}, part {k} of {len(pieces)}."), _signature(program, kernel, part) + "\n{"]
         texts.append("\n".join([*lines, *_body(program, kernel, part, piece), "}\n"]))
     arguments = ", ".join([*kernel.inputs, *(["lane"] if single else []), *(o.name for o in kernel.outputs), "work"])
-    head += ["    (void)own; /* parts read every lane */"] if alike else []
+    head += ["    (void)distinct_coef; /* parts read every lane */"] if alike else []
     head.append(f"    {form.number(program, 'work')} work[{size}];")
     if exported:
         arguments = arguments.replace(f", {kernel.outputs[0].name}, work", ", value, work")
@@ -169,7 +169,7 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
     # restrict: the outputs never overlap the inputs of our own calls; callers of the API get no such duty.
     qualifier = "" if form.exported else "restrict "
     arguments += ["int lane"] if form.single else []
-    arguments += ["int own"] if form.alike else []
+    arguments += ["int distinct_coef"] if form.alike else []
     for o in () if form.returning else kernel.outputs:
         # The caller of NAME_casimirs sizes the array by NAME_CASIMIRS, which may be 0.
         length = "" if form.exported and kernel.role is Role.CASIMIRS else f"{qualifier}{max(1, len(o.values))}"
@@ -184,7 +184,7 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
 def _body(program: Program, kernel: Kernel, form: Form, built: ir.Function) -> list[str]:
     """Return the lines of a function, which marks the arguments that it does not read."""
     parameters = [*kernel.inputs, *(() if form.returning else (o.name for o in kernel.outputs))]
-    parameters += [*["work"] * bool(form.workspace), *["own"] * bool(form.alike), *["lane"] * form.single]
+    parameters += [*["work"] * bool(form.workspace), *["distinct_coef"] * bool(form.alike), *["lane"] * form.single]
     if form.returning:
         *others, last = built.body
         assert isinstance(last, ir.Assign)

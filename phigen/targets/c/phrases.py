@@ -245,22 +245,22 @@ TAPE = Choice(
     ("SPLITTING", "GAUSS"),
     {
         "RECORD_OF_STEP": (
-            "double phi_kept[PHI_FLOWS][PHI_DIM]",
-            "double phi_kept[PHI_TRAIL]",
-            "double PHI_OF(phi_kept, PHI_STAGES)[PHI_DIM]",
+            "double phi_step_tape[PHI_FLOWS][PHI_DIM]",
+            "double phi_step_tape[PHI_TRAIL]",
+            "double PHI_OF(phi_step_tape, PHI_STAGES)[PHI_DIM]",
         ),
-        "STEP_BACK(s, trail, bar)": (
-            "phi_stage_adjoint(s->coef, trail, bar, bar->coef)",
-            "phi_stage_adjoint(s, trail, bar)",
-            "phi_stages_adjoint(s, trail, bar)",
+        "STEP_BACK(s, tape, bar)": (
+            "phi_stage_adjoint(s->coef, tape, bar, bar->coef)",
+            "phi_stage_adjoint(s, tape, bar)",
+            "phi_stages_adjoint(s, tape, bar)",
         ),
-        "AND_STARTS_OF_PACKS": (", &bar", "", ""),
+        "AND_STARTS_OF_BATCHES": (", &bar", "", ""),
     },
 )
 
 BATCHES = Choice(
     "The reverse pass of an ensemble is vectorised over batches of members.",
-    ("ABREAST",),
+    ("BATCHED",),
     {
         "BACK_MEMBERS": ("PHI_BACK_GROUP", "1"),
         "PULL_MEMBERS(all, m)": ("phi_pull_group(all, m)", "phi_pull_member(all, m)"),
@@ -275,7 +275,7 @@ PACKS = Choice(
 
 RECOMPUTED = Choice(
     "The reverse pass recomputes states by inverse flows, in segments of at least 16 steps.",
-    ("UNDONE",),
+    ("RECOMPUTED",),
     {"STEPS_OF_SEGMENT(steps)": ("16 + steps", "steps")},
 )
 
@@ -311,14 +311,14 @@ RUN = Choice(
         "RUN": (
             "static phi_status phi_single_steps",
             "phi_status phi_integrate_along",
-            "static phi_status phi_integrate_leaving",
+            "static phi_status phi_integrate_recording",
             "phi_status phi_integrate",
         ),
-        "AND_RECORD": ("", ", const double *dw", ", double (*kept)[PHI_DIM]", ""),
+        "AND_RECORD": ("", ", const double *dw", ", double (*tape)[PHI_DIM]", ""),
         "ABOUT_RUN": (
             "/* Steps one by one; those who call it update the attitude, if there is one. */",
             "",
-            "/* phi_integrate, which writes the states before all flows to kept, unless that is NULL. */",
+            "/* phi_integrate, which writes the states before all flows to tape, unless that is NULL. */",
             "",
         ),
     },
@@ -333,8 +333,8 @@ STEP = Choice(
         "COUNT_EVALUATION(s)": ("++s->evaluations;", *[""] * 4),
         "MAKE_STEP(s)": (
             "",
-            "const phi_status status = phi_stages(s, kept != NULL ? kept + PHI_BEGUN : NULL);",
-            "const phi_status status = phi_stages(s, kept);",
+            "const phi_status status = phi_stages(s, tape != NULL ? tape + PHI_BEGUN : NULL);",
+            "const phi_status status = phi_stages(s, tape);",
             "const phi_status status = phi_stages(s);",
             "const phi_status status = phi_stage(s);",
         ),
@@ -342,7 +342,7 @@ STEP = Choice(
             "if (!phi_advance(s, increment, s->carry)) return PHI_END_RUN(PHI_NOT_FINITE);",
             *["if (status != PHI_OK) return PHI_END_RUN(status);"] * 4,
         ),
-        "NEXT_RECORD": ("", *["if (kept != NULL) kept += PHI_FLOWS;"] * 2, "", ""),
+        "NEXT_RECORD": ("", *["if (tape != NULL) tape += PHI_FLOWS;"] * 2, "", ""),
     },
 )
 
@@ -351,18 +351,18 @@ CORRECTORS = Choice(
     " ends of runs, which are where rows are.",
     ("CORRECTED && ADJOINT",),
     {
-        "AND_KEPT": (", kept", ""),
-        "AND_KEPT_AT(place)": (", kept != NULL ? kept + (place) : NULL", ""),
-        "AND_STATES_KEPT": (", double (*kept)[PHI_DIM]", ""),
+        "AND_TAPE": (", tape", ""),
+        "AND_TAPE_AT(place)": (", tape != NULL ? tape + (place) : NULL", ""),
+        "AND_STATES_TAPE": (", double (*tape)[PHI_DIM]", ""),
         "FIRST_FLOW": ("PHI_BEGUN", "0"),
         "LAST_FLOW": ("(PHI_FLOWS - PHI_BEGUN - 1)", "(PHI_FLOWS - 1)"),
         "CORRECTOR_AFTER_BACK": (
             "if (done == steps || done % stride == 0)"
-            " phi_flows_back(s->coef, trail[done - 1], PHI_FLOWS - PHI_BEGUN, PHI_FLOWS - 1, bar, bar->coef);",
+            " phi_flows_back(s->coef, tape[done - 1], PHI_FLOWS - PHI_BEGUN, PHI_FLOWS - 1, bar, bar->coef);",
             "",
         ),
         "CORRECTOR_BEFORE_BACK": (
-            "if ((done - 1) % stride == 0) phi_flows_back(s->coef, trail[done - 1], 0, PHI_BEGUN - 1, bar, bar->coef);",
+            "if ((done - 1) % stride == 0) phi_flows_back(s->coef, tape[done - 1], 0, PHI_BEGUN - 1, bar, bar->coef);",
             "",
         ),
     },
@@ -373,8 +373,8 @@ ENDS = Choice(
     ("CORRECTED", "ATTITUDE && !BLOCKS"),
     {
         "BEFORE_RUN": ("const phi_solver before = *s;", "", ""),
-        "CORRECT_START": ("if (steps > 0 && phi_correct(s, 0 PHI_AND_KEPT) != PHI_OK) return PHI_NOT_FINITE;", "", ""),
-        "END_RUN(status)": ("phi_end_run(s, &before, status PHI_AND_KEPT)", "phi_end_turning(s, status)", "status"),
+        "CORRECT_START": ("if (steps > 0 && phi_correct(s, 0 PHI_AND_TAPE) != PHI_OK) return PHI_NOT_FINITE;", "", ""),
+        "END_RUN(status)": ("phi_end_run(s, &before, status PHI_AND_TAPE)", "phi_end_turning(s, status)", "status"),
     },
 )
 
@@ -573,14 +573,14 @@ DEVICE_STARTS = Choice(
     ("TIMED", "GAUGE"),
     {
         "OWN_STARTS": (
-            "PHI_GLOBAL const double *t0, int own_start,",
-            "PHI_GLOBAL const double *gauge, int own_start,",
+            "PHI_GLOBAL const double *t0, int start_per_member,",
+            "PHI_GLOBAL const double *gauge, int start_per_member,",
             "",
         ),
         "GAUGE_OF_MEMBER(level)": (
             "",
             "double level[PHI_GAUGES]; phi_gauge_of(&member, start,"
-            " gauge != NULL && own_start ? gauge + m * PHI_GAUGES : gauge, level);",
+            " gauge != NULL && start_per_member ? gauge + m * PHI_GAUGES : gauge, level);",
             "",
         ),
     },
@@ -610,7 +610,7 @@ DEVICE_PREDICTOR = Choice(
 PREDICTORS = Choice(
     "Each stage has a predictor of its own, if there are any.",
     ("GUESSES",),
-    {"AND_GUESS": ("PHI_AND_STAGE", "")},
+    {"AND_PREDICTOR": ("PHI_AND_STAGE", "")},
 )
 
 ALL = (

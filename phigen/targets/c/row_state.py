@@ -133,14 +133,14 @@ LATTICE = (
         ),
     ),
     StateBlock(
-        "guess",
+        "predictor",
         "SERIES && GUESSES",
-        ("phi_guess PHI_OF(guess, PHI_STAGES); /* predictor of each stage */",),
+        ("phi_predictor PHI_OF(predictor, PHI_STAGES); /* predictor of each stage */",),
         reset=(
             "PHI_EACH_STAGE",
             "    for (int d = 0; d < PHI_DIFFERENCES; ++d)",
             "        for (int k = 0; k < PHI_DIM; ++k, memory += block)"
-            " PHI_OF(s->guess, stage).difference[d][k] = memory;",
+            " PHI_OF(s->predictor, stage).difference[d][k] = memory;",
         ),
     ),
     StateBlock(
@@ -229,14 +229,14 @@ LATTICE = (
         ("int (*stop)(void);        /* called between steps to ask whether to stop, see phi_ask; or NULL */",),
     ),
     StateBlock(
-        "kept",
+        "tape",
         "ADJOINT && SERIES",
-        ("double *kept;             /* tape to which a step writes the solutions of its stages, or NULL */",),
+        ("double *tape;             /* tape to which a step writes the solutions of its stages, or NULL */",),
     ),
     StateBlock(
-        "kept",
-        "ADJOINT && !SERIES && !UNDONE",
-        (("double *kept; /* tape to which steps write the values that their sweeps overwrite, or NULL */"),),
+        "tape",
+        "ADJOINT && !SERIES && !RECOMPUTED",
+        (("double *tape; /* tape to which steps write the values that their sweeps overwrite, or NULL */"),),
     ),
     StateBlock(
         "tangents",
@@ -303,10 +303,10 @@ ROW = (
         reset=("row.bar = row.handed = NULL;",),
     ),
     StateBlock(
-        "given",
+        "received",
         "ADJOINT && TAKES",
-        ("double *const *given;         /* cotangents that neighbouring sites have computed for these before */",),
-        reset=("row.given = NULL;",),
+        ("double *const *received;      /* cotangents that neighbouring sites have computed for these before */",),
+        reset=("row.received = NULL;",),
     ),
     StateBlock(
         "givers",
@@ -328,9 +328,9 @@ ROW = (
         ),
     ),
     StateBlock(
-        "whole",
+        "complete",
         "OPEN && BESIDE && !ONE_ROW",
-        ("int whole;                    /* whether all terms of H are present */",),
+        ("int complete;                 /* whether all terms of H are present */",),
     ),
     StateBlock(
         "window",

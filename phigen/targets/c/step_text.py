@@ -148,7 +148,7 @@ def _splitting_texts(program: Program, step: Splitting, lanes: Lanes | None, has
         "tangent_flows.h": splitting.tangent(program, step) if has["TANGENT"] else "",
         "adjoint_flows.h": splitting.adjoint(program, step, step.adjoint) if step.adjoint else "",
     }
-    if has["ABREAST"] and isinstance(lanes, Packs):
+    if has["BATCHED"] and isinstance(lanes, Packs):
         texts["adjoint_flows_lanes.h"] = printed_back(program, step, lanes)
     return texts
 

@@ -130,9 +130,9 @@ BACK_GROUP = (
     ),
     StateBlock("start", "SPLITTING", ("phi_pack start[PHI_BACK_PACKS]; /* the members at their starts */",)),
     StateBlock(
-        "kept",
-        "SPLITTING && !UNDONE",
-        ("phi_lanes kept[PHI_SEGMENT][PHI_FLOWS][PHI_BACK_PACKS][PHI_DIM]; /* states before flows */",),
+        "stored",
+        "SPLITTING && !RECOMPUTED",
+        ("phi_lanes stored[PHI_SEGMENT][PHI_FLOWS][PHI_BACK_PACKS][PHI_DIM]; /* states before flows */",),
     ),
 )
 
@@ -150,13 +150,13 @@ TRANSPOSE = (
     StateBlock(
         "tape_of_stages",
         "SERIES",
-        ("double *kept;               /* tape: for each step and stage, its solution y, and x if needed */",),
+        ("double *tape;               /* tape: for each step and stage, its solution y, and x if needed */",),
     ),
     StateBlock(
         "states_of_legs",
-        "!SERIES && UNDONE",
+        "!SERIES && RECOMPUTED",
         (
-            "double *kept;               /* states at the starts of the legs of a segment */",
+            "double *tape;               /* states at the starts of the legs of a segment */",
             "size_t leg;                 /* number of steps of a leg */",
             "int lost;                   /* 1 if inverse flows of a leg have led to another state than its start */",
             "int anew;                   /* 1 if the flows of a step are repeated, as inverse flows do not serve */",
@@ -164,9 +164,9 @@ TRANSPOSE = (
     ),
     StateBlock(
         "tape_of_sweeps",
-        "!SERIES && !UNDONE",
+        "!SERIES && !RECOMPUTED",
         (
-            "double *kept;               /* tape: for each step and sweep of a segment, the fields that it changes */",
+            "double *tape;               /* tape: for each step and sweep of a segment, the fields that it changes */",
             "double *x[PHI_ARRAYS];      /* fields before the sweep that the reverse pass reached last */",
         ),
     ),
@@ -177,7 +177,7 @@ TRANSPOSE = (
         ("size_t last_far;            /* number of these that use full-range functions */",),
     ),
     StateBlock("block", members=("size_t block;               /* numbers of one field, in doubles */",)),
-    StateBlock("of_step", "!UNDONE", ("size_t of_step;             /* numbers that a step writes to the tape */",)),
+    StateBlock("of_step", "!RECOMPUTED", ("size_t of_step;             /* numbers that a step writes to the tape */",)),
     StateBlock("states", members=("double *states;             /* checkpoints: states at the starts of segments */",)),
     StateBlock("marks", "SERIES", ("size_t *marks;              /* for each, the number of its step */",)),
     StateBlock(
@@ -206,21 +206,23 @@ FLOW = (
         ),
     ),
     StateBlock(
-        "own", "RENEWED", ("double own[PHI_ROW];        /* memory for coef, which differs from step to step */",)
+        "renewed_coef",
+        "RENEWED",
+        ("double renewed_coef[PHI_ROW]; /* memory for coef, which differs from step to step */",),
     ),
     StateBlock(
         "go",
-        "UNDONE && TAKES",
+        "RECOMPUTED && TAKES",
         ("int go;                     /* 0 forward; 1, 2 reverse: by the array that takes derivatives */",),
     ),
     StateBlock(
         "go",
-        "UNDONE && !TAKES",
+        "RECOMPUTED && !TAKES",
         ("int go;                     /* 0 forward; reverse: 1 at the sites themselves, 2 for their neighbours */",),
     ),
     StateBlock(
         "reverse",
-        "UNDONE",
+        "RECOMPUTED",
         (
             "int row;                    /* in the reverse pass: the row of coefficients, */",
             "const struct phi_transpose *g;",

@@ -104,10 +104,10 @@ def _of_pullback(program: Program, step: Step) -> dict[str, object]:
         "parameters": len(program.parameters),
         "levels": int(program.monitor is not None),
         "early": step.prepared * rows,
-        "kept": 3 * program.dimension,
+        "of_step": 3 * program.dimension,
         "gauge_passed": "gauge.T, " * bool(program.held),
         "t0_too": ", t0" * bool(program.time),
         "chained": functions_of(program).chained,
-        "found": f"_early(stage, found{moment})" if step.refresh else "found",
+        "coef_slopes": f"_early(stage, slopes{moment})" if step.refresh else "slopes",
         "said_of_level": said if program.monitor else "a gauge is held fixed.",
     }

@@ -22,7 +22,7 @@ from phigen.targets.policies import PYTHON
 from phigen.targets.rendering import render
 
 #: The templates of implicit steps.
-_SERIES = ("lattice_series", "lattice_guesses", "lattice_newton")
+_SERIES = ("lattice_series", "lattice_predictors", "lattice_newton")
 
 
 def body(program: Program, step: Sweeps, prepare: str) -> str:
@@ -44,7 +44,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     values["adjoint"] = step.adjoint is not None
     flows = "(part, _), _ in sites.schedule" if step.by_colour else "part, _ in SCHEDULE"
     swept = f"sum(len(PARTS[part]) for {flows})" if any(step.parts) else "1"  # even if no field changes, not 0
-    values["kept"] = "2 * len(SCHEDULE)" if step.equation else swept
+    values["of_step"] = "2 * len(SCHEDULE)" if step.equation else swept
     values["extremes"] = any(ends.extremes for ends in step.others.observed.ends)
     values["pairs"] = step.partners is not None and not graph
     values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
@@ -59,7 +59,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     if step.adjoint:
         kind = "series" if step.equation else "splitting"
         pieces += [render("numpy", f"lattice_adjoint{part}.py", values) for part in (f"_{kind}", "")]
-    pieces += [render("numpy", "lattice_seen.py", {**values, **_reductions(program)}), prepare]
+    pieces += [render("numpy", "lattice_observables.py", {**values, **_reductions(program)}), prepare]
     pieces += functions.called(program)
     pieces += _functions(LatticeLoops(program, step))
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)

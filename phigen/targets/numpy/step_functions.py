@@ -60,13 +60,13 @@ class StepFunctions:
     chained: bool = False
 
 
-def _guess(program: Program) -> str:
-    return "anew" if program.noise else "guess"
+def _prediction(program: Program) -> str:
+    return "anew" if program.noise else "prediction"
 
 
 def _newton(program: Program, step: Newton) -> StepPart:
     return StepPart(
-        (step.prepare, step.refresh, step.linearise), ("solve", "plausible", "newton", f"newton_{_guess(program)}")
+        (step.prepare, step.refresh, step.linearise), ("solve", "plausible", "newton", f"newton_{_prediction(program)}")
     )
 
 
@@ -75,7 +75,16 @@ def _explicit(program: Program, step: Explicit) -> StepPart:
 
 
 def _path(program: Program, step: Path) -> StepPart:
-    templates = ("holds", "piece", "path", "residual", "solve", "plausible", "path_step", f"path_{_guess(program)}")
+    templates = (
+        "holds",
+        "piece",
+        "path",
+        "residual",
+        "solve",
+        "plausible",
+        "path_step",
+        f"path_{_prediction(program)}",
+    )
     values = statements(program, step.recurrences, PATH_SYNTAX)
     return StepPart((step.prepare, step.refresh, step.generate), templates, values)
 
@@ -122,7 +131,7 @@ def _gauss_tangent(program: Program, step: Gauss) -> StepPart:
 
 def _gauss_adjoint(program: Program, step: Gauss) -> StepPart:
     stored = 2 * program.dimension + step.unknowns * step.tableau.stages
-    return StepPart((), ("gauss",), {**_gauss_values(step), "kept": stored})
+    return StepPart((), ("gauss",), {**_gauss_values(step), "of_step": stored})
 
 
 def _gauss_values(step: Gauss) -> dict[str, object]:

@@ -11,7 +11,7 @@
 #include "adjoint_lanes.c"
 
 /* Set all of *s but the state to the values before its last step. */
-static void phi_go_back(phi_solver *s)
+static void phi_rewind(phi_solver *s)
 {
     --s->steps;
     PHI_COUNT_TIME(s)
@@ -35,14 +35,14 @@ static void phi_join(phi_cotangent *bar, const double *rows_bar, size_t done, si
 
 /* Make steps and write their tape. rows, if not NULL, receives the states after stride, 2 * stride, ... steps and at
    the end. */
-static phi_status phi_leave_trail(phi_solver *s, size_t steps, size_t stride, double *rows,
-    phi_kept *trail)
+static phi_status phi_record_run(phi_solver *s, size_t steps, size_t stride, double *rows,
+    phi_step_tape *tape)
 {
     phi_status status = PHI_OK;
     for (size_t done = 0; done < steps && status == PHI_OK;) {
         const size_t until = steps - done < stride - done % stride ? steps - done : stride - done % stride;
         const size_t count = until < PHI_AT_ONCE ? until : PHI_AT_ONCE;
-        status = phi_leave_few(s, count, trail + done);
+        status = phi_record_steps(s, count, tape + done);
         done += count;
         if (rows != NULL && count == until) {
             memcpy(rows, s->x, sizeof s->x);
@@ -63,14 +63,14 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
     const phi_solver before = *s;
     phi_status status = phi_integrate(s, h, 0); /* so that all coefficients for h are computed */
     if (status != PHI_OK) return status;
-    phi_kept *kept = (phi_kept *)trail;
+    phi_step_tape *tape = (phi_step_tape *)trail;
     phi_cotangent bar;
     memset(&bar, 0, sizeof bar);
-    status = phi_leave_trail(s, steps, stride, rows, kept);
+    status = phi_record_run(s, steps, stride, rows, tape);
     if (status == PHI_OK) {
         phi_solver at = *s;
         PHI_BEGIN_PATHS_BACK(bar, s)
-        status = phi_back(&at, steps, stride, rows_bar, kept, &bar);
+        status = phi_back(&at, steps, stride, rows_bar, tape, &bar);
     }
     for (int i = 0; i < PHI_DIM; ++i)
         if (!isfinite(bar.x[i]) && status == PHI_OK) status = PHI_NOT_FINITE;

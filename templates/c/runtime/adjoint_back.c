@@ -4,23 +4,23 @@
 
 /* Reverse pass of the step that led to s, from its tape. All of s but the state becomes what it was before that step.
    */
-static phi_status phi_back_step(phi_solver *s, phi_kept trail, phi_cotangent *bar)
+static phi_status phi_back_step(phi_solver *s, phi_step_tape tape, phi_cotangent *bar)
 {
-    phi_go_back(s);
-    const phi_status status = PHI_STEP_BACK(s, trail, bar);
+    phi_rewind(s);
+    const phi_status status = PHI_STEP_BACK(s, tape, bar);
     phi_all_early(s, bar);
     return status;
 }
 
 /* Reverse pass of a run that ended at s, from its tape. */
 static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const double *rows_bar,
-    phi_kept *trail, phi_cotangent *bar)
+    phi_step_tape *tape, phi_cotangent *bar)
 {
     phi_status status = PHI_OK;
     for (size_t done = steps; done > 0 && status == PHI_OK; --done) {
         phi_join(bar, rows_bar, done, steps, stride);
         PHI_CORRECTOR_AFTER_BACK
-        status = phi_back_step(s, trail[done - 1], bar);
+        status = phi_back_step(s, tape[done - 1], bar);
         PHI_CORRECTOR_BEFORE_BACK
     }
     return status;

@@ -7,7 +7,7 @@
 
 /* The reverse pass of a run that ended at s, from its tape, vectorised over stages. */
 static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const double *rows_bar,
-    phi_kept *trail, phi_cotangent *bar)
+    phi_step_tape *tape, phi_cotangent *bar)
 {
     phi_traced g;
     phi_lanes coef[PHI_COEFFICIENTS], slopes[PHI_COEFFICIENTS];
@@ -21,8 +21,8 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
         for (int lane = PHI_LANES - 1; lane >= 0; --lane) { /* unused lanes repeat the last stage */
             const size_t k = left - (size_t)count + (size_t)(lane < count ? lane : count - 1);
             PHI_TAKE_STAGE_OF(k)
-            for (; at > PHI_STEP_OF(k); --at) phi_go_back(s);
-            phi_load(&g, lane, s PHI_AND_STAGE, PHI_OF(trail[PHI_STEP_OF(k)], stage));
+            for (; at > PHI_STEP_OF(k); --at) phi_rewind(s);
+            phi_load(&g, lane, s PHI_AND_STAGE, PHI_OF(tape[PHI_STEP_OF(k)], stage));
         }
         phi_linearise_back(&g);
         phi_solve_lanes(g.jacobian, g.gain, PHI_DIM, g.wrong); /* linearise now, before the cotangents are known */

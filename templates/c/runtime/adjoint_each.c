@@ -13,8 +13,8 @@ phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t 
     double *trail, unsigned char *status)
 {
     phi_status result = PHI_OK;
-    const int given = x0 != NULL && h != NULL && rows_bar != NULL && x0_bar != NULL && trail != NULL && stride > 0;
-    if (members > 0 && !given) return PHI_BAD_ARGUMENT;
+    const int arguments_complete = x0 != NULL && h != NULL && rows_bar != NULL && x0_bar != NULL && trail != NULL && stride > 0;
+    if (members > 0 && !arguments_complete) return PHI_BAD_ARGUMENT;
     PHI_ASK_FOR_OWN
     phi_pulled all;
     memset(&all, 0, sizeof all);
@@ -29,7 +29,7 @@ phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t 
     all.each = stride > 0 ? (steps + stride - 1) / stride * PHI_DIM : 0;
     all.rows = rows;
     all.x0_bar = x0_bar;
-    all.trail = trail;
+    all.tape = trail;
     all.params_bar = params_bar;
     all.status = status;
     for (size_t m = 0; m < members; m += PHI_BACK_MEMBERS) {

@@ -8,9 +8,9 @@
    their row. */
 static void phi_early(const double *coef, double *coef_bar, double t)
 {
-    double found[PHI_PREPARED + 1];
-    phi_at_time_adjoint(coef, t, coef_bar + PHI_PREPARED, found);
-    for (int k = 0; k < PHI_PREPARED; ++k) coef_bar[k] += found[k];
+    double bar_of_prepared[PHI_PREPARED + 1];
+    phi_at_time_adjoint(coef, t, coef_bar + PHI_PREPARED, bar_of_prepared);
+    for (int k = 0; k < PHI_PREPARED; ++k) coef_bar[k] += bar_of_prepared[k];
     memset(coef_bar + PHI_PREPARED, 0, PHI_RENEWED_OF_ROW * sizeof coef_bar[0]);
 }
 

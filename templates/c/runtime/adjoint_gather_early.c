@@ -6,12 +6,12 @@
 static void phi_gather(phi_traced *g, phi_lanes slopes[PHI_COEFFICIENTS], int lane, double coef_bar[PHI_COEFFICIENTS])
 {
     if (g->wrong[lane] != 0.0) return;
-    double coef[PHI_COEFFICIENTS], own[PHI_COEFFICIENTS];
+    double coef[PHI_COEFFICIENTS], bar_of_lane[PHI_COEFFICIENTS];
     for (int k = 0; k < PHI_COEFFICIENTS; ++k) {
         coef[k] = g->coef[k][lane];
-        own[k] = slopes[k][lane];
+        bar_of_lane[k] = slopes[k][lane];
     }
-    phi_early(coef, own, g->t[lane]);
-    for (int k = 0; k < PHI_COEFFICIENTS; ++k) coef_bar[k] += own[k];
+    phi_early(coef, bar_of_lane, g->t[lane]);
+    for (int k = 0; k < PHI_COEFFICIENTS; ++k) coef_bar[k] += bar_of_lane[k];
 }
 #endif

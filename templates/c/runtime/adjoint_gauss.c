@@ -12,17 +12,17 @@
 
 /* Cotangents of the unknowns at all stages, from those of the stage increments: the transpose of phi_slopes. */
 static void phi_unknowns_bar(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
-    phi_lanes *moves_bar, phi_lanes *z_bar)
+    phi_lanes *increments_bar, phi_lanes *z_bar)
 {
 #if PHI_STAGED
-    phi_stage_field_adjoint_lanes(s->coef, point, z, weights, moves_bar, z_bar);
+    phi_stage_field_adjoint_lanes(s->coef, point, z, weights, increments_bar, z_bar);
 #else
-    double at[PHI_UNKNOWNS], move_bar[PHI_UNKNOWNS], found[PHI_UNKNOWNS];
+    double at[PHI_UNKNOWNS], increment_bar[PHI_UNKNOWNS], unknowns_bar[PHI_UNKNOWNS];
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_UNKNOWNS; ++k) at[k] = z[k][i];
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) move_bar[k] = moves_bar[k][i];
-        phi_stage_field_adjoint(s->coef, point, at, &weights[0][i], move_bar, found);
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) z_bar[k][i] = found[k];
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) increment_bar[k] = increments_bar[k][i];
+        phi_stage_field_adjoint(s->coef, point, at, &weights[0][i], increment_bar, unknowns_bar);
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) z_bar[k][i] = unknowns_bar[k];
     }
 #endif
 }
@@ -30,22 +30,22 @@ static void phi_unknowns_bar(const phi_solver *s, double point[PHI_POINT], phi_l
 /* Add the contributions of all stages to the cotangents of the start of the step and of the coefficients, from the
    cotangents of the stage increments. */
 static void phi_add_stages(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
-    phi_lanes *moves_bar, phi_cotangent *bar)
+    phi_lanes *increments_bar, phi_cotangent *bar)
 {
 #if PHI_STAGED
     phi_lanes x[PHI_DIM], coef[PHI_COEFFICIENTS];
     memset(coef, 0, sizeof coef); /* there may be no such cotangents */
-    phi_stage_start_adjoint_lanes(s->coef, point, z, weights, moves_bar, x, coef);
+    phi_stage_start_adjoint_lanes(s->coef, point, z, weights, increments_bar, x, coef);
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_DIM; ++k) bar->x[k] += x[k][i];
         for (int k = 0; k < PHI_COEFFICIENTS; ++k) bar->coef[k] += coef[k][i];
     }
 #else
-    double at[PHI_UNKNOWNS], move_bar[PHI_UNKNOWNS], x[PHI_DIM], coef[PHI_COEFFICIENTS] = { 0.0 };
+    double at[PHI_UNKNOWNS], increment_bar[PHI_UNKNOWNS], x[PHI_DIM], coef[PHI_COEFFICIENTS] = { 0.0 };
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_UNKNOWNS; ++k) at[k] = z[k][i];
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) move_bar[k] = moves_bar[k][i];
-        phi_stage_start_adjoint(s->coef, point, at, &weights[0][i], move_bar, x, coef);
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) increment_bar[k] = increments_bar[k][i];
+        phi_stage_start_adjoint(s->coef, point, at, &weights[0][i], increment_bar, x, coef);
         for (int k = 0; k < PHI_DIM; ++k) bar->x[k] += x[k];
         for (int k = 0; k < PHI_COEFFICIENTS; ++k) bar->coef[k] += coef[k];
     }
@@ -54,14 +54,14 @@ static void phi_add_stages(const phi_solver *s, double point[PHI_POINT], phi_lan
 
 /* Cotangents of the stage increments, from those of their sum and of the unknowns: sums with the transposes of mu and 1
    - mu. */
-static void phi_mixed_back(const double end_bar[PHI_UNKNOWNS], phi_lanes *z_bar, phi_lanes *moves_bar)
+static void phi_mixed_back(const double end_bar[PHI_UNKNOWNS], phi_lanes *z_bar, phi_lanes *increments_bar)
 {
-    phi_mixed(phi_mixing, z_bar, moves_bar);
+    phi_mixed(phi_mixing, z_bar, increments_bar);
     for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        double *move_bar = moves_bar[k], sum = end_bar[k];
+        double *increment_bar = increments_bar[k], sum = end_bar[k];
         for (int i = 0; i < PHI_NODES; ++i) sum += z_bar[k][i];
         PHI_EACH_LANE
-        for (int lane = 0; lane < PHI_WIDTH; ++lane) move_bar[lane] = sum - move_bar[lane];
+        for (int lane = 0; lane < PHI_WIDTH; ++lane) increment_bar[lane] = sum - increment_bar[lane];
     }
 }
 
@@ -85,17 +85,17 @@ static double phi_change_back(phi_lanes *before, phi_lanes *after)
    columns are the images of unit vectors. */
 static void phi_see_back(const phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *bar)
 {
-    phi_lanes seen_bar[PHI_UNKNOWNS], unit[PHI_UNKNOWNS];
+    phi_lanes next_frame_bar[PHI_UNKNOWNS], unit[PHI_UNKNOWNS];
     double image[PHI_UNKNOWNS][PHI_WIDTH];
-    memcpy(seen_bar, bar, sizeof seen_bar);
+    memcpy(next_frame_bar, bar, sizeof next_frame_bar);
     for (int first = 0; first < PHI_UNKNOWNS; first += PHI_NODES) {
         memset(unit, 0, sizeof unit);
         for (int i = 0; i < PHI_NODES && first + i < PHI_UNKNOWNS; ++i) unit[first + i][i] = 1.0;
-        phi_see(s, end, unit, image);
+        phi_to_next_frame(s, end, unit, image);
         for (int i = 0; i < PHI_NODES && first + i < PHI_UNKNOWNS; ++i) {
             memset(bar[first + i], 0, sizeof bar[0]);
             for (int l = 0; l < PHI_UNKNOWNS; ++l)
-                for (int lane = 0; lane < PHI_WIDTH; ++lane) bar[first + i][lane] += image[l][i] * seen_bar[l][lane];
+                for (int lane = 0; lane < PHI_WIDTH; ++lane) bar[first + i][lane] += image[l][i] * next_frame_bar[l][lane];
         }
     }
 }
@@ -104,7 +104,7 @@ static void phi_see_back(const phi_solver *s, const double end[PHI_UNKNOWNS], ph
 /* Starting values for the cotangents of the stage increments, from the cotangents of the unknowns in the step after: the
    predictor of steps, with the stages in the opposite order. */
 static void phi_predict_back(const phi_solver *s, const double end[PHI_UNKNOWNS], const double end_bar[PHI_UNKNOWNS],
-    const phi_cotangent *bar, phi_lanes *moves_bar)
+    const phi_cotangent *bar, phi_lanes *increments_bar)
 {
     phi_lanes after[PHI_UNKNOWNS], reversed[PHI_UNKNOWNS];
     memcpy(after, bar->after, sizeof after);
@@ -119,14 +119,14 @@ static void phi_predict_back(const phi_solver *s, const double end[PHI_UNKNOWNS]
         for (int i = 0; i < PHI_NODES; ++i) reversed[k][i] = after[k][PHI_NODES - 1 - i];
     phi_mixed(phi_prediction[PHI_PREDICTORS - 1], reversed, after); /* the last predictor reads one step */
     for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        for (int lane = 0; lane < PHI_WIDTH; ++lane) moves_bar[k][lane] = end_bar[k];
-        for (int i = 0; i < PHI_NODES; ++i) moves_bar[k][i] += after[k][PHI_NODES - 1 - i];
+        for (int lane = 0; lane < PHI_WIDTH; ++lane) increments_bar[k][lane] = end_bar[k];
+        for (int i = 0; i < PHI_NODES; ++i) increments_bar[k][i] += after[k][PHI_NODES - 1 - i];
     }
 }
 
 /* Solve for the cotangents of the stage increments by fixed-point sweeps, from the cotangent of their sum. */
 static phi_status phi_collocate_back(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
-    const double end[PHI_UNKNOWNS], const double end_bar[PHI_UNKNOWNS], phi_lanes *moves_bar, phi_cotangent *bar)
+    const double end[PHI_UNKNOWNS], const double end_bar[PHI_UNKNOWNS], phi_lanes *increments_bar, phi_cotangent *bar)
 {
     phi_lanes z_bar[PHI_UNKNOWNS], next[PHI_UNKNOWNS];
     double last = HUGE_VAL, size = 0.0;
@@ -135,14 +135,14 @@ static phi_status phi_collocate_back(const phi_solver *s, double point[PHI_POINT
     for (int k = 0; k < PHI_UNKNOWNS; ++k) size += fabs(end_bar[k]);
     memset(z_bar, 0, sizeof z_bar);
     memset(next, 0, sizeof next);
-    if (bar->chained) phi_predict_back(s, end, end_bar, bar, moves_bar);
-    else phi_mixed_back(end_bar, z_bar, moves_bar);
+    if (bar->chained) phi_predict_back(s, end, end_bar, bar, increments_bar);
+    else phi_mixed_back(end_bar, z_bar, increments_bar);
     for (int sweep = 0; sweep < PHI_MAX_SWEEPS; ++sweep) {
-        phi_unknowns_bar(s, point, weights, z, moves_bar, next);
+        phi_unknowns_bar(s, point, weights, z, increments_bar, next);
         const double change = phi_change_back(z_bar, next), rate = change / fmax(last, DBL_MIN);
         if (!isfinite(change)) return PHI_NOT_FINITE;
         memcpy(z_bar, next, sizeof next);
-        phi_mixed_back(end_bar, z_bar, moves_bar);
+        phi_mixed_back(end_bar, z_bar, increments_bar);
         if (rate > PHI_ADJOINT_STALLED && change <= PHI_ADJOINT_ROUNDING * size) ++stalls;
         if (stalls > 1 || (sweep > first && change * rate <= PHI_ADJOINT_SOLVED * size)) {
             memcpy(bar->after, z_bar, sizeof z_bar);
@@ -155,23 +155,23 @@ static phi_status phi_collocate_back(const phi_solver *s, double point[PHI_POINT
 }
 
 /* Pull a cotangent back through the step that s has just made from the start on the tape. */
-static phi_status phi_stage_adjoint(const phi_solver *s, const double *trail, phi_cotangent *bar)
+static phi_status phi_stage_adjoint(const phi_solver *s, const double *tape, phi_cotangent *bar)
 {
     double point[PHI_POINT], end[PHI_UNKNOWNS], end_bar[PHI_UNKNOWNS], x[PHI_DIM], coef[PHI_COEFFICIENTS] = { 0.0 };
-    phi_lanes weights[1] = { { 0.0 } }, moves[PHI_UNKNOWNS], z[PHI_UNKNOWNS];
-    memcpy(point, trail, sizeof x);
+    phi_lanes weights[1] = { { 0.0 } }, increments[PHI_UNKNOWNS], z[PHI_UNKNOWNS];
+    memcpy(point, tape, sizeof x);
 #if PHI_TIMED
     point[PHI_DIM] = s->t;
 #endif
-    memcpy(moves, trail + PHI_DIM, sizeof moves);
+    memcpy(increments, tape + PHI_DIM, sizeof increments);
     for (int i = 0; i < PHI_NODES; ++i) weights[0][i] = s->h * phi_weights[i];
-    phi_end(moves, end);
-    phi_mixed(phi_mixing, moves, z);
+    phi_end(increments, end);
+    phi_mixed(phi_mixing, increments, z);
     phi_stage_change_adjoint(s->coef, point, end, bar->x, x, end_bar, coef);
     for (int k = 0; k < PHI_DIM; ++k) bar->x[k] += x[k];
     for (int k = 0; k < PHI_COEFFICIENTS; ++k) bar->coef[k] += coef[k];
-    const phi_status status = phi_collocate_back(s, point, weights, z, end, end_bar, moves, bar);
-    if (status == PHI_OK) phi_add_stages(s, point, weights, z, moves, bar);
+    const phi_status status = phi_collocate_back(s, point, weights, z, end, end_bar, increments, bar);
+    if (status == PHI_OK) phi_add_stages(s, point, weights, z, increments, bar);
     return status;
 }
 #endif

@@ -2,9 +2,9 @@
 #define PHI_FILE_ADJOINT_GROUPS
 #include <string.h>
 
-#include "adjoint_abreast.c"
+#include "adjoint_batches.c"
 #include "adjoint_segments.c"
-#include "adjoint_kept.c"
+#include "adjoint_stored.c"
 #include "model.h"
 
 #include "adjoint_groups_parameters.c"
@@ -13,16 +13,16 @@
 static int phi_pull_end(const phi_back_group *bar, int m, const phi_pulled *all, size_t at PHI_AND_GAUGE(const phi_group *group))
 {
     const int k = m / PHI_LANES, lane = m % PHI_LANES;
-    phi_cotangent own;
-    for (int i = 0; i < PHI_DIM; ++i) own.x[i] = bar->x[k][i][lane];
-    if (!phi_finite(own.x, PHI_DIM)) return 0;
+    phi_cotangent member_bar;
+    for (int i = 0; i < PHI_DIM; ++i) member_bar.x[i] = bar->x[k][i][lane];
+    if (!phi_finite(member_bar.x, PHI_DIM)) return 0;
     PHI_EACH_STAGE {
-        double *coef = PHI_OF(own.coef, stage);
+        double *coef = PHI_OF(member_bar.coef, stage);
         for (int c = 0; c < PHI_COEFFICIENTS; ++c) coef[c] = PHI_OF(bar->coef[k], stage)[c][lane];
         if (!phi_finite(coef, PHI_COEFFICIENTS)) return 0;
     }
-    memcpy(all->x0_bar + at * PHI_DIM, own.x, sizeof own.x);
-    phi_pull_parameters(all, &own, at PHI_AND_GAUGE(group->gauge[m]));
+    memcpy(all->x0_bar + at * PHI_DIM, member_bar.x, sizeof member_bar.x);
+    phi_pull_parameters(all, &member_bar, at PHI_AND_GAUGE(group->gauge[m]));
     PHI_NO_GROUP(group)
     if (all->status != NULL) all->status[at] = PHI_OK;
     return 1;
@@ -43,7 +43,7 @@ PHI_APART static phi_status phi_pull_group(const phi_pulled *all, size_t first)
     memset(bar.coef, 0, sizeof bar.coef);
     PHI_COUNT_PACKS(group, count)
     for (int m = 0; m < count; ++m) good[m] = together && phi_pull_join(&group, m, all, first);
-    together = together && phi_pull_forth(&group, count, all, first PHI_AND_STARTS_OF_PACKS);
+    together = together && phi_pull_forth(&group, count, all, first PHI_AND_STARTS_OF_BATCHES);
     for (int m = 0; m < count; ++m) {
         double x[PHI_DIM];
         phi_pull_state(&group, m, x);

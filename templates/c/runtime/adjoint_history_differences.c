@@ -7,10 +7,10 @@
 #define PHI_AT_ONCE ((size_t)1) /* number of steps after which their solutions are read from the predictor */
 
 /* Read the solution of the last step from the predictor of a stage. Returns 0 if more than one step is asked for. */
-static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_kept *trail)
+static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_step_tape *tape)
 {
     if (steps > 1) return 0;
-    memcpy(PHI_OF(trail[0], stage), history->difference[0], PHI_DIM * sizeof(double));
+    memcpy(PHI_OF(tape[0], stage), history->difference[0], PHI_DIM * sizeof(double));
     return 1;
 }
 #endif

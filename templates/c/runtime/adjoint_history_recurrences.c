@@ -7,11 +7,11 @@
 #define PHI_AT_ONCE ((size_t)PHI_REMEMBERED) /* number of steps after which their solutions are read from the predictor */
 
 /* Read the solutions of the last steps from the predictor of a stage. Returns 0 if it stores fewer. */
-static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_kept *trail)
+static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_step_tape *tape)
 {
     const size_t count = (size_t)history->count;
     if (count < steps) return 0;
-    for (size_t k = 0; k < steps; ++k) memcpy(PHI_OF(trail[k], stage), history->past[count - steps + k], PHI_DIM * sizeof(double));
+    for (size_t k = 0; k < steps; ++k) memcpy(PHI_OF(tape[k], stage), history->past[count - steps + k], PHI_DIM * sizeof(double));
     return 1;
 }
 #endif

@@ -1,6 +1,6 @@
 #ifndef PHI_FILE_ADJOINT_JOIN_GROUPS
 #define PHI_FILE_ADJOINT_JOIN_GROUPS
-#include "adjoint_abreast.c"
+#include "adjoint_batches.c"
 
 /* Initialise a lane with a member at its initial state. Returns 0 if the member cannot start. */
 static int phi_pull_join(phi_group *group, int m, const phi_pulled *all, size_t first)

@@ -10,7 +10,7 @@ typedef struct {
     const double *x0, *h, *rows_bar;
 #include "state_of_pulled.h"
     size_t members, steps, stride, each;
-    double *rows, *x0_bar, *trail;
+    double *rows, *x0_bar, *tape;
     phi_params *params_bar;
     unsigned char *status;
 } phi_pulled;
@@ -30,12 +30,12 @@ static phi_status phi_pull_member(const phi_pulled *all, size_t m)
 {
     const double *rows_bar = all->rows_bar + m * all->each;
     double *rows = all->rows != NULL ? all->rows + m * all->each : NULL, *bar = all->x0_bar + m * PHI_DIM;
-    phi_params *own_bar = all->params_bar != NULL ? all->params_bar + m : NULL;
+    phi_params *params_bar_of_m = all->params_bar != NULL ? all->params_bar + m : NULL;
     phi_solver s;
     phi_status status = phi_pull_begin(all, m, &s);
     PHI_E_BAR_FROM_ZERO
     if (status == PHI_OK)
-        status = phi_pullback(&s, all->h[m], all->steps, all->stride, rows, rows_bar, bar, own_bar PHI_AND_TO_E_BAR, all->trail);
+        status = phi_pullback(&s, all->h[m], all->steps, all->stride, rows, rows_bar, bar, params_bar_of_m PHI_AND_TO_E_BAR, all->tape);
     if (status == PHI_OK) phi_pull_level(all, m, e_bar);
     if (all->status != NULL) all->status[m] = (unsigned char)status;
     return status;

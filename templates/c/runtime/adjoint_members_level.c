@@ -6,7 +6,7 @@
 static void phi_pull_level(const phi_pulled *all, size_t m, double e_bar)
 {
     const phi_params *params = all->params != NULL ? all->params + m : NULL;
-    phi_params unused = phi_default_params, *own_bar = all->params_bar != NULL ? all->params_bar + m : &unused;
-    if (all->gauge == NULL) phi_level_bar(params, all->x0 + m * PHI_DIM, e_bar, all->x0_bar + m * PHI_DIM, own_bar);
+    phi_params unused = phi_default_params, *params_bar_of_m = all->params_bar != NULL ? all->params_bar + m : &unused;
+    if (all->gauge == NULL) phi_level_bar(params, all->x0 + m * PHI_DIM, e_bar, all->x0_bar + m * PHI_DIM, params_bar_of_m);
 }
 #endif

@@ -7,14 +7,14 @@
 /* Add the derivatives of L by the parameters, from those by the coefficients. */
 static void phi_add_by_parameters(const phi_solver *s, const phi_cotangent *bar, phi_params *params_bar PHI_AND_DOUBLE(e_bar))
 {
-    double found[sizeof(phi_params) / sizeof(double) + 1];
+    double parameter_bars[sizeof(phi_params) / sizeof(double) + 1];
     PHI_SUMS_OF_PARAMETERS
     PHI_TAKE_SUMS(sums, params_bar)
     PHI_BAR_OF_LEVEL
     for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
         PHI_KICK(k, s->h)
-        phi_prepare_adjoint(&s->params PHI_AND_GAUGE(s->gauge), phi_times[k] * s->h PHI_AND_KICK, bar->coef + k * PHI_ROW, found PHI_AND_LEVEL(level));
-        PHI_ADD_TO_SUMS(sums, found)
+        phi_prepare_adjoint(&s->params PHI_AND_GAUGE(s->gauge), phi_times[k] * s->h PHI_AND_KICK, bar->coef + k * PHI_ROW, parameter_bars PHI_AND_LEVEL(level));
+        PHI_ADD_TO_SUMS(sums, parameter_bars)
         PHI_ADD_BAR_OF_LEVEL(e_bar)
     }
     PHI_GIVE_SUMS(params_bar, sums)

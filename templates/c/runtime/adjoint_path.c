@@ -97,23 +97,23 @@ static int phi_traced_back(const double *coef, const double end[PHI_DIM], const 
    paths the mean may change by more than the end does. Returns 0 if the path cannot be followed. */
 static int phi_anchor(const double *coef, const double p[PHI_DIM], const double y[PHI_DIM], double end[PHI_DIM])
 {
-    double minus[PHI_DIM], change[PHI_DIM], mean[PHI_DIM], miss[PHI_DIM], moved[PHI_DIM], before = HUGE_VAL;
-    int made = 0;
+    double minus[PHI_DIM], change[PHI_DIM], mean[PHI_DIM], miss[PHI_DIM], shifted_end[PHI_DIM], before = HUGE_VAL;
+    int pieces_used = 0;
     for (int i = 0; i < PHI_DIM; ++i) minus[i] = -p[i];
-    memcpy(moved, end, sizeof moved);
+    memcpy(shifted_end, end, sizeof shifted_end);
     for (int round = 0; round < PHI_ANCHORED; ++round) {
         double size = 0.0, missed = 0.0;
-        if (!phi_path(coef, moved, minus, change, mean, &made)) return round > 0;
+        if (!phi_path(coef, shifted_end, minus, change, mean, &pieces_used)) return round > 0;
         for (int i = 0; i < PHI_DIM; ++i) {
-            miss[i] = y[i] - (moved[i] + mean[i]);
+            miss[i] = y[i] - (shifted_end[i] + mean[i]);
             size += fabs(y[i]);
             missed += fabs(miss[i]);
         }
         if (!(missed < before)) return 1;
         before = missed;
         for (int i = 0; i < PHI_DIM; ++i) {
-            end[i] = moved[i];
-            moved[i] += miss[i];
+            end[i] = shifted_end[i];
+            shifted_end[i] += miss[i];
         }
         if (missed <= PHI_ANCHORED_TO * size) return 1;
     }

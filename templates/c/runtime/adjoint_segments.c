@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "adjoint_abreast.c"
+#include "adjoint_batches.c"
 #include "model.h"
 
 /* The reverse pass of splittings goes from segment to segment. The tape holds the states at the starts of segments. */
@@ -15,19 +15,19 @@
 /* Make all steps and write the states at the starts of segments, except the first, to the tape. */
 static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
 {
-    double *trail = all->trail;
+    double *tape = all->tape;
     memcpy(bar->start, group->pack, sizeof bar->start);
     for (size_t done = 0; done < all->steps;) {
         const size_t to_row = all->stride - done % all->stride, to_segment = PHI_SEGMENT - done % PHI_SEGMENT;
         size_t until = to_row < to_segment ? to_row : to_segment;
         if (all->steps - done < until) until = all->steps - done;
         for (int k = 0; k < group->packs && done > 0 && done % PHI_SEGMENT == 0; ++k) {
-            memcpy(trail, group->pack[k].x, sizeof group->pack[k].x);
-            memcpy(trail + PHI_DIM * PHI_LANES, group->pack[k].carry, sizeof group->pack[k].carry);
-            trail += 2 * PHI_DIM * PHI_LANES;
+            memcpy(tape, group->pack[k].x, sizeof group->pack[k].x);
+            memcpy(tape + PHI_DIM * PHI_LANES, group->pack[k].carry, sizeof group->pack[k].carry);
+            tape += 2 * PHI_DIM * PHI_LANES;
         }
         if (!phi_pull_steps(group, (int)until, bar)) {
-            trail = all->trail;
+            tape = all->tape;
             done = 0;
             continue;
         }
@@ -40,9 +40,9 @@ static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, si
 /* Start of a segment on the tape: states, then compensation terms. */
 static const double *phi_pull_left(const phi_group *group, int k, const phi_pulled *all, size_t begin)
 {
-    return all->trail + ((begin / PHI_SEGMENT - 1) * (size_t)group->packs + (size_t)k) * 2 * PHI_DIM * PHI_LANES;
+    return all->tape + ((begin / PHI_SEGMENT - 1) * (size_t)group->packs + (size_t)k) * 2 * PHI_DIM * PHI_LANES;
 }
 
 #include "adjoint_segments_inverse.c"
-#include "adjoint_segments_again.c"
+#include "adjoint_segments_repeated.c"
 #endif

@@ -7,7 +7,7 @@
 #include "adjoint_flows.h"
 
 /* Pull a cotangent back through the flows of a run of one step, the last one first; they started at y. */
-static void phi_flows_back(const double *coef, phi_kept y, int first, int last, phi_cotangent *bar,
+static void phi_flows_back(const double *coef, phi_step_tape y, int first, int last, phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {
     for (int k = last; k >= first; --k) {
@@ -17,7 +17,7 @@ static void phi_flows_back(const double *coef, phi_kept y, int first, int last, 
 }
 
 /* Pull a cotangent back through a step whose flows started at y. */
-static phi_status phi_stage_adjoint(const double *coef, phi_kept y, phi_cotangent *bar,
+static phi_status phi_stage_adjoint(const double *coef, phi_step_tape y, phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {
     phi_flows_back(coef, y, PHI_FIRST_FLOW, PHI_LAST_FLOW, bar, coef_bar);

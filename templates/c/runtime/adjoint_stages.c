@@ -3,11 +3,11 @@
 #include "adjoint_stage.c"
 
 /* The reverse pass of a step from its tape. */
-static phi_status phi_stages_adjoint(const phi_solver *s, phi_kept trail, phi_cotangent *bar)
+static phi_status phi_stages_adjoint(const phi_solver *s, phi_step_tape tape, phi_cotangent *bar)
 {
     phi_status status = PHI_OK;
     PHI_EACH_STAGE_BACK
-        if (status == PHI_OK) status = phi_stage_adjoint(PHI_OF(s->coef, stage), PHI_OF(trail, stage), bar, PHI_OF(bar->coef, stage));
+        if (status == PHI_OK) status = phi_stage_adjoint(PHI_OF(s->coef, stage), PHI_OF(tape, stage), bar, PHI_OF(bar->coef, stage));
     return status;
 }
 #endif

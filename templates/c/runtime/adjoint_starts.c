@@ -5,12 +5,12 @@
 #include "adjoint_stage.c"
 
 /* Compute the starts of all later stages of a step from that of the first. */
-static void phi_find_starts(const phi_solver *s, phi_kept trail)
+static void phi_find_starts(const phi_solver *s, phi_step_tape tape)
 {
     double change[PHI_DIM];
     for (int stage = 1; stage < PHI_STAGES; ++stage) {
-        phi_explicit(s->coef[stage - 1], trail[stage - 1], change);
-        for (int i = 0; i < PHI_DIM; ++i) trail[stage][i] = trail[stage - 1][i] + change[i];
+        phi_explicit(s->coef[stage - 1], tape[stage - 1], change);
+        for (int i = 0; i < PHI_DIM; ++i) tape[stage][i] = tape[stage - 1][i] + change[i];
     }
 }
 #endif

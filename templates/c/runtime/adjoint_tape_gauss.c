@@ -7,15 +7,15 @@
 #define PHI_AT_ONCE ((size_t)1) /* the predictor stores the stage increments of the last step only */
 
 /* Make a step and write its tape. On failure *s is unchanged. */
-static phi_status phi_leave_few(phi_solver *s, size_t steps, phi_kept *trail)
+static phi_status phi_record_steps(phi_solver *s, size_t steps, phi_step_tape *tape)
 {
     const phi_solver before = *s;
     const phi_status status = phi_integrate(s, s->h, steps);
-    memcpy(trail[0], before.x, sizeof before.x);
+    memcpy(tape[0], before.x, sizeof before.x);
 #if PHI_FRAMED
-    memcpy(trail[0] + PHI_DIM, s->history.solved, sizeof s->history.solved);
+    memcpy(tape[0] + PHI_DIM, s->history.solved, sizeof s->history.solved);
 #else
-    memcpy(trail[0] + PHI_DIM, s->history.moves[s->history.latest], sizeof s->history.moves[0]);
+    memcpy(tape[0] + PHI_DIM, s->history.increments[s->history.latest], sizeof s->history.increments[0]);
 #endif
     if (status != PHI_OK) *s = before;
     return status;

@@ -8,11 +8,11 @@ static inline int phi_advance(phi_solver *s, const double *change, const double 
 {
     double x[PHI_DIM], carry[PHI_DIM], zero = 0.0; /* a number less itself is 0, if it is finite */
     for (int i = 0; i < PHI_DIM; ++i) { /* x is available after two additions; the others are off the critical path */
-        const double moved = change[i] + small[i], more = moved - change[i];
-        const double sum = s->x[i] + moved, added = sum - s->x[i];
+        const double total = change[i] + small[i], more = total - change[i];
+        const double sum = s->x[i] + total, added = sum - s->x[i];
         x[i] = sum;
         zero += sum - sum;
-        carry[i] = ((s->x[i] - (sum - added)) + (moved - added)) + ((change[i] - (moved - more)) + (small[i] - more));
+        carry[i] = ((s->x[i] - (sum - added)) + (total - added)) + ((change[i] - (total - more)) + (small[i] - more));
     }
     if (!(zero == 0.0)) return 0;
     /* One by one, as they are read next: a load of several numbers would wait until all have been stored. */

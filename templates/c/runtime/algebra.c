@@ -16,18 +16,18 @@ PHI_CHAPTER_OF_ALGEBRA
 
 /* Within a step, moved holds the sum of the increments so far and the compensation term; x is start + moved, rounded.
    */
-static inline void phi_add(double x[PHI_DIM], double moved[PHI_DIM], const double start[PHI_DIM], int i, double change)
+static inline void phi_add(double x[PHI_DIM], double displacement[PHI_DIM], const double start[PHI_DIM], int i, double change)
 {
-    moved[i] += change;
-    x[i] = start[i] + moved[i];
+    displacement[i] += change;
+    x[i] = start[i] + displacement[i];
 }
 
 /* At the end of a step, add moved to x in compensated arithmetic. */
-static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double moved[PHI_DIM])
+static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double displacement[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) {
-        const double sum = x[i] + moved[i], added = sum - x[i];
-        carry[i] = (x[i] - (sum - added)) + (moved[i] - added);
+        const double sum = x[i] + displacement[i], added = sum - x[i];
+        carry[i] = (x[i] - (sum - added)) + (displacement[i] - added);
         x[i] = sum;
     }
 }

@@ -23,8 +23,8 @@ static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT] PHI_AND
     phi_add_aside(s, aside, element, carry);
     PHI_ADDED_FACTOR(element, factor, change);
     for (int i = 0; i < PHI_ELEMENT; ++i) {
-        const double moved = change[i] + carry[i], sum = s->turned[i] + moved;
-        s->turned_carry[i] = moved - (sum - s->turned[i]);
+        const double total = change[i] + carry[i], sum = s->turned[i] + total;
+        s->turned_carry[i] = total - (sum - s->turned[i]);
         s->turned[i] = sum;
     }
 }
@@ -35,10 +35,10 @@ static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT] PHI_AND
 /* Replace the first increment by the product of both; all are given minus the identity. */
 static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_ELEMENT], double both[PHI_ELEMENT])
 {
-    double whole[PHI_ELEMENT], change[PHI_ELEMENT];
-    memcpy(whole, first, sizeof whole);
-    phi_add_identity(whole);
-    PHI_ADDED_FACTOR(whole, second, change);
+    double element_of_first[PHI_ELEMENT], change[PHI_ELEMENT];
+    memcpy(element_of_first, first, sizeof element_of_first);
+    phi_add_identity(element_of_first);
+    PHI_ADDED_FACTOR(element_of_first, second, change);
     for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = first[i] + change[i];
 }
 

@@ -7,9 +7,9 @@
 /* Normalise an increment, given minus 1, whose scale is arbitrary, so that the quaternion q gets length 1. */
 static inline void phi_normalise(const double q[4], double factor[4])
 {
-    const double own = (factor[0] * (2.0 + factor[0]) + factor[1] * factor[1])
+    const double factor_excess = (factor[0] * (2.0 + factor[0]) + factor[1] * factor[1])
         + (factor[2] * factor[2] + factor[3] * factor[3]);
-    const double excess = own + phi_excess(q) * (1.0 + own), length = sqrt(1.0 + excess), per = 1.0 / length;
+    const double excess = factor_excess + phi_excess(q) * (1.0 + factor_excess), length = sqrt(1.0 + excess), per = 1.0 / length;
     factor[0] = per * (factor[0] - excess / (1.0 + length));
     for (int i = 1; i < 4; ++i) factor[i] *= per;
 }

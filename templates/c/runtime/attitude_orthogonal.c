@@ -23,9 +23,9 @@ static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT
 /* Correct a nearly orthogonal matrix, given minus the identity. */
 static void phi_make_orthogonal(double element[PHI_ELEMENT])
 {
-    double whole[PHI_ELEMENT];
-    memcpy(whole, element, sizeof whole);
-    phi_add_identity(whole);
-    phi_normalise(whole, element);
+    double full_element[PHI_ELEMENT];
+    memcpy(full_element, element, sizeof full_element);
+    phi_add_identity(full_element);
+    phi_normalise(full_element, element);
 }
 #endif

@@ -58,7 +58,7 @@ phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *a
     all.first_member = first_member;
     all.first_step = first_step;
 #endif
-    all.own = 1;
+    all.per_member = 1;
     all.stride = frames != NULL || attitudes != NULL ? stride : 0;
     all.frames = frames;
     all.attitude = attitude;

@@ -29,7 +29,7 @@ static int phi_near_lanes(phi_model *model, const double last[PHI_DIM])
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane) distance[lane] += fabs(PHI_IN(model, stage, y)[i][lane] - last[i]);
         }
-        phi_keep_largest(most, distance);
+        phi_update_largest(most, distance);
     }
     return phi_largest(most) <= PHI_REACH * size;
 }
@@ -101,13 +101,13 @@ static void phi_runge_kutta(const phi_solver *s PHI_AND_DOUBLE_T, double h, doub
 }
 
 #include "blocks_adams.c"
-#include "blocks_guess.c"
+#include "blocks_prediction.c"
 
 /* Predict the solutions of all stages and steps, by recurrences or else by approximate integration. Returns 0 if they
    are not near the state. */
-static int phi_guess(phi_solver *s, phi_table *table, phi_model *model)
+static int phi_predict_block(phi_solver *s, phi_table *table, phi_model *model)
 {
-    if (!s->blocks.use_recurrences) phi_guess_by_march(s, table, model);
+    if (!s->blocks.use_recurrences) phi_predict_by_march(s, table, model);
     if (s->blocks.use_recurrences) phi_end_march(table);
     PHI_EACH_STAGE
         if (s->blocks.use_recurrences) phi_foresee(&PHI_OF(s->history, stage), PHI_OF(table->weight, stage), PHI_IN(model, stage, y));
@@ -116,7 +116,7 @@ static int phi_guess(phi_solver *s, phi_table *table, phi_model *model)
 
 #include "blocks_elapsed.c"
 
-#include "blocks_turned.c"
+#include "blocks_attitude.c"
 
 /* Make PHI_LANES steps at once: predict the solutions of all, and correct them together until the remaining error is as
    small as after a single step. Returns the number of iterations, or 0, with the solver unchanged, if it exceeds most.
@@ -128,7 +128,7 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
     double x[PHI_DIM], carry[PHI_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     PHI_TURN_OF_BLOCK
-    if (!phi_guess(s, table, PHI_ADDRESS(model))) return 0;
+    if (!phi_predict_block(s, table, PHI_ADDRESS(model))) return 0;
     for (int lane = 0; lane < PHI_LANES; ++lane) size[lane] = HUGE_VAL;
     while (!solved) {
         const int matrices = previous > PHI_FROZEN;
@@ -183,7 +183,7 @@ static void phi_give_up(phi_solver *s)
 
 /* Choose the predictor of the next block: recurrences, fitted as soon as the steps to come, or those already made, are
    enough to repay the fit. */
-static void phi_choose_guess(phi_solver *s, size_t steps)
+static void phi_choose_predictor(phi_solver *s, size_t steps)
 {
     PHI_EACH_STAGE
         if (PHI_OF(s->history, stage).count < PHI_REMEMBERED) {
@@ -235,7 +235,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     PHI_EACH_STAGE PHI_OF(table.fits, stage) = -1;
     phi_end_march(&table);
     while (status == PHI_OK && steps > 0) {
-        if (steps >= PHI_LANES && s->blocks.single_steps == 0) phi_choose_guess(s, steps);
+        if (steps >= PHI_LANES && s->blocks.single_steps == 0) phi_choose_predictor(s, steps);
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) {
             PHI_EACH_STAGE phi_refresh(s PHI_AND_STAGE, &table);
             phi_renew_lanes(s, &table);

@@ -94,7 +94,7 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI
 }
 
 /* Increment of the exact motion over one stage, in all lanes. */
-static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lanes moved[PHI_DIM])
+static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lanes predicted[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) {
         phi_lanes sum = { 0.0 };
@@ -103,19 +103,19 @@ static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lan
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane) sum[lane] += part * from[lane];
         }
-        memcpy(moved[i], sum, sizeof sum);
+        memcpy(predicted[i], sum, sizeof sum);
     }
 }
 
 /* Start the iteration of a stage at its begin plus half of the increment of the exact motion, minus the expected error
    of that. */
-static void phi_begin_stage(phi_model *model, phi_lanes begin[restrict PHI_DIM], phi_lanes moved[restrict PHI_DIM],
+static void phi_begin_stage(phi_model *model, phi_lanes begin[restrict PHI_DIM], phi_lanes predicted[restrict PHI_DIM],
     phi_lanes missed[restrict PHI_DIM], double part)
 {
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane)
-            model->y[i][lane] = begin[i][lane] + (0.5 * moved[i][lane] - part * missed[i][lane]);
+            model->y[i][lane] = begin[i][lane] + (0.5 * predicted[i][lane] - part * missed[i][lane]);
     }
 }
 
@@ -132,22 +132,22 @@ static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin
 /* Predictor without recurrences. From the approximate starts of all steps, each lane iterates the stages of its own
    step. The error of half the exact increment is of third order in the size of a stage where y is the mean of its ends,
    else of second order; its factor is fitted to the stages before. */
-static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_model *model)
+static void phi_predict_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
-    phi_lanes begin[PHI_DIM], moved[PHI_DIM], missed[PHI_DIM];
+    phi_lanes begin[PHI_DIM], predicted[PHI_DIM], missed[PHI_DIM];
     double weight = 0.0;
     phi_march(s, table, begin);
     memset(missed, 0, sizeof missed);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_model *this_stage = model + stage;
         const double power = PHI_POWER_OF_STAGE(phi_fractions[stage]);
-        phi_travel(s, table, stage, moved);
-        phi_begin_stage(this_stage, begin, moved, missed, stage > 0 ? power / weight : 0.0);
+        phi_travel(s, table, stage, predicted);
+        phi_begin_stage(this_stage, begin, predicted, missed, stage > 0 ? power / weight : 0.0);
         for (int meeting = stage > 0; meeting <= PHI_MEETINGS; ++meeting) phi_meet(table->coef[stage], this_stage, begin);
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane) {
-                const double miss = this_stage->displacement[i][lane] + 0.5 * moved[i][lane];
+                const double miss = this_stage->displacement[i][lane] + 0.5 * predicted[i][lane];
                 missed[i][lane] = PHI_FADING * missed[i][lane] + power * miss;
                 begin[i][lane] += this_stage->increment[i][lane];
             }

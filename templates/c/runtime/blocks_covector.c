@@ -11,10 +11,10 @@ static void phi_matrix_exponential_lanes(phi_lanes p[PHI_COVECTOR], phi_lanes el
         return;
     }
     for (int lane = 0; lane < PHI_LANES; ++lane) {
-        double one[PHI_COVECTOR], made[PHI_ELEMENT];
+        double one[PHI_COVECTOR], exponential[PHI_ELEMENT];
         for (int i = 0; i < PHI_COVECTOR; ++i) one[i] = p[i][lane];
-        phi_matrix_exponential(one, made);
-        for (int i = 0; i < PHI_ELEMENT; ++i) element[i][lane] = made[i];
+        phi_matrix_exponential(one, exponential);
+        for (int i = 0; i < PHI_ELEMENT; ++i) element[i][lane] = exponential[i];
     }
 }
 

@@ -47,8 +47,8 @@ static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double
         for (int i = 0; i < PHI_DIM; ++i) {
             const double change = PHI_IN(model, stage, increment)[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (PHI_IN(model, next, displacement)[i][after] - PHI_IN(model, stage, displacement)[i][lane]) - change;
-            const double moved = (PHI_IN(model, next, y)[i][after] - PHI_IN(model, stage, y)[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            const double y_change = (PHI_IN(model, next, y)[i][after] - PHI_IN(model, stage, y)[i][lane]) + turn;
+            residual[i] = ((y_change + residual[i]) + odd[i]) + even[i];
             small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
@@ -63,7 +63,7 @@ static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double
     memset(most, 0, PHI_LANES * sizeof most[0]);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_correct(model + stage, unit, size);
-        phi_keep_largest(most, size);
+        phi_update_largest(most, size);
     }
 #else
     phi_correct(model, unit, most);

@@ -117,17 +117,17 @@ static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DI
             }
         }
         phi_take(this_stage, delta, unit, size);
-        phi_keep_largest(most, size);
+        phi_update_largest(most, size);
     }
     for (int i = 0; i < PHI_DIM; ++i) {
-        double whole = x[i], rest = carry[i];
+        double rounded = x[i], rest = carry[i];
         for (int lane = 0; lane < PHI_LANES; ++lane) {
-            const double total = whole + sum[i][lane], added = total - whole;
-            rest += ((whole - (total - added)) + (sum[i][lane] - added)) + small[i][lane];
-            whole = total;
+            const double total = rounded + sum[i][lane], added = total - rounded;
+            rest += ((rounded - (total - added)) + (sum[i][lane] - added)) + small[i][lane];
+            rounded = total;
         }
-        x[i] = whole + rest;
-        carry[i] = rest - (x[i] - whole);
+        x[i] = rounded + rest;
+        carry[i] = rest - (x[i] - rounded);
     }
 }
 #endif

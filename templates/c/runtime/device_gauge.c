@@ -5,10 +5,10 @@
 #include "level.c"
 
 /* Gauge of a member; for NULL the gauge chosen at its initial state. */
-static void phi_gauge_of(const phi_params *params, const double x0[PHI_DIM], PHI_GLOBAL const double *given,
+static void phi_gauge_of(const phi_params *params, const double x0[PHI_DIM], PHI_GLOBAL const double *gauge_of_member,
     double gauge[PHI_GAUGES])
 {
-    if (given == NULL) phi_choose_gauge(params, x0, gauge);
-    for (int k = 0; k < PHI_GAUGES && given != NULL; ++k) gauge[k] = given[k];
+    if (gauge_of_member == NULL) phi_choose_gauge(params, x0, gauge);
+    for (int k = 0; k < PHI_GAUGES && gauge_of_member != NULL; ++k) gauge[k] = gauge_of_member[k];
 }
 #endif

@@ -4,7 +4,7 @@
 
 #include "model.h"
 #include "group_run.c"
-#include "packs.c"
+#include "batches.c"
 #include "members.c"
 #include "solver.c"
 #include "attitudes.c"
@@ -152,7 +152,7 @@ phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members
 #if PHI_GAUGE
     all.gauge = gauge;
 #endif
-    all.own = 1;
+    all.per_member = 1;
     all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     return phi_run(&all);

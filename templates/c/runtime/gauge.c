@@ -60,11 +60,11 @@ static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
 static double phi_least_on_line(const phi_params *params, const double gauge[PHI_GAUGES], int c, double width,
     double samples[][PHI_DIM])
 {
-    double moved[PHI_GAUGES], difference[PHI_DEGREE + 1], size = 0.0, best = 0.0, mesh = PHI_MESH;
-    memcpy(moved, gauge, sizeof moved);
+    double changed[PHI_GAUGES], difference[PHI_DEGREE + 1], size = 0.0, best = 0.0, mesh = PHI_MESH;
+    memcpy(changed, gauge, sizeof changed);
     for (int j = 0; j <= PHI_DEGREE; ++j) {
-        moved[c] = gauge[c] + (j - PHI_DEGREE / 2) * width;
-        difference[j] = phi_gauge_error(params, moved, samples);
+        changed[c] = gauge[c] + (j - PHI_DEGREE / 2) * width;
+        difference[j] = phi_gauge_error(params, changed, samples);
         size += difference[j];
     }
     for (int order = 1; order <= PHI_DEGREE; ++order)
@@ -99,12 +99,12 @@ static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], 
         gauge[c] = sums[1 + 2 * c] / norm;
         width[c] = sqrt(sums[0] / norm);
     }
-    for (int sweep = 0, moved = 1; sweep < PHI_SWEEPS && moved; ++sweep) {
-        moved = 0;
+    for (int sweep = 0, changed = 1; sweep < PHI_SWEEPS && changed; ++sweep) {
+        changed = 0;
         for (int c = 0; c < PHI_GAUGES; ++c) {
             const double best = phi_least_on_line(params, gauge, c, width[c], samples);
             gauge[c] += best * width[c];
-            moved = moved || best != 0.0;
+            changed = changed || best != 0.0;
         }
     }
     if (!isfinite(phi_gauge_error(params, gauge, samples))) memset(gauge, 0, PHI_GAUGES * sizeof gauge[0]);

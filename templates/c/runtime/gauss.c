@@ -30,22 +30,22 @@ static void phi_start(const phi_solver *s, double point[PHI_POINT])
 }
 
 /* Sum of the increments of all stages. */
-static void phi_end(phi_lanes *moves, double end[PHI_UNKNOWNS])
+static void phi_end(phi_lanes *increments, double end[PHI_UNKNOWNS])
 {
-    for (int k = 0; k < PHI_UNKNOWNS; ++k) end[k] = phi_total(moves[k]);
+    for (int k = 0; k < PHI_UNKNOWNS; ++k) end[k] = phi_total(increments[k]);
 }
 
 /* h b_j times the vector field at each stage, for unknowns z; the weights are h b_j. */
-static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z, phi_lanes *moves)
+static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z, phi_lanes *increments)
 {
 #if PHI_STAGED
-    phi_stage_field_lanes(s->coef, point, z, weights, moves);
+    phi_stage_field_lanes(s->coef, point, z, weights, increments);
 #else
-    double at[PHI_UNKNOWNS], move[PHI_UNKNOWNS];
+    double at[PHI_UNKNOWNS], increment[PHI_UNKNOWNS];
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_UNKNOWNS; ++k) at[k] = z[k][i];
-        phi_stage_field(s->coef, point, at, &weights[0][i], move);
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) moves[k][i] = move[k];
+        phi_stage_field(s->coef, point, at, &weights[0][i], increment);
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) increments[k][i] = increment[k];
     }
 #endif
 }
@@ -75,16 +75,16 @@ static void phi_factors_at(double fraction, double factor[PHI_NODES])
 }
 
 #include "gauss_reduced.c"
-#include "gauss_whole.c"
+#include "gauss_all_unknowns.c"
 
 /* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
-static double phi_scale(const double x[PHI_DIM], phi_lanes *moves)
+static double phi_scale(const double x[PHI_DIM], phi_lanes *increments)
 {
     double square = DBL_MIN;
     for (int i = 0; i < PHI_DIM; ++i) square += x[i] * x[i];
     if (square <= DBL_MIN)
         for (int k = 0; k < PHI_PLAIN && k < PHI_ITERATED; ++k)
-            for (int i = 0; i < PHI_NODES; ++i) square += moves[k][i] * moves[k][i];
+            for (int i = 0; i < PHI_NODES; ++i) square += increments[k][i] * increments[k][i];
     return 1.0 / square;
 }
 
@@ -107,7 +107,7 @@ static inline double phi_change_of(double scale, int count, phi_lanes *before, p
 /* What sweeps read, as a predictor derives it from the increments of the last steps. */
 static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads[PHI_READS])
 {
-    double(*last)[PHI_WIDTH] = past->moves[past->latest], (*older)[PHI_WIDTH] = past->moves[1 - past->latest];
+    double(*last)[PHI_WIDTH] = past->increments[past->latest], (*older)[PHI_WIDTH] = past->increments[1 - past->latest];
     if (predictor + 1 < PHI_PREDICTORS)
         for (int r = 0; r < PHI_READS; ++r) phi_mix_twice(phi_prediction[predictor], last[PHI_READ(r)], older[PHI_READ(r)], reads[r]);
     else /* the last one reads the last step only */
@@ -135,31 +135,31 @@ static int phi_best_predictor(phi_history *past, double scale, phi_lanes *reads)
 /* The values of the unknowns that the predictor derives from the moves of the last step. */
 static void phi_predict(phi_history *past, int predictor, phi_lanes *z)
 {
-    phi_mixed(phi_prediction[predictor], past->moves[past->latest], z);
+    phi_mixed(phi_prediction[predictor], past->increments[past->latest], z);
 }
 
 #endif
 #if PHI_FRAMED
 /* Stage increments in the frame of the end of a step, where the next step starts. */
-static void phi_see(const phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *moves, double seen[PHI_UNKNOWNS][PHI_WIDTH])
+static void phi_to_next_frame(const phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *increments, double in_next_frame[PHI_UNKNOWNS][PHI_WIDTH])
 {
 #if PHI_STAGED
-    phi_lanes turned[PHI_UNKNOWNS];
-    phi_next_frame_lanes(s->coef, end, moves, turned);
-    memcpy(seen, turned, sizeof turned); /* may be unaligned */
+    phi_lanes in_frame[PHI_UNKNOWNS];
+    phi_next_frame_lanes(s->coef, end, increments, in_frame);
+    memcpy(in_next_frame, in_frame, sizeof in_frame); /* may be unaligned */
 #else
-    double move[PHI_UNKNOWNS], turned[PHI_UNKNOWNS];
+    double increment[PHI_UNKNOWNS], in_frame[PHI_UNKNOWNS];
     for (int i = 0; i < PHI_NODES; ++i) {
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) move[k] = moves[k][i];
-        phi_next_frame(s->coef, end, move, turned);
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) seen[k][i] = turned[k];
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) increment[k] = increments[k][i];
+        phi_next_frame(s->coef, end, increment, in_frame);
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) in_next_frame[k][i] = in_frame[k];
     }
 #endif
 }
 
 #endif
 /* Store the stage increments of a step with this end, to predict the next step. */
-static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *moves)
+static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *increments)
 {
     phi_history *past = &s->history;
     const int older = past->latest, latest = PHI_EARLIER - 1 - older;
@@ -169,16 +169,16 @@ static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lane
 #if PHI_FRAMED
 #if PHI_STAGED
     phi_lanes last[PHI_UNKNOWNS];
-    memcpy(last, past->moves[older], sizeof last);
-    phi_see(s, end, last, past->moves[older]);
+    memcpy(last, past->increments[older], sizeof last);
+    phi_to_next_frame(s, end, last, past->increments[older]);
 #endif
-    phi_see(s, end, moves, past->moves[latest]);
+    phi_to_next_frame(s, end, increments, past->increments[latest]);
 #if PHI_ADJOINT
-    PHI_COPY_STAGES(past->solved, moves, past->solved);
+    PHI_COPY_STAGES(past->solved, increments, past->solved);
 #endif
 #else
     (void)end;
-    PHI_COPY_STAGES(past->moves[latest], moves, past->moves[latest]);
+    PHI_COPY_STAGES(past->increments[latest], increments, past->increments[latest]);
 #endif
     past->latest = latest;
     if (past->count < PHI_EARLIER) ++past->count;
@@ -212,11 +212,11 @@ static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep,
 
 /* Solve for the increments of all stages by fixed-point sweeps, starting from the prediction. Changes are measured only
    from the sweep on that is expected to be the last. */
-static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lanes *moves)
+static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lanes *increments)
 {
     phi_history *past = &s->history;
     phi_lanes z[PHI_READS], apart[PHI_ITERATED], next[PHI_ITERATED], factors[PHI_FACTORS] = { { 0.0 } };
-    phi_lanes *now = phi_iterates(moves, apart);
+    phi_lanes *now = phi_iterates(increments, apart);
     phi_progress progress = { HUGE_VAL, 0, 0 };
     phi_set_factors(s->h, factors);
     if (past->count == 0 || PHI_DIFFERS(s->h, past->h)) {
@@ -246,7 +246,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
                 if (past->count == PHI_EARLIER && past->age++ % PHI_TRIALS == 0) past->predictor = phi_best_predictor(past, scale, z);
 #endif
                 s->evaluations += (size_t)sweep;
-                phi_complete_stages(s, point, factors, now, z, moves);
+                phi_complete_stages(s, point, factors, now, z, increments);
                 return PHI_OK;
             }
         }
@@ -257,12 +257,12 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
 
 #if PHI_MONITOR
 /* Physical time of a step: the integral of dt/dtau over its stages. */
-static double phi_time_of(const phi_solver *s, double point[PHI_POINT], phi_lanes *moves)
+static double phi_time_of(const phi_solver *s, double point[PHI_POINT], phi_lanes *increments)
 {
     double sum = 0.0;
     phi_lanes z[PHI_UNKNOWNS], weights[1] = { { 0.0 } };
     for (int i = 0; i < PHI_NODES; ++i) weights[0][i] = s->h * phi_weights[i];
-    phi_mixed(phi_mixing, moves, z);
+    phi_mixed(phi_mixing, increments, z);
 #if PHI_STAGED
     phi_lanes elapsed[1];
     phi_elapsed_lanes(s->coef, point, z, weights, elapsed);
@@ -283,20 +283,20 @@ static double phi_time_of(const phi_solver *s, double point[PHI_POINT], phi_lane
 static phi_status phi_attempt(phi_solver *s)
 {
     double point[PHI_POINT], end[PHI_UNKNOWNS], change[PHI_DIM];
-    phi_lanes moves[PHI_UNKNOWNS];
+    phi_lanes increments[PHI_UNKNOWNS];
     phi_start(s, point);
-    const phi_status status = phi_collocate(s, point, moves);
+    const phi_status status = phi_collocate(s, point, increments);
     if (status != PHI_OK) return status;
-    phi_end(moves, end);
-    phi_end_followers(s, point, moves, end);
+    phi_end(increments, end);
+    phi_end_followers(s, point, increments, end);
     phi_stage_change(s->coef, point, end, change);
 #if PHI_MONITOR
-    const double elapsed = phi_time_of(s, point, moves);
+    const double elapsed = phi_time_of(s, point, increments);
     if (!(elapsed * s->h > 0.0)) return PHI_NOT_FINITE;
 #endif
     if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
     PHI_PASS(s, elapsed)
-    phi_remember(s, end, moves);
+    phi_remember(s, end, increments);
 #if PHI_ATTITUDE
     double factor[PHI_ELEMENT];
     phi_turn(s->coef, end, factor);

@@ -21,7 +21,7 @@ typedef phi_lanes phi_batch[PHI_NODES][PHI_UNKNOWNS];
 typedef struct {
     phi_lanes x[PHI_DIM], carry[PHI_DIM], coef[PHI_COEFFICIENTS];
     phi_lanes weights[PHI_NODES][1]; /* h b_j */
-    phi_batch moves[PHI_EARLIER];    /* stage increments of the last steps, in the frame of the end of the last one */
+    phi_batch increments[PHI_EARLIER];    /* stage increments of the last steps, in the frame of the end of the last one */
     int latest;    /* index of the last step in moves */
     int count;     /* steps in moves */
     int predictor; /* number of the predictor */
@@ -36,9 +36,9 @@ typedef struct {
 static void phi_group_predict(phi_group *group, int predictor, int i, phi_lanes z[PHI_UNKNOWNS])
 {
     phi_lanes older[PHI_UNKNOWNS];
-    phi_mix_members(phi_prediction[predictor], i, group->moves[group->latest], z);
+    phi_mix_members(phi_prediction[predictor], i, group->increments[group->latest], z);
     if (predictor + 1 == PHI_PREDICTORS) return; /* the last predictor reads one step */
-    phi_mix_members(phi_prediction[predictor] + PHI_NODES, i, group->moves[1 - group->latest], older);
+    phi_mix_members(phi_prediction[predictor] + PHI_NODES, i, group->increments[1 - group->latest], older);
     for (int k = 0; k < PHI_UNKNOWNS; ++k) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) z[k][lane] += older[k][lane];
@@ -171,13 +171,13 @@ static void phi_group_remember(phi_group *group, phi_lanes end[PHI_UNKNOWNS], ph
 #if PHI_FRAMED
     phi_lanes last[PHI_UNKNOWNS];
     for (int i = 0; i < PHI_NODES; ++i) {
-        memcpy(last, group->moves[older][i], sizeof last);
-        phi_member_frame_lanes(group->coef, end, last, group->moves[older][i]);
-        phi_member_frame_lanes(group->coef, end, now[i], group->moves[latest][i]);
+        memcpy(last, group->increments[older][i], sizeof last);
+        phi_member_frame_lanes(group->coef, end, last, group->increments[older][i]);
+        phi_member_frame_lanes(group->coef, end, now[i], group->increments[latest][i]);
     }
 #else
     (void)end;
-    memcpy(group->moves[latest], now, sizeof(phi_batch));
+    memcpy(group->increments[latest], now, sizeof(phi_batch));
 #endif
     group->latest = latest;
     if (group->count < PHI_EARLIER) ++group->count;
@@ -192,11 +192,11 @@ static void phi_group_advance(phi_group *group, phi_lanes change[PHI_DIM])
         const double *was = group->x[i], *small = group->carry[i], *by = change[i];
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
-            const double moved = by[lane] + small[lane], more = moved - by[lane];
-            const double sum = was[lane] + moved, added = sum - was[lane];
+            const double total = by[lane] + small[lane], more = total - by[lane];
+            const double sum = was[lane] + total, added = sum - was[lane];
             x[i][lane] = sum;
             zero[lane] += sum - sum; /* a number less itself is 0, if it is finite */
-            carry[i][lane] = ((was[lane] - (sum - added)) + (moved - added)) + ((by[lane] - (moved - more)) + (small[lane] - more));
+            carry[i][lane] = ((was[lane] - (sum - added)) + (total - added)) + ((by[lane] - (total - more)) + (small[lane] - more));
         }
     }
     for (int lane = 0; lane < PHI_LANES; ++lane) group->active[lane] = group->active[lane] && zero[lane] == 0.0;

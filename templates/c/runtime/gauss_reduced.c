@@ -14,9 +14,9 @@ static inline void phi_set_factors(double h, phi_lanes factors[PHI_FACTORS])
 }
 
 /* The array that sweeps write: increments of the iterated unknowns. */
-static inline phi_lanes *phi_iterates(phi_lanes *moves, phi_lanes *apart)
+static inline phi_lanes *phi_iterates(phi_lanes *increments, phi_lanes *apart)
 {
-    (void)moves;
+    (void)increments;
     return apart;
 }
 
@@ -34,26 +34,26 @@ static inline void phi_read(phi_lanes *now, phi_lanes *reads)
 
 /* The increments of all unknowns, by those of the iterated ones and what the last sweep read. */
 static void phi_complete_stages(const phi_solver *s, double point[PHI_POINT], phi_lanes *factors, phi_lanes *now, phi_lanes *reads,
-    phi_lanes *moves)
+    phi_lanes *increments)
 {
     phi_lanes z[PHI_UNKNOWNS], offsets[PHI_FOLLOWERS];
     PHI_CLEAR_STAGES(z);
     phi_followers_lanes(s->coef, point, reads, factors + 1, offsets);
     for (int r = 0; r < PHI_ITERATED; ++r) phi_mix(phi_mixing, now[r], z[phi_iterated[r]]);
     for (int r = 0; r < PHI_FOLLOWERS; ++r) memcpy(z[phi_followed[r]], offsets[r], sizeof z[0]);
-    phi_slopes(s, point, factors, z, moves);
-    for (int r = 0; r < PHI_ITERATED; ++r) memcpy(moves[phi_iterated[r]], now[r], sizeof z[0]);
+    phi_slopes(s, point, factors, z, increments);
+    for (int r = 0; r < PHI_ITERATED; ++r) memcpy(increments[phi_iterated[r]], now[r], sizeof z[0]);
 }
 
 /* The ends of unknowns that follow from others: with the factors 1 - c_j of the increments the step is symplectic. */
-static void phi_end_followers(const phi_solver *s, double point[PHI_POINT], phi_lanes *moves, double end[PHI_UNKNOWNS])
+static void phi_end_followers(const phi_solver *s, double point[PHI_POINT], phi_lanes *increments, double end[PHI_UNKNOWNS])
 {
     double reads[PHI_READS], offsets[PHI_FOLLOWERS], time[2] = { 1.0, s->h };
     for (int r = 0; r < PHI_READS; ++r) {
-        const double *move = moves[PHI_READ(r)];
+        const double *increment = increments[PHI_READ(r)];
         phi_lanes rest;
         PHI_EACH_LANE
-        for (int lane = 0; lane < PHI_WIDTH; ++lane) rest[lane] = (1.0 - phi_stage_times[lane]) * move[lane];
+        for (int lane = 0; lane < PHI_WIDTH; ++lane) rest[lane] = (1.0 - phi_stage_times[lane]) * increment[lane];
         reads[r] = phi_total(rest);
     }
     phi_followers(s->coef, point, reads, time, offsets);

@@ -37,16 +37,16 @@ static int phi_connected(const phi_bonds *bonds, size_t sites)
 }
 
 /* Greedy colouring: each site takes the first colour that none of its earlier neighbours has. */
-static void phi_colour(phi_solver *s, int *taken)
+static void phi_colour(phi_solver *s, int *used_by)
 {
     const int sites = (int)s->sites;
     s->colour_count = 2;
-    for (int i = 0; i < sites; ++i) taken[i] = -1;
+    for (int i = 0; i < sites; ++i) used_by[i] = -1;
     for (int i = 0; i < sites; ++i) {
         for (int k = s->bonds[i]; k < s->bonds[i + 1]; ++k)
-            if (s->other[k] < i) taken[s->colours[s->other[k]]] = i;
+            if (s->other[k] < i) used_by[s->colours[s->other[k]]] = i;
         int colour = 0;
-        while (taken[colour] == i) ++colour;
+        while (used_by[colour] == i) ++colour;
         s->colours[i] = colour;
         if (colour >= s->colour_count) s->colour_count = colour + 1;
     }

@@ -118,19 +118,19 @@ static void phi_group_fit(phi_group *group)
     const int helped = group->fits == 0 || PHI_OF(group->use_recurrences, 0);
     member.count = PHI_REMEMBERED;
     PHI_EACH_STAGE {
-        int found = 1;
+        int fitted = 1;
         PHI_OF(group->recurrence_terms, stage) = 0;
         for (int lane = 0; lane < PHI_LANES; ++lane)
-            for (int i = 0; i < PHI_DIM && group->active[lane] && found; ++i) {
+            for (int i = 0; i < PHI_DIM && group->active[lane] && fitted; ++i) {
                 for (int k = 0; k < PHI_REMEMBERED; ++k)
                     member.past[PHI_REMEMBERED - 1 - k][i] = phi_group_past(group PHI_AND_STAGE, k)[i][lane];
                 const int terms = phi_train(&member, i);
-                found = terms > 0;
+                fitted = terms > 0;
                 if (terms > PHI_OF(group->recurrence_terms, stage)) PHI_OF(group->recurrence_terms, stage) = terms;
                 for (int k = 0; k < PHI_WINDOW; ++k) PHI_OF(group->weight, stage)[k][i][lane] = member.weight[k][i][0];
             }
-        if (!found) PHI_OF(group->recurrence_terms, stage) = 0;
-        PHI_OF(group->use_recurrences, stage) = found;
+        if (!fitted) PHI_OF(group->recurrence_terms, stage) = 0;
+        PHI_OF(group->use_recurrences, stage) = fitted;
     }
     ++group->fits;
     group->slow_steps = 0;
@@ -228,16 +228,16 @@ static void phi_group_advance(phi_lanes x[restrict PHI_DIM], phi_lanes carry[res
 static int phi_group_leave(phi_group *group, phi_lanes x[PHI_DIM], phi_lanes carry[PHI_DIM],
     size_t remaining)
 {
-    phi_lanes moved = { 0.0 }, size = { 0.0 }, bad;
+    phi_lanes distance = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            distance[lane] += fabs(group->x[i][lane] - x[i][lane]);
             size[lane] += fabs(x[i][lane]);
         }
     }
-    for (int lane = 0; lane < PHI_LANES; ++lane) bad[lane] = moved[lane] <= PHI_REACH * size[lane] ? 0.0 : 1.0;
+    for (int lane = 0; lane < PHI_LANES; ++lane) bad[lane] = distance[lane] <= PHI_REACH * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < PHI_LANES; ++lane) active += group->active[lane];
     if (active == PHI_LANES && !(phi_largest(bad) > 0.0)) return active;
     active = 0;

@@ -13,7 +13,7 @@ typedef struct {
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
     int kicked;    /* whether the state was changed since the last step */
     double h;      /* size of the last step */
-    double moves[PHI_EARLIER][PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last steps, in the frame of the end of the last one */
+    double increments[PHI_EARLIER][PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last steps, in the frame of the end of the last one */
 #if PHI_FRAMED && PHI_ADJOINT
     double solved[PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last step in the frame of its start, for the tape */
 #endif

@@ -1,6 +1,6 @@
 #ifndef PHI_FILE_HISTORY_RECURRENCES_H
 #define PHI_FILE_HISTORY_RECURRENCES_H
-enum { PHI_KEPT = 2 * PHI_REMEMBERED };
+enum { PHI_STORED_VALUES = 2 * PHI_REMEMBERED };
 
 /* Predictor: recent solutions of the implicit equation, from which the starting value of the next iteration follows by
    extrapolation, or by a linear recurrence fitted to the last PHI_REMEMBERED solutions. It affects the speed only. */
@@ -12,7 +12,7 @@ typedef struct {
     int fits;                        /* number of fits so far */
     int slow_steps;                  /* recent steps that took more than one iteration */
     int slow_steps_allowed;          /* value of slow_steps at which the recurrence is fitted again */
-    double past[PHI_KEPT][PHI_DIM]; /* solutions, the latest last */
+    double past[PHI_STORED_VALUES][PHI_DIM]; /* solutions, the latest last */
     double weight[PHI_WINDOW][PHI_DIM][PHI_AHEAD]; /* factors of past solutions, the latest first, for the next ones */
 } phi_history;
 #endif

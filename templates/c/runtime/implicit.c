@@ -14,12 +14,12 @@
    energy, and unrelated to the motion. */
 static int phi_plausible(const phi_solver *s PHI_AND_INT_STAGE, const double increment[PHI_DIM])
 {
-    double moved = 0.0, size = 0.0, field[PHI_DIM], point[PHI_DIM], H[3];
+    double distance = 0.0, size = 0.0, field[PHI_DIM], point[PHI_DIM], H[3];
     for (int i = 0; i < PHI_DIM; ++i) {
-        moved += fabs(increment[i]);
+        distance += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= PHI_PLAUSIBLE * size) return 1;
+    if (distance <= PHI_PLAUSIBLE * size) return 1;
     phi_vector_field(&s->params PHI_AND_T(s->t), s->x, field);
 #if PHI_MONITOR
     const double rate = phi_monitor(&s->params, s->x);
@@ -32,7 +32,7 @@ static int phi_plausible(const phi_solver *s PHI_AND_INT_STAGE, const double inc
     phi_noise_fields(&s->params PHI_AND_T(s->t), s->x, fields);
     for (int k = 0; k < PHI_SOURCES * PHI_DIM; ++k) size += fabs(s->dw[k / PHI_DIM] * fields[k]);
 #endif
-    if (moved <= PHI_PLAUSIBLE * size) return 1;
+    if (distance <= PHI_PLAUSIBLE * size) return 1;
     for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
         for (int i = 0; i < PHI_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = phi_hamiltonian(&s->params PHI_AND_T(s->t), point);

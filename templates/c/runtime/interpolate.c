@@ -13,7 +13,7 @@ phi_status phi_interpolate(const phi_solver *s, const double *fraction, size_t c
         phi_factors_at(fraction[row], factor);
         for (int k = 0; k < PHI_UNKNOWNS; ++k) {
             z[k] = 0.0;
-            for (int j = 0; j < PHI_NODES; ++j) z[k] += factor[j] * s->history.moves[s->history.latest][k][j];
+            for (int j = 0; j < PHI_NODES; ++j) z[k] += factor[j] * s->history.increments[s->history.latest][k][j];
         }
         phi_stage_change(s->coef, point, z, change);
         for (int i = 0; i < PHI_DIM; ++i) x[row * PHI_DIM + (size_t)i] = s->x[i] + change[i];

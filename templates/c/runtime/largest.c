@@ -20,7 +20,7 @@ static double phi_largest(const phi_lanes size)
 #if PHI_BLOCKS
 
 /* Replace each lane of most by the larger value, in the same order. */
-static void phi_keep_largest(phi_lanes most, const phi_lanes size)
+static void phi_update_largest(phi_lanes most, const phi_lanes size)
 {
     uint64_t bits[PHI_LANES], bits_of_most[PHI_LANES];
     memcpy(bits, size, sizeof bits);

@@ -97,12 +97,12 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL PHI_OR_NO_T0) return PHI_BAD_ARGUMENT;
-    const phi_params own = params != NULL ? *params : phi_default_params;
+    const phi_params solver_params = params != NULL ? *params : phi_default_params;
     const size_t rows = phi_shape(sizes, &width), length = sizes[PHI_LAST_AXIS], sites = rows * length;
-    if (rows == 0 PHI_OR_UNCONNECTED(sites) || !phi_finite(x0, PHI_DIM * sites) || !phi_allowed(&own, sites PHI_AND_BONDS))
+    if (rows == 0 PHI_OR_UNCONNECTED(sites) || !phi_finite(x0, PHI_DIM * sites) || !phi_allowed(&solver_params, sites PHI_AND_BONDS))
         return PHI_BAD_ARGUMENT;
     double coef[PHI_COEFFICIENTS] = { 0.0 };
-    phi_prepare_step(&own, PHI_PROBE_STEP, coef);
+    phi_prepare_step(&solver_params, PHI_PROBE_STEP, coef);
     if (!phi_finite(coef, PHI_COEFFICIENTS)) return PHI_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -111,7 +111,7 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
     s->length = (ptrdiff_t)length;
     s->width = width;
     PHI_TAKE_T0
-    s->params = own;
+    s->params = solver_params;
     phi_find_seams(s);
     double *memory = PHI_FIRST_SITE((double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64));
     const size_t block = phi_block(rows, width);
@@ -122,8 +122,8 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->x[k], x0 + k * sites);
     phi_clear_carry(s);
     phi_put_kinds(s);
-    phi_put_parameters(s, &own);
-    phi_put_at_bonds(s, &own);
+    phi_put_parameters(s, &solver_params);
+    phi_put_at_bonds(s, &solver_params);
 #if PHI_MONITOR
     memset(s->clock, 0, 4 * sizeof *s->clock);
     if (!phi_take_level(s)) return PHI_BAD_ARGUMENT;

@@ -4,7 +4,7 @@
 #include "phrases.h"
 #include "status.h"
 
-#include "lattice_guess.h"
+#include "lattice_predictor.h"
 
 /* A solver, initialised by phi_init. Its arrays lie in memory of the caller: a copy of the struct is no independent solver.
    A field lies in rows, all sites along the last axis, with a halo where steps read other sites: copies of the other end

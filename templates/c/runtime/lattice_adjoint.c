@@ -7,7 +7,7 @@
 #include "lattice.h"
 #include "model.h"
 #include "rows.c"
-#include "lattice_trail.c"
+#include "lattice_checkpoints.c"
 #include "lattice_adjoint_stages.c"
 #include "lattice_adjoint_flows.c"
 
@@ -31,14 +31,14 @@ static void phi_add_parameters(const phi_solver *s, const phi_transpose *g, cons
 {
 #if PHI_NUMBERED
     for (int row = 0; row < PHI_ROWS_OF_FLOWS; ++row) {
-        double found[PHI_NUMBERS] = { 0.0 };
+        double parameter_bars[PHI_NUMBERS] = { 0.0 };
 #if PHI_KICKS
         const double kick[1] = { phi_multiples[row] * (s->h * s->h) };
-        phi_prepare_adjoint(&s->params, phi_times[row] * s->h, kick, coef_bar + row * PHI_ROW, found);
+        phi_prepare_adjoint(&s->params, phi_times[row] * s->h, kick, coef_bar + row * PHI_ROW, parameter_bars);
 #else
-        phi_prepare_adjoint(&s->params, phi_times[row] * s->h, coef_bar + row * PHI_ROW, found);
+        phi_prepare_adjoint(&s->params, phi_times[row] * s->h, coef_bar + row * PHI_ROW, parameter_bars);
 #endif
-        phi_add_numbers(found, params_bar);
+        phi_add_numbers(parameter_bars, params_bar);
     }
 #if PHI_SERIES && PHI_GATHER
     phi_add_numbers(coef_bar + PHI_COEFFICIENTS, params_bar); /* sums over bonds or pairs depend on parameters directly */
@@ -68,11 +68,11 @@ static int phi_parameters_hold(const phi_solver *s, const phi_transpose *g, cons
 static size_t phi_onward(const phi_transpose *g, size_t left)
 {
     const size_t free = g->most - g->count, parts = free > 1 ? free / 2 + 1 : 2;
-    const size_t wanted = free == 0 ? left - g->longest : left <= g->longest * (free + 1) ? g->longest : (left + parts - 1) / parts;
-#if PHI_UNDONE
-    return phi_legs(wanted, g->leg) * g->leg;
+    const size_t steps_of_segment = free == 0 ? left - g->longest : left <= g->longest * (free + 1) ? g->longest : (left + parts - 1) / parts;
+#if PHI_RECOMPUTED
+    return phi_legs(steps_of_segment, g->leg) * g->leg;
 #else
-    return wanted;
+    return steps_of_segment;
 #endif
 }
 
@@ -81,7 +81,7 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
     const double *rows_bar, double coef_bar[PHI_SUMS])
 {
     phi_status status = PHI_OK;
-#if PHI_UNDONE
+#if PHI_RECOMPUTED
     for (size_t k = until, next; k > done && status == PHI_OK; k = next) {
         const size_t row = (k - 1) / stride, leg = (k - 1 - done) / g->leg, most = PHI_UNASKED / s->sites + 1;
         if (k == steps || k % stride == 0) phi_row_back(s, g, g->first_step + k, rows_bar + row * PHI_DIM * s->sites);
@@ -114,12 +114,12 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
 #endif
     for (size_t k = until; k > done && status == PHI_OK; --k) {
         const size_t row = (k - 1) / stride, before = g->first_step + k - 1;
-        double *kept = g->kept + (k - 1 - done) * g->of_step;
+        double *tape = g->tape + (k - 1 - done) * g->of_step;
         if (k == steps || k % stride == 0) phi_row_back(s, g, before + 1, rows_bar + row * PHI_DIM * s->sites);
 #if PHI_SERIES
-        status = phi_step_back(s, g, before, kept);
+        status = phi_step_back(s, g, before, tape);
 #else
-        phi_step_back(s, g, before, k > 1, kept);
+        phi_step_back(s, g, before, k > 1, tape);
 #endif
 #if PHI_RENEWED
         phi_add_up_step(s, g, before, coef_bar);
@@ -138,16 +138,16 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
 {
     phi_status status = PHI_OK;
     for (size_t end = steps, done; end > 0 && status == PHI_OK; end = done) {
-        double *const made = end == steps ? rows : NULL;
+        double *const forward_rows = end == steps ? rows : NULL;
         done = phi_return(s, g);
         while (end - done > g->longest && status == PHI_OK) {
             const int free = g->count < g->most;
             const size_t next = done + phi_onward(g, end - done);
-            status = phi_walk(s, g, done, next, stride, steps, made, 0);
+            status = phi_walk(s, g, done, next, stride, steps, forward_rows, 0);
             done = next;
             if (free && status == PHI_OK) phi_mark(s, g, done);
         }
-        if (status == PHI_OK) status = phi_walk(s, g, done, end, stride, steps, made, 1);
+        if (status == PHI_OK) status = phi_walk(s, g, done, end, stride, steps, forward_rows, 1);
         if (status != PHI_OK) break;
         if (end == steps) {
             phi_copy(g->end, s->x, s);
@@ -157,7 +157,7 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
         }
         status = phi_segment_back(s, g, done, end, stride, steps, rows_bar, coef_bar);
         if (status == PHI_OK && !phi_all_hold(s, g->bar)) status = PHI_NOT_FINITE;
-#if PHI_UNDONE
+#if PHI_RECOMPUTED
         g->failed = status == PHI_NOT_FINITE && !g->far && !g->lost;
 #else
         g->failed = status != PHI_OK && status != PHI_STOPPED && !g->far;
@@ -194,11 +194,11 @@ static phi_status phi_attempt(phi_solver *s, phi_transpose *g, size_t steps, siz
     return phi_run_back(s, g, steps, stride, rows, rows_bar, coef_bar);
 }
 
-#if PHI_NEAR || PHI_UNDONE
+#if PHI_NEAR || PHI_RECOMPUTED
 /* Whether the reverse pass must be repeated, with full-range functions or shorter legs; restores the initial state. */
 static int phi_begins_again(phi_solver *s, phi_transpose *g)
 {
-#if PHI_UNDONE
+#if PHI_RECOMPUTED
     if (!g->failed && !g->lost) return 0;
     if (!g->lost) g->far = 1;
     else if (g->leg > 1) g->leg = 1;
@@ -227,14 +227,14 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
     phi_transpose g;
     double coef_bar[PHI_SUMS];
     memset(&g, 0, sizeof g);
-#if PHI_UNDONE
+#if PHI_RECOMPUTED
     g.leg = PHI_STRETCH;
 #if !PHI_NEAR
     g.far = 1; /* full-range functions are the only ones */
 #endif
 #endif
     status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar, trail, size);
-#if PHI_NEAR || PHI_UNDONE
+#if PHI_NEAR || PHI_RECOMPUTED
     while (phi_begins_again(s, &g)) status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar, trail, size);
 #endif
     status = phi_settle(s, &g, steps, status);

@@ -5,7 +5,7 @@
 #include "lattice.h"
 #include "model.h"
 #include "rows.c"
-#include "lattice_trail.c"
+#include "lattice_checkpoints.c"
 
 /* ---- Reverse pass of flows ---- */
 #if !PHI_TAKES
@@ -19,8 +19,8 @@ static int phi_sweep_of(const phi_solver *s, int flow, int number)
 #else
     const int last = s->flows - 1;
 #endif
-    const int found = part == 0 ? 0 : part == 2 ? last : part == 1 ? 1 + number : last - 1 - number;
-    return (part == 0 || part == 2) && number > 0 ? -1 : part % 2 == 1 && (found < 1 || found >= last) ? -1 : found;
+    const int place = part == 0 ? 0 : part == 2 ? last : part == 1 ? 1 + number : last - 1 - number;
+    return (part == 0 || part == 2) && number > 0 ? -1 : part % 2 == 1 && (place < 1 || place >= last) ? -1 : place;
 #else
     (void)s;
     return number == 0 ? part : -1;
@@ -32,7 +32,7 @@ static int phi_part_of(const phi_solver *s, int sweep)
 {
 #if PHI_BY_COLOUR
     int part = 0;
-    for (int own; sweep >= (own = phi_by_colour[part] ? s->colour_count : 1); ++part) sweep -= own;
+    for (int colours; sweep >= (colours = phi_by_colour[part] ? s->colour_count : 1); ++part) sweep -= colours;
     return part;
 #else
     (void)s;
@@ -41,8 +41,8 @@ static int phi_part_of(const phi_solver *s, int sweep)
 }
 
 #endif
-#include "lattice_undoing.c"
-#include "lattice_keeping.c"
+#include "lattice_recomputed.c"
+#include "lattice_tape.c"
 
 /* Pull the cotangent of a row, the state after a number of steps, back through the last flow, and add it. */
 static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, const double *row_bar)
@@ -50,11 +50,11 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
     for (size_t f = 0; f < PHI_DIM; ++f) phi_put(s, g->row_bar[f], row_bar + f * s->sites);
     PHI_PARALLEL
     {
-#if PHI_UNDONE
+#if PHI_RECOMPUTED
         if (PHI_FLOWS > 1) {
             phi_flow last;
             size_t count = 0;
-            phi_find_flow(s, steps - 1, PHI_FLOWS - 1, &last);
+            phi_set_flow(s, steps - 1, PHI_FLOWS - 1, &last);
             phi_sweep_part(s, last.part, last.coef PHI_AND_FAR(g->far)); /* the reverse pass inverts this flow */
 #if PHI_TAKES
             phi_hand_nothing(s, g, phi_number_of(steps, 0) + 1);
@@ -76,7 +76,7 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
                 const double *restrict from = PHI_HERE(g->row_bar[f]);
                 double *restrict to = PHI_HERE(g->bar[f]);
                 for (ptrdiff_t i = row.from; i < row.to; ++i) to[i] += from[i];
-#if PHI_UNDONE
+#if PHI_RECOMPUTED
                 PHI_COPY_ENDS(to, s->length, row.from, row.to)
 #endif
             }
@@ -90,16 +90,16 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
     double *rows, int keeping)
 {
     phi_status status = PHI_OK;
-#if PHI_UNDONE
+#if PHI_RECOMPUTED
     const size_t begin = done;
 #else
-    s->kept = keeping ? g->kept : NULL;
+    s->tape = keeping ? g->tape : NULL;
 #endif
     while (done < until && status == PHI_OK) {
         const size_t row = done / stride + 1, left = until - done, ahead = row * stride - done;
-        const size_t most = PHI_UNASKED / s->sites + 1, wanted = rows == NULL || left < ahead ? left : ahead;
-#if PHI_UNDONE
-        const size_t leg = keeping ? g->leg - (done - begin) % g->leg : wanted, less = wanted < leg ? wanted : leg;
+        const size_t most = PHI_UNASKED / s->sites + 1, steps_to_row = rows == NULL || left < ahead ? left : ahead;
+#if PHI_RECOMPUTED
+        const size_t leg = keeping ? g->leg - (done - begin) % g->leg : steps_to_row, less = steps_to_row < leg ? steps_to_row : leg;
         const size_t now = less < most ? less : most;
         if (keeping && (done - begin) % g->leg == 0) {
             double *fields[PHI_DIM];
@@ -107,25 +107,25 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
             phi_copy(fields, s->x, s);
         }
 #else
-        const size_t now = wanted < most ? wanted : most;
+        const size_t now = steps_to_row < most ? steps_to_row : most;
 #endif
         status = phi_march(s, now);
         done += now;
         if (status == PHI_OK && phi_is_stopped(s, g, now)) status = PHI_STOPPED;
         if (status != PHI_OK || rows == NULL || (done != steps && done % stride != 0)) continue;
-#if !PHI_UNDONE
-        double *const kept = s->kept;
-        s->kept = NULL;
+#if !PHI_RECOMPUTED
+        double *const tape = s->tape;
+        s->tape = NULL;
 #endif
         if (s->open && !PHI_TRY_FLOWS) status = PHI_NOT_FINITE;
         phi_take(s, s->x, rows + (row - 1) * PHI_DIM * s->sites);
         phi_copy(s->x, s->before, s);
-#if !PHI_UNDONE
-        s->kept = kept;
+#if !PHI_RECOMPUTED
+        s->tape = tape;
 #endif
     }
-#if !PHI_UNDONE
-    s->kept = NULL;
+#if !PHI_RECOMPUTED
+    s->tape = NULL;
 #endif
     return status;
 }

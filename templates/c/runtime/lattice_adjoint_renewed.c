@@ -7,21 +7,21 @@
    others. */
 static void phi_add_up_step(const phi_solver *s, phi_transpose *g, size_t steps, double coef_bar[PHI_SUMS])
 {
-    double found[PHI_SUMS] = { 0.0 }, early[PHI_PREPARED];
-    phi_add_up(s, g, found);
-    for (int k = PHI_COEFFICIENTS; k < PHI_SUMS; ++k) coef_bar[k] += found[k];
+    double coef_sums[PHI_SUMS] = { 0.0 }, early[PHI_PREPARED];
+    phi_add_up(s, g, coef_sums);
+    for (int k = PHI_COEFFICIENTS; k < PHI_SUMS; ++k) coef_bar[k] += coef_sums[k];
 #if PHI_SERIES
     PHI_EACH_STAGE {
         const double *coef = PHI_ROW_OF(s->coef, stage), middle = PHI_OF(phi_middles, stage);
-        double *own = PHI_ROW_OF(found, stage), *to = PHI_ROW_OF(coef_bar, stage);
+        double *sums = PHI_ROW_OF(coef_sums, stage), *to = PHI_ROW_OF(coef_bar, stage);
 #else
     for (int row = 0; row < PHI_ROWS_OF_FLOWS; ++row) {
-        double *own = found + row * PHI_ROW, *to = coef_bar + row * PHI_ROW, coef[PHI_ROW];
+        double *sums = coef_sums + row * PHI_ROW, *to = coef_bar + row * PHI_ROW, coef[PHI_ROW];
         const double middle = phi_moments[row];
         phi_renew(s, row, steps, coef);
 #endif
-        phi_refresh_adjoint(coef, PHI_TIME_AFTER(s, steps) + middle * s->h, own + PHI_PREPARED, early);
-        for (int k = 0; k < PHI_PREPARED; ++k) to[k] += own[k] + early[k];
+        phi_refresh_adjoint(coef, PHI_TIME_AFTER(s, steps) + middle * s->h, sums + PHI_PREPARED, early);
+        for (int k = 0; k < PHI_PREPARED; ++k) to[k] += sums[k] + early[k];
     }
 }
 #endif

@@ -6,7 +6,7 @@
 #include "lattice.h"
 #include "model.h"
 #include "rows.c"
-#include "lattice_trail.c"
+#include "lattice_checkpoints.c"
 
 /* ---- Reverse pass of stages ---- */
 /* A stage solves y = r(x, y) and adds a(y) to x. With v the cotangent of x after the stage, the cotangent m of y solves
@@ -24,14 +24,14 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
 }
 
 /* Pull cotangents back through a stage, from its solution on the tape. */
-static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept PHI_AND_INT_STAGE)
+static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *tape PHI_AND_INT_STAGE)
 {
     const double *coef = PHI_ROW_OF(s->coef, stage);
     double *side[PHI_BARS], *m[PHI_BARS];
     memcpy(side, g->bar, sizeof side);
     memcpy(side, g->row_bar, sizeof *side * PHI_DIM);
     for (size_t f = 0; f < PHI_DIM; ++f) {
-        s->y[2][f] = PHI_FIRST_SITE(kept + f * g->block);
+        s->y[2][f] = PHI_FIRST_SITE(tape + f * g->block);
 #if PHI_STARTS
         s->x[f] = s->y[2][f] + PHI_DIM * g->block;
 #endif
@@ -40,12 +40,12 @@ static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept P
     phi_pull(s, PHI_ADVANCE_BACK, coef, g->bar, side, side);
     int now = 0;
     s->side = side;
-    phi_predict(s, side PHI_AND_GUESS);
+    phi_predict(s, side PHI_AND_PREDICTOR);
     phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef PHI_AND_FAR(1), 0.0, &now);
     if (status != PHI_OK) {
         s->stiff = 1;
         now = 0;
-        phi_predict(s, side PHI_AND_GUESS);
+        phi_predict(s, side PHI_AND_PREDICTOR);
         status = phi_middle(s, coef PHI_AND_FAR(1), HUGE_VAL, &now);
     }
     s->side = NULL;
@@ -59,9 +59,9 @@ static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept P
 }
 
 /* Pull cotangents back through one step, from the solutions of its stages on the tape. */
-static phi_status phi_step_back(phi_solver *s, phi_transpose *g, size_t steps, double *kept)
+static phi_status phi_step_back(phi_solver *s, phi_transpose *g, size_t steps, double *tape)
 {
-    double *x[PHI_DIM], *left = kept + g->of_step;
+    double *x[PHI_DIM], *left = tape + g->of_step;
     phi_status status = PHI_OK;
     memcpy(x, s->x, sizeof x);
     PHI_EACH_STAGE_BACK {
@@ -71,7 +71,7 @@ static phi_status phi_step_back(phi_solver *s, phi_transpose *g, size_t steps, d
 #if PHI_RENEWED
         phi_refresh(PHI_ROW_OF(s->coef, stage), s->now, PHI_ROW_OF(s->coef, stage) + PHI_PREPARED);
 #endif
-        left -= PHI_KEPT * PHI_DIM * g->block;
+        left -= PHI_STORED_STATES * PHI_DIM * g->block;
         if (status == PHI_OK) status = phi_stage_back(s, g, left PHI_AND_STAGE);
     }
     memcpy(s->x, x, sizeof x);
@@ -85,10 +85,10 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
     double *rows, int keeping)
 {
     phi_status status = PHI_OK;
-    double *kept = g->kept;
-    for (; done < until && status == PHI_OK; kept += g->of_step) {
+    double *tape = g->tape;
+    for (; done < until && status == PHI_OK; tape += g->of_step) {
         if (rows != NULL && done % stride == 0) phi_forget(s);
-        s->kept = keeping ? kept : NULL;
+        s->tape = keeping ? tape : NULL;
         status = phi_try(s);
         if (status != PHI_OK) break;
         phi_stand(s, s->steps + 1);
@@ -97,7 +97,7 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
         if (rows != NULL && (done == steps || done % stride == 0))
             phi_take(s, s->x, rows + (done - 1) / stride * PHI_DIM * s->sites);
     }
-    s->kept = NULL;
+    s->tape = NULL;
     return status;
 }
 

@@ -11,7 +11,7 @@
 
 /* Copy row segments to the tape, with their halo, which another thread may be writing for a single row. Pairs read
    beyond the last site, but do not use these values. */
-static void phi_keep_units(const phi_solver *s, const double *from, double *to, size_t first, size_t end)
+static void phi_store_units(const phi_solver *s, const double *from, double *to, size_t first, size_t end)
 {
 #if PHI_ONE_ROW
     const ptrdiff_t begin = (ptrdiff_t)first * PHI_PIECE, stop = end == phi_units(s) ? s->length : (ptrdiff_t)end * PHI_PIECE;

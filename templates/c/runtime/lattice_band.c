@@ -19,10 +19,10 @@ static void phi_swap(double *a, double *b)
 /* Row of the entry with the largest magnitude. */
 static ptrdiff_t phi_largest(const double *entries, ptrdiff_t count)
 {
-    ptrdiff_t found = 0;
+    ptrdiff_t pivot = 0;
     for (ptrdiff_t k = 1; k < count; ++k)
-        if (fabs(entries[k]) > fabs(entries[found])) found = k;
-    return found;
+        if (fabs(entries[k]) > fabs(entries[pivot])) pivot = k;
+    return pivot;
 }
 
 /* LU factorisation with pivoting of a band matrix (A), or with middle < 0 of a full one (D). Columns are `tall` apart,
@@ -111,11 +111,11 @@ static int phi_factorise(phi_solver *s, const double *coef, int now)
 {
     phi_matrix m;
     const size_t entries = phi_matrix_of(s->sites, s->matrix, &m);
-    const ptrdiff_t sites = s->length, apart = 2 * PHI_REACH + 1, whole = sites / apart, inner = m.inner, border = m.border;
+    const ptrdiff_t sites = s->length, apart = 2 * PHI_REACH + 1, full_periods = sites / apart, inner = m.inner, border = m.border;
     memset(s->matrix, 0, entries * sizeof *s->matrix);
     for (int f = 0; f < PHI_DIM; ++f) {
-        for (ptrdiff_t first = 0; whole > 0 && first < apart; ++first) phi_probe(s, &m, coef, now, first, whole, f);
-        for (ptrdiff_t i = whole * apart; i < sites; ++i) phi_probe(s, &m, coef, now, i, 1, f);
+        for (ptrdiff_t first = 0; full_periods > 0 && first < apart; ++first) phi_probe(s, &m, coef, now, first, full_periods, f);
+        for (ptrdiff_t i = full_periods * apart; i < sites; ++i) phi_probe(s, &m, coef, now, i, 1, f);
     }
     if (!phi_decompose(m.a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m.pivots)) return 0;
     for (ptrdiff_t j = 0; j < border; ++j) {

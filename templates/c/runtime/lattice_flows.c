@@ -48,12 +48,12 @@ static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI
 }
 
 #endif
-#include "lattice_found_flows.c"
-#include "lattice_made_flows.c"
+#include "lattice_flow_records.c"
+#include "lattice_plain_flows.c"
 #include "lattice_monitored_flows.c"
 
-#if PHI_UNDONE
-static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first, size_t end);
+#if PHI_RECOMPUTED
+static void phi_reverse_flow(const phi_solver *s, const phi_flow *flow, size_t first, size_t end);
 
 #endif
 #include "lattice_waves.c"
@@ -84,19 +84,19 @@ static void phi_steps(const phi_solver *s, size_t steps)
         for (int flow = 0; flow < PHI_FLOWS; ++flow) {
             if (flow == 0 || flow == PHI_FLOWS - (int)PHI_SOURCES) phi_draw(s, step, flow > 0);
 #if PHI_RENEWED
-            phi_make_flow(s, step, flow);
+            phi_apply_flow(s, step, flow);
 #else
             phi_sweep_part(s, phi_flow_parts[flow], s->coef + flow * PHI_ROW PHI_AND_FAR(s->far > 0));
 #endif
         }
 #else
-    if (steps == 0) phi_make_flow(s, s->steps - 1, PHI_FLOWS - 1);
+    if (steps == 0) phi_apply_flow(s, s->steps - 1, PHI_FLOWS - 1);
 #if PHI_WAVES
     phi_make_waves(s, steps);
 #else
     for (size_t step = s->steps; step < s->steps + steps; ++step) {
-        phi_make_flow(s, step, PHI_FLOWS > 1 && (step > s->steps || s->open) ? PHI_FLOWS : 0);
-        for (int flow = 1; flow < PHI_FLOWS - 1; ++flow) phi_make_flow(s, step, flow);
+        phi_apply_flow(s, step, PHI_FLOWS > 1 && (step > s->steps || s->open) ? PHI_FLOWS : 0);
+        for (int flow = 1; flow < PHI_FLOWS - 1; ++flow) phi_apply_flow(s, step, flow);
     }
 #endif
 #endif
@@ -110,16 +110,16 @@ static void phi_steps(const phi_solver *s, size_t steps)
 }
 
 #endif
-#if PHI_ADJOINT && !PHI_UNDONE
-static size_t phi_numbers_kept(const phi_solver *s);
-static void phi_keep_steps(const phi_solver *s, size_t steps);
+#if PHI_ADJOINT && !PHI_RECOMPUTED
+static size_t phi_step_tape_size(const phi_solver *s);
+static void phi_make_steps_with_tape(const phi_solver *s, size_t steps);
 
 #endif
 /* Make some steps from the state in s->before, or restore it and return 0 if values are not finite. */
 static int phi_try(phi_solver *s, size_t steps)
 {
-#if PHI_ADJOINT && !PHI_UNDONE
-    if (s->kept != NULL) phi_keep_steps(s, steps);
+#if PHI_ADJOINT && !PHI_RECOMPUTED
+    if (s->tape != NULL) phi_make_steps_with_tape(s, steps);
     else phi_steps(s, steps);
 #else
     phi_steps(s, steps);
@@ -172,8 +172,8 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         if (phi_try(s, now)) {
             phi_copy(s->before, s->x, s);
             s->steps += now;
-#if PHI_ADJOINT && !PHI_UNDONE
-            if (s->kept != NULL) s->kept += now * phi_numbers_kept(s);
+#if PHI_ADJOINT && !PHI_RECOMPUTED
+            if (s->tape != NULL) s->tape += now * phi_step_tape_size(s);
 #endif
 #if !PHI_NOISE
             s->open = PHI_FLOWS > 1;

@@ -4,10 +4,10 @@
 #include "model.h"
 #include "rows.c"
 
-#include "lattice_moved_level.c"
+#include "lattice_level_of_state.c"
 
-/* Set the state to x + kept * state. */
-static phi_status phi_move(phi_solver *s, const double *x, double kept)
+/* Set the state to x + factor * state. */
+static phi_status phi_move(phi_solver *s, const double *x, double factor)
 {
     if (s == NULL || x == NULL) return PHI_BAD_ARGUMENT;
 #if PHI_MONITOR
@@ -18,9 +18,9 @@ static phi_status phi_move(phi_solver *s, const double *x, double kept)
         for (size_t r = 0; r < PHI_DIM * s->rows; ++r) {
             double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
             for (ptrdiff_t i = 0; i < s->length; ++i) {
-                const double moved = kept * row[i] + x[(ptrdiff_t)r * s->length + i];
-                if (!isfinite(moved)) return PHI_BAD_ARGUMENT;
-                row[i] = moving ? moved : row[i];
+                const double new_value = factor * row[i] + x[(ptrdiff_t)r * s->length + i];
+                if (!isfinite(new_value)) return PHI_BAD_ARGUMENT;
+                row[i] = moving ? new_value : row[i];
             }
             PHI_COPY_ENDS(row, s->length, 0, s->length)
         }

@@ -19,14 +19,14 @@ static double phi_product(const phi_solver *s, double *const *x, double *const *
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
         const phi_row row = phi_piece_of(s, unit);
-        const ptrdiff_t whole = row.to - (row.to - row.from) % PHI_WIDTH;
+        const ptrdiff_t vectors_end = row.to - (row.to - row.from) % PHI_WIDTH;
         s->sums[unit] = 0.0;
         for (int k = 0; k < PHI_DIM; ++k) {
             const double *one = PHI_HERE(x[k]), *other = PHI_HERE(y[k]);
             double lanes[PHI_WIDTH] = { 0.0 };
-            for (ptrdiff_t i = row.from; i < whole; i += PHI_WIDTH)
+            for (ptrdiff_t i = row.from; i < vectors_end; i += PHI_WIDTH)
                 for (int l = 0; l < PHI_WIDTH; ++l) lanes[l] += one[i + l] * other[i + l];
-            for (ptrdiff_t i = whole; i < row.to; ++i) *lanes += one[i] * other[i];
+            for (ptrdiff_t i = vectors_end; i < row.to; ++i) *lanes += one[i] * other[i];
             for (int l = 1; l < PHI_WIDTH; ++l) *lanes += lanes[l];
             s->sums[unit] += *lanes / s->usual[k] / s->usual[k];
         }

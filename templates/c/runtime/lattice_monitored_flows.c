@@ -7,7 +7,7 @@
 
 /* The flow of that number in a step, of a part of K; after those of a step the last and the first together. Where its time
    would not be positive, the state is no number afterwards. */
-static void phi_make_flow(const phi_solver *s, size_t steps, int number)
+static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
 {
     double coef[PHI_ROW];
     const int part = phi_flow_parts[number];

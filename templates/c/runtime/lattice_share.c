@@ -25,9 +25,9 @@ int omp_get_thread_num(void);
 /* The share of a thread in a number of work items: from *first on; returns its end. */
 static size_t phi_share(size_t units, size_t *first)
 {
-    const size_t threads = PHI_THREADS, own = PHI_THREAD, each = units / threads, more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
+    const size_t threads = PHI_THREADS, thread = PHI_THREAD, each = units / threads, more = units % threads;
+    *first = each * thread + (thread < more ? thread : more);
+    return *first + each + (thread < more);
 }
 
 /* Wait for all threads. */

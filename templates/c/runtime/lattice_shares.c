@@ -36,10 +36,10 @@ enum { PHI_ADDED = 64 }; /* number of sites whose contributions are stored befor
 static inline double phi_added(const double *values, ptrdiff_t count)
 {
     double lanes[8] = { 0.0 }, rest = 0.0;
-    const ptrdiff_t whole = count - count % 8;
-    for (ptrdiff_t i = 0; i < whole; i += 8)
+    const ptrdiff_t vectors_end = count - count % 8;
+    for (ptrdiff_t i = 0; i < vectors_end; i += 8)
         for (int l = 0; l < 8; ++l) lanes[l] += values[i + l];
-    for (ptrdiff_t i = whole; i < count; ++i) rest += values[i];
+    for (ptrdiff_t i = vectors_end; i < count; ++i) rest += values[i];
     return phi_total(lanes) + rest;
 }
 #endif

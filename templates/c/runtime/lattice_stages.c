@@ -18,16 +18,16 @@ static inline void phi_raise(double *largest, double value) { *largest = value >
 static void phi_measure(const phi_solver *s, int now, size_t unit, double *change, double *size)
 {
     const phi_row row = phi_piece_of(s, unit);
-    const ptrdiff_t whole = row.to - (row.to - row.from) % PHI_WIDTH;
+    const ptrdiff_t vectors_end = row.to - (row.to - row.from) % PHI_WIDTH;
     for (int k = 0; k < PHI_DIM; ++k) {
         const double *restrict before = PHI_HERE(s->y[now][k]), *restrict after = PHI_HERE(s->y[1 - now][k]);
         double changes[PHI_WIDTH] = { 0.0 }, sizes[PHI_WIDTH] = { 0.0 };
-        for (ptrdiff_t i = row.from; i < whole; i += PHI_WIDTH)
+        for (ptrdiff_t i = row.from; i < vectors_end; i += PHI_WIDTH)
             for (int l = 0; l < PHI_WIDTH; ++l) {
                 phi_raise(changes + l, fabs(after[i + l] - before[i + l]));
                 phi_raise(sizes + l, fabs(after[i + l]));
             }
-        for (ptrdiff_t i = whole; i < row.to; ++i) {
+        for (ptrdiff_t i = vectors_end; i < row.to; ++i) {
             phi_raise(changes, fabs(after[i] - before[i]));
             phi_raise(sizes, fabs(after[i]));
         }
@@ -64,7 +64,7 @@ static void phi_pull(const phi_solver *s, int kernel, const double *coef, double
 static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int now)
 {
     const size_t units = phi_units(s);
-    double change[PHI_DIM] = { 0.0 }, size[PHI_DIM] = { 0.0 }, largest = 0.0, moved = 0.0;
+    double change[PHI_DIM] = { 0.0 }, size[PHI_DIM] = { 0.0 }, largest = 0.0, largest_change = 0.0;
 #if PHI_ADJOINT
     if (coef != NULL && s->side != NULL) {
         phi_pull(s, PHI_SLOPE_BACK, coef, s->y[now], s->side, s->y[1 - now]);
@@ -80,30 +80,30 @@ static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int
     for (int k = 0; k < PHI_DIM; ++k) {
         s->usual[k] = size[k] + PHI_LEAST_SIZE * largest + 1e-300;
         change[k] /= s->usual[k]; /* NaN if both are infinite */
-        moved = isnan(change[k]) || change[k] > moved ? change[k] : moved;
+        largest_change = isnan(change[k]) || change[k] > largest_change ? change[k] : largest_change;
     }
-    return moved;
+    return largest_change;
 }
 
-#include "lattice_without_guesses.c"
-#include "lattice_guesses.c"
+#include "lattice_without_predictors.c"
+#include "lattice_predictors.c"
 
 #include "lattice_newton.c"
 
 /* Write the solution y of a stage, and x if its reverse pass reads it, to the tape; returns the end of the tape. */
-static double *phi_keep_stage(const phi_solver *s, int now, double *to)
+static double *phi_store_stage(const phi_solver *s, int now, double *to)
 {
     const size_t block = phi_block(s->rows, s->width), units = phi_units(s);
 #if PHI_STARTS
-    double *const *const kept[] = { s->y[now], s->x };
+    double *const *const fields[] = { s->y[now], s->x };
 #else
-    double *const *const kept[] = { s->y[now] };
+    double *const *const fields[] = { s->y[now] };
 #endif
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit)
-        for (size_t k = 0; k < PHI_KEPT * PHI_DIM; ++k)
-            phi_keep_units(s, PHI_MEMORY_OF(kept[k / PHI_DIM][k % PHI_DIM]), to + k * block, unit, unit + 1);
-    return to + PHI_KEPT * PHI_DIM * block;
+        for (size_t k = 0; k < PHI_STORED_STATES * PHI_DIM; ++k)
+            phi_store_units(s, PHI_MEMORY_OF(fields[k / PHI_DIM][k % PHI_DIM]), to + k * block, unit, unit + 1);
+    return to + PHI_STORED_STATES * PHI_DIM * block;
 }
 
 /* Make the stages of a step. */
@@ -111,7 +111,7 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
 {
     const size_t units = phi_units(s);
 #if PHI_ADJOINT
-    double *kept = s->kept;
+    double *tape = s->tape;
 #endif
 #if PHI_NOISE
     PHI_EACH_PIECE
@@ -130,7 +130,7 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
         phi_refresh(coef, s->now, coef + PHI_PREPARED);
 #endif
         int now = 0;
-        phi_predict(s, s->x PHI_AND_GUESS);
+        phi_predict(s, s->x PHI_AND_PREDICTOR);
         phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef PHI_AND_FAR(far), 0.0, &now);
 #if PHI_NEAR
         if (status != PHI_OK && (far || status != PHI_NOT_FINITE)) {
@@ -140,7 +140,7 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
             s->stiff = 1;
             now = 0;
             const double range = phi_range(s, coef);
-            phi_predict(s, s->x PHI_AND_GUESS);
+            phi_predict(s, s->x PHI_AND_PREDICTOR);
             status = phi_middle(s, coef PHI_AND_FAR(far), range, &now);
         }
 #if PHI_TANGENT
@@ -148,7 +148,7 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
 #endif
         if (status != PHI_OK) return status;
 #if PHI_ADJOINT
-        if (kept != NULL) kept = phi_keep_stage(s, now, kept);
+        if (tape != NULL) tape = phi_store_stage(s, now, tape);
 #endif
 #if PHI_GUESSES
         phi_remember(s, s->x PHI_AND_STAGE, now);

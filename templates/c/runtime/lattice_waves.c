@@ -40,8 +40,8 @@ static void phi_make_slices(const phi_solver *s, const phi_flow *flow, size_t fr
     from *= rows;
     to *= rows;
 #endif
-#if PHI_UNDONE
-    if (flow->go > 0) phi_go_back(s, flow, from, to);
+#if PHI_RECOMPUTED
+    if (flow->go > 0) phi_reverse_flow(s, flow, from, to);
     else phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FAR(s->far > 0), from, to);
 #else
     phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FAR(s->far > 0), from, to);
@@ -73,7 +73,7 @@ static void phi_make_waves(const phi_solver *s, size_t steps)
         size_t count = 0;
         for (; count < depth && done < steps * each; ++count, ++done) {
             const int number = (int)(done % each), joined = number == 0 && (done > 0 || s->open);
-            phi_find_flow(s, s->steps + done / each, joined ? PHI_FLOWS : number, flows + count);
+            phi_set_flow(s, s->steps + done / each, joined ? PHI_FLOWS : number, flows + count);
         }
         if (count > 1) phi_make_wave(s, flows, count);
         else phi_sweep_part(s, flows->part, flows->coef PHI_AND_FAR(s->far > 0));

@@ -13,7 +13,7 @@
    of member 0. */
 typedef struct {
     double *x;
-    size_t members, steps, own;
+    size_t members, steps, per_member;
     const phi_params *params; /* NULL for the defaults */
     const double *h;
 #include "state_of_members.h"
@@ -39,9 +39,9 @@ static phi_members phi_asked(const phi_params *params, double *x, size_t members
 /* Initialise a member at a state, with its parameters and all coefficients for its step size. */
 static phi_status phi_begin_member(const phi_members *all, size_t m, const double x[PHI_DIM] PHI_AND_GAUGE(const double *gauge), phi_solver *s)
 {
-    const phi_params *params = all->params != NULL ? all->params + m * all->own : NULL;
-    const phi_status status = PHI_INIT_OWN(s, params, x, all->t0[m * all->own], gauge);
-    return status == PHI_OK ? phi_integrate(s, all->h[m * all->own], 0) : status;
+    const phi_params *params = all->params != NULL ? all->params + m * all->per_member : NULL;
+    const phi_status status = PHI_INIT_OWN(s, params, x, all->t0[m * all->per_member], gauge);
+    return status == PHI_OK ? phi_integrate(s, all->h[m * all->per_member], 0) : status;
 }
 
 /* Initialise a member at its state in the ensemble, which is copied to x. */

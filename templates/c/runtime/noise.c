@@ -23,10 +23,10 @@ static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double no
 #include "noise_of_flows.c"
 
 /* Increments of the next step: the given ones, or random ones. Returns 0 if one is not finite. */
-static int phi_draw(phi_solver *s, const double *given)
+static int phi_draw(phi_solver *s, const double *increments)
 {
-    if (given != NULL) {
-        PHI_TAKE_INCREMENTS(s->dw, given);
+    if (increments != NULL) {
+        PHI_TAKE_INCREMENTS(s->dw, increments);
     } else {
         phi_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
         const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h); /* so that a step of -h inverts one of h */

@@ -61,7 +61,7 @@ static int phi_piece(const double *coef, const double p[PHI_DIM], const double s
 /* Whole path from x, in 1, 2, 4, ... pieces until each expansion converges. For any p, the end of the path lies on the
    symplectic leaf of x. Returns 0 if the path is too long or leaves the domain. *made counts all pieces. */
 static int phi_path(const double *coef, const double x[PHI_DIM], const double p[PHI_DIM], double change[PHI_DIM],
-    double mean[PHI_DIM], int *made)
+    double mean[PHI_DIM], int *pieces_used)
 {
     for (int pieces = 1; pieces <= PHI_LONGEST_PATH; pieces *= 2) {
         double q[PHI_DIM], point[PHI_DIM], shift[PHI_DIM], piece_mean[PHI_DIM];
@@ -73,7 +73,7 @@ static int phi_path(const double *coef, const double x[PHI_DIM], const double p[
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < PHI_DIM; ++i) point[i] = x[i] + change[i];
             good = phi_piece(coef, q, point, shift, piece_mean);
-            ++*made;
+            ++*pieces_used;
             for (int i = 0; i < PHI_DIM; ++i) {
                 mean[i] += (change[i] + piece_mean[i]) / (double)pieces;
                 change[i] += shift[i];
@@ -87,10 +87,10 @@ static int phi_path(const double *coef, const double x[PHI_DIM], const double p[
 /* Residual p - grad S_h(mean) of the equation for p, where mean is that of the path; also the change of x along the
    path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
 static int phi_residual(phi_solver *s, const double *coef, const double p[PHI_DIM], double y[PHI_DIM],
-    double residual[PHI_DIM], double change[PHI_DIM], double jacobian[PHI_DIM * PHI_DIM], int *made)
+    double residual[PHI_DIM], double change[PHI_DIM], double jacobian[PHI_DIM * PHI_DIM], int *pieces_used)
 {
     double mean[PHI_DIM];
-    if (!phi_path(coef, s->x, p, change, mean, made)) return 0;
+    if (!phi_path(coef, s->x, p, change, mean, pieces_used)) return 0;
     for (int i = 0; i < PHI_DIM; ++i) y[i] = s->x[i] + mean[i];
     phi_generate(coef, y, residual, jacobian);
     for (int i = 0; i < PHI_DIM; ++i) residual[i] = p[i] - residual[i];
@@ -100,15 +100,15 @@ static int phi_residual(phi_solver *s, const double *coef, const double p[PHI_DI
 
 /* Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
 static int phi_differences(phi_solver *s, const double *coef, const double p[PHI_DIM], const double residual[PHI_DIM],
-    double jacobian[PHI_DIM * PHI_DIM], int *made)
+    double jacobian[PHI_DIM * PHI_DIM], int *pieces_used)
 {
-    double q[PHI_DIM], y[PHI_DIM], moved[PHI_DIM], change[PHI_DIM], unused[PHI_DIM * PHI_DIM], norm = DBL_MIN;
+    double q[PHI_DIM], y[PHI_DIM], shifted_residual[PHI_DIM], change[PHI_DIM], unused[PHI_DIM * PHI_DIM], norm = DBL_MIN;
     for (int i = 0; i < PHI_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < PHI_DIM; ++j) {
         PHI_COPY(q, p, q, PHI_DIM);
         q[j] += PHI_DIFFERENCE * norm;
-        if (!phi_residual(s, coef, q, y, moved, change, unused, made)) return 0;
-        for (int i = 0; i < PHI_DIM; ++i) jacobian[i * PHI_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+        if (!phi_residual(s, coef, q, y, shifted_residual, change, unused, pieces_used)) return 0;
+        for (int i = 0; i < PHI_DIM; ++i) jacobian[i * PHI_DIM + j] = (shifted_residual[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
@@ -125,8 +125,8 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
     PHI_COPY(y, s->x, y, PHI_DIM);
 #endif
     phi_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < PHI_MAX_ITERATIONS && made <= PHI_MOST_PIECES; ++iteration) {
-        if (!phi_residual(s, coef, p, y, residual, change, jacobian, &made)) return PHI_NO_CONVERGENCE;
+    for (int iteration = 0, pieces_used = 0; iteration < PHI_MAX_ITERATIONS && pieces_used <= PHI_MOST_PIECES; ++iteration) {
+        if (!phi_residual(s, coef, p, y, residual, change, jacobian, &pieces_used)) return PHI_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < PHI_DIM; ++i) {
             if (!isfinite(residual[i])) return PHI_NOT_FINITE;
@@ -157,7 +157,7 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
             return PHI_OK;
         }
         const int slow = iteration >= PHI_PATIENCE && size > PHI_CONTRACTING * previous;
-        if (slow && !phi_differences(s, coef, p, residual, jacobian, &made)) return PHI_NO_CONVERGENCE;
+        if (slow && !phi_differences(s, coef, p, residual, jacobian, &pieces_used)) return PHI_NO_CONVERGENCE;
         if (!phi_solve(jacobian, residual)) return PHI_SINGULAR;
         for (int i = 0; i < PHI_DIM; ++i) p[i] -= residual[i];
         previous = size;

@@ -11,7 +11,7 @@
 /* ---- Blocks along paths ---- */
 #define PHI_SLOPE_ACCURACY 1e-7 /* accuracy of the derivatives of paths */
 #define PHI_MIDDLES_SETTLED 1e-9 /* accuracy of middles; Newton iterations remove the remaining error */
-#define PHI_GUESS_ACCURACY 1e-6 /* accuracy of expansions in predictions, which are not more accurate */
+#define PHI_PREDICTION_ACCURACY 1e-6 /* accuracy of expansions in predictions, which are not more accurate */
 
 /* alpha - y and beta - alpha to leading order, by one short expansion. */
 static void phi_evaluate_lanes(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM],
@@ -21,7 +21,7 @@ static void phi_evaluate_lanes(phi_lanes coef[restrict], phi_lanes y[restrict PH
     phi_momentum_lanes(coef, y, e.p);
     phi_halve(e.p);
     phi_begin(coef, &e, y);
-    phi_extend(coef, &e, PHI_GUESS_ACCURACY);
+    phi_extend(coef, &e, PHI_PREDICTION_ACCURACY);
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {

@@ -74,7 +74,7 @@ static void phi_judge(phi_history *history, const double value[PHI_DIM])
 /* Drop the oldest values if the history has no room for `count` more. */
 static void phi_make_room(phi_history *history, int values)
 {
-    if (history->count + values <= PHI_KEPT) return;
+    if (history->count + values <= PHI_STORED_VALUES) return;
     memmove(history->past, history->past + history->count - PHI_REMEMBERED, PHI_REMEMBERED * sizeof history->past[0]);
     history->count = PHI_REMEMBERED;
 }
@@ -83,20 +83,20 @@ static void phi_make_room(phi_history *history, int values)
    recurrence predicts well. */
 static int phi_fit(phi_history *history)
 {
-    int found = 1;
+    int fitted = 1;
     history->recurrence_terms = 0;
-    for (int i = 0; i < PHI_DIM && found; ++i) {
+    for (int i = 0; i < PHI_DIM && fitted; ++i) {
         const int terms = phi_train(history, i);
-        found = terms > 0;
+        fitted = terms > 0;
         if (terms > history->recurrence_terms) history->recurrence_terms = terms;
     }
-    if (!found) history->recurrence_terms = 0;
-    history->use_recurrence = found;
+    if (!fitted) history->recurrence_terms = 0;
+    history->use_recurrence = fitted;
     ++history->fits;
     history->slow_steps = 0;
     history->slow_steps_allowed = history->slow_steps_allowed < PHI_LONG_WAIT / 2
         ? 2 * history->slow_steps_allowed + PHI_REPAY : PHI_LONG_WAIT;
-    return found;
+    return fitted;
 }
 
 /* Update the predictor with a solution. A solve of one iteration needs no better prediction. */

@@ -71,7 +71,7 @@ static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
 #endif
 #if PHI_OPEN
 #if PHI_BESIDE
-    row.whole = 1;
+    row.complete = 1;
 #endif
     for (int k = 0; k < PHI_WEIGHTS; ++k) {
         int there = 1;
@@ -80,7 +80,7 @@ static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
                 place[a] + phi_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
         row.present[k] = there ? 1.0 : 0.0;
 #if PHI_BESIDE
-        row.whole = row.whole && there;
+        row.complete = row.complete && there;
 #endif
     }
 #endif

@@ -9,7 +9,7 @@ const char *phi_status_string(phi_status status); /* the meaning of a status */
 #include "history_differences.h"
 #include "history_recurrences.h"
 
-#include "blocks_learnt.h"
+#include "blocks_measurements.h"
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {

@@ -34,31 +34,31 @@ enum { PHI_TIME = PHI_DIM, PHI_DOMAIN, PHI_ALONG };
 
 /* Make one step: the exact flows of the parts of K, one after the other. If it fails, the state is unchanged. */
 #if PHI_ADJOINT
-static phi_status phi_stages(phi_solver *s, double (*kept)[PHI_DIM])
+static phi_status phi_stages(phi_solver *s, double (*tape)[PHI_DIM])
 #else
 static phi_status phi_stages(phi_solver *s)
 #endif
 {
-    double x[PHI_ALONG] = { 0.0 }, moved[PHI_ALONG] = { 0.0 }, start[PHI_ALONG] = { 0.0 };
+    double x[PHI_ALONG] = { 0.0 }, displacement[PHI_ALONG] = { 0.0 }, start[PHI_ALONG] = { 0.0 };
     PHI_COPY(x, s->x, s->x, PHI_DIM);
     PHI_COPY(start, s->x, s->x, PHI_DIM);
-    PHI_COPY(moved, s->carry, s->carry, PHI_DIM);
+    PHI_COPY(displacement, s->carry, s->carry, PHI_DIM);
 #if PHI_ATTITUDE && PHI_ADJOINT
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef, x, moved, start, element, kept);
+    phi_flows(s->coef, x, displacement, start, element, tape);
 #elif PHI_ATTITUDE
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef, x, moved, start, element);
+    phi_flows(s->coef, x, displacement, start, element);
 #elif PHI_ADJOINT
-    phi_flows(s->coef, x, moved, start, kept);
+    phi_flows(s->coef, x, displacement, start, tape);
 #else
-    phi_flows(s->coef, x, moved, start);
+    phi_flows(s->coef, x, displacement, start);
 #endif
     ++s->evaluations;
     if (!phi_finite(x, PHI_ALONG)) return PHI_NOT_FINITE;
-    if (!(moved[PHI_TIME] * s->h > 0.0)) return PHI_NOT_FINITE;
-    phi_settle(s->x, s->carry, moved);
-    phi_pass(s, moved[PHI_TIME]);
+    if (!(displacement[PHI_TIME] * s->h > 0.0)) return PHI_NOT_FINITE;
+    phi_settle(s->x, s->carry, displacement);
+    phi_pass(s, displacement[PHI_TIME]);
 #if PHI_ATTITUDE
     phi_turn_by(s, element);
 #endif
@@ -68,28 +68,28 @@ static phi_status phi_stages(phi_solver *s)
 #else
 /* Make one step: the exact flows of the parts of H, one after the other. If it fails, the state is unchanged. */
 #if PHI_ADJOINT
-static phi_status phi_stages(phi_solver *s, double (*kept)[PHI_DIM])
+static phi_status phi_stages(phi_solver *s, double (*tape)[PHI_DIM])
 #else
 static phi_status phi_stages(phi_solver *s)
 #endif
 {
-    double x[PHI_DIM], moved[PHI_DIM];
+    double x[PHI_DIM], displacement[PHI_DIM];
     PHI_COPY(x, s->x, x, PHI_DIM);
-    PHI_COPY(moved, s->carry, moved, PHI_DIM);
+    PHI_COPY(displacement, s->carry, displacement, PHI_DIM);
 #if PHI_ATTITUDE && PHI_ADJOINT
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef, x, moved, s->x, element, kept);
+    phi_flows(s->coef, x, displacement, s->x, element, tape);
 #elif PHI_ATTITUDE
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef, x, moved, s->x, element);
+    phi_flows(s->coef, x, displacement, s->x, element);
 #elif PHI_ADJOINT
-    phi_flows(s->coef, x, moved, s->x, kept);
+    phi_flows(s->coef, x, displacement, s->x, tape);
 #else
-    phi_flows(s->coef, x, moved, s->x);
+    phi_flows(s->coef, x, displacement, s->x);
 #endif
     ++s->evaluations;
     if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
-    phi_settle(s->x, s->carry, moved);
+    phi_settle(s->x, s->carry, displacement);
 #if PHI_RATE_OF_GAUGE
     phi_turn_by(s, element, s->aside);
 #elif PHI_ATTITUDE
@@ -100,22 +100,22 @@ static phi_status phi_stages(phi_solver *s)
 
 #if PHI_CORRECTED
 /* Apply the corrector before the steps of a run, or its inverse after them. If it fails, the state is unchanged. */
-static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_KEPT)
+static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_TAPE)
 {
-    double x[PHI_DIM], moved[PHI_DIM];
+    double x[PHI_DIM], displacement[PHI_DIM];
     PHI_COPY(x, s->x, x, PHI_DIM);
-    PHI_COPY(moved, s->carry, moved, PHI_DIM);
-    phi_corrector(after, s->coef, x, moved, s->x PHI_AND_KEPT);
+    PHI_COPY(displacement, s->carry, displacement, PHI_DIM);
+    phi_corrector(after, s->coef, x, displacement, s->x PHI_AND_TAPE);
     if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
-    phi_settle(s->x, s->carry, moved);
+    phi_settle(s->x, s->carry, displacement);
     return PHI_OK;
 }
 
 /* End a run that started at `before`; returns the status of its last step, or that of the corrector. Without a
    successful step, or if the corrector fails, the state is that before the run. */
-static phi_status phi_end_run(phi_solver *s, const phi_solver *before, phi_status status PHI_AND_STATES_KEPT)
+static phi_status phi_end_run(phi_solver *s, const phi_solver *before, phi_status status PHI_AND_STATES_TAPE)
 {
-    const phi_status corrected = s->steps == before->steps ? PHI_OK : phi_correct(s, 1 PHI_AND_KEPT_AT(-PHI_BEGUN));
+    const phi_status corrected = s->steps == before->steps ? PHI_OK : phi_correct(s, 1 PHI_AND_TAPE_AT(-PHI_BEGUN));
     if (s->steps == before->steps || corrected != PHI_OK) *s = *before;
     return status != PHI_OK ? status : corrected;
 }

@@ -48,25 +48,25 @@ static phi_status phi_tangent_stage(const phi_solver *s, const phi_solver *at, d
 {
     double point[PHI_POINT], end[PHI_UNKNOWNS], node[PHI_UNKNOWNS], along[PHI_UNKNOWNS];
     double slopes[PHI_NODES][PHI_SLOPES], outer[PHI_DIM * (PHI_DIM + PHI_UNKNOWNS)];
-    phi_lanes moves[PHI_UNKNOWNS], z[PHI_UNKNOWNS];
+    phi_lanes increments[PHI_UNKNOWNS], z[PHI_UNKNOWNS];
     phi_solver twin = *s;
     memcpy(twin.x, at->x, sizeof twin.x);
     twin.t = at->t;
     twin.history.count = 0;
     phi_start(&twin, point);
-    const phi_status status = phi_collocate(&twin, point, moves);
+    const phi_status status = phi_collocate(&twin, point, increments);
     if (status != PHI_OK) return status;
-    phi_mixed(phi_mixing, moves, z);
+    phi_mixed(phi_mixing, increments, z);
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_UNKNOWNS; ++k) node[k] = z[k][i];
         phi_stage_slope_jacobian(s->coef, point, node, slopes[i]);
     }
-    phi_end(moves, end);
+    phi_end(increments, end);
     phi_stage_change(s->coef, point, end, change);
     phi_stage_change_jacobian(s->coef, point, end, outer);
     for (int j = 0; j < PHI_DIM; ++j) {
-        if (!phi_vary(s, slopes, j, moves)) return PHI_NO_CONVERGENCE;
-        phi_end(moves, along);
+        if (!phi_vary(s, slopes, j, increments)) return PHI_NO_CONVERGENCE;
+        phi_end(increments, along);
         for (int i = 0; i < PHI_DIM; ++i) {
             const double *row = outer + i * (PHI_DIM + PHI_UNKNOWNS);
             double sum = row[j] + (i == j ? 1.0 : 0.0);

@@ -15,30 +15,30 @@ static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {
 #if PHI_MONITOR
-    double y[PHI_ALONG] = { 0.0 }, moved[PHI_ALONG] = { 0.0 }, start[PHI_ALONG] = { 0.0 };
+    double y[PHI_ALONG] = { 0.0 }, displacement[PHI_ALONG] = { 0.0 }, start[PHI_ALONG] = { 0.0 };
     double slope[PHI_DIM * PHI_DIM], product[PHI_DIM * PHI_DIM];
     (void)value;
     memcpy(start, x, PHI_DIM * sizeof x[0]);
     memcpy(y, x, PHI_DIM * sizeof x[0]);
-    memcpy(moved, carry, PHI_DIM * sizeof carry[0]);
+    memcpy(displacement, carry, PHI_DIM * sizeof carry[0]);
 #else
-    double y[PHI_DIM], moved[PHI_DIM], slope[PHI_DIM * PHI_DIM], product[PHI_DIM * PHI_DIM];
+    double y[PHI_DIM], displacement[PHI_DIM], slope[PHI_DIM * PHI_DIM], product[PHI_DIM * PHI_DIM];
     (void)value;
     memcpy(y, x, sizeof y);
-    memcpy(moved, carry, sizeof moved);
+    memcpy(displacement, carry, sizeof displacement);
 #endif
     memset(derivative, 0, sizeof product);
     for (int i = 0; i < PHI_DIM; ++i) derivative[i * PHI_DIM + i] = 1.0;
     for (int k = 0; k < PHI_FLOWS; ++k) {
 #if PHI_MONITOR
-        phi_tangent_flow(phi_part_of[k], coef + phi_row_of[k] * PHI_ROW, y, moved, start, slope);
+        phi_tangent_flow(phi_part_of[k], coef + phi_row_of[k] * PHI_ROW, y, displacement, start, slope);
 #else
-        phi_tangent_flow(phi_part_of[k], coef + phi_row_of[k] * PHI_ROW, y, moved, x, slope);
+        phi_tangent_flow(phi_part_of[k], coef + phi_row_of[k] * PHI_ROW, y, displacement, x, slope);
 #endif
         phi_tangent_product(slope, derivative, product);
         for (int i = 0; i < PHI_DIM * PHI_DIM; ++i) derivative[i] += product[i];
     }
-    for (int i = 0; i < PHI_DIM; ++i) change[i] = moved[i] - carry[i];
+    for (int i = 0; i < PHI_DIM; ++i) change[i] = displacement[i] - carry[i];
     return PHI_OK;
 }
 #endif

@@ -37,9 +37,9 @@ export function beginAttitude(solver, first) {
  * all steps.
  */
 export function currentElement(solver) {
-  const found = new Float64Array(ELEMENT);
-  multiplyAfter(firstOf(solver), solver.turned, found);
-  return found;
+  const element = new Float64Array(ELEMENT);
+  multiplyAfter(firstOf(solver), solver.turned, element);
+  return element;
 }
 
 /** The group element of an attitude and a position of the public interface. */

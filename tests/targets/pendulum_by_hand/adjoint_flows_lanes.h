@@ -1,6 +1,6 @@
 #ifndef ADJOINT_FLOWS_LANES_H
 #define ADJOINT_FLOWS_LANES_H
-#include "packs.c"
+#include "batches.c"
 
 static void phi_follow_lanes(int part, int row, phi_group *group, phi_lanes kept[PHI_BACK_PACKS][2])
 {

@@ -79,7 +79,7 @@ enum { PHI_NODES = 1, PHI_WIDTH = 1, PHI_UNKNOWNS = 2, PHI_EARLIER = 1, PHI_DIFF
 #define PHI_ALONG 0
 #define PHI_PACKS (PHI_FAST && !PHI_IMPLICIT)
 #define PHI_FAR 0
-#define PHI_ABREAST ((PHI_PACKS || PHI_GROUPS) && PHI_ADJOINT)
+#define PHI_BATCHED ((PHI_PACKS || PHI_GROUPS) && PHI_ADJOINT)
 #define PHI_SPARSE 0
 #define PHI_SWEPT 0
 #define PHI_CENTRED 0
@@ -107,7 +107,7 @@ void phi_vector_field(const phi_params *params, const double x[2], double out[2]
 enum { PHI_STAGES = 3 };
 #endif
 enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2, PHI_TRAIL = (PHI_SPLITTING || PHI_COMPOSED ? 3 : PHI_GAUSS ? 2 : 1) * PHI_DIM };
-enum { PHI_TRAIL_EACH = PHI_TRAIL * (PHI_SPLITTING || !PHI_ABREAST ? 1 : PHI_EXPLICIT ? 32 : 8) };
+enum { PHI_TRAIL_EACH = PHI_TRAIL * (PHI_SPLITTING || !PHI_BATCHED ? 1 : PHI_EXPLICIT ? 32 : 8) };
 enum { PHI_GAUGES = 2 };
 #if PHI_MATRICES
 enum { PHI_ATTITUDE_SIZE = 9, PHI_ELEMENT = 9, PHI_COVECTOR = 4, PHI_RATE = 4, PHI_ROWS_OF_ATTITUDE = 3 };

@@ -66,15 +66,15 @@ from phigen.targets.rendering import render
 class Back:
     """The reverse pass of a part, or of a kernel: its ``loops``, and the calls for each row segment in two traversals.
 
-    ``handed`` is the number of arrays that sites pass to other sites, ``undone`` has the fields that the inverse flow
-    recomputes.
+    ``handed`` is the number of arrays that sites pass to other sites; ``recomputed`` are the fields that the inverse
+    flow recomputes.
     """
 
     loops: tuple[ir.Function, ...]
     first: ir.Block
     second: ir.Block
     handed: int
-    undone: tuple[int, ...] = ()
+    recomputed: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,9 @@ class _Pulled:
     """A transposed kernel, and the place of its cotangents.
 
     ``gather`` has the sums that it reads; ``ends`` are the kernels of these, with the parameters that have the opposite
-    sign seen from b, and their transposes. ``before`` are statements for a row segment before its calls. The kernel
-    recomputes the fields ``undone``, or another kernel does, from sums that the transposes over bonds or pairs compute.
-    The cotangents that the flow after it passes are ``taken``. The ``sweep`` is that of which it is the transpose.
+    sign seen from b, and their transposes. ``before`` are statements for a row segment before its calls. The fields
+    ``recomputed`` are recomputed by the kernel, or by another one from sums that the transposes over bonds or pairs
+    compute. The cotangents that the flow after it passes are ``taken``. It is the transpose of the ``sweep``.
     """
 
     kernel: Kernel
@@ -92,7 +92,7 @@ class _Pulled:
     gather: Gather | None
     ends: tuple[tuple[Ends, frozenset[str], Kernel], ...]
     before: ir.Block = ()
-    undone: tuple[int, ...] = ()
+    recomputed: tuple[int, ...] = ()
     undo: Kernel | None = None
     taken: tuple[Handed, ...] = ()
     sweep: Sweep | None = None
@@ -111,7 +111,7 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
     return "\n".join([_tables(program, step, parts, adjoint.steps), *texts, _added(program, step, layout)])
 
 
-_ARRAYS = {name: member(name, ir.fixed(name)) for name in ("x", "bar", "handed", "given")}
+_ARRAYS = {name: member(name, ir.fixed(name)) for name in ("x", "bar", "handed", "received")}
 
 
 @dataclass(frozen=True)
@@ -153,10 +153,10 @@ class _Reverse:
                 setup = (member("x", y), _ARRAYS["bar"], member("handed", ir.Member(S, "handed")))
             in_first: ir.Block = (member("varied", ir.fixed("v")),) if step.equation else ()
             if receives:
-                in_first = (_ARRAYS["given"], *find_givers[:1])
+                in_first = (_ARRAYS["received"], *find_givers[:1])
             elif step.by_colour and step.by_colour[k - 1]:
                 setup = (*setup, member("chosen", FLOW))
-            first[k] = RowSegment(part.first, (*setup, *in_first), updated=part.undone, arrays=ir.fixed("x"))
+            first[k] = RowSegment(part.first, (*setup, *in_first), updated=part.recomputed, arrays=ir.fixed("x"))
             if part.second:
                 second[k] = RowSegment(part.second, (*setup, *find_givers))
         title = "How a kernel goes back" if step.equation else "How a part goes back"
@@ -170,7 +170,7 @@ class _Reverse:
         """Return the text of a driver that makes one traversal of some parts."""
         step, back = self.layout.step, name == "back_rows"
         far = ["coef", *["far"] * bool(self.rows.limited)]
-        arrays = ["x", "bar", "handed", *["given"] * (back and takes(self.program, step))]
+        arrays = ["x", "bar", "handed", *["received"] * (back and takes(self.program, step))]
         parameters = [*far, *arrays, "sums"] if back or step.partners else arrays
         if step.equation:
             parameters = [*far, "v", "bar", "sums"] if back else ["bar", *["numbers"] * bool(step.partners)]
@@ -184,7 +184,7 @@ class _Reverse:
         """Yield the two traversals of all sweeps of each part; one traversal if the next flow adds the
         contributions."""
         program, layout, step = self.program, self.layout, self.layout.step
-        undone, back = can_recompute_fields(program, step), transposes(program, step)
+        recomputed, back = can_recompute_fields(program, step), transposes(program, step)
         around = {
             layout.bar(program.coordinates[sweep.moved[int(s.key[0])]])
             for part, part_kernels in zip(step.parts, back, strict=True)
@@ -200,7 +200,7 @@ class _Reverse:
                 bars = tuple(layout.bar(program.coordinates[i]) for i in sweep.moved)
                 seeds = Seeds("change_bar", bars, sweep.colour)
                 ends = tuple(self._ends_back(sweep.gather))
-                moved = sweep.moved if undone else ()
+                moved = sweep.moved if recomputed else ()
                 alike = len(ends) == 1 and ends[0][0].of_all
                 transposed, undo = (alike and apart(kernel)) or (kernel, None)
                 before = tuple(self._gathered(sweep)) if reads_sums(transposed) else ()
@@ -253,10 +253,10 @@ class _Reverse:
             of_segment = ir.Binary("+", sums, ir.Binary("*", UNIT, ir.fixed("SUMS")))
             return ir.Call(loop.name, (*[COEF] * coefficients, at(sites), of_segment))
 
-        def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], undone: Sequence[str]) -> ir.Block:
+        def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], recomputed: Sequence[str]) -> ir.Block:
             """Return the calls of a kernel, in each form."""
             sums, blocks = one.gather.names if one.gather else (), dict[str, ir.Block]()
-            build = First(self.loops, kernel, one.seeds, sums, tuple(listed), arrays, tuple(undone), one.taken)
+            build = First(self.loops, kernel, one.seeds, sums, tuple(listed), arrays, tuple(recomputed), one.taken)
             for form, versions in self.loops.forms(self.rows, [build.on_sites]).items():
                 parts = build.loops_of(form, versions)
                 blocks[form] = tuple(called(loop, sites) for loop, sites in calls_of(parts, one.sweep))
@@ -266,7 +266,7 @@ class _Reverse:
         for one in pulled:
             listed = handed_by(layout, one.kernel, arrays)
             arrays = max([arrays, *(h.array + 1 for h in listed)])
-            fields = [self.program.coordinates[f] for f in one.undone]
+            fields = [self.program.coordinates[f] for f in one.recomputed]
             first += [*one.before, *(self._cleared(listed) if one.sweep and beside_seams(one.sweep) else ())]
             first += over_sites(one, one.kernel, listed, () if one.undo else fields)
             bonds = [loop for e in one.ends for loop in self.loops.transposed_sums(*e, arrays, summed=bool(one.undo))]
@@ -282,8 +282,8 @@ class _Reverse:
             purpose = f"contributions to the cotangents of sites by those that {whom}"
             loops.append(row_transposes.handing(name, purpose, beside, self.loops.rows))
             second.append(ir.Call(name, (SEGMENT,)))
-        undone = sorted({f for one in pulled for f in one.undone})
-        return Back(tuple(loops), tuple(first), tuple(second), arrays, tuple(undone))
+        recomputed = sorted({f for one in pulled for f in one.recomputed})
+        return Back(tuple(loops), tuple(first), tuple(second), arrays, tuple(recomputed))
 
     def _cleared(self, handed: Sequence[Handed]) -> Iterator[ir.Statement]:
         """Clear the arrays of contributions to other sites, if loops omit some of the sites."""
@@ -318,9 +318,9 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
         "NAME": program.name,
         "parts": len(parts),
         "kernels": [f"{name.upper()} = {k}" for k, (name, *_) in enumerate(KERNELS, 1)] if step.equation else (),
-        "kept": 1 + starts_are_read(step),
+        "stored_states": 1 + starts_are_read(step),
         "sums": _sums(program, step),
-        "keeps": "" if can_recompute_fields(program, step) else ", ".join(f"{{ {row} }}" for row in rows),
+        "stored_fields": "" if can_recompute_fields(program, step) else ", ".join(f"{{ {row} }}" for row in rows),
         "hands": ", ".join(str(int(bool(part.second))) for part in parts),
         "handing": not ways_of and (any(handed_apart(program, step)) or can_recompute_fields(program, step)),
         "handed": max(1, *(part.handed for part in parts)) * (2 if ways_of else 1) if parts else 1,

@@ -43,7 +43,7 @@ class First:
     """The first loop of the transpose of a kernel.
 
     Cotangents of ``sums`` over bonds or pairs, if it computes any, are stored in arrays from ``begin`` on. It
-    recomputes the fields ``undone`` before the sweep. The cotangents passed by the flow after it are ``received``.
+    recomputes the fields ``recomputed`` before the sweep. The cotangents passed by the flow after it are ``received``.
     """
 
     loops: RowLoops
@@ -52,13 +52,13 @@ class First:
     sums: Sequence[str]
     handed: tuple[Handed, ...]
     begin: int
-    undone: tuple[str, ...] = ()
+    recomputed: tuple[str, ...] = ()
     received: tuple[Handed, ...] = ()
 
     @property
     def on_sites(self) -> ir.Function:
         """The loop on the level of sites."""
-        return self.loops.sites.recomputing(self.kernel, self.sums, self.undone, self.seeds.colour)
+        return self.loops.sites.recomputing(self.kernel, self.sums, self.recomputed, self.seeds.colour)
 
     def loops_of(self, form: str, versions: Mapping[str, str]) -> list[ir.Function]:
         """Return the loops of one form, by rows."""
@@ -73,7 +73,7 @@ class First:
                     self.begin,
                     summed,
                     self.received,
-                    frozenset(self.undone),
+                    frozenset(self.recomputed),
                 ),
                 self.loops.rows,
                 vectors=self.loops.fast,

@@ -114,7 +114,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "TAKES": takes(program, step),
         "SHARES": shares(step),
         "STARTS": starts_are_read(step),
-        "UNDONE": can_recompute_fields(program, step),
+        "RECOMPUTED": can_recompute_fields(program, step),
         "APART": (program.profile != "fast" or step.sites.colours > 1) and shares(step),
         "GIVERS": givers(step) and (takes(program, step) or any(handed_apart(program, step))),
         "SITE_PARAMETERS": bool(step.sites.parameters),

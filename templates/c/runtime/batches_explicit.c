@@ -1,0 +1,31 @@
+#ifndef PHI_FILE_BATCHES_EXPLICIT
+#define PHI_FILE_BATCHES_EXPLICIT
+#include <math.h>
+#include <string.h>
+#include "batches.c"
+
+/* phi_stage for a batch of members; sums as in phi_advance. */
+PHI_IN_PLACE static inline void phi_stage_lanes(phi_lanes *coef, int distinct_coef, phi_pack *pack)
+{
+    phi_lanes increment[PHI_DIM];
+    phi_explicit_lanes(coef, pack->x, distinct_coef, increment);
+    for (int i = 0; i < PHI_DIM; ++i) {
+        double *x = pack->x[i], *carry = pack->carry[i];
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double change = increment[i][lane], sum = x[lane] + change, added = sum - x[lane];
+            const double small = ((x[lane] - (sum - added)) + (change - added)) + carry[lane];
+            x[lane] = sum + small;
+            carry[lane] = small - (x[lane] - sum);
+        }
+    }
+}
+
+/* Make steps of a group: each stage for all batches. own = 0: all members have the coefficients of the first lane. */
+PHI_IN_PLACE static inline void phi_steps_lanes(int distinct_coef, phi_group *group, int steps)
+{
+    for (int step = 0; step < steps; ++step)
+        PHI_EACH_STAGE
+            for (int k = 0; k < group->packs; ++k) phi_stage_lanes(PHI_OF(group->coef[distinct_coef * k], stage), distinct_coef, &group->pack[k]);
+}
+#endif

@@ -1,0 +1,41 @@
+#ifndef PHI_FILE_GAUSS_ALL_UNKNOWNS
+#define PHI_FILE_GAUSS_ALL_UNKNOWNS
+/* Sweeps iterate all unknowns, and read them. */
+#define PHI_READ(r) (r)
+
+/* The factors of a stage that a sweep reads. */
+static inline void phi_set_factors(double h, phi_lanes factors[PHI_FACTORS])
+{
+    for (int i = 0; i < PHI_NODES; ++i) factors[0][i] = h * phi_weights[i];
+}
+
+/* Values of the unknowns in a step of another size, the last one times a ratio, by the collocation polynomial. */
+static void phi_predict_at(phi_history *past, double ratio, phi_lanes *z)
+{
+    double factor[PHI_NODES];
+    for (int i = 0; i < PHI_NODES; ++i) {
+        phi_factors_at(1.0 + ratio * phi_nodes[i], factor);
+        for (int k = 0; k < PHI_UNKNOWNS; ++k)
+            for (int j = 0; j < PHI_NODES; ++j) z[k][i] += factor[j] * past->increments[past->latest][k][j];
+    }
+}
+
+/* The array that sweeps write. */
+static inline phi_lanes *phi_iterates(phi_lanes *increments, phi_lanes *apart)
+{
+    (void)apart;
+    return increments;
+}
+
+/* A sweep: the increments of the unknowns, by what it reads. */
+static inline void phi_sweep(const phi_solver *s, double point[PHI_POINT], phi_lanes *factors, phi_lanes *reads, phi_lanes *now)
+{
+    phi_slopes(s, point, factors, reads, now);
+}
+
+/* What the next sweep reads, by these increments. */
+static inline void phi_read(phi_lanes *now, phi_lanes *reads)
+{
+    phi_mixed(phi_mixing, now, reads);
+}
+#endif

@@ -1,0 +1,176 @@
+#ifndef PHI_FILE_LATTICE_CHECKPOINTS
+#define PHI_FILE_LATTICE_CHECKPOINTS
+#include <float.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+#include "lattice_back.c"
+
+/* ---- Checkpoints and tape ---- */
+#if !PHI_SERIES
+/* Number of flows in a step whose last flow is merged with the first of the next step. */
+#define PHI_OWN_FLOWS (PHI_FLOWS > 1 ? PHI_FLOWS - 1 : 1)
+
+/* Number of a flow, with PHI_FLOWS for the merged last and first one. */
+static int phi_joined(int flow, int continues) { return PHI_FLOWS > 1 && flow == 0 && continues ? PHI_FLOWS : flow; }
+
+#endif
+/* The reverse pass of a run: derivatives of a number L, and checkpoints and tape of the forward pass. */
+typedef struct phi_transpose {
+#include "state_of_transpose.h"
+} phi_transpose;
+
+#if PHI_SERIES
+/* Doubles on the tape for one step. */
+static size_t phi_step_tape_size(const phi_solver *s) { return PHI_ALL_STAGES((size_t)PHI_STORED_STATES) * PHI_DIM * phi_block(s->rows, s->width); }
+
+/* Set the number of steps and the time. */
+static void phi_stand(phi_solver *s, size_t steps)
+{
+    s->steps = steps;
+    s->t = s->t_before_h + (double)(steps - s->steps_before_h) * s->h;
+#if PHI_TIMED
+    s->now = s->t;
+#endif
+}
+
+#endif
+#if PHI_BOND_PARAMETERS
+/* Doubles for values at all bonds. */
+static size_t phi_at_bonds(const phi_solver *s) { return ((size_t)s->bonds[s->sites] + 7) / 8 * 8; }
+
+#endif
+/* Doubles that every reverse pass needs. */
+static size_t phi_always(const phi_solver *s)
+{
+    const size_t block = phi_block(s->rows, s->width), units = phi_units(s);
+    size_t numbers = (PHI_ARRAYS + 2 * PHI_DIM) * block + PHI_HANDED * (block + (size_t)s->width);
+#if PHI_BOND_PARAMETERS
+    numbers += PHI_BOND_ARRAYS * phi_at_bonds(s);
+#endif
+    return numbers + units * PHI_SUMS;
+}
+
+/* Bytes of a checkpoint: the state at the start of a segment. */
+static size_t phi_state_size(const phi_solver *s)
+{
+    return PHI_DIM * phi_block(s->rows, s->width) * sizeof(double) + 2 * sizeof(size_t);
+}
+
+#include "lattice_tape_recomputed.c"
+#include "lattice_tape_stored.c"
+
+#if !PHI_SERIES
+enum { PHI_BESIDE_CORE = 1 << 19 }; /* bytes of cache for the tape, beside the state */
+
+#endif
+/* Whether the checkpoints of all segments fit beside the tape of one segment. */
+static int phi_fits(size_t room, size_t longest, size_t of_step, size_t of_state, size_t steps)
+{
+    return (room - longest * of_step) / of_state > steps / longest;
+}
+
+#if PHI_SERIES
+/* Divide the memory between the tape of one segment and checkpoints: the longest segments for which every step but
+   those of the last segment is made twice; or one half each. */
+#else
+/* Divide the memory between the tape of one segment and checkpoints: the shortest segments for which every step is made
+   at most twice, but long enough to fill the cache; or one half each. */
+#endif
+static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t steps, void *memory, size_t size)
+{
+    double *next = (double *)(void *)((char *)memory + (64 - (uintptr_t)memory % 64) % 64);
+    const size_t block = phi_block(s->rows, s->width), room = size - 64 - phi_always(s) * sizeof *next;
+    const size_t of_state = phi_state_size(s);
+    memset(next, 0, phi_always(s) * sizeof *next);
+    g->block = block;
+#if PHI_RECOMPUTED
+    const size_t of_step = phi_leg_size(s); /* sizes are counted in legs */
+    steps = phi_legs(steps, g->leg);
+#else
+    g->of_step = phi_step_tape_size(s);
+    const size_t of_step = g->of_step * sizeof *next;
+#endif
+    const size_t fit = (room - of_state) / of_step;
+    g->longest = steps > 0 ? steps : 1;
+    if (fit < steps) {
+#if PHI_SERIES
+        g->longest = fit;
+        while (g->longest > 1 && !phi_fits(room, g->longest, of_step, of_state, steps)) --g->longest;
+#else
+        g->longest = of_step < PHI_BESIDE_CORE ? PHI_BESIDE_CORE / of_step : 1;
+        if (g->longest > fit) g->longest = fit;
+        while (g->longest < fit && !phi_fits(room, g->longest, of_step, of_state, steps)) ++g->longest;
+#endif
+        if (!phi_fits(room, g->longest, of_step, of_state, steps)) g->longest = fit > 2 ? fit / 2 : 1;
+    }
+    g->most = (room - g->longest * of_step) / of_state;
+    for (int f = 0; f < PHI_ARRAYS; ++f, next += block) g->bar[f] = g->row_bar[f] = PHI_FIRST_SITE(next);
+    for (int f = 0; f < PHI_DIM; ++f, next += block) g->row_bar[f] = PHI_FIRST_SITE(next);
+    for (int f = 0; f < PHI_DIM; ++f, next += block) g->end[f] = PHI_FIRST_SITE(next);
+    for (int k = 0; k < PHI_HANDED; ++k, next += block + (size_t)s->width) g->handed[k] = PHI_FIRST_SITE(next);
+#if PHI_BOND_PARAMETERS
+    for (int k = PHI_ARRAYS; k < PHI_BARS; ++k, next += phi_at_bonds(s)) g->bar[k] = g->row_bar[k] = next;
+#endif
+    g->states = next;
+    g->tape = next + g->most * PHI_DIM * block;
+    g->sums = g->tape + g->longest * (of_step / sizeof *next);
+    g->marks = (size_t *)(void *)(g->sums + phi_units(s) * PHI_SUMS);
+    memset(g->sums, 0, phi_units(s) * PHI_SUMS * sizeof *next);
+#if PHI_RECOMPUTED
+    g->longest *= g->leg;
+#endif
+}
+
+enum { PHI_UNASKED = 1 << 22 }; /* site updates between calls of s->stop */
+
+/* Whether to stop; called after some more steps. */
+static int phi_is_stopped(const phi_solver *s, phi_transpose *g, size_t steps)
+{
+    g->unasked += steps * s->sites;
+    if (s->stop == NULL || g->unasked < PHI_UNASKED) return 0;
+    g->unasked = 0;
+    return s->stop();
+}
+
+/* Fields of a checkpoint. */
+static void phi_fields_of_state(const phi_transpose *g, size_t number, double *fields[PHI_DIM])
+{
+    for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = PHI_FIRST_SITE(g->states + (number * PHI_DIM + f) * g->block);
+}
+
+/* Store a checkpoint after a number of steps. */
+static void phi_mark(const phi_solver *s, phi_transpose *g, size_t done)
+{
+    double *fields[PHI_DIM];
+    phi_fields_of_state(g, g->count, fields);
+    phi_copy(fields, s->x, s);
+    g->marks[2 * g->count] = done;
+#if !PHI_SERIES
+    g->marks[2 * g->count + 1] = s->far;
+#endif
+    ++g->count;
+}
+
+/* Restore the last checkpoint; returns the number of its step. */
+static size_t phi_return(phi_solver *s, const phi_transpose *g)
+{
+    double *fields[PHI_DIM];
+    const size_t done = g->marks[2 * (g->count - 1)];
+    phi_fields_of_state(g, g->count - 1, fields);
+    phi_copy(s->x, fields, s);
+#if PHI_SERIES
+    phi_stand(s, g->first_step + done);
+    phi_forget(s);
+#else
+    phi_copy(s->before, fields, s);
+    s->far = g->marks[2 * (g->count - 1) + 1];
+    s->steps = g->first_step + done;
+    s->open = PHI_FLOWS > 1 && done > 0;
+#endif
+    return done;
+}
+#endif

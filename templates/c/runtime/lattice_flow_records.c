@@ -1,0 +1,33 @@
+#ifndef PHI_FILE_LATTICE_FLOW_RECORDS
+#define PHI_FILE_LATTICE_FLOW_RECORDS
+#include "lattice.h"
+#include "model.h"
+
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+#include "state_of_flow.h"
+} phi_flow;
+
+/* Set *flow to flow `number` of a step; number PHI_FLOWS is the last merged with the first. */
+static void phi_set_flow(const phi_solver *s, size_t steps, int number, phi_flow *flow)
+{
+    flow->part = phi_flow_parts[number];
+#if PHI_RECOMPUTED
+    flow->go = 0;
+#endif
+#if PHI_RENEWED
+    phi_renew(s, number, steps, flow->renewed_coef);
+    flow->coef = flow->renewed_coef;
+#else
+    flow->coef = s->coef + number * PHI_ROW;
+    (void)steps;
+#endif
+}
+
+static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
+{
+    phi_flow flow;
+    phi_set_flow(s, steps, number, &flow);
+    phi_sweep_part(s, flow.part, flow.coef PHI_AND_FAR(s->far > 0));
+}
+#endif

@@ -1,0 +1,18 @@
+#ifndef PHI_FILE_LATTICE_PLAIN_FLOWS
+#define PHI_FILE_LATTICE_PLAIN_FLOWS
+#include "lattice.h"
+#include "model.h"
+
+/* Apply flow `number` of a step; number PHI_FLOWS is the last merged with the first. */
+static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
+{
+#if PHI_RENEWED
+    double coef[PHI_ROW];
+    phi_renew(s, number, steps, coef);
+    phi_sweep_part(s, phi_flow_parts[number], coef PHI_AND_FAR(s->far > 0));
+#else
+    (void)steps;
+    phi_sweep_part(s, phi_flow_parts[number], s->coef + number * PHI_ROW PHI_AND_FAR(s->far > 0));
+#endif
+}
+#endif

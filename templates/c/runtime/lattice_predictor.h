@@ -1,0 +1,9 @@
+#ifndef PHI_FILE_LATTICE_PREDICTOR_H
+#define PHI_FILE_LATTICE_PREDICTOR_H
+/* Predictor of the solution y of an implicit stage: backward differences of the last values of y - x, from which the
+   starting value of the iteration is extrapolated. */
+typedef struct {
+    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
+    double *difference[PHI_DIFFERENCES][PHI_DIM];
+} phi_predictor;
+#endif
