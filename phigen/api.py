@@ -24,7 +24,7 @@ from phigen.geometry.system import System, system_from_spec, system_of_lattice
 from phigen.proofs.examination import located
 from phigen.spec import limits
 from phigen.spec.model import Overrides, Spec
-from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SCHEMES, SPEC_NAME, TIMED_ARGUMENTS
+from phigen.spec.names import ARGUMENTS, IDENTIFIER, PROFILES, SCHEMES, SPEC_NAME, TIMED_ARGUMENTS, argument_hint
 from phigen.spec.taken import objection
 
 if TYPE_CHECKING:
@@ -314,7 +314,7 @@ def _expect_names(system: System) -> None:
     ]
     reserved_names = TIMED_ARGUMENTS if system.time else ARGUMENTS
     wrong = [name for name in system.parameter_names if name in reserved_names]
-    problems += [(f"a parameter cannot be called {name!r}", ARGUMENT_HINT) for name in wrong]
+    problems += [(f"a parameter cannot be called {name!r}", argument_hint(name)) for name in wrong]
     diagnostics = [Diagnostic(message, hint=hint) for message, hint in filter(None, problems)]
     if diagnostics:
         raise SpecError(diagnostics)

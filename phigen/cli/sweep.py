@@ -46,9 +46,14 @@ if TYPE_CHECKING:
 @scheme_option
 @profile_option
 @click.option(
-    "--plot", metavar="FILE", callback=file_ending(*FIGURES), help="Draw the map: FILE.png, FILE.svg or FILE.pdf."
+    "--plot", metavar="FILE", callback=file_ending(*FIGURES), help="Draw the results: FILE.png, FILE.svg or FILE.pdf."
 )
-@click.option("--show", "shown", metavar="VARIABLE", help="The variable to draw.  [default: the first of keep]")
+@click.option(
+    "--show",
+    "shown",
+    metavar="VARIABLE",
+    help="The variable to draw.  [default: all observables, else one other variable]",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 @force_option
 @verbosity
@@ -86,8 +91,8 @@ def command(
         raise click.UsageError("--show chooses what --plot draws: add --plot FILE")
     spec = load_one(spec_file)
     sweep = _sweep_of(spec, name)
-    if shown and shown not in sweep.keep:
-        stored = ", ".join(sweep.keep)
+    if shown and shown not in sweep.stored:
+        stored = ", ".join(sweep.stored)
         raise click.BadParameter(f"{shown!r} is not stored; the sweep stores {stored}", param_hint="--show")
     setting = SweepSetting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme, profile)
     with console.watching(), stage(f"sweep {sweep.name}") as progress:

@@ -1,8 +1,8 @@
-"""Maps of sweeps: a stored result of each member over two of the dimensions."""
+"""Figures of sweeps: curves and maps of stored results over the dimensions."""
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Iterator, Sequence, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,11 +21,18 @@ _FIRST = ("lyapunov", "crossings", "energy_error", "casimir_error", "final")
 #: Values that span more than this factor are drawn on a logarithmic scale.
 _WIDE = 1e3
 
-_PANELS = 6
+#: Largest number of panels of a figure, and of panels side by side.
+_PANELS, _COLUMNS = 6, 3
+
+#: Marker of each curve of a family, so that curves differ without colours.
+_MARKERS = ("o", "s", "^", "D", "v", "P")
 
 
 def draw(store: Path, path: Path, shown: str | None = None) -> None:
-    """Draw a variable of a store into a file. Raises `FileError` if the store has no variable with this name."""
+    """Draw a variable of a store into a file; by default all kept observables, else the first other variable.
+
+    Raises `FileError` if the store has no variable with this name.
+    """
     import xarray
 
     from phigen.sweeping.store import open_job
@@ -37,78 +44,105 @@ def draw(store: Path, path: Path, shown: str | None = None) -> None:
         if not known:
             hint = f"keep one of {', '.join(_FIRST)}, or observables, in the sweep"
             raise FileError(f"{store} has nothing that can be drawn over the members\n  hint: {hint}")
-        chosen = shown or known[0]
-        if chosen not in known:
-            raise FileError(f"{store} has no {chosen!r} to draw; it has {', '.join(known)}")
+        if shown and shown not in known:
+            raise FileError(f"{store} has no {shown!r} to draw; it has {', '.join(known)}")
+        names = [shown] if shown else [n for n in observed if not n.startswith(("std(", "error("))] or known[:1]
         logarithmic = {axis.name for axis in plan.axes if axis.scale == "log"}
-        errors = f"error({chosen.removeprefix('mean(')}"
-        save(_figure(data.drop_vars([w for w in observed if w not in (chosen, errors)]), chosen, logarithmic), path)
+        varied = {axis.name for axis in plan.drawn} | {*plan.listed}
+        save(_figure(data, names[:_PANELS], logarithmic, varied), path)
 
 
 @styled
-def _figure(data: Any, name: str, logarithmic: Set[str]) -> Figure:
+def _figure(data: Any, names: Sequence[str], logarithmic: Set[str], varied: Set[str]) -> Figure:
+    """Return the figure of variables, one panel each; states have a panel for each coordinate.
+
+    ``varied`` names the variables in which members without a grid differ.
+    """
     from matplotlib.figure import Figure
 
-    values = data[name]
-    sites = values.dims[values.dims.index("coordinate") + 1 :] if "coordinate" in values.dims else ()
-    if sites:  # fields of lattices are averaged over the sites
-        values = values.mean(dim=sites)
-    panels = [values]
-    if "coordinate" in values.dims:
-        panels = [values.isel(coordinate=k) for k in range(min(values.sizes["coordinate"], _PANELS))]
-    titles = [str(c) for c in data["coordinate"].values] if len(panels) > 1 else [name]
-    figure = Figure(figsize=(4.6 * len(panels), 3.8), layout="constrained")
-    for axes, panel, title in zip(np.ravel(figure.subplots(1, len(panels))), panels, titles, strict=False):
-        if panel.dims == ("member",):
-            _scatter(figure, axes, data, panel)
+    panels = [panel for name in names for panel in _panels(data, name)][:_PANELS]
+    columns = min(len(panels), _COLUMNS)
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(4.6 * columns, 3.8 * rows), layout="constrained")
+    for axes, (title, values, errors) in zip(figure.subplots(rows, columns, squeeze=False).flat, panels, strict=False):
+        observed = values.name not in _FIRST
+        said = ""
+        if values.dims == ("member",):
+            _scatter(figure, axes, data, values, [n for n in data.data_vars if n in varied])
         else:
-            _over_grid(figure, axes, panel, logarithmic, _errors(data, name), observed=name not in _FIRST)
+            said = _over_grid(figure, axes, values, logarithmic, errors, observed=observed)
         if axes.get_xlabel() in logarithmic:
             axes.set_xscale("log")
         if axes.get_ylabel() in logarithmic:
             axes.set_yscale("log")
-        shown = title if title == name else f"{name}: {title}"
-        axes.set_title(f"{shown}, mean over the sites" if sites else shown)
+        axes.set_title(f"{title}{said}")
+    for unused in figure.axes[len(panels) : rows * columns]:
+        unused.set_axis_off()
     return figure
 
 
-def _errors(data: Any, name: str) -> Any:
-    """Return the stored standard errors of the mean of an observable; None for other variables."""
-    of, opened, rest = name.partition("(")
-    errors = f"error({rest}"
-    return data[errors] if of == "mean" and opened and errors in data else None
+def _panels(data: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
+    """Yield title, values and standard errors, or None, of each panel of a variable."""
+    values = data[name]
+    if "coordinate" not in values.dims:
+        of, opened, rest = name.partition("(")
+        errors = f"error({rest}"
+        yield name, values, data[errors] if of == "mean" and opened and errors in data else None
+        return
+    said = ""
+    if sites := values.dims[values.dims.index("coordinate") + 1 :]:  # fields of lattices are averaged over the sites
+        values, said = values.mean(dim=sites).rename(name), ", mean over the sites"
+    for k, coordinate in enumerate(values["coordinate"].values):
+        title = f"{name}: {coordinate}" if values.sizes["coordinate"] > 1 else name
+        yield f"{title}{said}", values.isel(coordinate=k), None
 
 
-def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors: Any, *, observed: bool) -> None:
-    """Draw a curve over one dimension or a map over two; the median is taken over further dimensions, draws first.
+def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors: Any, *, observed: bool) -> str:
+    """Draw curves or a map over the dimensions; return what the title says of errors and further dimensions.
 
-    Along one dimension, means of observables over draws have error bars, as have variables with ``errors``.
+    Observables are curves over one dimension, or over two of which one has few values; with draws these are means with
+    standard errors over the draws. All other variables over two dimensions are maps, as are larger ones. The median is
+    taken over further dimensions, draws first.
     """
-    dims = [*panel.dims]
-    if "seed" in dims and len(dims) == 2 and panel.sizes["seed"] > 1 and observed:
+    said = " ± standard error" if errors is not None else ""
+    if observed and panel.sizes.get("seed", 1) > 1 and len(panel.dims) > 1:
         draws, panel = panel, panel.mean(dim="seed", skipna=True)
         errors = draws.std(dim="seed", ddof=1, skipna=True) / np.sqrt(draws.notnull().sum(dim="seed"))
-    if len(panel.dims) == 1 and errors is not None:
-        (along,) = panel.dims
-        axes.errorbar(
-            panel[along], panel, errors, color=SERIES[0], linewidth=1.2, capsize=2.5, marker="o", markersize=3
-        )
-        axes.set(xlabel=along)
-        axes.grid(True)
-        return
+        said = f", mean of {draws.sizes['seed']} draws ± standard error"
     dims = [d for d in panel.dims if d != "seed"] or [*panel.dims]
-    more = [d for d in panel.dims if d not in dims[:2]]
-    panel = panel.median(dim=more, skipna=True) if more else panel
+    if more := [d for d in panel.dims if d not in dims[:2]]:
+        panel, errors, said = panel.median(dim=more, skipna=True), None, f", median over {', '.join(more)}"
+    few = min(dims[:2], key=lambda d: panel.sizes[d])
     if len(dims) == 1:
-        axes.plot(panel[dims[0]], panel, color=SERIES[0], linewidth=1.2)
-        axes.set(xlabel=dims[0], yscale="log" if _is_wide(_positive(panel)) else "linear")
-        axes.grid(True)
-        return
-    y, x = dims[:2]
-    edges = [_edges(np.asarray(panel[d], dtype=float), logarithmic=d in logarithmic) for d in (x, y)]
-    image = axes.pcolormesh(*edges, panel.transpose(y, x), rasterized=True, **_colours(panel))
-    axes.set(xlabel=x, ylabel=y)
-    figure.colorbar(image, ax=axes)
+        _curve(axes, dims[0], panel, errors, SERIES[0], "o")
+    elif observed and panel.sizes[few] <= len(SERIES):
+        (along,) = (d for d in dims[:2] if d != few)
+        for k, (colour, marker) in enumerate(zip(SERIES[: panel.sizes[few]], _MARKERS, strict=False)):
+            label = f"{few} = {float(panel[few][k]):g}"
+            bars = None if errors is None else errors.isel({few: k})
+            _curve(axes, along, panel.isel({few: k}), bars, colour, marker, label)
+        axes.legend()
+    else:
+        y, x = dims[:2]
+        edges = [_edges(np.asarray(panel[d], dtype=float), logarithmic=d in logarithmic) for d in (x, y)]
+        image = axes.pcolormesh(*edges, panel.transpose(y, x), rasterized=True, **_colours(panel))
+        axes.set(xlabel=x, ylabel=y)
+        figure.colorbar(image, ax=axes)
+        return said if more else ""
+    if errors is None and _is_wide(_positive(panel)):
+        axes.set_yscale("log")
+    return said
+
+
+def _curve(axes: Any, along: str, values: Any, errors: Any, colour: str, marker: str, label: str = "") -> None:
+    """Draw values over one dimension, with error bars if there are ``errors``."""
+    style = {"color": colour, "linewidth": 1.2, "label": label or None}
+    if errors is None:
+        axes.plot(values[along], values, **style)
+    else:
+        axes.errorbar(values[along], values, errors, capsize=2.5, marker=marker, markersize=3, **style)
+    axes.set(xlabel=along)
+    axes.grid(True)
 
 
 def _edges(values: Any, *, logarithmic: bool) -> Any:
@@ -122,10 +156,8 @@ def _edges(values: Any, *, logarithmic: bool) -> Any:
     return np.exp(edges) if logarithmic else edges
 
 
-def _scatter(figure: Any, axes: Any, data: Any, panel: Any) -> None:
-    """Draw members without a grid as points over the first two quantities in which they differ."""
-    results = (*_FIRST, "status", panel.name)
-    names = [n for n in data.data_vars if data[n].dims == ("member",) and n not in results and "(" not in n][:2]
+def _scatter(figure: Any, axes: Any, data: Any, panel: Any, names: Sequence[str]) -> None:
+    """Draw members without a grid as points over the first two quantities ``names`` in which they differ."""
     if len(names) < 2:
         axes.scatter(data[names[0]] if names else np.arange(panel.size), panel, s=4, color=SERIES[0])
         axes.set(xlabel=names[0] if names else "member")

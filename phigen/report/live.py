@@ -22,7 +22,7 @@ from phigen.targets.js.emitter import emit
 from phigen.targets.js.printing import LANGUAGE
 from phigen.targets.names import Scope
 
-#: Orders offered in addition to that of the page if they are lower; largest total number of characters of all solvers.
+#: Orders offered in addition to that of the page; largest total number of characters of all solvers.
 ORDERS, MOST = (2, 4), 200_000
 #: Largest number of unfolded sliders of a group; largest number of coordinates with sliders; largest factors by which
 #: sliders change step, speed and parameters.
@@ -30,8 +30,9 @@ FEW, COORDINATES = 4, 15
 STEP, SPEED, PARAMETER = 16, 20, 8
 
 HELP = """Drag a picture of space, or use the arrow keys, to turn both; + and − zoom; 0 resets. Between steps the curves
-are interpolated. The panel begins with a step that is large for RK4, but at most half of the step with which phigen
-fails. With smaller steps both come closer to the exact solution."""
+are interpolated. The panel begins with the order and the step for which the advantage of phigen at equal work is seen
+best, if it has one within ten seconds; the step is at most half of that with which phigen fails. With smaller steps
+both come closer to the exact solution, and over short times RK4 is often closer."""
 
 NOISE = "RK4, with which it compares the solver, does not apply to noise"
 NOTHING = "Nothing is conserved, because this system depends on the time or has forces: no errors are shown."
@@ -71,7 +72,7 @@ def gathered(
     parameters: Mapping[str, float],
     orders: Sequence[int] = ORDERS,
 ) -> Live:
-    """Return the panel for a run: JavaScript solvers of the order of the page and of lower orders in ``orders``."""
+    """Return the panel for a run: JavaScript solvers of the order of the page and of ``orders``."""
     if compilation.system.noise:
         return Live({}, why_not=NOISE)
     by_order, why_not = solvers(compilation, scheme, orders)
@@ -83,13 +84,13 @@ def solvers(
 ) -> tuple[dict[int, str], str]:
     """Return JavaScript by order, for the order of the page and for ``orders``, or the reason why there is none.
 
-    For ordinary systems only lower ``orders`` count. ``spec`` replaces the spec of the compilation, from which it
+    ``spec`` replaces the spec of the compilation, from which it
     differs only by observables.
     """
     page_order, is_own = compilation.order.order, spec is None
     spec = replace(spec or compilation.spec, reconstruct="", extras=_PRIVATE)
     by_order: dict[int, str] = {}
-    for order in (page_order, *(o for o in orders if o < page_order or (spec.lattice and o > page_order))):
+    for order in (page_order, *(o for o in orders if o != page_order)):
         try:
             if order == page_order and is_own and emits(compilation):
                 variant = compilation

@@ -30,7 +30,8 @@ MANY, SHORT = 6, 420
 
 _STYLES, _SCRIPTS = ("report.css",), ("theme.js", "space.js", "viewer.js")
 #: Scripts of the live panel, after its solvers; each kind of picture has a separate script.
-CURVES, FIELDS = ("race.js", "curves.js", "live.js"), ("race.js", "fields.js", "live.js")
+CURVES = ("race.js", "start.js", "curves.js", "live.js")
+FIELDS = ("race.js", "start.js", "fields.js", "live.js")
 
 
 @cache

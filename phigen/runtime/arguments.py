@@ -376,7 +376,9 @@ def number(value: float, what: str) -> float:
     except OverflowError:
         raise ValueError(f"{what} must be finite, not {_shown(value)}") from None
     except (TypeError, ValueError):
-        raise TypeError(f"{what} must be a number, not {_shown(value)}") from None
+        shape = np.shape(value) if isinstance(value, list | tuple | np.ndarray) else ()
+        several = f"an array of shape {shape}" if shape else _shown(value)
+        raise TypeError(f"{what} must be {'one' if shape else 'a'} number, not {several}") from None
     if not math.isfinite(number):
         raise ValueError(f"{what} must be finite, not {_shown(value)}")
     return number
@@ -406,6 +408,8 @@ def expect_known(names: Iterable[str], known: Mapping[str, float]) -> None:
 
 
 def _unknown(name: str, known: Mapping[str, float]) -> str:
+    if name == "h":
+        return "unknown parameter 'h'; the step size of a run is step="
     near = get_close_matches(name, known, n=1)
     if near:
         return f"unknown parameter {name!r}; did you mean {near[0]!r}?"

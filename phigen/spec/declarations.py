@@ -16,7 +16,7 @@ from phigen.spec.grammar import CONSTANTS, AllowedNames, constant, names_in, par
 from phigen.spec.indices import Indices
 from phigen.spec.kinds import Reader
 from phigen.spec.model import Lattice, Parameter
-from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, NOISY_ARGUMENTS, SPEC_FUNCTIONS, TIMED_ARGUMENTS
+from phigen.spec.names import ARGUMENTS, NOISY_ARGUMENTS, SPEC_FUNCTIONS, TIMED_ARGUMENTS, argument_hint
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.values import values
 from phigen.spec.yaml_source import Node, Scalar
@@ -242,7 +242,7 @@ class Declarations:
             where = f"line {first.location.line}, column {first.location.column}"
             self.reader.error(node, f"the name {name!r} is declared twice; the first is in {where}")
         elif what == "parameter" and name in self.arguments:
-            self.reader.error(node, f"a parameter cannot be called {name!r}", ARGUMENT_HINT)
+            self.reader.error(node, f"a parameter cannot be called {name!r}", argument_hint(name))
             self.nodes[name] = node  # so that its uses are no errors too
             return True
         elif self.lattice and name in (*self.lattice.indices, *(f"N_{i}" for i in self.lattice.indices)):

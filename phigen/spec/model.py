@@ -356,6 +356,12 @@ class SweepSettings:
     frames: int = 0
     description: str = ""
 
+    @property
+    def stored(self) -> tuple[str, ...]:
+        """``keep``, with the standard error of each mean, which figures show."""
+        errors = (word.replace("mean(", "error(", 1) for word in self.keep if word.startswith("mean("))
+        return tuple(dict.fromkeys((*self.keep, *errors)))
+
 
 @dataclass(frozen=True)
 class Reduction:

@@ -22,7 +22,13 @@ ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge", "cotang
 TIMED_ARGUMENTS = ARGUMENTS | {"t", "t0"}
 #: Names of these arguments with noise, in addition.
 NOISY_ARGUMENTS = frozenset(["seed", "member", "step0", "increments"])
-ARGUMENT_HINT = "it is the name of an argument of the generated functions"
+
+
+def argument_hint(name: str) -> str:
+    """Return why a parameter cannot have the ``name`` of an argument."""
+    other = f"{name}_0" if len(name) > 1 else f"{name}{name}"
+    return f"parameters are passed by name in Python, where {name}= is an argument of solvers; call it {other}, say"
+
 
 #: Names in other programs, which users may type here.
 MEANT = {

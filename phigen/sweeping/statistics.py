@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.interface import BackendError, Floats, row_steps
 from phigen.runtime.members import Members
 from phigen.runtime.solver import Solver
 from phigen.spec.model import Statistic
@@ -26,7 +26,8 @@ def statistics_of(
     """Return the statistics by their keywords, (members,) each.
 
     ``states`` (rows, members, DIM) are the frames of the sweep, or the final states alone. Statistics are over the
-    frames; without frames they are over the start and all steps. Rows before ``plan.after`` do not count.
+    frames; without frames they are over every ``stride``-th step of the run, with start and end, as those of
+    ``phigen run``. Rows before ``plan.after`` do not count.
     """
     names = list(solver.interface.observables)
     values: dict[str, Floats] = {}
@@ -71,11 +72,13 @@ def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: F
     """Return the standard errors of means (members, observables) over rows, from means of blocks."""
     values = _values(job, solver, members, rows, numbers)
     errors = np.empty(values.shape[1:])
-    for m in range(len(members)):
-        h, t0 = float(members.h[m]), float(members.t0[m])
-        averages = Averages(values.shape[2], after=job.plan.after, backwards=h < 0, blocks=job.plan.blocks)
-        averages.see(t0 + numbers * h, values[:, m])
-        errors[m] = [average.error for average in averages.results()]
+    clocks, which = np.unique(np.stack([members.t0, members.h], axis=1), axis=0, return_inverse=True)
+    for k, (t0, h) in enumerate(clocks.tolist()):  # members with the same times of rows are averaged together
+        alike = np.flatnonzero(which.reshape(-1) == k)
+        columns = values[:, alike].reshape(len(values), -1)
+        averages = Averages(columns.shape[1], after=job.plan.after, backwards=h < 0, blocks=job.plan.blocks)
+        averages.see(t0 + numbers * h, columns)
+        errors[alike] = np.reshape([average.error for average in averages.results()], (len(alike), -1))
     return errors
 
 
@@ -87,12 +90,13 @@ def _pieces(
         numbers = np.array(job.plan.rows, dtype=np.float64)
         yield slice(None), members, states[: len(numbers)], numbers
         return
-    room = max(1, MOST_BYTES // (8 * members.x0.shape[1] * (members.steps + 1)))
+    numbers = row_steps(members.steps, job.plan.stride).astype(np.float64)
+    room = max(1, MOST_BYTES // (8 * members.x0.shape[1] * len(numbers)))
     for first in range(0, len(members), room):
         part = slice(first, first + room)
-        some = replace(members.part(part), stride=1)
+        some = replace(members.part(part), stride=job.plan.stride)
         try:
             rows = solver.backend.ensemble(some, 1)
         except BackendError as error:
             rows = error.states
-        yield part, some, rows, np.arange(len(rows), dtype=np.float64)
+        yield part, some, rows, numbers

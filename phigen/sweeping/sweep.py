@@ -121,7 +121,7 @@ def made(
 def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> None:
     """Raise `SpecError` for a name that the store uses for other data."""
     for name in varied:
-        if name in (*store.OWN, *KEPT, *sweep.keep):
+        if name in (*store.OWN, *KEPT, *sweep.stored):
             message = f"{spec.file}: a sweep over {name!r}, under which its store has something else"
             raise SpecError([Diagnostic(message, hint="choose another name for it in the spec")])
 
@@ -157,7 +157,7 @@ def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int]
         noise=(run.seed + sweep.seed) % 2**64,
         members=sweep.random or next(iter(columns.values()), 0),
         listed=tuple(columns),
-        keep=sweep.keep,
+        keep=sweep.stored,
         frames=sweep.frames,
         after=None if run.average.after is None else float(run.average.after),
         blocks=run.average.blocks,

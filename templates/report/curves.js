@@ -74,21 +74,23 @@ function makeView(panel) {
   // The first steps, and the box that they stay in.
   function bounded(given, steps, milliseconds) {
     let low, high;
-    const found = tried(given, steps, milliseconds, ({ x }) => {
+    const trial = tried(given, steps, milliseconds, ({ x }) => {
       low = low ? low.map((v, i) => Math.min(v, x[i])) : [...x];
       high = high ? high.map((v, i) => Math.max(v, x[i])) : [...x];
     });
-    return { ...found, low, high };
+    return { trial, low, high };
   }
 
-  // How many steps are to be seen in a second: so many that the motion is neither a blur nor at rest.
+  // How many steps are to be seen in a second, so many that the motion is neither a blur nor at rest, and what part of
+  // the picture is crossed in that second.
   function pace(given) {
     const { trial, low, high } = bounded(given, 60, 100), { axes } = data.groups[0];
     const chords = trial.ours.trail.slice(1).map(({ x }, k) => {
       return Math.hypot(...axes.map((a) => (x[a] - trial.ours.trail[k].x[a]) / (high[a] - low[a] || 1))) / Math.sqrt(axes.length);
     });
     const chord = chords.reduce((sum, c) => sum + c, 0) / Math.max(1, chords.length);
-    return { longest: Math.max(...chords), speed: shortened(Math.max(15, Math.min(120, 3 / (chord || 1)))) };
+    const speed = shortened(Math.max(15, Math.min(120, 3 / (chord || 1))));
+    return { longest: Math.max(...chords), moved: chord * speed, speed };
   }
 
   // The box around the motion, and in it what the motion cannot leave: a surface, or a curve of one energy.

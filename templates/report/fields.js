@@ -140,7 +140,7 @@ function makeView(panel) {
   function surveyed(given, steps, milliseconds) {
     const chosen = data.groups[given.group], sizes = sizesOf(given), changes = [];
     let last, least = Infinity, most = -Infinity;
-    const { trial } = tried(given, steps, milliseconds, (runner) => {
+    const trial = tried(given, steps, milliseconds, (runner) => {
       const now = shown(runner, runner.race.solver, chosen, sizes);
       let sum = 0;
       now.forEach((v, k) => {
@@ -156,7 +156,8 @@ function makeView(panel) {
 
   function pace(given) {
     const { changes } = surveyed(given, 40, 60), mean = changes.reduce((sum, c) => sum + c, 0) / (changes.length || 1);
-    return { longest: data.picture === "moving" ? Math.max(...changes) : 0, speed: shortened(Math.max(25, Math.min(120, 1 / (mean || 1)))) };
+    const speed = shortened(Math.max(25, Math.min(120, 1 / (mean || 1))));
+    return { longest: data.picture === "moving" ? Math.max(...changes) : 0, moved: mean * speed, speed };
   }
 
   function look() {

@@ -90,7 +90,7 @@ if (document.getElementById("live-panel")) {
       number(`p.${name}`, allowed, (v) => { found.params[name] = v; });
     }
     // A link shows what its sender saw, whatever this browser would measure.
-    number("rk4", (v) => v >= 1 && v <= MOST_PARTS && Number.isInteger(v), (v) => { measured[alike(found)] = v; });
+    number("rk4", (v) => v >= 1 && v <= MOST_PARTS && Number.isInteger(v), (v) => { start.remember(found, v); });
     found.start.forEach((_, i) => number(`x.${data.coordinates[i]}`, () => true, (v) => { found.start[i] = v; }));
     return found;
   }
@@ -99,49 +99,10 @@ if (document.getElementById("live-panel")) {
 
   const begin = (given) => view.begin(solverOf(given.order), given);
 
-  // How many steps RK4 takes for one of the solver: one, or as many as take as long here. Measured once for each order
-  // and size and for steps of about one length, so that it does not change while a slider moves.
-  const measured = {};
-  const alike = ({ order, sites, h }) => [order, sites, Math.round(2 * Math.log2(Math.abs(h)))].join();
-  const partsOf = (given) => (given.compare === "step" ? 1 : (measured[alike(given)] ??= equalWork(begin(given))));
-
-  // The first steps, no more than take so many milliseconds, each of ours watched: the largest errors on the way.
-  function tried(given, steps, milliseconds, watch = () => {}) {
-    const trial = begin(given), { ours, theirs } = trial, end = performance.now() + milliseconds;
-    watch(ours);
-    while (ours.steps < steps && !ours.failed && performance.now() < end) {
-      trial.step();
-      watch(ours);
-    }
-    const worst = (runner) => (runner.failed ? Infinity : Math.max(0, ...runner.histories.map(({ values }) => Math.max(...values))));
-    return { trial, ours: worst(ours), theirs: worst(theirs) };
-  }
-
-  // Whether the solver has margin with a step: it does not break down with twice that.
-  const hasMargin = (given) => tried({ ...given, h: 2 * given.h }, 100, 60).ours < 0.5;
-
-  // A step, and its speed, with which RK4 fails within some ten seconds, where there is one with which the solver
-  // does not, and has margin.
-  function showing() {
-    let h = data.step;
-    const end = performance.now() + 1000, at = (step) => ({ ...view.rehearsed(standard), h: step });
-    for (let k = 0; data.quantities.length && k < 5 && !hasMargin(at(h)); k++) h = shortened(h / 2);
-    let best = { h, speed: view.pace({ ...standard, h }).speed, gain: 0 };
-    for (let k = 0; data.quantities.length && k <= 7 && performance.now() < end; k++) {
-      const given = at(shortened(h * 2 ** k)), { longest, speed } = view.pace(given);
-      const { ours, theirs } = tried(given, Math.min(400, 10 * speed), 200);
-      if (ours > 0.03 || longest > 0.8 || (k > 0 && !hasMargin(given))) break;
-      const gain = Math.min(theirs, 0.3) / Math.max(ours, 3e-3);
-      if (gain > 1.2 * best.gain) best = { h: given.h, speed, gain };
-      if (theirs > 0.2) break;
-    }
-    return best;
-  }
-
   function restart() {
     waiting = 1;
     try {
-      settings.parts = partsOf(settings);
+      settings.parts = start.partsOf(settings);
       race = begin(settings);
       view.look();
       at("told").textContent = "";
@@ -167,12 +128,14 @@ if (document.getElementById("live-panel")) {
 
   // Drawn by curves.js or fields.js, as the system has it.
   const view = makeView({
-    at, data, sides, ink, colour, begin, tried, shortened, draw, solverOf, restart,
+    at, data, sides, ink, colour, begin, shortened, draw, solverOf, restart,
+    tried: (...given) => start.tried(...given),
     get settings() { return settings; },
     get standard() { return standard; },
     get race() { return race; },
     get waiting() { return waiting; },
   });
+  const start = makeStart({ data, begin, view, shortened });
 
   // An error to read: in per cent, or as a power of ten where that would be many zeros.
   function readable(error) {
@@ -344,8 +307,8 @@ if (document.getElementById("live-panel")) {
   standard = { h: data.step, order: data.order, speed: 30, group: 0, compare: "work", parts: 1, params: {}, start: data.start, sites: data.site };
   for (const { name, value } of data.parameters) standard.params[name] = value;
   at("panel").hidden = false;
-  const { h, speed } = showing();
-  Object.assign(standard, { h, speed });
+  const { order, h, speed } = start.showing(standard);
+  Object.assign(standard, { order, h, speed });
   settings = copy(standard);
   follow();
   if (location.hash.startsWith("#live&")) at("panel").scrollIntoView();

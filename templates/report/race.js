@@ -123,14 +123,19 @@ function halves(history) {
   return [values.slice(0, middle), values.slice(middle)].map((part) => Math.max(0, ...part));
 }
 
-// What to say of the groups in which RK4 is closer to the truth, "" if there is none: from the errors themselves.
-function whereRk4IsCloser({ ours, theirs, groups }) {
-  const sentences = groups.flatMap(({ name }, k) => {
-    const [[first, last], [begin, end]] = [ours, theirs].map((runner) => halves(runner.histories[k]));
-    if (theirs.failed || end >= last || last < ROUNDING) return [];
+// The groups in which RK4 is closer to the truth, from the errors themselves, with the errors of both halves.
+function groupsOfRk4({ ours, theirs, groups }) {
+  if (theirs.failed) return [];
+  const errors = groups.map(({ name }, k) => ({ name, ours: halves(ours.histories[k]), theirs: halves(theirs.histories[k]) }));
+  return errors.filter((of) => of.theirs[1] < of.ours[1] && of.ours[1] >= ROUNDING);
+}
+
+// What to say of these groups, "" if there is none.
+function whereRk4IsCloser(race) {
+  const sentences = groupsOfRk4(race).map(({ name, ours: [first, last], theirs: [begin, end] }) => {
     const crossing = last <= STEADY * first && end > GROWING * begin;
-    return [crossing ? `${name}: RK4 is closer so far, but its error grows while that of phigen does not`
-      : `${name}: RK4 is closer with these settings`];
+    return crossing ? `${name}: RK4 is closer so far, but its error grows while that of phigen does not`
+      : `${name}: RK4 is closer with these settings`;
   });
   return sentences.length ? `${sentences.join("; ")}.` : "";
 }

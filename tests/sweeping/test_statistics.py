@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 import phigen
 import phigen.spec
@@ -43,6 +44,59 @@ def test_statistics_are_those_of_single_runs(frames, after):
             assert data["kinetic"][i, j] == pytest.approx(kinetic[-1], rel=1e-12)
             assert data["mean(kinetic)"][i, j] == pytest.approx(kinetic[rows].mean(), rel=1e-11)
             assert data["std(inside)"][i, j] == pytest.approx(inside[rows].std(ddof=1), rel=1e-11)
+            averages = Averages(1, after=after)
+            averages.see(trajectory.t[rows], kinetic[rows][:, None])
+            error = averages.results()[0].error
+            assert data["error(kinetic)"][i, j] == pytest.approx(error, rel=1e-9, nan_ok=True)
+
+
+@pytest.mark.slow  # it starts a cluster of workers
+def test_statistics_are_over_the_stored_rows_of_a_run():
+    text = DRIVEN.replace("start: 0.5", "start: 0.5, stride: 7, average: {after: 2.5, blocks: 2}")
+    data, solver = phigen.sweep(phigen.spec.loads(text), workers=1), phigen.compile(phigen.spec.loads(text))
+    trajectory, averages = solver.run("swing", A=0.4), Averages(1, after=2.5, blocks=2)
+    averages.see(trajectory.t, trajectory.observables["kinetic"][:, None])
+    (average,) = averages.results()
+    member = data.sel(A=0.4, q=0.9)
+    assert float(member["mean(kinetic)"]) == pytest.approx(average.mean, rel=1e-11)
+    assert float(member["error(kinetic)"]) == pytest.approx(average.error, rel=1e-9)
+
+
+def curves(data, names, logarithmic=frozenset()):
+    """Error bars (x, low, high) of each curve of the panels of a figure, and the axes."""
+    from phigen.drawing.sweep_map import _figure
+
+    drawn = _figure(data, names, logarithmic, frozenset()).get_axes()
+    bars = [[c.lines[2][0].get_segments() for c in axes.containers] for axes in drawn]
+    return [[np.array([[*s[0], s[1][1]] for s in curve]) for curve in of] for of in bars], drawn
+
+
+def test_error_bars_are_the_stored_standard_errors():
+    a, r = np.geomspace(0.1, 10, 5), np.array([0.5, 1.0, 2.0])
+    means, errors = 5 + np.outer(r, np.log(a)), 0.1 + np.outer(r, a) / 50
+    variables = {"mean(M)": (("r", "a"), means), "error(M)": (("r", "a"), errors), "N": (("r", "a"), -means)}
+    data = xarray.Dataset(variables, {"r": r, "a": a})
+    ((*over_a,), none), (axes, other) = curves(data, ["mean(M)", "N"], {"a"})
+    assert (axes.get_xscale(), axes.get_yscale(), axes.get_xlabel()) == ("log", "linear", "a")
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["r = 0.5", "r = 1", "r = 2"]
+    for k, curve in enumerate(over_a):
+        np.testing.assert_allclose(curve, np.stack([a, means[k] - errors[k], means[k] + errors[k]], 1), rtol=1e-12)
+    assert not none
+    assert len(other.get_lines()) == 3
+    ((line,),), (axes,) = curves(data.isel(a=2), ["mean(M)"])
+    np.testing.assert_allclose(line[:, 2] - line[:, 1], 2 * errors[:, 2])
+    assert axes.get_title() == "mean(M) ± standard error"
+
+
+def test_error_bars_over_draws_are_those_of_the_mean_of_the_draws():
+    values = np.random.default_rng(1).normal(size=(3, 4, 7))
+    data = xarray.Dataset({"mean(M)": (("W", "T", "seed"), values)}, {"W": [1, 2, 3], "T": [0.1, 0.2, 0.3, 0.4]})
+    data["error(M)"] = data["mean(M)"] * 0 + 9
+    ((*over_t,),), (axes,) = curves(data, ["mean(M)"])
+    means, errors = values.mean(axis=2), values.std(axis=2, ddof=1) / np.sqrt(7)
+    for k, curve in enumerate(over_t):
+        np.testing.assert_allclose(curve[:, 1:], np.stack([means[k] - errors[k], means[k] + errors[k]], 1))
+    assert axes.get_title() == "mean(M), mean of 7 draws ± standard error"
 
 
 def test_what_is_no_observable_is_told():

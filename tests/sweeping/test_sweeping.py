@@ -448,7 +448,7 @@ def test_members_are_lattices_with_disorder_of_their_own(cluster, tmp_path, monk
     assert np.isfinite(data.lyapunov).all()
     assert np.ptp(data.final.values, axis=1).min() > 0
     titles = [axes.get_title() for axes in drawn(tmp_path / "s.zarr", monkeypatch, "final")]
-    assert titles == [f"final: {c}, mean over the sites" for c in spec.coordinates]
+    assert titles == [f"final: {c}, mean over the sites, median over seed" for c in spec.coordinates]
 
 
 def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path):
