@@ -324,9 +324,19 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
         return split_bodies(system, spec.coordinates_from)
     if spec.monitor:
         return replace(split(system, motions=False), small=None)
-    parts = split(system, rigid=not spec.reconstruct)
+    parts = split(system, rigid=_turns_bodies(spec, system))
     alone = len(parts.flows) == 1 and parts.flows[0].has_motion
     return split(system, motions=False) if alone and spec.composition != "auto" else parts
+
+
+def _turns_bodies(spec: Spec, system: System) -> bool:
+    """Whether free rigid bodies may be parts: if the spec asks for the attitude, this must be theirs."""
+    group = _group(spec, system, "exponential")
+    if group is None:
+        return True
+    from phigen.attitude.free_bodies import rotates
+
+    return rotates(group)
 
 
 def _collocated(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:

@@ -4,19 +4,22 @@ A part is written as c C + Q + R with a Casimir C, Q = ½c′|m|² for the angul
 gradients of Q and of R are constant along the flows of both. Then the flow of the part is, in the group, exp(t∇Q)
 exp(t∇R) times the rotation by C. This rotation does not change x, and over a step its times add up to h, so it is
 applied once. If it is not uniform (with forces, a monitor, the time in H, or noise), C has an element in each flow,
-like Q and R. A flow that is composed of commuting ones has the product of their elements.
+like Q and R. A flow that is composed of commuting ones has the product of their elements. Free rigid bodies have those
+of `phigen.attitude.free_bodies`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain, permutations
 
+from phigen.attitude import free_bodies
 from phigen.attitude.elements import dot, product, rotated, rotation_by
 from phigen.attitude.group import Group, refused
 from phigen.attitude.matrices import flow_exponential, product_less_1
 from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.splitting.euler import EulerMotion
 from phigen.splitting.flow import Flow
 from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import (
@@ -42,7 +45,7 @@ MOST_PIECES = 4
 
 @dataclass(frozen=True)
 class Turning:
-    """A part as ``casimir`` + the sum of ``terms``, whose flows are made in turn.
+    """A part as ``casimir`` + the sum of ``terms`` + ``bodies``, whose flows are made in turn.
 
     ``put_back`` says whether the rotation by the Casimir is applied once a step.
     """
@@ -50,10 +53,11 @@ class Turning:
     casimir: Expression
     terms: tuple[Expression, ...]
     put_back: bool = True
+    bodies: tuple[EulerMotion, ...] = field(default=(), kw_only=True)
 
     @property
     def factors(self) -> list[Expression]:
-        """The summands that have a group element of their own."""
+        """The summands that have a group element of their own, except the free rigid bodies."""
         turning = self.terms if self.put_back else (self.casimir, *self.terms)
         return [e for e in turning if not e.is_zero]
 
@@ -104,10 +108,17 @@ def _of_square(function: str, square: Expression) -> Expression:
 
 def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> list[Turning]:
     """Each part in this form. Raises `SpecError` that names the first that has none."""
-    return [
-        turning_of(system, group, f.hamiltonian, f"H_{k}", [p.hamiltonian for p in f.pieces], put_back=put_back)
-        for k, f in enumerate(flows, 1)
-    ]
+    return [_turning(system, group, flow, f"H_{k}", put_back=put_back) for k, flow in enumerate(flows, 1)]
+
+
+def _turning(system: System, group: Group, flow: Flow, name: str, *, put_back: bool) -> Turning:
+    """Return a part in this form, the terms that commute with free rigid bodies first."""
+    pieces = flow.pieces or (flow,)
+    bodies = tuple(piece.motion for piece in pieces if isinstance(piece.motion, EulerMotion))
+    others = [piece.hamiltonian for piece in pieces if not isinstance(piece.motion, EulerMotion)]
+    h = total(others) if bodies else flow.hamiltonian
+    pieces_of_h = others if bodies or flow.pieces else []
+    return replace(turning_of(system, group, h, name, pieces_of_h, put_back=put_back), bodies=bodies)
 
 
 def turning_of(
@@ -163,7 +174,7 @@ def constancy(system: System, turning: Turning, name: str) -> Statement:
 def factor_elements(
     system: System, group: Group, turning: Turning, t: Expression | None = None
 ) -> list[list[Expression]]:
-    """The elements of the factors, less 1, for the time ``t``, at the state before the flow.
+    """The elements of the factors and of bodies, less 1, for the time ``t``, at the state before the flow.
 
     `SpecError` for matrices whose exponential has no closed form.
     """
@@ -180,7 +191,7 @@ def factor_elements(
             r, shift = [p[i] for i in group.rotation], [p[i] for i in group.translation]
             trivial = all(e.is_zero for e in r)
             elements.append([ZERO] * 4 + shift if trivial else list(rotation_by(r, shift)))
-    return elements
+    return [*elements, *(e for body in turning.bodies for e in free_bodies.elements(body, group, t))]
 
 
 def joined(group: Group, elements: Sequence[Sequence[Expression]]) -> list[Expression]:

@@ -13,6 +13,7 @@ from fractions import Fraction
 from functools import partial
 from itertools import combinations, islice
 
+from phigen.attitude import free_bodies
 from phigen.attitude.elements import cross, direction, dot, element, product, rotated, with_phi
 from phigen.attitude.flow_elements import Turning, constancy, factor_elements, joined, turnings
 from phigen.attitude.group import Group
@@ -26,6 +27,7 @@ from phigen.realisations.cayley import trilinear
 from phigen.realisations.protocol import BiRealisation, covector_names, covector_symbols
 from phigen.scheme.attitude import uniform
 from phigen.scheme.program import Attitude
+from phigen.splitting.euler import CYCLIC
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.expression import (
     ONE,
@@ -152,19 +154,24 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
     turned = turnings(compilation.discretised, group, splitting.flows, put_back=uniform(system))
     order = "exp(t∇H_{k}) g₀" if group.spatial else "g₀ exp(t∇H_{k})"
     for k, (turning, flow) in enumerate(zip(turned, splitting.flows, strict=True), 1):
-        parts = [e for e in (turning.left, *turning.factors) if not e.is_zero]
+        bodies = [body.hamiltonian for body in turning.bodies]
+        parts = [e for e in (turning.left, *turning.factors, *bodies) if not e.is_zero]
         name = f"∇H_{k} is constant along the flow of H_{k}, hence g₁ = {order.format(k=k)}"
         if len(parts) > 1:
             name = (
                 f"H_{k} in {len(parts)} parts with gradients constant along their flows, hence g₁ = {order.format(k=k)}"
             )
-        residuals = [("sum", flow.hamiltonian - total(parts))]
+        residuals = [("sum", flow.hamiltonian - total(parts)), *_stays(system, turning)]
         stated = constancy(system, turning, name)
         whole = decide_zero(name, residuals, system.positive)
-        yield stated if whole.holds else whole
+        if turning.factors or not bodies or not whole.holds:
+            yield stated if whole.holds else whole
+        if bodies:
+            name = f"the element of the free body of H_{k} rotates with ∇H_{k}, hence g₁ = {order.format(k=k)}"
+            yield decide_zero(name, [*_weights(turning, group), *free_bodies.identities()], system.positive)
         if group.matrices and turning.factors:
             yield exponential_statement(system, group, turning, f"the matrix of the flow of H_{k} is exp(t∇H_{k})")
-        elif turning.left.is_zero and len(turning.factors) == 1:
+        elif turning.left.is_zero and len(turning.factors) == 1 and not turning.bodies:
             step_element = joined(group, factor_elements(system, group, turning))
             start = [symbol(c) for c in system.coordinates]
             end = [a + b for a, b in zip(start, flow.increment, strict=True)]
@@ -175,6 +182,22 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
     plain = substitute([f.hamiltonian for f in splitting.flows], {KICK: ZERO})
     slope = gradient(total(plain) - total(put_back), system.coordinates)
     yield rate_statement(system, attitude, slope)
+
+
+def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]:
+    """Yield the rates of free rigid bodies along the other terms, which come first."""
+    for factor in turning.factors if turning.bodies else ():
+        rates = hamiltonian_vector_field(system.poisson, gradient(factor, system.coordinates))
+        of = dict(zip(system.coordinates, rates, strict=True))
+        yield from ((f"rate of {c}", of[c]) for body in turning.bodies for c in body.coordinates)
+
+
+def _weights(turning: Turning, group: Group) -> Iterator[tuple[str, Expression]]:
+    """Yield the residuals of α_i = w_k − w_j for the weights of H, with the sign of the bracket."""
+    for body in turning.bodies:
+        w = [derivative(derivative(body.hamiltonian, c), c) for c in body.coordinates]
+        for a, (j, k) in zip(body.factors, CYCLIC, strict=True):
+            yield "α", a - (w[j] - w[k] if group.spatial else w[k] - w[j])
 
 
 def exponential_statement(system: System, group: Group, turning: Turning, name: str) -> Statement:

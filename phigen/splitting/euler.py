@@ -1,14 +1,13 @@
 """The flow of a free rigid body: ẋ_i = α_i x_j x_k for three coordinates, α of both signs, by elliptic functions.
 
-E_i = α_j α_k x_i² differ by constants. With the largest and the smallest of them, P = max − min, and Q = max less the
-third, S, C and κ of `phigen.symbolic.elliptic` give, by the addition theorem of Jacobi's functions,
+E_i = α_j α_k x_i² differ by constants. With the largest and the smallest of them, P = max − min, and R = the third less
+min, S, C and κ of `phigen.symbolic.elliptic` give, by the addition theorem of Jacobi's functions,
 
     x_i' = (x_i σ_j σ_k + α_i x_j x_k S σ_i)/D,    σ_i² = D + E_i S²,    D = 1 − max S² = C² − min S²,
 
 where σ_i > 0, but σ_i = C for the smallest E_i. An error of κ gives the motion of another time, and does not change the
 energy and |x|. No step has a phase, and nothing is divided by the difference of two moments: the separatrix, rotations
-about an axis and symmetric bodies are no special cases. Within 1e-8 of the separatrix Q rounds to P, and a step of more
-than 20/√P may miss the next turn-over.
+about an axis and symmetric bodies are no special cases. Near the separatrix R has the digits of x_i close to its axis.
 
 C. G. J. Jacobi, Sur la rotation d'un corps, Crelle's Journal 39 (1850); R. van Zon, J. Schofield, Numerical
 implementation of the exact dynamics of free rigid bodies, Journal of Computational Physics 225 (2007).
@@ -22,7 +21,7 @@ from fractions import Fraction
 
 from phigen.splitting.ring import TIME
 from phigen.symbolic.elliptic import AMPLITUDE, functions_of
-from phigen.symbolic.expression import ONE, ZERO, Expression, call, derivatives, number, power, sqrt, symbol, total
+from phigen.symbolic.expression import ONE, ZERO, Expression, call, derivatives, number, power, sqrt, symbol
 from phigen.symbolic.symbols import Symbol
 
 Vector = Sequence[Expression]
@@ -58,7 +57,11 @@ class EulerMotion:
 
     def increments(self, names: Sequence[str]) -> list[Expression]:
         """Return the increments of all coordinates in the time of the flow."""
-        return self._placed(names, _changes([symbol(name) for name in self.coordinates], self.factors))
+        return self._placed(names, self.addition(symbol(TIME)).changes())
+
+    def addition(self, time: Expression) -> Addition:
+        """Return the addition theorem for a time."""
+        return Addition.at([symbol(name) for name in self.coordinates], self.factors, time)
 
     def residuals(self) -> Iterator[tuple[str, Expression]]:
         """Yield the residuals that vanish if the changes are the motion."""
@@ -69,51 +72,82 @@ class EulerMotion:
         return [placed.get(name, ZERO) for name in names]
 
 
-def _changes(x: Vector, factors: Vector) -> list[Expression]:
-    """Return the changes in the time of the flow."""
-    levels = _levels(x, factors)
-    low = _smaller(_smaller(*levels[:2]), levels[2])
-    high = -_smaller(_smaller(-levels[0], -levels[1]), -levels[2])
-    above, below = [e - low for e in levels], [high - e for e in levels]
-    p = high - low
-    q = 2 * p - total(above)
-    kappa = call(AMPLITUDE, symbol(TIME), p, q)
-    s, c, _ = functions_of(kappa, p, q)
-    square, z = s**2, p * kappa**2
-    roots = [sqrt(c**2 + e * square) for e in above]
-    # On the separatrix C > 0, but may be negative by rounding.
-    sigma = _at_smallest(levels, [call("choose", p - q, c, root) for root in roots], roots)
-    versine = 8 * z * power(1 + z, -2)  # 1 − C
-    losses = _at_smallest(levels, [versine] * 3, [d * square / (1 + r) for d, r in zip(below, roots, strict=True)])
-    divisor = c**2 - low * square
-    # Where D is small, 1 − σ_j and 1 − σ_k are not.
-    gaps = [
-        call("choose", divisor - _HALF, high * square - (u + v - u * v), sigma[j] * sigma[k] - divisor)
-        for j, k, u, v in ((j, k, losses[j], losses[k]) for j, k in CYCLIC)
-    ]
-    return _ends(x, factors, sigma, s, divisor, gaps)
+@dataclass(frozen=True)
+class Addition:
+    """The addition theorem at a state ``x``: P, R and κ, with S, C and D, the E_i, and their order as conditions."""
+
+    x: Vector
+    factors: Vector
+    levels: Vector
+    conditions: tuple[Expression, Expression, Expression]
+    p: Expression
+    r: Expression
+    kappa: Expression
+
+    @classmethod
+    def at(cls, x: Vector, factors: Vector, time: Expression) -> Addition:
+        """Return the theorem for a time."""
+        levels = levels_of(x, factors)
+        conditions = _order(levels)
+        low, middle, high = sorted_by(conditions, levels)
+        p, r = high - low, middle - low
+        return cls(x, factors, levels, conditions, p, r, call(AMPLITUDE, time, p, r))
+
+    def sorted(self, values: Vector) -> tuple[Expression, Expression, Expression]:
+        """Return those of three values that belong to the lowest, the middle and the highest E_i."""
+        return sorted_by(self.conditions, values)
+
+    def changes(self) -> list[Expression]:
+        """Return the changes of the x_i."""
+        s, c, _ = functions_of(self.kappa, self.p, self.r)
+        low, _, high = self.sorted(self.levels)
+        above, below = [e - low for e in self.levels], [high - e for e in self.levels]
+        square, z = s**2, self.p * self.kappa**2
+        roots = [sqrt(c**2 + e * square) for e in above]
+        # On the separatrix C > 0, but may be negative by rounding.
+        sigma = self._at_lowest([call("choose", self.r, c, root) for root in roots], roots)
+        versine = 8 * z * power(1 + z, -2)  # 1 − C
+        losses = self._at_lowest([versine] * 3, [d * square / (1 + r) for d, r in zip(below, roots, strict=True)])
+        divisor = c**2 - low * square
+        # Where D is small, 1 − σ_j and 1 − σ_k are not.
+        gaps = [
+            call("choose", divisor - _HALF, high * square - (u + v - u * v), sigma[j] * sigma[k] - divisor)
+            for j, k, u, v in ((j, k, losses[j], losses[k]) for j, k in CYCLIC)
+        ]
+        return _ends(self.x, self.factors, sigma, s, divisor, gaps)
+
+    def _at_lowest(self, chosen: Vector, others: Vector) -> list[Expression]:
+        """Return the i-th of ``chosen`` for the i with the lowest E_i, and those of ``others`` for the other two.
+
+        On the separatrix two E_i are equal, but have different derivatives.
+        """
+        second, third, _ = self.conditions
+        first_two = ((chosen[0], others[0]), (others[1], chosen[1]))
+        pairs = zip(first_two, others[:2], strict=True)
+        placed = [call("choose", third, call("choose", second, *values), other) for values, other in pairs]
+        return [*placed, call("choose", third, others[2], chosen[2])]
 
 
-def _levels(x: Vector, factors: Vector) -> list[Expression]:
+def levels_of(x: Vector, factors: Vector) -> list[Expression]:
     """Return the E_i."""
     return [factors[j] * factors[k] * e**2 for e, (j, k) in zip(x, CYCLIC, strict=True)]
 
 
-def _smaller(a: Expression, b: Expression) -> Expression:
-    return call("choose", b - a, a, b)
-
-
-def _at_smallest(levels: Vector, chosen: Vector, others: Vector) -> list[Expression]:
-    """Return the i-th of ``chosen`` for one i with the smallest E_i, and those of ``others`` for the other two.
-
-    On the separatrix two E_i are equal, but have different derivatives.
-    """
+def _order(levels: Vector) -> tuple[Expression, Expression, Expression]:
+    """Return what is positive if the second is above the first, the third above the lower of these, and the upper of
+    the first two above the rest."""
     second = levels[1] - levels[0]
-    third = levels[2] - _smaller(*levels[:2])
-    first_two = ((chosen[0], others[0]), (others[1], chosen[1]))
-    pairs = zip(first_two, others[:2], strict=True)
-    placed = [call("choose", third, call("choose", second, *values), other) for values, other in pairs]
-    return [*placed, call("choose", third, others[2], chosen[2])]
+    lower, upper = call("choose", second, *levels[:2]), call("choose", second, levels[1], levels[0])
+    third = levels[2] - lower
+    return second, third, upper - call("choose", third, levels[2], lower)
+
+
+def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Expression, Expression, Expression]:
+    """Return three values in the order of the E_i with these conditions, the lowest first."""
+    second, third, last = conditions
+    lower, upper = call("choose", second, *values[:2]), call("choose", second, values[1], values[0])
+    low, rest = call("choose", third, lower, values[2]), call("choose", third, values[2], lower)
+    return low, call("choose", last, rest, upper), call("choose", last, upper, rest)
 
 
 def _ends(
@@ -127,6 +161,12 @@ def _ends(
     ]
 
 
+def moved(x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Expression) -> list[Expression]:
+    """Return the x_i after the flow, from σ_i, S and D."""
+    gaps = [sigma[j] * sigma[k] - divisor for j, k in CYCLIC]
+    return [a + b for a, b in zip(x, _ends(x, factors, sigma, s, divisor, gaps), strict=True)]
+
+
 def identities() -> Iterator[tuple[str, Expression]]:
     """Yield the residuals that vanish if the increments are the flow, in independent symbols x_i, α_i and S.
 
@@ -136,7 +176,7 @@ def identities() -> Iterator[tuple[str, Expression]]:
     names = [Symbol("body", kind, i) for kind in ("x", "a") for i in range(3)]
     x, factors = ([symbol(name) for name in of] for of in (names[:3], names[3:]))
     name = Symbol("body", "S")
-    s, levels = symbol(name), _levels(x, factors)
+    s, levels = symbol(name), levels_of(x, factors)
     for m, (j, k) in enumerate(CYCLIC):
         sigma = [ONE if i == m else sqrt(1 - (levels[m] - levels[i]) * s**2) for i in range(3)]
         divisor = 1 - levels[m] * s**2
@@ -153,9 +193,9 @@ def identities() -> Iterator[tuple[str, Expression]]:
 
 def _function_identities() -> Iterator[tuple[str, Expression]]:
     """Yield the residuals that vanish if S(κ) moves with CD, where κ moves with (1 + z)D/4."""
-    name, p, q = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "Q"))
+    name, p, r = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "R"))
     kappa = symbol(name)
-    s, c, _ = functions_of(kappa, p, q)
+    s, c, _ = functions_of(kappa, p, r)
     yield "C² + PS²", c**2 + p * s**2 - 1
     yield "dS/dt = CD", derivatives([s], name)[0] * (1 + p * kappa**2) / 4 - c
     yield "1 - C", 8 * (p * kappa**2) * power(1 + p * kappa**2, -2) - (1 - c)

@@ -5,15 +5,18 @@ are sn, cn and dn of √P t with the modulus √(Q/P), and Ṡ = CD. With κ = t
 
     S = 4κ(1 − z)/(1 + z)²,    C = (1 − 6z + z²)/(1 + z)²,    D² = C² + (P − Q)S².
 
-`AMPLITUDE` is κ of (t, P, Q), for φ less full turns, so that |κ|√P ≤ 1. Its derivatives have G = ∫ S² dt and
-I = ∫ S²/D² dt from 0 to t, `SQUARES` and `RATIOS`; none divides by P, Q or P − Q:
+`AMPLITUDE` is κ of (t, P, R) with R = P − Q, for φ less full turns, so that |κ|√P ≤ 1. Near a separatrix R is small and
+has digits that a difference of P and Q has not. The derivatives have G = ∫ S² dt and I = ∫ S²/D² dt from 0 to t,
+`SQUARES` and `RATIOS`; none divides by P, Q or R:
 
-    ∂κ/∂t = (1 + z)D/4,  ∂κ/∂Q = −(1 + z)DI/8,  ∂κ/∂P = (1 + z)D(G + I)/8 − κ³(5 − 2z + z²)/(1 + z)³.
+    ∂κ/∂t = (1 + z)D/4,  ∂κ/∂R = (1 + z)DI/8,  ∂κ/∂P = (1 + z)DG/8 − κ³(5 − 2z + z²)/(1 + z)³.
+
+`THIRD` is ∫ S²/(1 − nS²) dt from 0 to t for (t, P, R, n) with n ≤ 0, an integral of the third kind.
 
 Where Pt² ≤ 1, S is a power series at t/16, doubled four times; elsewhere φ follows from the arithmetic–geometric mean
-of √P and √(P − Q) (M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 16.4 and 17.6). G and I are
-Carlson's integral R_D, by duplication (B. C. Carlson, Numerical computation of real or complex elliptic integrals,
-Numerical Algorithms 10, 1995).
+of √P and √R (M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 16.4 and 17.6), where arcsin is written
+as an arctangent whose denominator has no cancellation. The integrals are Carlson's R_D and R_J, by duplication (B. C.
+Carlson, Numerical computation of real or complex elliptic integrals, Numerical Algorithms 10, 1995).
 """
 
 from __future__ import annotations
@@ -24,8 +27,11 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-#: Names of the functions; their arguments are t, P and Q.
+#: Names of the functions; their arguments are t, P and R.
 AMPLITUDE, SQUARES, RATIOS = ELLIPTIC = ("amplitude", "amplitude1", "amplitude2")
+
+#: The name of the integral of the third kind; its arguments are t, P, R and n.
+THIRD = "amplitude3"
 
 #: Doublings of the series, and its terms: at Pt² ≤ 1 and a 16th of t what is left out is below 10⁻¹⁸.
 DOUBLINGS, TERMS = 4, 6
@@ -64,79 +70,115 @@ def _product(a: dict[tuple[int, int], Fraction], b: dict[tuple[int, int], Fracti
     return product
 
 
-def functions_of(kappa: Any, p: Any, q: Any) -> tuple[Any, Any, Any]:
+def functions_of(kappa: Any, p: Any, r: Any) -> tuple[Any, Any, Any]:
     """Return S, C and D² from κ."""
     z = p * kappa**2
     inverse = 1 / (1 + z) ** 2
     s, c = 4 * kappa * (1 - z) * inverse, (1 - 6 * z + z**2) * inverse
-    return s, c, c**2 + (p - q) * s**2
+    return s, c, c**2 + r * s**2
 
 
-def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, q: Any) -> tuple[Any, ...]:
-    """The partial derivatives of κ along t, P and Q."""
+def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, r: Any) -> tuple[Any, ...]:
+    """The partial derivatives of κ along t, P and R."""
     z = p * kappa**2
-    *_, square = functions_of(kappa, p, q)
+    *_, square = functions_of(kappa, p, r)
     along = (1 + z) * square ** Fraction(1, 2) / 4
-    squares, ratios = call(SQUARES, t, p, q), call(RATIOS, t, p, q)
+    squares, ratios = call(SQUARES, t, p, r), call(RATIOS, t, p, r)
     explicit = kappa**3 * (5 - 2 * z + z**2) / (1 + z) ** 3
-    return along, along * (squares + ratios) / 2 - explicit, -(along * ratios) / 2
+    return along, along * squares / 2 - explicit, along * ratios / 2
 
 
-def value(library: Any, t: Any, p: Any, q: Any) -> Any:
+def value(library: Any, t: Any, p: Any, r: Any) -> Any:
     """κ, in double precision if the library is `math`, else to that of an mpmath context."""
-    return _reduced(library, t, p, q)[0]
+    return _reduced(library, t, p, r)[0]
 
 
-def squares(library: Any, t: Any, p: Any, q: Any) -> Any:
+def squares(library: Any, t: Any, p: Any, r: Any) -> Any:
     """∫ S² dt from 0 to t."""
-    return _integral(library, t, p, q, lambda c, d: (c, d, 1 + 0 * c))
+    return _integral(library, t, p, r, lambda c, d, _: carlson(library, c, d, 1 + 0 * c))
 
 
-def ratios(library: Any, t: Any, p: Any, q: Any) -> Any:
+def ratios(library: Any, t: Any, p: Any, r: Any) -> Any:
     """∫ S²/D² dt from 0 to t."""
-    return _integral(library, t, p, q, lambda c, d: (c, 1 + 0 * c, d))
+    return _integral(library, t, p, r, lambda c, d, _: carlson(library, c, 1 + 0 * c, d))
 
 
-def _reduced(library: Any, t: Any, p: Any, q: Any) -> tuple[Any, Any]:
+def third(library: Any, t: Any, p: Any, r: Any, n: Any) -> Any:
+    """∫ S²/(1 − nS²) dt from 0 to t."""
+    return _integral(library, t, p, r, lambda c, d, e: carlson_third(library, c, d, 1 - n * e))
+
+
+def _reduced(library: Any, t: Any, p: Any, r: Any) -> tuple[Any, Any]:
     """κ, and the number of full turns that the amplitude has made."""
-    q = min(max(q, 0 * q), p)
     if p <= 0:
         return t / 4, 0
     root = library.sqrt(p)
-    phi = _amplitude(library, root * t, q / p)
+    phi = _amplitude(library, root * t, min(max(r, 0 * r), p) / p)
     turns = library.floor(phi / (2 * library.pi) + 0.5)
     return library.tan((phi - 2 * library.pi * turns) / 4) / root, turns
 
 
-def _amplitude(library: Any, u: Any, m: Any) -> Any:
-    """The amplitude of u for the square m of the modulus, by the arithmetic–geometric mean."""
-    a, b, c = 1 + 0 * u, library.sqrt(1 - m), library.sqrt(m)
+def _amplitude(library: Any, u: Any, k: Any) -> Any:
+    """The amplitude of u for the square k of the complementary modulus, by the arithmetic–geometric mean."""
+    a, b, c = 1 + 0 * u, library.sqrt(k), library.sqrt(1 - k)
     if b == 0:
         return 2 * library.atan(library.tanh(u / 2))
     ratio = MEAN_RATIO if library is math else library.sqrt(library.eps)
-    quotients: list[Any] = []
+    quotients: list[tuple[Any, Any]] = []
     while c > ratio * a:
         a, b, c = (a + b) / 2, library.sqrt(a * b), (a - b) / 2
-        quotients.append(c / a)
+        quotients.append((c / a, (b / a) ** 2))
     phi = 2 ** len(quotients) * a * u
-    for quotient in reversed(quotients):
-        phi = (phi + library.asin(quotient * library.sin(phi))) / 2
+    for quotient, rest in reversed(quotients):
+        cosine = library.sqrt(rest + (quotient * library.cos(phi)) ** 2)
+        phi = (phi + library.atan2(quotient * library.sin(phi), cosine)) / 2
     return phi
 
 
-def _integral(library: Any, t: Any, p: Any, q: Any, arguments: Callable[[Any, Any], tuple[Any, ...]]) -> Any:
-    """An integral of S² over t; ``arguments`` are those of R_D, from C² and D²."""
-    q = min(max(q, 0 * q), p)
-    kappa, turns = _reduced(library, t, p, q)
-    s, c, square = functions_of(kappa, p, q)
+def _integral(library: Any, t: Any, p: Any, r: Any, carlson_of: Callable[[Any, Any, Any], Any]) -> Any:
+    """An integral of S² over t; ``carlson_of`` returns Carlson's integral from C², D² and S²."""
+    if p <= 0:
+        return t**3 / 3
+    r = min(max(r, 0 * r), p)
+    kappa, turns = _reduced(library, t, p, r)
+    s, c, square = functions_of(kappa, p, r)
     halves = 2 * turns
     if c < 0:
         halves, s = halves + (1 if s > 0 else -1), -s
-    result = s**3 / 3 * carlson(library, *arguments(c**2, square))
+    result = s**3 / 3 * carlson_of(c**2, square, s**2)
     if halves:
-        whole = carlson(library, *arguments(0 * p, 1 - q / p))
-        result += 2 * halves * whole / (3 * p * library.sqrt(p))
+        result += 2 * halves * carlson_of(0 * p, r / p, 1 / p) / (3 * p * library.sqrt(p))
     return result
+
+
+def carlson_third(library: Any, x: Any, y: Any, w: Any) -> Any:
+    """Carlson's R_J(x, y, 1, w) for x, y ≤ 1 ≤ w."""
+    rounding = 2.2e-16 if library is math else library.eps
+    z, start = 1 + 0 * x, (x + y + 1 + 2 * w) / 5
+    mean, factor, terms = start, 1 + 0 * x, 0 * x
+    spread = max(abs(mean - e) for e in (x, y, z, w)) * (rounding / 4) ** (-1 / 6 + 0 * rounding)
+    excess = (w - x) * (w - y) * (w - z)
+    first = (x, y, z)
+    while factor * spread > mean:
+        a, b, c, d = (library.sqrt(e) for e in (x, y, z, w))
+        common, divisor = a * b + a * c + b * c, (d + a) * (d + b) * (d + c)
+        e = library.sqrt(excess * factor**3) / divisor
+        terms += factor / divisor * (library.atan(e) / e if e > 0 else 1)
+        factor /= 4
+        x, y, z, w, mean = ((value + common) / 4 for value in (x, y, z, w, mean))
+    a, b, c = (factor * (start - e) / mean for e in first)
+    return factor * _third_series(a, b, c) / (mean * library.sqrt(mean)) + 6 * terms
+
+
+def _third_series(a: Any, b: Any, c: Any) -> Any:
+    """R_J of arguments that differ from their mean by little, relative to the mean to the power -3/2."""
+    d = -(a + b + c) / 2
+    product, dd = a * b * c, d * d
+    second = a * b + a * c + b * c - 3 * dd
+    third_sum = product + 2 * second * d + 4 * dd * d
+    fourth, fifth = (2 * product + second * d + 3 * dd * d) * d, product * dd
+    even = -3 * second / 14 + 9 * second**2 / 88 - 3 * fourth / 22
+    return 1 + even + third_sum / 6 - 9 * second * third_sum / 52 + 3 * fifth / 26
 
 
 def carlson(library: Any, x: Any, y: Any, z: Any) -> Any:

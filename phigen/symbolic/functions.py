@@ -368,6 +368,7 @@ FUNCTIONS |= {
     )
     for name, value in zip(elliptic.ELLIPTIC, (elliptic.value, elliptic.squares, elliptic.ratios), strict=True)
 }
+FUNCTIONS[elliptic.THIRD] = Function(elliptic.THIRD, arity=4, own=True, value=elliptic.third, cost=160)
 #: Of exponentials of matrices: see `phigen.symbolic.remainders`.
 FUNCTIONS |= {
     name: Function(

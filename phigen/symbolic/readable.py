@@ -35,7 +35,8 @@ UNFAMILIAR = {
     "sinroot": "sinroot(s) = sin(√s)/√s",
     "arcroot": "arcroot(s) = (√s − sin √s)/√s³",
     "anomaly": "anomaly(t, r, η, β, μ, …) = s with r G1 + η G2 + μ G3 = t, Stumpff functions of β and s",
-    "amplitude": "amplitude(t, P, Q) = tan(φ/4)/√P, φ = am(√P t) with the modulus √(Q/P)",
+    "amplitude": "amplitude(t, P, R) = tan(φ/4)/√P, φ = am(√P t) with the modulus √(1 − R/P)",
+    "amplitude3": "amplitude3(t, P, R, n) = the integral of S²/(1 − nS²), S = sin(φ)/√P, φ as for amplitude(t, P, R)",
     "exprel": "exprel(s) = (e^s − 1)/s",
     **{
         name: f"{name}(t, a0, …, a3): the coefficient of x^{k} in e^(tx) - 1 modulo x⁴ - a3 x³ - a2 x² - a1 x - a0"

@@ -128,7 +128,7 @@ def calls_anomaly(program: Program) -> bool:
 def elliptic_used(program: Program) -> list[str]:
     """The functions of `ELLIPTIC` that kernels call, and the first of them if any other is called."""
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
-    called = [name for name in ELLIPTIC if name in ops]
+    called = [name for name in (*ELLIPTIC, elliptic.THIRD) if name in ops]
     return called if not called or called[0] == ELLIPTIC[0] else [ELLIPTIC[0], *called]
 
 
@@ -158,16 +158,29 @@ def _described(place: int) -> str:
     return f"Coefficient {place % 4} of the {'remainder' if place < 4 else 'quotient'}."
 
 
-#: The integrals of `ELLIPTIC`: their meaning, and the arguments of Carlson's R_D for them and for half a turn, from the
-#: squares cc of cn and dd of dn, and the square m of the modulus.
+#: The integrals of elliptic functions: their meaning, the template of Carlson's integral, and the arguments of that for
+#: them and for half a turn, from the squares cc of cn, dd of dn and s*s of S, and the ratio R/P.
 _INTEGRALS = {
-    elliptic.SQUARES: ("The integral over t of S**2 with S = sn/sqrt(P)", "cc, dd, 1.0", "0.0, 1.0 - m, 1.0"),
-    elliptic.RATIOS: ("The integral over t of S**2/dn**2 with S = sn/sqrt(P)", "cc, 1.0, dd", "0.0, 1.0, 1.0 - m"),
-}
+    elliptic.SQUARES: ("The integral over t of S**2 with S = sn/sqrt(P)", "carlson", "cc, dd, 1.0", "0.0, ratio, 1.0"),
+    elliptic.RATIOS: (
+        "The integral over t of S**2/dn**2 with S = sn/sqrt(P)", "carlson", "cc, 1.0, dd", "0.0, 1.0, ratio"
+    ),
+    elliptic.THIRD: (
+        "The integral over t of S**2/(1 - n*S**2) with S = sn/sqrt(P), n <= 0", "carlson_third",
+        "cc, dd, 1.0 - n * (s * s)", "0.0, ratio, 1.0 - n / P",
+    ),
+}  # fmt: skip
 
 
-def elliptic_texts(names: Sequence[str], render: Callable[[str, Mapping[str, object]], str]) -> list[str]:
-    """The definitions of functions of `ELLIPTIC` by three templates: amplitude, Carlson's R_D, and integrals."""
+def elliptic_texts(
+    names: Sequence[str],
+    render: Callable[[str, Mapping[str, object]], str],
+    spelling: Callable[[str], str] = lambda name: name,
+) -> list[str]:
+    """The definitions of elliptic functions by templates: amplitude, Carlson's integrals, and those that call them.
+
+    ``spelling`` is how the language writes the names of Carlson's integrals.
+    """
     values: dict[str, object] = {
         "part": repr(2.0**-elliptic.DOUBLINGS),
         "doublings": elliptic.DOUBLINGS,
@@ -181,11 +194,12 @@ def elliptic_texts(names: Sequence[str], render: Callable[[str, Mapping[str, obj
     }
     texts = [render("amplitude", values)] if ELLIPTIC[0] in names else []
     integrals = [name for name in names if name in _INTEGRALS]
-    texts += [render("carlson", values)] if integrals else []
+    texts += [render(template, values) for template in dict.fromkeys(_INTEGRALS[name][1] for name in integrals)]
     for name in integrals:
-        meaning, arguments, whole = _INTEGRALS[name]
+        meaning, template, arguments, whole = _INTEGRALS[name]
         forms = {"function": name, "meaning": meaning, "arguments": arguments, "whole": whole}
-        texts.append(render("amplitude_integral", {**values, **forms}))
+        third = {"carlson": spelling(template), "third": name == elliptic.THIRD}
+        texts.append(render("amplitude_integral", {**values, **forms, **third}))
     return texts
 
 

@@ -7,12 +7,16 @@ from itertools import product
 import mpmath
 import numpy as np
 import pytest
-from scipy import special
+from scipy import integrate, special
 from support import compile_text, javascript, solver
 
+from phigen.attitude import free_bodies
+from phigen.proofs import attitude as attitudes
 from phigen.splitting import euler
 from phigen.splitting.statements import check
 from phigen.symbolic import elliptic
+from phigen.symbolic.expression import symbols_of
+from phigen.symbolic.numeric import evaluate
 from phigen.symbolic.verdict import PROVED, REFUTED, decide_zero
 
 SO3 = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}}}\n"
@@ -166,14 +170,76 @@ def test_the_flow_is_proved_and_a_wrong_sign_is_refuted(monkeypatch):
     assert decide_zero("", list(euler.identities()), ()).verdict == REFUTED
 
 
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_the_time_of_turning_over_has_all_digits_close_to_the_separatrix(target):
+    """The difference of P and Q is 1e-16 here. Errors are those of C in the middle of a turn-over, 2e-16 over C."""
+    for start, h, allowed in (((1e-8, 1, 1e-8), 70.0, 3e-8), ((1e-8, 1, 1.7e-8), 120.0, 1e-15)):
+        x = np.array(start)
+        end = solver(body(), target).integrate(x, h, 1).x[-1]
+        np.testing.assert_allclose(end, expected(x, (1, 2, 3), h), rtol=0, atol=allowed)
+
+
+def _attitude(x, moments, h, sign):
+    """The attitude after a time by a method of order 8, a rotation matrix; ``sign`` is -1 for momenta in space."""
+    inverse = 1 / np.array(moments)
+
+    def rates(_, y):
+        spin = inverse * y[9:]
+        skew, g = _bracket(spin), y[:9].reshape(3, 3)
+        return np.concatenate([(skew @ g if sign < 0 else g @ skew).ravel(), sign * np.cross(y[9:], spin)])
+
+    y = integrate.solve_ivp(rates, (0, h), [*np.eye(3).ravel(), *x], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    return y[:9].reshape(3, 3)
+
+
+def _matrix(q):
+    """The matrix of a quaternion; matrices as they are."""
+    if np.size(q) == 9:
+        return np.reshape(q, (3, 3))
+    skew = _bracket(q[1:])
+    return np.eye(3) + 2 * q[0] * skew + 2 * skew @ skew
+
+
+#: The sign of the bracket, and the kind of attitude.
+ATTITUDES = [(1, "quaternion"), *(pytest.param(-1, kind, marks=pytest.mark.slow) for kind in ("quaternion", "matrix"))]
+
+
+@pytest.mark.parametrize(("sign", "kind"), ATTITUDES)
+def test_the_attitude_of_the_exact_flow_is_exact(sign, kind):
+    """For steps of any size, all orders of the moments, momenta in the body and in space, in all targets."""
+    spatial = BODY.replace("-", "+") if sign < 0 else BODY
+    spatial = spatial.replace("+0.5", "-0.5").replace("y: +z, z: y}, y: {z: +x", "y: z, z: -y}, y: {z: x")
+    compiled = compile_text(f"{spatial}reconstruct: {kind}\n", 4)
+    assert compiled.splitting.flows[0].has_motion
+    assert kind == "quaternion" or {s.verdict for s in attitudes.check(compiled)} == {PROVED}
+    for moments, start, h in ((MOMENTS[0], 2, 0.7), ((3, 1, 2), 6, -4.0), ((2, 3, 1), 0, 30.0), ((2, 2, 2), 6, 2.0),
+                              (MOMENTS[1], 5, 9.0), (MOMENTS[0], 7, 1.0), (MOMENTS[3], 6, 0.01)):  # fmt: skip
+        x, values = np.array(STARTS[start]), dict(zip("ABC", moments, strict=True))
+        found = [solver(compiled, target).integrate(x, h, 1, **values).attitude[-1] for target in ("c", "numpy")]
+        if start == 2:
+            found.append(javascript(compiled, f"x0: {x.tolist()}", f"s.integrate({h}, 1)", "[...s.attitude]"))
+        exact = _attitude(x, moments, h, sign)
+        for q in found:
+            np.testing.assert_allclose(_matrix(q), exact, rtol=0, atol=1e-12 if abs(h) < 10 else 1e-11)
+
+
+def test_a_wrong_rate_of_the_attitude_is_refuted(monkeypatch):
+    """The residual is evaluated at numbers, since a refutation by polynomials takes ten seconds."""
+    ((_, residual),) = free_bodies._angle((0, 2, 1))
+    values = {s: 0.3 + 0.17 * k for k, s in enumerate(sorted(symbols_of(residual), key=str))}
+    assert abs(evaluate([residual], values)[0]) < 1e-13
+    monkeypatch.setattr(free_bodies._Axes, "linear", property(lambda axes: (axes.weights[0], axes.betas[2] * axes.n)))
+    ((_, residual),) = free_bodies._angle((0, 2, 1))
+    assert abs(evaluate([residual], values)[0]) > 1e-2
+
+
 def test_where_the_body_is_split_in_rotations():
     named = compile_text(BODY + "composition: blanes-moan\n", 4)
-    attitude = compile_text(BODY + "reconstruct: quaternion\n", 4)
     linear = compile_text(BODY.replace("/2\nscheme", "/2 + 0.1*x\nscheme"), 4)
     hyperbolic = BODY.replace("y: {z: -x}", "y: {z: x}").replace("casimirs: {S: x**2 + y**2 + z**2}\n", "")
     other_brackets = compile_text(hyperbolic, 4)
-    assert [len(c.splitting.flows) for c in (named, attitude)] == [2, 2]
-    assert not any(f.has_motion for c in (named, attitude, other_brackets) for f in c.splitting.flows)
+    assert len(named.splitting.flows) == 2
+    assert not any(f.has_motion for c in (named, other_brackets) for f in c.splitting.flows)
     assert [f.has_motion for f in linear.splitting.flows].count(True) == 1
 
 
@@ -185,8 +251,8 @@ ARGUMENTS = [(u, m) for u in (1e-3, 0.3, 0.999, 1.001, 2.5, -7.0, 300.0) for m i
 def test_the_amplitude_is_that_of_jacobi(p):
     for u, m in ARGUMENTS:
         t = u / np.sqrt(p)
-        kappa = elliptic.value(math, t, p, m * p)
-        s, c, square = elliptic.functions_of(kappa, p, m * p)
+        kappa = elliptic.value(math, t, p, (1 - m) * p)
+        s, c, square = elliptic.functions_of(kappa, p, (1 - m) * p)
         sn, cn, dn, _ = special.ellipj(u, m)
         found = [np.sqrt(p) * s, c, np.sqrt(square)]
         np.testing.assert_allclose(found, [sn, cn, dn], rtol=0, atol=1e-14 * (1 + abs(u)))
@@ -199,6 +265,6 @@ def test_the_integrals_are_those_of_the_second_kind():
             _, _, _, phi = special.ellipj(u, m)
             exact = (u - special.ellipeinc(phi, m)) / m
             if abs(u) > 0.1:
-                assert elliptic.squares(math, u, 1.0, m) == pytest.approx(exact, rel=1e-12)
+                assert elliptic.squares(math, u, 1.0, 1 - m) == pytest.approx(exact, rel=1e-12)
     for x, y, z in ((0.5, 0.7, 1), (0, 1, 1e-3), (0.2, 1, 0.3), (0, 1e-9, 1)):
         assert elliptic.carlson(math, x, y, z) == pytest.approx(float(mpmath.elliprd(x, y, z)), rel=3e-15)

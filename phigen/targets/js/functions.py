@@ -26,8 +26,15 @@ def definitions(
 
 
 def elliptic_definitions(names: Sequence[str]) -> list[str]:
-    """Return the definitions of functions of `ELLIPTIC`."""
-    return [t.strip("\n") for t in special.elliptic_texts(names, lambda t, values: render("js", f"{t}.mjs", values))]
+    """Return the definitions of elliptic functions."""
+    texts = special.elliptic_texts(names, lambda t, values: render("js", f"{t}.mjs", values), _camel)
+    return [text.strip("\n") for text in texts]
+
+
+def _camel(name: str) -> str:
+    """Return a name in the case of JavaScript."""
+    first, *others = name.split("_")
+    return first + "".join(part.capitalize() for part in others)
 
 
 def _anomaly() -> str:

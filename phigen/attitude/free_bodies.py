@@ -1,0 +1,171 @@
+"""The group element of the exact flow of a free rigid body, by an elliptic integral of the third kind.
+
+Let x be the momentum in the body, ẋ = x × ω with ω_i = w_i x_i, and x' its value after the time t. The rotation from
+the body at t to the body at 0, which takes x' to x, is the shortest such rotation M, then one about x by θ|x|:
+
+    M = (|x|² + x·x', x' × x),    θ̇ = ω'·(x + x')/(|x|² + x·x').
+
+Let l, m, h be the axes with the lowest, the middle and the highest E_i of `phigen.splitting.euler`, L = |x|, and
+
+    β_l = w_h − w_m,  β_m = w_l − w_h,  β_h = w_m − w_l,  c = β_h x_m² − β_m x_h²,  n = β_m c ≤ 0,
+    W = (β_l x_m² − β_m x_l²)c/L²,  T = 4κ/(1 + z),  Q = P − R.
+
+Then θ = t w_l − β_h n ∫S²/(1 − nS²)dt + χ/L, where χ is the angle of the point
+
+    (1 − (Q − WC)T²/2(1 + D),  LS(c/L² + β_m(Q + W)T²/2(1 + D))).
+
+An error of the angle does not change the momentum in space. For momenta in space the element is the inverse of that
+for −H.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from phigen.attitude.elements import cross, dot, product, rotated, rotation_by
+from phigen.attitude.group import Group
+from phigen.splitting.euler import CYCLIC, EulerMotion, levels_of, moved
+from phigen.symbolic.elliptic import THIRD, functions_of
+from phigen.symbolic.expression import ONE, ZERO, Expression, call, derivative, derivatives, power, sqrt, symbol, total
+from phigen.symbolic.symbols import Symbol
+
+Vector = Sequence[Expression]
+
+
+def rotates(group: Group) -> bool:
+    """Whether elements are quaternions, or the matrices of the rotations of so(3)."""
+    if not group.matrices:
+        return True
+    if (group.dimension, group.rows) != (3, 3) or not group.orthogonal:
+        return False
+    units = [[ONE if i == k else ZERO for i in range(3)] for k in range(3)]
+    return all(dot(e, e).value == 2 for e in map(group.generator, units))
+
+
+def elements(motion: EulerMotion, group: Group, t: Expression) -> list[list[Expression]]:
+    """Return the elements, less 1, whose product is that of the flow for the time ``t``."""
+    weights = [derivative(derivative(motion.hamiltonian, name), name) for name in motion.coordinates]
+    addition = motion.addition(t)
+    x, changes = addition.x, addition.changes()
+    signed = [-w for w in weights] if group.spatial else weights
+    s, c, _ = functions_of(addition.kappa, addition.p, addition.r)
+    axes = _Axes(addition.sorted(x), addition.sorted(signed), dot(x, x), call("inv0", dot(x, x)))
+    z = addition.p * addition.kappa**2
+    stretched = (4 * addition.kappa * power(1 + z, -1)) ** 2
+    d = sqrt(c**2 + addition.r * s**2)
+    across, along = axes.point(addition.p - addition.r, ONE, stretched, s, c, d)
+    length = sqrt(axes.square)
+    chi = call("atan2", length * along, across) * call("inv0", length)
+    rate, factor = axes.linear
+    theta = t * rate + factor * call(THIRD, t, addition.p, addition.r, axes.n) + chi
+    inverse = call("inv0", 2 * axes.square + dot(x, changes))
+    shortest = [ZERO, *(inverse * e for e in cross(changes, x))]
+    both = [list(rotation_by([theta * e for e in x], ())), shortest]
+    both = [[q[0], *(-e for e in q[1:])] for q in both] if group.spatial else both
+    if group.matrices:
+        return [_matrix(group, q) for q in both]
+    return [[*q, *(ZERO for _ in group.translation)] for q in both]
+
+
+def _matrix(group: Group, q: Vector) -> list[Expression]:
+    """Return the rotation matrix of 1 + q, less 1, for a quaternion of any length."""
+    once = group.generator(q[1:])
+    w, rows = ONE + q[0], group.rows
+    scale = 2 * power(w**2 + dot(q[1:], q[1:]), -1)
+    twice = [
+        total(once[i * rows + k] * once[k * rows + j] for k in range(rows)) for i in range(rows) for j in range(rows)
+    ]
+    return [scale * (w * a + b) for a, b in zip(once, twice, strict=True)]
+
+
+@dataclass(frozen=True)
+class _Axes:
+    """x_i and w_i in the order l, m, h, with L² and 1/L²."""
+
+    x: Vector
+    weights: Vector
+    square: Expression
+    inverse: Expression
+
+    @property
+    def betas(self) -> tuple[Expression, Expression, Expression]:
+        """β_l, β_m, β_h."""
+        low, middle, high = self.weights
+        return high - middle, low - high, middle - low
+
+    @property
+    def c(self) -> Expression:
+        """The constant c of the motion."""
+        _, of_m, of_h = self.betas
+        return of_h * self.x[1] ** 2 - of_m * self.x[2] ** 2
+
+    @property
+    def n(self) -> Expression:
+        """The parameter n of the integral."""
+        return self.betas[1] * self.c
+
+    @property
+    def linear(self) -> tuple[Expression, Expression]:
+        """The factors of the time and of the integral in θ."""
+        return self.weights[0], -(self.betas[2] * self.n)
+
+    def point(
+        self, q: Expression, unit: Expression, square: Expression, s: Expression, c: Expression, d: Expression
+    ) -> tuple[Expression, Expression]:
+        """Return the point of χ, its second entry over L, from Q, 1, T², S, C and D.
+
+        ``unit`` and ``square`` may have a common factor, which the point then has.
+        """
+        of_l, of_m, _ = self.betas
+        ratio = self.c * self.inverse
+        w = (of_l * self.x[1] ** 2 - of_m * self.x[0] ** 2) * ratio
+        share = square * power(2 * (1 + d), -1)
+        return unit - (q - w * c) * share, s * (unit * ratio + of_m * (q + w) * share)
+
+
+def identities() -> Iterator[tuple[str, Expression]]:
+    """Yield the residuals that vanish if the element is that of the flow, in independent symbols x_i, w_i and S.
+
+    That x' is the momentum after the flow is proved by the identities of the motion, with Ṡ = CD.
+    """
+    yield from _shortest_rotation()
+    for order in ((0, 2, 1), (1, 2, 0)):  # others follow by cyclic permutations
+        yield from _angle(order)
+
+
+def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
+    """Yield the residuals of M x' = x and of Ṁ = M(ω − θ̇x')/2, up to its length, for any ω."""
+    x, omega = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "ω"))
+    end = [symbol(Symbol("attitude", "end", i)) for i in range(2)]
+    end.append(sqrt(dot(x, x) - dot(end, end)))
+    rates = cross(end, omega)
+    m = [dot(x, x) + dot(x, end), *cross(end, x)]
+    slope = [dot(x, rates), *cross(rates, x)]
+    square = dot(m, m)
+    yield from (("M x' = x", a - square * b) for a, b in zip(rotated(m, end), x, strict=True))
+    theta = dot(omega, [a + b for a, b in zip(x, end, strict=True)])
+    turned = product([m[0], *(-e for e in m[1:])], slope)[1:]
+    for a, o, e in zip(turned, omega, end, strict=True):
+        yield "dM/dt", 2 * m[0] * a - square * (m[0] * o - theta * e)
+
+
+def _angle(order: Sequence[int]) -> Iterator[tuple[str, Expression]]:
+    """Yield the residual of the rate of θ where the axes l, m, h have this ``order``."""
+    x, w = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "w"))
+    name = Symbol("attitude", "S")
+    s, factors = symbol(name), [w[k] - w[j] for j, k in CYCLIC]
+    levels = levels_of(x, factors)
+    low, middle, high = (levels[i] for i in order)
+    c, d = (sqrt(1 - (high - e) * s**2) for e in (low, middle))
+    sigma = [dict(zip(order, (c, d, ONE), strict=True))[i] for i in range(3)]
+    end = moved(x, factors, sigma, s, 1 - high * s**2)
+    axes = _Axes([x[i] for i in order], [w[i] for i in order], dot(x, x), power(dot(x, x), -1))
+    across, along = axes.point(high - middle, (1 + c) / 2, s**2, s, c, d)
+    slopes = [c * d * e for e in derivatives([across, along], name)]
+    turning = (across * slopes[1] - along * slopes[0]) * power(across**2 + axes.square * along**2, -1)
+    rate, factor = axes.linear
+    theta = turning + rate + factor * s**2 * power(1 - axes.n * s**2, -1)
+    omega = [a * b for a, b in zip(w, end, strict=True)]
+    both = [a + b for a, b in zip(x, end, strict=True)]
+    yield "rate of θ", theta * (axes.square + dot(x, end)) - dot(omega, both)
