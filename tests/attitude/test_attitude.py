@@ -107,10 +107,15 @@ pytestmark = pytest.mark.few(
 )
 
 
+#: A composition for each order, with which a body is split in rotations: otherwise it has one exact flow.
+COMPOSITIONS = {2: "none", 4: "suzuki", 6: "yoshida"}
+
+
 @cache
 def made(case, order=2):
     """The compilation of a case."""
-    return compile_spec(spec_of(CASES[case]), order=order)
+    composition = f"composition: {COMPOSITIONS[order]}\n" if case == "body, split" else ""
+    return compile_spec(spec_of(CASES[case] + composition), order=order)
 
 
 def spec_of(text):

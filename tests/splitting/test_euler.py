@@ -223,6 +223,15 @@ def test_the_attitude_of_the_exact_flow_is_exact(sign, kind):
             np.testing.assert_allclose(_matrix(q), exact, rtol=0, atol=1e-12 if abs(h) < 10 else 1e-11)
 
 
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_quaternions_of_long_steps_keep_their_length(target):
+    """Their real parts may be negative, where a correction of the length would lengthen it."""
+    x = np.array([0.3, 0.2, 1.0])
+    found = solver(body("reconstruct: quaternion\n"), target).integrate(x, -50.0, 40)
+    space = [_matrix(q) @ y for q, y in zip(found.attitude, found.x, strict=True)]
+    np.testing.assert_allclose(space, np.broadcast_to(x, (41, 3)), rtol=0, atol=1e-14)
+
+
 def test_a_wrong_rate_of_the_attitude_is_refuted(monkeypatch):
     """The residual is evaluated at numbers, since a refutation by polynomials takes ten seconds."""
     ((_, residual),) = free_bodies._angle((0, 2, 1))

@@ -160,8 +160,8 @@ class _StatementPrinter:
                 pointer = f"({spell(array)})" if isinstance(array, ir.Binary) else spell(array)
                 yield f"memset({start}, 0, {spell(ir.Cast(count, 'size'))} * sizeof *{pointer});"
             case ir.Copy(target, source, count):
-                size = f"sizeof {spell(target)}"
-                size = f"{spell(count)} * {size}" if count else size
+                size = f"sizeof {spell(source if count is None else target)}"
+                size = size if count is None else f"{spell(count)} * {size}"
                 yield f"memcpy({spell(target)}, {spell(source)}, {size});"
             case ir.Append(tape, vector):
                 yield f"if ({spell(tape)} != NULL) memcpy({spell(tape)}++, {spell(vector)}, sizeof *{spell(tape)});"

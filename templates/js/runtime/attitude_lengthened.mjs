@@ -1,5 +1,12 @@
-/** Divide a quaternion, given minus 1, by its length. */
+/**
+ * Divide a quaternion, given minus 1, by its length. The sign is such that the real part is not negative: otherwise
+ * corrections of lengths would act in reverse.
+ */
 export function shorten(q) {
+  if (q[0] < -1) {
+    q[0] = -2 - q[0];
+    for (let i = 1; i < 4; i++) q[i] = -q[i];
+  }
   const excess = q[0] * (2 + q[0]) + q[1] * q[1] + (q[2] * q[2] + q[3] * q[3]);
   const length = Math.sqrt(1 + excess);
   q[0] = (q[0] - excess / (1 + length)) / length;
