@@ -43,14 +43,18 @@ class NumpyLatticeSession:
         try:
             _, self._sites = module._started(x0, parameters, *([t0] if timed else []))
             module._coefficients(self._sites, StartPolicy().probe_step)
-            if hasattr(module, "_begin"):
-                module._begin(self._sites, self._x)
+            self._begin()
         except ValueError:
             raise BackendError("BAD_ARGUMENT", 0, self._x[None]) from None
         self._sites.seed, self._sites.member = draws.seed, draws.member
         self._h = np.nan
         self._rows: Any = None
         self._tell_time()
+
+    def _begin(self) -> None:
+        """Start the clock of steps that are equal in τ. Raises `ValueError` where the monitor is not positive."""
+        if hasattr(self._module, "_begin"):
+            self._module._begin(self._sites, self._x)
 
     def state(self) -> Floats:
         """Return a copy of the state (coordinates, *sizes)."""

@@ -102,6 +102,7 @@ STATE = (
         "GAUGE && !MONITOR",
         ("double gauge[PHI_GAUGES]; /* factors of the Casimirs that are subtracted from H, in their order */",),
     ),
+    StateBlock("common", "COMMON", ("PHI_COMMON_MEMBER",)),
     StateBlock(
         "coef",
         "NOISE",

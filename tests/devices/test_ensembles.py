@@ -90,6 +90,26 @@ def x0():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "source",
+    [
+        BODY,
+        BODY.replace("order: 2", "order: 4\nscheme: splitting"),
+        BODY.replace("order: 2", "order: 6\ncomposition: yoshida"),
+    ],
+)
+def test_members_with_common_coefficients_have_the_bits_of_others(source, x0):
+    device = phigen.compile(compile_text(source), "opencl", profile="small")
+    gauge = np.array([0.3]) if "t_GAUGES" in device.backend._header else None
+    fixed = device.backend if gauge is None else device.backend.with_gauge(gauge)
+    solver = type(device)(fixed, device.interface)
+    common = solver.ensemble(x0, 0.1, 20)
+    own = solver.ensemble(x0, np.full(100, 0.1), 20)
+    assert set(fixed._compiled) == {True, False}
+    np.testing.assert_array_equal(common, own)
+
+
+@pytest.mark.slow
 def test_members_have_parameters_and_steps_of_their_own(body, x0):
     device, c = body
     own = {"h": np.linspace(0.01, 0.1, 100), "I1": np.linspace(1, 2, 100)}
@@ -136,7 +156,7 @@ def test_a_launch_without_memory_is_divided(body, x0, monkeypatch):
 
     monkeypatch.setattr(device.device, "launch", limited)
     np.testing.assert_array_equal(device.ensemble(x0, 0.1, 20), expected)
-    assert sizes == [100, 50, 50]
+    assert sizes == [1, 100, 50, 50]  # one work item computes the coefficients
 
 
 def test_a_lost_device_leaves_the_members_that_are_done(body, x0, monkeypatch):
@@ -145,7 +165,7 @@ def test_a_lost_device_leaves_the_members_that_are_done(body, x0, monkeypatch):
 
     def lost(*arguments):
         launches.append(arguments)
-        if len(launches) > 1:
+        if len(launches) > 2:  # the coefficients, and the first batch
             raise DeviceError("the device was lost")
         launch(*arguments)
 

@@ -10,10 +10,11 @@ from systems import LATTICES, spec_of
 import phigen
 from phigen.api import compilation_of
 from phigen.compiler import emit
-from phigen.errors import DeviceError, SpecError
+from phigen.errors import DeviceError
 from phigen.lattice.states import start_of
 from phigen.runtime.devices.device import OutOfMemoryError
 from phigen.runtime.devices.lattices import DeviceLattice
+from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.lattice_series import recordable
 from phigen.spec import loads
@@ -21,11 +22,11 @@ from phigen.spec import loads
 pytest.importorskip("pyopencl")
 
 MONITORED = "pythagorean"
-QUICK, LONGER = ("fput",), ("heisenberg", "thermal_heisenberg", "xxz_disorder")
+QUICK, LONGER = ("fput",), ("heisenberg", "thermal_heisenberg", "xxz_disorder", MONITORED)
 
 
 def cases():
-    for name in (n for n in LATTICES if n != MONITORED):
+    for name in LATTICES:
         mark = () if name in QUICK else pytest.mark.slow if name in LONGER else pytest.mark.exhaustive
         yield pytest.param(name, marks=mark)
 
@@ -54,6 +55,7 @@ def test_fields_are_those_of_c(name):
     ours, theirs = (solver.integrate(x, h, 20, stride=5, **more) for solver in (device, c))
     np.testing.assert_allclose(ours.x, theirs.x, rtol=0, atol=1e-14 * np.abs(theirs.x).max())
     np.testing.assert_allclose(ours.energy, theirs.energy, rtol=1e-13)
+    np.testing.assert_allclose(ours.t, theirs.t, rtol=1e-13)
 
 
 def of_group_size(device, size):
@@ -177,9 +179,27 @@ def test_a_lost_device_says_where_the_run_can_be_resumed(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_monitor_of_pairs_is_refused():
-    with pytest.raises(SpecError, match=f"{MONITORED} has a monitor, which lattices on devices do not take"):
-        emit(compilation_of(MONITORED, profile="small").program, "device", COMMAND)
+def test_steps_equal_in_tau_keep_clock_and_state_of_failed_and_resumed_runs(monkeypatch):
+    device, c = both(MONITORED)
+    x, h, more = beginning(MONITORED, c.interface)
+    session, resumed = (device.backend.start(x, more) for _ in range(2))
+    session.advance(h, 7)
+    stored, state, passed = session.saved(), session.state(), session.time()
+    resumed.place(state)
+    resumed.resume(h, 7, stored)
+    for each in (session, resumed):
+        each.advance(h, 5)
+    np.testing.assert_array_equal(session.state(), resumed.state())
+    assert session.time() == resumed.time() > passed > 0
+    session.place(state)
+    monkeypatch.setattr(session, "_failed", lambda: True)
+    elapsed = session.time()
+    with pytest.raises(BackendError, match="NOT_FINITE"):
+        session.advance(h, 1)
+    np.testing.assert_array_equal(session.state(), state)
+    assert session.time() == elapsed
+    with pytest.raises(BackendError, match="BAD_ARGUMENT"):  # a single body: its potential energy is not negative
+        device.backend.start(x[:, :1], {"m": more["m"][:1]})
 
 
 def test_a_run_on_a_device_that_was_lost_is_resumed_with_the_same_bits(monkeypatch, tmp_path):

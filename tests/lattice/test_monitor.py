@@ -250,12 +250,6 @@ def test_what_has_no_monitor_is_refused_at_its_place(case):
     assert error.value.diagnostics[0].location.line == line
 
 
-def test_devices_refuse_it():
-    program = compile_spec(loads(BODIES)).program
-    with pytest.raises(SpecError, match="lattices on devices do not take"):
-        emit(program, "device", COMMAND)
-
-
 def test_verify_holds_the_level(tmp_path):
     spec = Path(tmp_path / "bodies.yaml")
     spec.write_text(BODIES.replace("scheme:", "order: 4\nscheme:"))

@@ -52,6 +52,10 @@ class CUDADevice:
         """See `phigen.runtime.devices.device.Device`."""
         return self._tried(lambda: self._cupy.empty(max(1, size), dtype=np.uint8))
 
+    def constants(self, array: Any) -> Any:
+        """See `phigen.runtime.devices.device.Device`; a struct that CuPy passes by value, in constant memory."""
+        return array.reshape(-1).view(np.dtype([("values", array.dtype, (array.size,))]))
+
     def write(self, buffer: Any, array: Any) -> None:
         """See `phigen.runtime.devices.device.Device`."""
         if array.nbytes:

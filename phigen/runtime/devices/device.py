@@ -46,6 +46,10 @@ class Device(Protocol):
         """Return a new buffer of the given number of bytes."""
         ...
 
+    def constants(self, array: Any) -> Any:
+        """Return a kernel argument with numbers that all work items read and that do not change."""
+        ...
+
     def write(self, buffer: Any, array: Any) -> None:
         """Copy a contiguous array into a buffer."""
         ...

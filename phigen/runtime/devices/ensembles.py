@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, cast
 
@@ -14,6 +16,7 @@ from phigen import registry
 from phigen.errors import DeviceError
 from phigen.runtime.backend import Backend
 from phigen.runtime.devices.device import Device, OutOfMemoryError
+from phigen.runtime.devices.launching import Kernels
 from phigen.runtime.devices.opening import device_of
 from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface, status_name
 from phigen.runtime.members import Members
@@ -50,6 +53,8 @@ class DeviceSolver:
         self._files, self._host, self._gauge = dict(files), host, gauge
         self.defined: dict[str, int] = {}
         self._real: Any = np.float32 if interface.single else np.float64
+        self._header = files[f"{interface.name}_device.h"]
+        self._compiled: dict[bool, Kernels] = {}
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         return _loaded_again, (self._files, self.interface, self.target, self._gauge, self._index)
@@ -62,7 +67,7 @@ class DeviceSolver:
     @property
     def identity(self) -> str:
         """See `phigen.runtime.backend.Backend`."""
-        text = f"{self._files[f'{self.interface.name}_device.h']}\n{self.device.name}\n{self._host.identity}"
+        text = f"{self._header}\n{self.device.name}\n{self._host.identity}"
         return hashlib.sha256(text.encode()).hexdigest()[:40]
 
     def with_gauge(self, gauge: Floats) -> DeviceSolver:
@@ -83,11 +88,14 @@ class DeviceSolver:
         frames, final = members.frames() if members.stride else None, np.full(members.x0.shape, np.nan)
         if frames is not None:
             frames[1:] = np.nan
+        common, coefficients = self._has_common_coefficients(members), list[Any]()
         status, done, batch = np.zeros(len(members), dtype=np.uint8), 0, self._batch(members)
         while done < len(members):
             part = slice(done, min(done + batch, len(members)))
             try:
-                self._integrate(members.part(part), final[part], status[part], frames, part)
+                if common and not coefficients:
+                    coefficients.append(self._coefficients(members))
+                self._integrate(members.part(part), final[part], status[part], frames, part, coefficients)
                 done = part.stop
             except OutOfMemoryError as error:
                 if batch == 1:
@@ -123,26 +131,35 @@ class DeviceSolver:
         return max(1, min(fitting, short, len(members)))
 
     def _integrate(
-        self, members: Members, final: Floats, status: NDArray[np.uint8], frames: Floats | None, part: slice
+        self,
+        members: Members,
+        final: Floats,
+        status: NDArray[np.uint8],
+        frames: Floats | None,
+        part: slice,
+        coefficients: Sequence[Any],
     ) -> None:
-        """Integrate the members of one launch, and store their results."""
+        """Integrate the members of one launch, and store their results.
+
+        ``coefficients`` is empty, or has the coefficients of all members as an argument of the kernel.
+        """
         device, count, size = self.device, len(members), np.dtype(self._real).itemsize
         x = np.ascontiguousarray(members.x0.T, dtype=self._real)
         rows = members.steps // members.stride if frames is not None else 0
         states, ended = self._written(x), device.empty(count)
         out = device.empty(rows * x.size * size) if rows else None
-        arguments: list[Any] = [np.uint64(count), *self._shared_or_each(self._parameters(members)), states]
+        parameters = self._shared_or_each(self._parameters(members))
+        arguments: list[Any] = [*coefficients, np.uint64(count), *parameters, states]
         if self.interface.time:
             arguments += self._shared_or_each(np.atleast_1d(members.t0))
         elif self._holds_gauge:
-            gauge = self._gauge
-            arguments += [None if gauge is None else self._written(np.array(gauge, self._real)), np.int32(0)]
+            arguments += [self._gauge_argument(), np.int32(0)]
         arguments += [*self._shared_or_each(np.atleast_1d(members.h)), np.uint64(members.steps)]
         if self.interface.noise:
             first = np.uint32(members.paths[0])
             arguments += [np.uint64(members.draws.seed), first, np.uint64(members.draws.step)]
         arguments += [np.uint64(max(1, members.stride)), out, ended]
-        device.launch(self._kernel, count, arguments)
+        device.launch(self._kernels(common=bool(coefficients))["ensemble"], count, arguments)
         device.read(ended, status)
         device.read(states, x)
         final[:] = x.T
@@ -151,15 +168,37 @@ class DeviceSolver:
             device.read(out, stored_rows)
             frames[1 : rows + 1, part] = stored_rows.transpose(0, 2, 1)
 
-    @cached_property
-    def _kernel(self) -> Any:
-        name = self.interface.name
-        program = self.device.compiled(self._files[f"{name}_device.h"], self.defined)
-        return self.device.kernel(program, f"{name}_ensemble_kernel")
+    def _kernels(self, *, common: bool) -> Kernels:
+        """Return the kernels for members with ``common`` coefficients, or with coefficients of their own."""
+        if common not in self._compiled:
+            defined = {**self.defined, **({f"{self.interface.name}_COMMON": 1} if common else {})}
+            self._compiled[common] = Kernels(self.device, self._header, self.interface.name, defined)
+        return self._compiled[common]
+
+    def _has_common_coefficients(self, members: Members) -> bool:
+        """Whether all members have the same parameters, step and gauge, and their kernel can share coefficients."""
+        same = np.ndim(members.h) == 0 and not any(np.ndim(v) for v in members.parameters.values())
+        chosen = self._holds_gauge and self._gauge is None
+        return same and not chosen and f"{self.interface.name}_COMMON" in self._header
+
+    def _coefficients(self, members: Members) -> Any:
+        """Return the coefficients of all members as an argument of their kernel."""
+        numbers = re.findall(rf"{self.interface.name}_(?:STAGES|COEFFICIENTS) = (\d+)", self._header)
+        coefficients = np.empty(math.prod(map(int, numbers)), self._real)
+        buffer = self.device.empty(coefficients.nbytes)
+        parameters, h = (self._shared_or_each(v)[0] for v in (self._parameters(members), np.atleast_1d(members.h)))
+        gauge = [self._gauge_argument()] if self._holds_gauge else []
+        self.device.launch(self._kernels(common=True)["coefficients"], 1, [parameters, *gauge, h, buffer])
+        self.device.read(buffer, coefficients)
+        return self.device.constants(coefficients)
+
+    def _gauge_argument(self) -> Any:
+        """Return a buffer of the gauge of all members, None for gauges chosen at their starts."""
+        return None if self._gauge is None else self._written(np.array(self._gauge, self._real))
 
     @cached_property
     def _holds_gauge(self) -> bool:
-        return f"{self.interface.name}_GAUGES" in self._files[f"{self.interface.name}_device.h"]
+        return f"{self.interface.name}_GAUGES" in self._header
 
     def _parameters(self, members: Members) -> Floats:
         """Return the parameters (members or 1, parameters); a system without any has one unused number."""

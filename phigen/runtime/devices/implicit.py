@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from phigen.runtime.devices.device_array import DeviceArray
-from phigen.runtime.devices.lattices import DeviceLattice, DeviceLatticeSession, resumable
+from phigen.runtime.devices.lattice_sessions import DeviceLatticeSession, resumable
 from phigen.runtime.interface import BackendError
 from phigen.runtime.modules import load_module
 from phigen.targets.c.real import THRESHOLD, threshold
@@ -16,7 +16,7 @@ from phigen.targets.c.real import THRESHOLD, threshold
 class ImplicitSession(DeviceLatticeSession):
     """A session of a lattice with implicit stages."""
 
-    def __init__(self, backend: DeviceLattice, *arguments: Any, timed: bool) -> None:
+    def __init__(self, backend: Any, *arguments: Any, timed: bool) -> None:
         super().__init__(backend, *arguments, timed=timed)
         self._stepping = backend.stepping
         self._sites.on_device = self

@@ -1,10 +1,9 @@
-"""Lattices on devices: fields stay on the device; energies and observables are transferred as numbers."""
+"""Back end of lattices on devices: compiled kernels, and sessions of each kind of step."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -13,226 +12,14 @@ import numpy as np
 
 from phigen.errors import DeviceError
 from phigen.runtime.devices.device import Device, OutOfMemoryError
+from phigen.runtime.devices.implicit import ImplicitSession, stepping_module
+from phigen.runtime.devices.lattice_sessions import DeviceLatticeSession
 from phigen.runtime.devices.launching import Kernels, Launcher
+from phigen.runtime.devices.monitored import MonitoredSession, monitoring_module
 from phigen.runtime.devices.opening import device_of
 from phigen.runtime.devices.site_tables import SiteTables
-from phigen.runtime.interface import FIRST_DRAWS, BackendError, Draws, Floats, LatticeInterface
+from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, LatticeInterface
 from phigen.runtime.numpy_lattice import NumpyLattice, NumpyLatticeSession
-
-#: Steps between checks that all fields are finite; after a failed check, these steps are repeated one by one.
-_STEPS_PER_LOOK = 64
-
-
-class DeviceLatticeSession(NumpyLatticeSession):
-    """A session whose state is on a device, and is copied to the host when it is read. The module is that of the
-    host."""
-
-    def __init__(self, backend: DeviceLattice, *arguments: Any, timed: bool) -> None:
-        self._interface, self._device = backend.interface, backend.device
-        self._host: Floats | None = None
-        self._shape: tuple[int, ...] = arguments[1].shape
-        self._size = int(np.prod(self._shape))
-        self._on_device = False
-        super().__init__(*arguments, timed=timed)
-        self._launcher = backend.launcher(self._sites, self._shape[1:])
-        stored = self._size * (2 if self._interface.compensated else 1)  # the fields, and their compensation terms
-        self._fields, self._before = (self._launcher.empty(stored) for _ in range(2))
-        self._stored = stored
-        self._flag = self._device.empty(4)
-        self._increments = self._launcher.empty(self._launcher.tables.count * max(1, len(self._interface.noise)))
-        self._parameters: list[float] = []  # those on the device
-        self._coefficients: Any = None
-        self._row = 0
-
-    @property
-    def _x(self) -> Floats:
-        """The state on the host."""
-        if self._host is None:
-            self._host = self._launcher.read(self._fields, self._shape)
-        return self._host
-
-    @_x.setter
-    def _x(self, value: Floats) -> None:
-        self._host, self._on_device = np.ascontiguousarray(value), False
-
-    def _upload(self, compensation: Floats | None = None) -> None:
-        """Copy a state that was set on the host to the device, with its compensation terms, 0 by default."""
-        if self._on_device:
-            return
-        state = self._x.ravel()
-        if self._interface.compensated:
-            state = np.append(state, np.zeros(self._size) if compensation is None else compensation.ravel())
-        self._launcher.write(self._fields, state)
-        self._on_device = True
-
-    def saved(self) -> dict[str, Any]:
-        """See `phigen.runtime.lattice.LatticeSession`."""
-        if not self._interface.compensated:
-            return {}
-        self._upload()
-        return {"compensation": self._launcher.read(self._fields, (2, *self._shape))[1]}
-
-    def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
-        """See `phigen.runtime.lattice.LatticeSession`."""
-        super().resume(h, steps, arrays)
-        self._upload(arrays.get("compensation"))
-
-    def advance(self, h: float, steps: int) -> None:
-        """See `phigen.runtime.lattice.LatticeSession`. Raises `DeviceError` if the device fails; the state stays."""
-        self.prepare(h)
-        left = steps
-        while left:
-            count = min(left, _STEPS_PER_LOOK)
-            begun = self.steps
-            with resumable(begun):
-                self._upload()
-                self._launcher.copy(self._fields, self._before, self._stored)
-                self._make(count)
-                if self._failed():
-                    self.steps = begun
-                    self._restore()
-                    self._make_until_failure()
-            left -= count
-
-    def _restore(self) -> None:
-        self._launcher.copy(self._before, self._fields, self._stored)
-        self._host = None
-
-    def _make_until_failure(self) -> None:
-        """Make steps one by one until one fails. Raises `BackendError` with the state before it."""
-        while True:
-            self._launcher.copy(self._fields, self._before, self._stored)
-            self._make(1)
-            if self._failed():
-                self.steps -= 1
-                self._tell_time()
-                self._restore()
-                raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
-
-    def _make(self, steps: int) -> None:
-        """Make steps without a check of the results."""
-        self._host = None
-        module, rows = self._module, self._rows
-        constant = not (hasattr(module, "_renewed") or hasattr(module, "_draw"))
-        flows = self._flows()
-        if constant:
-            self._write_coefficients(rows)
-        for _ in range(steps):
-            self._tell_time()
-            if hasattr(module, "_renewed"):
-                rows = module._renewed(self._sites, self._rows)
-            if not constant:
-                self._write_coefficients(rows)
-            for number, (part, colour, row) in enumerate(flows):
-                if hasattr(module, "_draw") and number in (0, len(module.SCHEDULE) - len(module.SOURCES)):
-                    self._launcher.write(self._increments, module._draw(self._sites, int(number > 0)))
-                arrays = {"x": self._fields, "dw": self._increments}
-                for sweep in self._interface.launches.parts[part]:
-                    self._launcher.run(sweep, self._coefficients, row * self._row, colour, **arrays)
-            self.steps += 1
-        self._tell_time()
-
-    def _flows(self) -> list[tuple[int, int, int]]:
-        """Return the flows of a step: part of H, colour of the sites of a graph, row of coefficients."""
-        if hasattr(self._module, "BY_COLOUR"):
-            return [(part, colour, row) for (part, colour), row in self._sites.schedule]
-        return [(part, 0, row) for part, row in self._module.SCHEDULE]
-
-    def _write_coefficients(self, rows: Sequence[Sequence[Any]]) -> None:
-        """Copy the coefficients of all flows of a step to the device."""
-        values = np.asarray(rows, dtype=np.float64).reshape(len(rows), -1)
-        self._row = values.shape[1]
-        if self._coefficients is None:
-            self._coefficients = self._launcher.empty(values.size)
-        self._launcher.write(self._coefficients, values)
-
-    def _failed(self) -> bool:
-        flag = np.zeros(1, dtype=np.int32)
-        self._device.write(self._flag, flag)
-        kernel = self._launcher.kernels["failed"]
-        self._device.launch(kernel, self._size, [np.int32(self._size), self._fields, self._flag])
-        self._device.read(self._flag, flag)
-        return bool(flag[0])
-
-    # --- functions of the state
-
-    def _evaluated(self, name: str) -> tuple[Any, int]:
-        """Return a buffer of the outputs of a kernel at all sites, and the number of outputs."""
-        launch = self._interface.launches.others.get(name)
-        if launch is None:
-            return None, 0
-        self._upload()
-        self._write_parameters()
-        out = self._launcher.empty(launch.outputs * self._launcher.tables.count)
-        self._launcher.run(launch, self._launcher.parameters, x=self._fields, out=out)
-        return out, launch.outputs
-
-    def _write_parameters(self) -> None:
-        """Copy the parameters that are numbers, and the time, to the device, if they changed."""
-        values = [float(self._sites.parameters[name]) for name in self._interface.launches.numbers]
-        values.append(float(self._sites.t) if self._timed else 0.0)
-        if values != self._parameters:
-            self._launcher.write(self._launcher.parameters, values)
-            self._parameters = values
-
-    def _fields_of(self, name: str) -> Floats:
-        """Return the outputs of a kernel (outputs, *sizes)."""
-        with resumable(self.steps):
-            out, outputs = self._evaluated(name)
-            sizes = self._shape[1:]
-            return self._launcher.read(out, (outputs, *sizes)) if outputs else np.empty((0, *sizes))
-
-    def _numbers_of(self, name: str, kinds: Sequence[str]) -> Floats:
-        """Return the outputs of a kernel, reduced over the sites by the kind of each."""
-        with resumable(self.steps):
-            out, _ = self._evaluated(name)
-            return self._launcher.reduced(out, kinds, self._launcher.tables.count)
-
-    def hamiltonian(self) -> float:
-        """Return H of the state."""
-        return float(self._numbers_of("energy", ["sum"])[0])
-
-    def density(self) -> Floats:
-        """Return the density of H at the sites (*sizes)."""
-        return self._fields_of("energy").reshape(self._shape[1:])
-
-    def casimirs(self) -> Any:
-        """Return the densities of the Casimirs of sites, and numbers for sums and products."""
-        kinds = self._interface.casimir_kinds
-        if "sites" in kinds:
-            fields = self._fields_of("casimirs")
-        numbers = self._numbers_of("casimirs", ["max" if kind == "sites" else kind for kind in kinds])
-        return [fields[k] if kind == "sites" else numbers[k] for k, kind in enumerate(kinds)]
-
-    def vector_field(self) -> Floats:
-        """Return π∇H (coordinates, *sizes)."""
-        return self._fields_of("vector_field")
-
-    def observables(self) -> Floats:
-        """Return the observables that are one number each (observables,)."""
-        reductions, count = self._interface.launches.reductions, self._launcher.tables.count
-        if not reductions:
-            return np.empty(0)
-        values = self._numbers_of("observables", [kind for kind, _ in reductions])
-        counts = {"sites": count, "bonds": len(getattr(self._sites, "ends", ())), "pairs": count * (count - 1) / 2}
-        divisors = [counts[over] if kind == "mean" else 1.0 for kind, over in reductions]
-        with np.errstate(all="ignore"):
-            quotients: Floats = values / np.array(divisors)
-        return quotients
-
-    def observed_fields(self) -> Floats:
-        """Return the observables with a value at each site (fields, *sizes)."""
-        return self._fields_of("observed_fields")
-
-
-@contextmanager
-def resumable(steps: int) -> Iterator[None]:
-    """Raise `DeviceError` with a hint if a device fails after a number of steps."""
-    try:
-        yield
-    except (DeviceError, OutOfMemoryError) as error:
-        hint = "with checkpoints=, integrate stores the state at each frame, and resumes from there"
-        raise DeviceError(f"after step {steps}: {error}\n  hint: {hint}") from error
 
 
 class DeviceLattice(NumpyLattice):
@@ -271,9 +58,12 @@ class DeviceLattice(NumpyLattice):
     @cached_property
     def stepping(self) -> Any:
         """The module that makes implicit steps."""
-        from phigen.runtime.devices.implicit import stepping_module
-
         return stepping_module(self._text, self.interface.name, single=self.interface.single)
+
+    @cached_property
+    def monitoring(self) -> Any:
+        """The module that computes the times of flows of steps that are equal in τ."""
+        return monitoring_module(self._text, self.interface.name)
 
     def launcher(self, sites: Any, sizes: tuple[int, ...]) -> Launcher:
         """Return the launches for a lattice of some size. Raises `DeviceError` if it is too large."""
@@ -292,9 +82,8 @@ class DeviceLattice(NumpyLattice):
         self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
     ) -> NumpyLatticeSession:
         """Return a session at x0 (coordinates, *sizes), at the time t0. Raises `DeviceError`."""
-        from phigen.runtime.devices.implicit import ImplicitSession
-
-        session = ImplicitSession if hasattr(self._module, "_relax") else DeviceLatticeSession
+        implicit, monitored = hasattr(self._module, "_relax"), hasattr(self._module, "_rate")
+        session = ImplicitSession if implicit else MonitoredSession if monitored else DeviceLatticeSession
         timed = bool(self.interface.time)
         try:
             return session(self, self._module, x0, parameters, t0, draws, timed=timed)

@@ -56,6 +56,12 @@ class OpenCLDevice:
         """See `phigen.runtime.devices.device.Device`."""
         return self._tried(lambda: self._cl.Buffer(self._context, self._cl.mem_flags.READ_WRITE, max(1, size)))
 
+    def constants(self, array: Any) -> Any:
+        """See `phigen.runtime.devices.device.Device`; a buffer in the address space of constants."""
+        buffer = self.empty(array.nbytes)
+        self.write(buffer, array)
+        return buffer
+
     def write(self, buffer: Any, array: Any) -> None:
         """See `phigen.runtime.devices.device.Device`."""
         if array.nbytes:

@@ -13,6 +13,7 @@ from phigen.targets.features import Feature
 FEATURES = (
     Feature("GUESSED", lambda p: p.step.kind.predicted and not p.noise),
     Feature("DEVICE", lambda p: False),  # of `phigen.targets.device`
+    Feature("COMMON", lambda p: False),  # of `phigen.targets.device` too
     Feature("SINGLE", lambda p: p.single),
     Feature("PARAMETERS", lambda p: p.parameters),
     Feature("RELATIVE", lambda p: p.step.inner_solve and p.step.inner_solve.relative),

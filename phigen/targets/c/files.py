@@ -98,6 +98,7 @@ CONDITIONS = {
     "blocks_slopes.h": "COMPOSED && !PATH",
     "chain_by_points.c": "!SWEPT",
     "chain_swept.c": "SWEPT",
+    "device_common.c": "COMMON",
     "device_finite.c": "DEVICE",
     "device_gauge.c": "GAUGE && DEVICE",
     "device_history.h": "GUESSED && !GAUSS",

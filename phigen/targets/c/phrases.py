@@ -329,7 +329,7 @@ STEP = Choice(
     ("EXPLICIT && !COMPOSED", "CORRECTED && ADJOINT", "SPLITTING && ADJOINT", "COMPOSED || SPLITTING"),
     {
         "NAME_INCREMENT": ("double increment[PHI_DIM];", *[""] * 4),
-        "COMPUTE_INCREMENT(s)": ("phi_explicit(s->coef, s->x, increment);", *[""] * 4),
+        "COMPUTE_INCREMENT(s)": ("phi_explicit(PHI_COEFFICIENTS_OF(s), s->x, increment);", *[""] * 4),
         "COUNT_EVALUATION(s)": ("++s->evaluations;", *[""] * 4),
         "MAKE_STEP(s)": (
             "",
@@ -586,6 +586,26 @@ DEVICE_STARTS = Choice(
     },
 )
 
+DEVICE_COEFFICIENTS = Choice(
+    "The coefficients of a step. On a device they may be those of all members, which the kernel then receives.",
+    ("COMMON",),
+    {
+        "COEFFICIENTS_OF(s)": ("phi_COEF_OF(s)", "s->coef"),
+        "COMMON_MEMBER": ("phi_COMMON_MEMBER", ""),
+        "COMMON_ARGUMENT": ("phi_COMMON_ARGUMENT ", ""),
+        "TAKE_COMMON(s)": ("phi_TAKE_COMMON(s)", ""),
+    },
+)
+
+COMMON_GAUGE = Choice(
+    "The gauge of all members on a device.",
+    ("GAUGE",),
+    {
+        "GAUGE_ARGUMENT": ("PHI_GLOBAL const double *gauge, ", ""),
+        "COPY_OF_GAUGE": ("double gauges[PHI_GAUGES]; for (int k = 0; k < PHI_GAUGES; ++k) gauges[k] = gauge[k];", ""),
+    },
+)
+
 DEVICE_NOISE = Choice(
     "The random numbers of a member on a device.",
     ("NOISE",),
@@ -658,6 +678,8 @@ ALL = (
     PREDICTORS,
     MEMORY,
     DEVICE_STARTS,
+    DEVICE_COEFFICIENTS,
+    COMMON_GAUGE,
     DEVICE_NOISE,
     DEVICE_MEMORY,
     DEVICE_PREDICTOR,

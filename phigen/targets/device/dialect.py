@@ -15,11 +15,16 @@ _TABLE = "static const "
 _TYPES = ("typedef", "enum", "struct", "union")
 
 
-def qualified(lines: Sequence[str], name: str) -> list[str]:
+#: Declarations of coefficients as parameters of functions.
+_COEFFICIENTS = [f"const {real} {end}" for real in ("double", "float") for end in ("*coef,", "*coef)", "coef[")]
+
+
+def qualified(lines: Sequence[str], name: str, *, common: bool = False) -> list[str]:
     """Return the lines of a solver with the qualifiers of devices before functions and tables of the part for devices.
 
     Functions become `NAME_FUNCTION`, which is static, and tables `NAME_CONSTANT`; kernels have their qualifiers in
-    the runtime. Raises `ValueError` for objects without an address space: non-constant objects of a file, and static
+    the runtime. Where coefficients may be ``common`` to all members, functions read them in the address space
+    `NAME_COEF`. Raises `ValueError` for objects without an address space: non-constant objects of a file, and static
     objects of functions.
     """
     begin, linkage = lines.index(DEVICES_ONLY), {"static", "inline", f"{name}_APART"}
@@ -40,4 +45,6 @@ def qualified(lines: Sequence[str], name: str) -> list[str]:
     for line in spelt[begin:]:
         if line.lstrip().startswith("static "):
             raise ValueError(f"{name}: an object without address space: {line.strip()}")
+    for declared in _COEFFICIENTS if common else ():
+        spelt[begin:] = [line.replace(declared, f"{name}_COEF {declared}") for line in spelt[begin:]]
     return spelt

@@ -10,7 +10,6 @@ from dataclasses import fields, replace
 from functools import partial
 from typing import Any
 
-from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import Program
 from phigen.targets.c import emitter as c
@@ -44,15 +43,11 @@ _READING = (
 
 
 def for_devices(program: Program) -> Program:
-    """Return a program without the parts that no kernel calls: derivatives of steps, the modified H, attitudes.
-
-    Raises `SpecError` for lattices whose steps are equal in τ, which need sums over all sites in each flow.
-    """
-    if program.step.swept and program.step.swept.rates:
-        message = f"{program.name} has a monitor, which lattices on devices do not take"
-        raise SpecError([Diagnostic(message, hint="target c; on devices ensembles of ordinary systems have monitors")])
+    """Return a program without the parts that no kernel calls: derivatives of steps, the modified H, attitudes."""
     left_out: dict[str, Any] = {"adjoint": None, "tangent": None, "tangents": ()}
     parts = {f.name for f in fields(program.step)}
+    if swept := program.step.swept:
+        left_out["rates"] = replace(swept.rates, slopes=()) if swept.rates else None
     step = replace(program.step, **{part: none for part, none in left_out.items() if part in parts})
     extras = replace(program.extras, tangent=False, adjoint=False, modified_hamiltonian=0)
     return replace(program, step=step, extras=extras, modified=None, attitude=None, lanes=False, profile="small")
@@ -73,20 +68,43 @@ def group_size(program: Program) -> int:
     return next((size for size in _GROUPS if size * of_item <= _SHARED), _GROUPS[-1])
 
 
+#: Bytes of coefficients that a kernel of CUDA can receive: all its arguments have at most 4,096.
+_COMMON_BYTES = 3_840
+
+
+def has_common_coefficients(program: Program) -> bool:
+    """Whether members with the same parameters, step and gauge may share the coefficients of their steps."""
+    step = program.step
+    if step.swept or step.refresh or step.kind.collocates or step.path is not None or program.monitor:
+        return False
+    size = 4 if program.single else 8
+    return 0 < size * step.coefficients * len(program.fractions) <= _COMMON_BYTES
+
+
 def text_of_device(program: Program) -> str:
     """Return the text of a file without its first comment."""
-    language = render(
-        "c", "device_language.h", {"NAME": program.name, "double": not program.single, "group": group_size(program)}
-    )
-    has = switches(program, None) | {"DEVICE": True, "KICKED": False}
+    common = has_common_coefficients(program)
+    staged = len(program.fractions) > 1
+    values = {
+        "NAME": program.name,
+        "double": not program.single,
+        "group": group_size(program),
+        "common": common,
+        "pointer": f"(*common)[{program.name}_COEFFICIENTS]" if staged else "*common",
+    }
+    language = render("c", "device_language.h", values)
+    has = switches(program, None) | {"DEVICE": True, "KICKED": False, "COMMON": common}
     real = OVERLOADED_FLOAT if program.single else DOUBLE
-    spelt = partial(qualified, name=program.name)
+    spelt = partial(qualified, name=program.name, common=common)
     if program.step.swept:
         kernels = {"device_lattice.h": lattice.body(program, program.step.swept, language)}
         amalgam = Amalgam(program.name, has, kernels, real)
         return fitted(_guarded(program.name, amalgam.text("device_lattice.h", spelt)))
     texts = {"device_language.h": language} | text_of(program).texts(program, program.step, None, has)
-    declarations = render("c", "device_declarations.h", c.declared_values(program, None, has))
+    stages = f"[{program.name}_STAGES]" if staged else ""
+    coefficients = f"double coef{stages}[{program.name}_COEFFICIENTS];"
+    declared = c.declared_values(program, None, has) | {"common": common, "coefficients": coefficients}
+    declarations = render("c", "device_declarations.h", declared)
     texts |= {"device_declarations.h": declarations, "model.h": c.model(program, None, has, texts.values())}
     amalgam = Amalgam(program.name, has, c.policies(program) | texts, real)
     body = c.unrestricted(program, amalgam.text("device.c", spelt))

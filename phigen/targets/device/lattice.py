@@ -93,9 +93,10 @@ def _functions(loops: LatticeLoops) -> Iterator[ir.Function]:
         yield from summed(sweep.gather)
         yield loops.sweep(sweep)
     gathers = [step.others.energy, step.others.field, step.others.observed]
+    gathers += map(step.others.sums_of, step.rate_kernels)
     if step.equation:
         yield from map(loops.stage, (step.equation.relax, step.equation.advance, step.equation.slope))
         gathers.append(step.others.varied)
     for gather in gathers:
         yield from summed(gather)
-    yield from map(loops.observable, loops.program.observables.kernels)
+    yield from map(loops.observable, (*loops.program.observables.kernels, *step.rate_kernels))

@@ -21,7 +21,7 @@ def launches(program: Program, step: Sweeps) -> LatticeLaunches:
         gather = step.others.varied if kernel.reads_variations else step.others.field
         sums = _sums(gather if kernel.inputs["gathered"] else None)
         others[kernel.name] = SiteLaunch(kernel.name, sums, len(kernel.roots))
-    for kernel in (k for k in program.observables.kernels if k.roots):
+    for kernel in (k for k in (*program.observables.kernels, *step.rate_kernels) if k.roots):
         others[kernel.name] = SiteLaunch(kernel.name, _sums(step.others.sums_of(kernel)), len(kernel.roots))
     return LatticeLaunches(
         parts,

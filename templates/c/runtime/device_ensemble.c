@@ -3,6 +3,7 @@
 #include "device_solver.c"
 #include "device_gauge.c"
 #include "device_lent.c"
+#include "device_common.c"
 
 /* ---- The kernel of ensembles ---- */
 /* Each work item integrates one member; work items beyond members do nothing, so that any size of work groups or blocks
@@ -17,10 +18,14 @@
 #endif
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
    coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before. status[m] is a phi_status. */
+#if PHI_COMMON
+/* If PHI_COMMON is defined, the first argument is the coefficients of all members: params_per_member and
+   h_per_member are 0. */
+#endif
 #if PHI_NOISE
 /* Member m has the random numbers of first_member + m, from the step first_step on, as in phi_ensemble_of. */
 #endif
-PHI_KERNEL void phi_ensemble_kernel(uint64_t members, PHI_GLOBAL const phi_params *params, int params_per_member,
+PHI_KERNEL void phi_ensemble_kernel(PHI_COMMON_ARGUMENT uint64_t members, PHI_GLOBAL const phi_params *params, int params_per_member,
     PHI_GLOBAL double *x,
     PHI_OWN_STARTS
     PHI_GLOBAL const double *h, int h_per_member, uint64_t steps,
@@ -39,6 +44,7 @@ PHI_KERNEL void phi_ensemble_kernel(uint64_t members, PHI_GLOBAL const phi_param
     const int begun = ended == PHI_OK;
     PHI_SET_NOISE(&s)
     PHI_LEND(&s)
+    PHI_TAKE_COMMON(&s)
     uint64_t done = 0;
     PHI_NO_UNROLL
     do {

@@ -7,7 +7,7 @@
 static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 {
     double increment[PHI_DIM];
-    phi_explicit(PHI_OF(s->coef, stage), s->x, increment);
+    phi_explicit(PHI_OF(PHI_COEFFICIENTS_OF(s), stage), s->x, increment);
     ++s->evaluations;
     return phi_advance(s, increment, s->carry) ? PHI_OK : PHI_NOT_FINITE;
 }

@@ -41,7 +41,7 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
     PHI_COPY(y, s->x, y, PHI_DIM);
 #endif
     for (int iteration = 1; iteration <= PHI_MAX_ITERATIONS; ++iteration) {
-        phi_linearise(PHI_OF(s->coef, stage), y, displacement, increment, jacobian, slope);
+        phi_linearise(PHI_OF(PHI_COEFFICIENTS_OF(s), stage), y, displacement, increment, jacobian, slope);
         ++s->evaluations;
         for (int i = 0; i < PHI_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = phi_solve(jacobian, delta);

@@ -45,14 +45,14 @@ static phi_status phi_stages(phi_solver *s)
     PHI_COPY(displacement, s->carry, s->carry, PHI_DIM);
 #if PHI_ATTITUDE && PHI_ADJOINT
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef, x, displacement, start, element, tape);
+    phi_flows(PHI_COEFFICIENTS_OF(s), x, displacement, start, element, tape);
 #elif PHI_ATTITUDE
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef, x, displacement, start, element);
+    phi_flows(PHI_COEFFICIENTS_OF(s), x, displacement, start, element);
 #elif PHI_ADJOINT
-    phi_flows(s->coef, x, displacement, start, tape);
+    phi_flows(PHI_COEFFICIENTS_OF(s), x, displacement, start, tape);
 #else
-    phi_flows(s->coef, x, displacement, start);
+    phi_flows(PHI_COEFFICIENTS_OF(s), x, displacement, start);
 #endif
     ++s->evaluations;
     if (!phi_finite(x, PHI_ALONG)) return PHI_NOT_FINITE;
@@ -78,14 +78,14 @@ static phi_status phi_stages(phi_solver *s)
     PHI_COPY(displacement, s->carry, displacement, PHI_DIM);
 #if PHI_ATTITUDE && PHI_ADJOINT
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef, x, displacement, s->x, element, tape);
+    phi_flows(PHI_COEFFICIENTS_OF(s), x, displacement, s->x, element, tape);
 #elif PHI_ATTITUDE
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef, x, displacement, s->x, element);
+    phi_flows(PHI_COEFFICIENTS_OF(s), x, displacement, s->x, element);
 #elif PHI_ADJOINT
-    phi_flows(s->coef, x, displacement, s->x, tape);
+    phi_flows(PHI_COEFFICIENTS_OF(s), x, displacement, s->x, tape);
 #else
-    phi_flows(s->coef, x, displacement, s->x);
+    phi_flows(PHI_COEFFICIENTS_OF(s), x, displacement, s->x);
 #endif
     ++s->evaluations;
     if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
@@ -105,7 +105,7 @@ static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_TAPE)
     double x[PHI_DIM], displacement[PHI_DIM];
     PHI_COPY(x, s->x, x, PHI_DIM);
     PHI_COPY(displacement, s->carry, displacement, PHI_DIM);
-    phi_corrector(after, s->coef, x, displacement, s->x PHI_AND_TAPE);
+    phi_corrector(after, PHI_COEFFICIENTS_OF(s), x, displacement, s->x PHI_AND_TAPE);
     if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
     phi_settle(s->x, s->carry, displacement);
     return PHI_OK;

@@ -1,0 +1,91 @@
+"""Lattices on devices with a monitor: the time of each flow follows from the energy of a part of H, summed there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from phigen.runtime.devices.lattice_sessions import DeviceLatticeSession, resumable
+from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.modules import load_module
+
+
+class MonitoredSession(DeviceLatticeSession):
+    """A session of a lattice with steps that are equal in τ. Each flow waits for one number from the device."""
+
+    def __init__(self, backend: Any, *arguments: Any, timed: bool) -> None:
+        self._monitoring = backend.monitoring
+        super().__init__(backend, *arguments, timed=timed)
+        self._sites.on_device = self
+        self._sites.clock = 0.0, 0.0
+        self._hold_level()
+
+    def _begin(self) -> None:
+        """The level is computed on the device, which is not open yet."""
+
+    def _hold_level(self) -> None:
+        """Hold the energy level of the state."""
+        with np.errstate(all="ignore"):
+            try:
+                self._sites.level = self._monitoring._level(self._sites, None)
+            except ValueError:
+                raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy()) from None
+
+    def part_energy(self, part: int) -> float:
+        """Return the energy of a part of H."""
+        return float(self._numbers_of(f"part{part + 1}", ["sum"])[0])
+
+    def place(self, x: Floats) -> None:
+        """See `phigen.runtime.numpy_lattice.NumpyLatticeSession.place`."""
+        if not np.isfinite(x).all():
+            raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy())
+        before, self._x = self._x, x
+        try:
+            self._hold_level()
+        except BackendError:
+            self._x = before
+            raise
+
+    def advance(self, h: float, steps: int) -> None:
+        """See `DeviceLatticeSession.advance`."""
+        self.prepare(h)
+        for _ in range(steps):
+            with resumable(self.steps), np.errstate(all="ignore"):
+                self._advance_once()
+            self.steps += 1
+
+    def _advance_once(self) -> None:
+        """Make one step. Raises `BackendError`, with the state before it, if it fails."""
+        self._upload()
+        self._launcher.copy(self._fields, self._before, self._stored)
+        begun = self._sites.clock
+        try:
+            self._make(1)
+            failed = self._failed()
+        except self._monitoring.FailedError:
+            failed = True
+        if failed:
+            self._sites.clock = begun
+            self._restore()
+            raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
+
+    def _make(self, steps: int) -> None:
+        """Make steps without a check of the results."""
+        self._host = None
+        module, sites = self._monitoring, self._sites
+        late = [[0.0]] if hasattr(module, "_late") else []
+        for part, row in module.SCHEDULE * steps:
+            time = self._rows[row] / module._rate(sites, part, None)
+            self._write_coefficients([module._prepare(sites.parameters, time, *late)])
+            for sweep in self._interface.launches.parts[part]:
+                self._launcher.run(sweep, self._coefficients, x=self._fields, dw=self._increments)
+            if part != module.NEGATIVE:
+                sites.clock = module._passed(sites.clock, time)
+
+
+def monitoring_module(text: str, name: str) -> Any:
+    """Return the NumPy module of a lattice with energies of parts of H that are summed on a device."""
+    module: Any = load_module(text, name)
+    module._part_energy = lambda sites, part, x: sites.on_device.part_energy(part)
+    return module
