@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 1fa2b0d65feceb550f327acf0da5807b2d5760b59db3d97a72c806cae860b9ec
+ * body-sha256: 0beca387cfd2e17edb3ddd204fce6480eea21a8549d2b7b8f918e5b7dc2fb10a
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -407,8 +407,7 @@ static int quaternion_top_plausible(const quaternion_top_solver *s,
 static void quaternion_top_path_begin(const double *coef, const double p[7],
     double s[84][quaternion_top_TERMS + 1], double f[1])
 {
-    (void)coef;
-    (void)f;
+    (void)coef, (void)f;
     s[7][0] = p[6] * s[5][0];
     s[8][0] = 0.5 * s[7][0];
     s[9][0] = p[5] * s[6][0];
@@ -492,8 +491,7 @@ static void quaternion_top_path_begin(const double *coef, const double p[7],
 static void quaternion_top_path_order(const double *coef, const double p[7],
     double s[84][quaternion_top_TERMS + 1], const double f[1], int k)
 {
-    (void)coef;
-    (void)f;
+    (void)coef, (void)f;
     if (k > 0) {
         s[7][k] = p[6] * s[5][k];
         s[8][k] = 0.5 * s[7][k];
@@ -511,7 +509,7 @@ static void quaternion_top_path_order(const double *coef, const double p[7],
         s[20][k] = s[14][k] + s[19][k];
         s[21][k] = s[11][k] + s[20][k];
         s[22][k] = p[5] * s[3][k];
-        s[23][k] = -0.5 * s[22][k];
+        s[23][k] = (-0.5) * s[22][k];
         s[24][k] = p[6] * s[4][k];
         s[25][k] = 0.5 * s[24][k];
         s[26][k] = s[23][k] - s[25][k];
@@ -541,7 +539,7 @@ static void quaternion_top_path_order(const double *coef, const double p[7],
         s[50][k] = s[44][k] + s[49][k];
         s[51][k] = s[41][k] + s[50][k];
         s[52][k] = p[0] * s[4][k];
-        s[53][k] = -0.5 * s[52][k];
+        s[53][k] = (-0.5) * s[52][k];
         s[54][k] = p[1] * s[5][k];
         s[55][k] = 0.5 * s[54][k];
         s[56][k] = s[53][k] - s[55][k];
@@ -586,8 +584,8 @@ static void quaternion_top_path_order(const double *coef, const double p[7],
 static void quaternion_top_path_field(const double *coef, const double p[7], const double m[7],
     double field[7])
 {
-    double e[84];
     (void)coef;
+    double e[84];
     memcpy(e, m, 7 * sizeof e[0]);
     e[7] = p[6] * e[5];
     e[8] = 0.5 * e[7];

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: cbf1727627fec7256d151ad8b4e21c20f7241035103ef33d1dcb4ec7172970a0
+# body-sha256: cec43eea5e3e6b7a5aac76d1bd1bf4996b08603d9cb10186f5a5b54ad57feade
 import numpy as np
 
 VERSION = "0.1.0"
@@ -670,7 +670,7 @@ def _piece(coef, p, start):
             s[20].append(s[14][k] + s[19][k])
             s[21].append(s[11][k] + s[20][k])
             s[22].append(p[:, 5] * s[3][k])
-            s[23].append(-0.5 * s[22][k])
+            s[23].append((-0.5) * s[22][k])
             s[24].append(p[:, 6] * s[4][k])
             s[25].append(0.5 * s[24][k])
             s[26].append(s[23][k] - s[25][k])
@@ -700,7 +700,7 @@ def _piece(coef, p, start):
             s[50].append(s[44][k] + s[49][k])
             s[51].append(s[41][k] + s[50][k])
             s[52].append(p[:, 0] * s[4][k])
-            s[53].append(-0.5 * s[52][k])
+            s[53].append((-0.5) * s[52][k])
             s[54].append(p[:, 1] * s[5][k])
             s[55].append(0.5 * s[54][k])
             s[56].append(s[53][k] - s[55][k])

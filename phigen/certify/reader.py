@@ -161,7 +161,8 @@ class PathReader(KernelReader):
         self._known = [f"s{i}" for i in range(coordinates)]
         super().__init__(source, "path_begin", series)
         _, body = _expect(source.function("path_order"), "path_order")
-        matched = re.fullmatch(r"(?:\s*\(void\)\w+;)*\s*if \(k > 0\) \{(.*?)\n    \}\n(.*)", body, re.DOTALL)
+        unused = r"(?:\s*\(void\)\w+(?:, \(void\)\w+)*;)?"
+        matched = re.fullmatch(unused + r"\s*if \(k > 0\) \{(.*?)\n    \}\n(.*)", body, re.DOTALL)
         if not matched:
             raise RefusedError("the C has recurrences of paths that certificates do not cover")
         for k in range(orders):

@@ -51,13 +51,15 @@ class Pointer:
 class Vector:
     """Array of reals, or of reals in SIMD ``lanes``; a matrix if it has several ``rows``.
 
-    As a parameter it is an address; a ``constant`` one is only read through.
+    As a parameter it is an address, of any length if it has none; a ``constant`` one is only read through, a
+    ``restricted`` one has no alias.
     """
 
-    length: Value
+    length: Value | None
     rows: Value | None = None
     lanes: bool = False
     constant: bool = False
+    restricted: bool = False
 
 
 @dataclass(frozen=True)
@@ -222,7 +224,7 @@ class Accumulated:
 
 @dataclass(frozen=True)
 class Cast:
-    """A value as an index, or as a size."""
+    """A value as an index, as a size, or as a real number."""
 
     value: Value
     kind: str = "index"
@@ -360,11 +362,11 @@ class Together:
 
 @dataclass(frozen=True)
 class Clear:
-    """Set ``count`` elements of an array to zero, from the index ``first`` on."""
+    """Set ``count`` elements of an array to zero, from the index ``first`` on, or all without a count."""
 
     array: Value
     first: Value | None
-    count: Value
+    count: Value | None
 
 
 @dataclass(frozen=True)
@@ -539,12 +541,12 @@ class Table:
 
     name: str
     values: tuple[int, ...]
-    length: Value
+    length: Value | None = None  # the number of the values, if it has no name
 
 
 @dataclass(frozen=True)
 class Function:
-    """A function; ``doc`` is its purpose, ``role`` that of its kernel.
+    """A function; ``doc`` is its purpose, ``role`` that of its kernel, ``returns`` the type of its value.
 
     On the level of sites its parameters are some of `PARAMETERS`. On the level of memory they have the types that are
     listed in ``types``, or else those of `TYPES`.
@@ -556,6 +558,7 @@ class Function:
     parameters: tuple[str, ...]
     body: Block
     types: tuple[tuple[str, ParameterType], ...] = ()
+    returns: Type | None = None
 
     def type_of(self, parameter: str) -> ParameterType:
         """Return the type of a parameter on the level of memory."""

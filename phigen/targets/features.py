@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from phigen.scheme.program import Program
 from phigen.scheme.step_kinds import STEP_KINDS, StepKind
-from phigen.targets.path import kinds, recurrences
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,14 @@ class Feature:
 
 
 def _sums(kind: str) -> Callable[[Program], bool]:
-    return lambda p: any(kind in kinds(path) for path in recurrences(p))
+    """Return the test whether the path, its tangent path or its reverse pass need sums over orders of a kind."""
+
+    def needed(program: Program) -> bool:
+        step = program.step
+        paths = [step.path, step.varied_path, step.back.recurrences if step.back else None]
+        return any(t.kind == kind for path in paths if path for q in path.series for t in q.terms)
+
+    return needed
 
 
 def _is_of(kind: StepKind) -> Callable[[Program], bool]:

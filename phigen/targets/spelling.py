@@ -37,6 +37,7 @@ class Dialect:
     subscript: str = "{0}[{1}]"
     member: str = "{0}.{1}"
     pointers: frozenset[str] = frozenset()  # addresses of records, unless the function declares the record
+    links: frozenset[str] = frozenset()  # members that are addresses of records
     quote: str = '"{0}"'
 
 
@@ -98,8 +99,10 @@ class Spelling:
             case ir.Constant(number):
                 return repr(number), _ATOM
             case ir.Member(record, name):
-                text, last = self(record, _ATOM), record.name if isinstance(record, ir.Member) else self(record)
-                return f"{text}->{name}" if last in self._pointers else self.dialect.member.format(text, name), _ATOM
+                text = self(record, _ATOM)
+                is_link = isinstance(record, ir.Member) and record.name in self.dialect.links
+                address = is_link or text in self._pointers
+                return f"{text}->{name}" if address else self.dialect.member.format(text, name), _ATOM
             case ir.Entry(array, index):
                 return self.dialect.subscript.format(self(array, _ATOM), self(index)), _ATOM
             case ir.Binary("&", left, right):
@@ -109,6 +112,8 @@ class Spelling:
                 return f"{self(left, level)} {spelt} {self(right, level + (operator != 'and'))}", level
             case ir.Accumulated(start, terms):
                 return f"{self(start, 3)} + {self(terms)}", 3
+            case ir.Cast(inner, kind) if kind not in self.dialect.operators:
+                return self._spelt(inner)
             case ir.Cast(inner, kind):
                 return f"({self.dialect.operators[kind]}){self(inner, _ATOM)}", _ATOM
             case ir.Select(condition, then, otherwise):

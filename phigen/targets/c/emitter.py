@@ -16,7 +16,7 @@ from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import MAX_NORMAL_VARIATE, Attitude, Noise, Program
 from phigen.scheme.steps import Adjoint
 from phigen.spec.model import Parameter
-from phigen.targets.c import functions, paths
+from phigen.targets.c import functions
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.gauss import SINGLE_POLICY
@@ -27,7 +27,7 @@ from phigen.targets.c.language import members
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.misra import compliant
 from phigen.targets.c.real import DOUBLE, FLOAT
-from phigen.targets.c.step_text import Sizes, text_of
+from phigen.targets.c.step_text import Sizes, path_sizes, text_of
 from phigen.targets.c.tokens import without_word
 from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
@@ -284,7 +284,7 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
             entries = len(lanes.factors.factorise.roots)
             sizes.append(("FACTORS", entries, "entries of the factors of a Newton matrix"))
     if isinstance(lanes, Blocks | Traces) and lanes.path and (has["BLOCKS"] or has["TRACED"]):
-        sizes += paths.sizes(lanes.path, lanes.slope_terms)
+        sizes += path_sizes(lanes.path, lanes.slope_terms)
     if has["ALONG"] and step.back:
         sizes.append(("USED", len(step.back.used), "coefficients that the slope of a path depends on"))
     if has["BATCHED"]:

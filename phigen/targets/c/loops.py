@@ -16,11 +16,11 @@ from phigen.targets.spelling import Dialect, Spelling
 #: Functions and sizes of the runtime, whose names begin with that of the solver.
 _RUNTIME = (
     "first", "LANES", "total", "added", "ADDED", "piece_of", "between", "units", "part_of_flow", "DIM", "SUMS", "ROW",
-    "ELEMENT", "BACK_PACKS", "FLOWS",
+    "ELEMENT", "BACK_PACKS", "FLOWS", "TERMS", "taylor_product", "taylor_chain", "taylor_power",
 )  # fmt: skip
 
 #: Names of addresses of records.
-_POINTERS = frozenset({"row", "s", "group", "pack", "bar"})
+_POINTERS = frozenset({"row", "s", "e", "group", "pack", "bar", "params_bar"})
 
 #: Types of values that are no pointers.
 _TYPES = {
@@ -32,7 +32,14 @@ _TYPES = {
 }
 
 #: Types of the variables of loops, by their kinds.
-_COUNTERS = {"segments": "size_t", "search": "size_t", "lanes": "int", "packs": "int", "stages": "int"}
+_COUNTERS = {
+    "segments": "size_t",
+    "search": "size_t",
+    "lanes": "int",
+    "packs": "int",
+    "stages": "int",
+    "entries": "int",
+}
 
 #: Limits of a case of a switch that is printed on one line: statements, and letters, which leave room for the label and
 #: the indentation.
@@ -43,7 +50,8 @@ def function(printed: ir.Function, name: str, linkage: str = "static") -> str:
     """Return a function of a solver as text, without its comment."""
     spelling = _spelling(printed, name)
     parameters = ", ".join(_parameter(p, printed.type_of(p), name, spelling) for p in printed.parameters)
-    head = f"{linkage} void {name}_{printed.name}({parameters})"
+    returned = _TYPES[printed.returns] if printed.returns else "void"
+    head = f"{linkage} {returned} {name}_{printed.name}({parameters})"
     return "\n".join([f"{head}\n{{", *_indented(_StatementPrinter(spelling, name, 0).lines(printed.body)), "}\n"])
 
 
@@ -54,7 +62,8 @@ def commented(printed: ir.Function, name: str, linkage: str = "static") -> str:
 
 def table(printed: ir.Table, name: str) -> str:
     """Return the constants of a table of a solver as a line."""
-    length = _spelling(ir.Function("", "", Role.OTHER, (), ()), name)(printed.length)
+    number = printed.length or ir.Constant(len(printed.values))
+    length = _spelling(ir.Function("", "", Role.OTHER, (), ()), name)(number)
     return f"static const int {name}_{printed.name}[{length}] = {{ {', '.join(map(str, printed.values))} }};"
 
 
@@ -69,9 +78,10 @@ def statements(printed: ir.Function, name: str, *, shared_line: int = 0) -> list
 def _spelling(printed: ir.Function, name: str) -> Spelling:
     dialect = Dialect(
         replace(LANGUAGE, reserved=reserved_variables(name), functions=elementary_functions(name)),
-        operators={"and": "&&", "or": "||", "not": "!", "index": "ptrdiff_t", "size": "size_t"},
+        operators={"and": "&&", "or": "||", "not": "!", "index": "ptrdiff_t", "size": "size_t", "real": "double"},
         functions={function: f"{name}_{function}" for function in _RUNTIME},
         pointers=_POINTERS | {p for p in printed.parameters if p == "params"},
+        links=frozenset({"s"}),
     )
     return Spelling(dialect, printed.parameters, printed.body)
 
@@ -83,8 +93,9 @@ def _parameter(parameter: str, kind: ir.ParameterType, name: str, spell: Spellin
         case ir.Pointer(constant, restricted):
             return f"{'const ' * constant}{_number(kind, name)} *{'restrict ' * restricted}{parameter}"
         case ir.Vector(length, rows):
-            row = f"[{spell(rows)}]" if rows else ""
-            return f"{'const ' * kind.constant}{_number(kind, name)} {parameter}{row}[{spell(length)}]"
+            row, sized = f"[{spell(rows)}]" if rows else "", spell(length) if length else ""
+            sized = " ".join(filter(None, ["restrict" * kind.restricted, sized]))
+            return f"{'const ' * kind.constant}{_number(kind, name)} {parameter}{row}[{sized}]"
         case ir.Tape(length):
             return f"double (*{parameter})[{spell(length)}]"
     return f"{_TYPES[kind]}{'' if _TYPES[kind].endswith('*') else ' '}{parameter}"
@@ -153,12 +164,16 @@ class _StatementPrinter:
                 yield f"{', '.join(map(self._assignment, assignments))};"
             case ir.Call(called, arguments):
                 yield f"{self.name}_{called}({', '.join(map(spell, arguments))}){';' * (not called.isupper())}"
+            case ir.Clear(array, None, None):
+                yield f"memset({spell(array)}, 0, sizeof {spell(array)});"
             case ir.Clear(array, None, ir.Constant() as count):
                 yield f"PHI_CLEAR_FIRST({spell(array)}, {spell(count)});"
-            case ir.Clear(array, first, count):
+            case ir.Clear(array, first, count) if count:
                 start = spell(ir.Binary("+", array, first) if first else array)
                 pointer = f"({spell(array)})" if isinstance(array, ir.Binary) else spell(array)
                 yield f"memset({start}, 0, {spell(ir.Cast(count, 'size'))} * sizeof *{pointer});"
+            case ir.Copy(ir.Name() as target, source, ir.Constant() as count):
+                yield f"PHI_COPY_FIRST({spell(target)}, {spell(source)}, {spell(count)});"
             case ir.Copy(target, source, count):
                 size = f"sizeof {spell(source if count is None else target)}"
                 size = size if count is None else f"{spell(count)} * {size}"
@@ -190,7 +205,7 @@ class _StatementPrinter:
                 kind = f"{'const ' * constant}{_number(s.type, self.name)}"
                 star = "*restrict " if restricted else "*"
             case ir.Vector(size):
-                kind, length = _number(s.type, self.name), f"[{self.spell(size)}]"
+                kind, length = _number(s.type, self.name), f"[{self.spell(size) if size else ''}]"
             case ir.Type.ARRAYS:
                 kind, star, length = "double", "*const ", "[]"
             case ir.RecordType(record, mutable, address):

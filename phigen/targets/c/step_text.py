@@ -6,26 +6,22 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from phigen.ir import nodes as ir
+from phigen.ir import path_functions
+from phigen.ir.path_functions import TERMS, adjoint_program, tangent_program
 from phigen.lanes.in_lanes import Blocks, Lanes, Packs, Traces
 from phigen.scheme.kernel import Kernel
-from phigen.scheme.path import Recurrences
+from phigen.scheme.path import PathSlopes, Recurrences
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss, Newton, Path, PathAdjoint, Splitting
-from phigen.symbolic.expression import Expression, symbols_of
-from phigen.symbolic.symbols import COEFFICIENT, FIXED, MOMENTUM, kind_of
-from phigen.targets.c import gauss, paths, splitting
+from phigen.targets.c import gauss, splitting
 from phigen.targets.c.kernels import function
 from phigen.targets.c.lanes import packed_kernels, packed_step, printed_back
-from phigen.targets.c.language import printer
-from phigen.targets.path import TERMS, Syntax, adjoint_program, statements, tangent_program
-from phigen.targets.rendering import render
+from phigen.targets.c.loops import commented, table
 
 #: Constants: names, values, and comments.
 Sizes = list[tuple[str, int, str]]
 Switches = Mapping[str, bool]
-
-#: The symbols that stand for entries of the arguments of functions on paths.
-_ENTRIES = {"coef": COEFFICIENT, "p": MOMENTUM, "f": FIXED}
 
 
 @dataclass(frozen=True)
@@ -75,7 +71,7 @@ def _path_texts(program: Program, step: Path, lanes: Lanes | None, has: Switches
     if step.back:
         texts["adjoint_path.h"] = _adjoint_path(program, step.back)
     if isinstance(lanes, Blocks | Traces) and lanes.path and (has["BLOCKS"] or has["TRACED"]):
-        texts["path_model_lanes.h"] = paths.printed(program, step, lanes.path)
+        texts["path_model_lanes.h"] = _path_in_lanes(program, step, lanes.path)
     return texts
 
 
@@ -98,40 +94,31 @@ def _path_constants(program: Program, step: Path) -> Sizes:
 
 def _adjoint_path(program: Program, path: PathAdjoint) -> str:
     """Return the recurrences of the reverse pass of a path, and the coefficients that it depends on."""
-    values = {"NAME": program.name, "count": len(path.used), "used": ", ".join(map(str, path.used))}
-    extended = adjoint_program(program, path)
-    return render("c", "adjoint_path.c", values) + "\n" + _path(extended, path.recurrences, "back")
+    used, extended = ir.Table("back_used", tuple(path.used) or (0,)), adjoint_program(program, path)
+    said = "The coefficients" if path.used else "None of the coefficients is one"
+    comment = f"/* {said} that the slope of a path depends on. */"
+    return f"{comment}\n{table(used, program.name)}\n\n{_path(extended, path.recurrences, 'back')}"
 
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
     """Return the recurrences of a path, or of a tangent path."""
-    slope = "s[{i}][k + 1] = s[{slope}][k] / (double)(k + 1);"
-    syntax = Syntax(printer, slope, sums=f"{program.name}_taylor_{{kind}}")
-    texts = statements(program, path, syntax)
-    derived = path.series[program.dimension :]
-    firsts, factors = [q.first for q in derived], [factor for q in derived for _, factor in q.linear]
-    defined = ("coef", "p") if path.fixed else ("coef", "p", "f")  # f is defined if it has values
-    return render(
-        "c",
-        "path.c",
-        {
-            **texts,
-            "NAME": program.name,
-            "kind": kind,
-            "n": program.dimension,
-            "series": len(path.series),
-            "fixed_count": max(1, len(path.fixed)),
-            "unused_first": _unused([*path.fixed, *firsts], defined),
-            "unused_rules": _unused(factors, ("coef", "p", "f")),
-            "unused_field": _unused([*path.fixed, *firsts], ("coef", "p")),
-        },
-    )
+    return "\n".join(commented(f, program.name) for f in path_functions.functions(program, path, kind))
 
 
-def _unused(expressions: Sequence[Expression], arrays: Sequence[str]) -> list[str]:
-    """The statements that mark the unused arguments of a function."""
-    read = {kind_of(s) for s in symbols_of(*expressions)}
-    return [f"(void){array};" for array in arrays if _ENTRIES[array] not in read]
+def _path_in_lanes(program: Program, step: Path, slopes: PathSlopes) -> str:
+    """Return the recurrences of a path and its derivatives in SIMD lanes."""
+    used = step.back.used if step.back else ()
+    listed = path_functions.lane_functions(program, step.recurrences, slopes, used)
+    return "\n".join(commented(f, program.name) for f in listed)
+
+
+def path_sizes(slopes: PathSlopes, slope_terms: int) -> Sizes:
+    """Return the constants of paths in SIMD lanes."""
+    return [
+        ("SLOPE_TERMS", slope_terms, "most of the expansion of the derivatives of a path"),
+        ("SLOPE_SERIES", max(1, len(slopes.series)), "further series that these need"),
+        ("SLOPE_FIXED", max(1, len(slopes.fixed)), "further values that are constant along a path"),
+    ]
 
 
 def _gauss_texts(program: Program, step: Gauss, lanes: Lanes | None, has: Switches) -> dict[str, str]:

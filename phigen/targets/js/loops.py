@@ -8,7 +8,11 @@ from phigen.ir import nodes as ir
 from phigen.targets.js.printing import LANGUAGE, camel, comment, wrapped
 from phigen.targets.spelling import Dialect, Spelling
 
-DIALECT = Dialect(LANGUAGE, operators={"==": "===", "!=": "!==", "and": "&&", "or": "||"})
+DIALECT = Dialect(
+    LANGUAGE,
+    operators={"==": "===", "!=": "!==", "and": "&&", "or": "||"},
+    functions={name: camel(name) for name in ("taylor_product", "taylor_chain", "taylor_power")},
+)
 
 
 def function(lowered: ir.Function, names: Iterable[str] = ()) -> str:
@@ -49,7 +53,7 @@ def _line(s: ir.Statement, spelling: Spelling) -> str:
         case ir.Call(name, arguments, instance):
             owner = f"{spelling(instance)}." if instance else ""
             return f"{owner}{camel(name)}({', '.join(map(spelling, arguments))});"
-        case ir.Clear(array, None, count):
+        case ir.Clear(array, None, count) if count:
             return f"{spelling(array)}.fill(0, 0, {spelling(count)});"
         case ir.If(condition, (ir.Continue(),)):
             return f"if ({spelling(condition)}) continue;"

@@ -7,15 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from phigen.ir.path_functions import TERMS, PathFunctions, PathLayout, tangent_program
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Attitude, Program
 from phigen.scheme.steps import Explicit, Gauss, Newton, Path, Splitting
-from phigen.targets.js.printing import LANGUAGE
-from phigen.targets.path import TERMS, Syntax, statements, tangent_program
+from phigen.targets.js.loops import statements
 from phigen.targets.rendering import render
-
-PATH_SYNTAX = Syntax(LANGUAGE.printer, slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);", sums="taylor{Kind}")
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,9 @@ def _path_series(program: Program, step: Path) -> list[str]:
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
     """The recurrences of a path, or of one with its variation."""
-    return render("js", "path.mjs", {**statements(program, path, PATH_SYNTAX), "kind": kind})
+    blocks = PathFunctions(program, path, PathLayout()).blocks()
+    lines = {name: [line.removeprefix("  ") for line in statements(function)] for name, function in blocks.items()}
+    return render("js", "path.mjs", {**lines, "kind": kind})
 
 
 def _path_kernels(program: Program, step: Path) -> Sequence[Kernel | None]:

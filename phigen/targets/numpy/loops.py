@@ -8,7 +8,12 @@ from phigen.ir import nodes as ir
 from phigen.targets.numpy.language import LANGUAGE
 from phigen.targets.spelling import Dialect, Spelling
 
-DIALECT = Dialect(LANGUAGE, operators={"not": "not "}, select="np.where({0}, {1}, {2})")
+DIALECT = Dialect(
+    LANGUAGE,
+    operators={"not": "not "},
+    functions={f"taylor_{kind}": f"_{kind}" for kind in ("product", "chain", "power")},
+    select="np.where({0}, {1}, {2})",
+)
 
 
 def function(lowered: ir.Function) -> str:
@@ -33,6 +38,8 @@ def _statement(s: ir.Statement, spelling: Spelling, indent: str) -> Iterator[str
             yield f"{indent}{', '.join(names)} = {spelling(value)}"
         case ir.Assign(target, value, adds):
             yield f"{indent}{spelling(target)} {'+=' if adds else '='} {spelling(value)}"
+        case ir.Append(series, value):
+            yield f"{indent}{spelling(series)}.append({spelling(value)})"
         case ir.Call(name, arguments, instance):
             yield f"{indent}{spelling(ir.Called(name, arguments, instance))}"
         case ir.Within(context, body) | ir.If(context, body):

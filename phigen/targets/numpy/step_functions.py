@@ -6,26 +6,41 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from phigen.ir import nodes as ir
+from phigen.ir.path_functions import PathFunctions, PathLayout, tangent_program
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Explicit, Gauss, Newton, Path, PathAdjoint, Splitting
 from phigen.targets.numpy.kernels import function
-from phigen.targets.numpy.language import LANGUAGE, listed
+from phigen.targets.numpy.language import listed
+from phigen.targets.numpy.loops import statements
 from phigen.targets.numpy.values import values_of
-from phigen.targets.path import Syntax, statements, tangent_program
 from phigen.targets.rendering import render
 
-PATH_SYNTAX = Syntax(
-    LANGUAGE.printer,
-    slope="s[{i}].append(s[{slope}][k] / (k + 1))",
-    sums="_{kind}",
-    covector="p[:, {i}]",
-    fixed="f{i} = {value}",
-    held="f{i}",
-    first="s[{i}].append({value} + 0.0)",
-    following="s[{i}].append({value})",
-)
+
+class _PathOverMembers(PathLayout):
+    """The places of the values of a path: columns of arrays over members, and lists of the orders of a series."""
+
+    def covector(self, i: int) -> ir.Value:
+        """Return component i of p."""
+        return ir.Entry(ir.fixed("p"), ir.Several((ir.fixed(":"), ir.Constant(i))))
+
+    def fixed(self, i: int) -> ir.Value:
+        """Return value i of those that are constant along a path."""
+        return ir.fixed(f"f{i}")
+
+    def following(self, i: int, k: ir.Value, value: ir.Value) -> ir.Statement:
+        """Return the statement that appends coefficient k; the first ones are arrays, not numbers."""
+        first = k == ir.Constant(0)
+        return ir.Append(self.series(i), ir.Binary("+", value, ir.Constant(0.0)) if first else value)
+
+
+def _path_lines(program: Program, path: Recurrences) -> dict[str, list[str]]:
+    """Return the statements of a path by their purpose."""
+    blocks = PathFunctions(program, path, _PathOverMembers()).blocks()
+    printed = {name: statements(function)[1] for name, function in blocks.items()}
+    return {name: [line.strip() for line in lines] for name, lines in printed.items()}
 
 
 @dataclass(frozen=True)
@@ -85,7 +100,7 @@ def _path(program: Program, step: Path) -> StepPart:
         "path_step",
         f"path_{_prediction(program)}",
     )
-    values = statements(program, step.recurrences, PATH_SYNTAX)
+    values = _path_lines(program, step.recurrences)
     return StepPart((step.prepare, step.refresh, step.generate), templates, values)
 
 
@@ -93,7 +108,7 @@ def _path_tangent(program: Program, step: Path) -> StepPart:
     if step.tangent is None:
         return StepPart()
     extended, path = tangent_program(program), step.tangent.recurrences
-    values = {**statements(extended, path, PATH_SYNTAX), "series": len(path.series), "n_twice": extended.dimension}
+    values = {**_path_lines(extended, path), "series": len(path.series), "n_twice": extended.dimension}
     return StepPart((step.tangent.curvature,), ("holds", "piece", "seeds", "path"), values)
 
 
@@ -111,7 +126,7 @@ def _varied(program: Program, step: Path, adjoint: PathAdjoint) -> dict[str, obj
     along_p = [(e.row, n + e.column, e.series, True) for e in slopes.tensor]
     along_c = [(e.row, 2 * n + e.column, e.series, False) for e in slopes.along]
     return {
-        **statements(program, whole, PATH_SYNTAX),
+        **_path_lines(program, whole),
         "series": len(whole.series),
         "width": 2 * n + len(adjoint.used),
         "used": repr(list(adjoint.used)),

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from phigen.ir.path_functions import TERMS
 from phigen.scheme.policies import PathPolicy
 from phigen.scheme.program import Program
 from phigen.scheme.steps import InnerSolve
 from phigen.targets.header import facts, plain
 from phigen.targets.numpy.language import listed, quoted
-from phigen.targets.path import TERMS
 from phigen.targets.policies import PYTHON, policies_of
 
 _NOISE_ARGUMENTS = """ The random

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from phigen.ir import nodes as ir
+from phigen.ir.lattice_parameters import sums_of_derivatives
 from phigen.ir.passes import row_transposes
 from phigen.ir.passes.by_rows import ROW
 from phigen.ir.passes.row_transposes import Handed
@@ -59,6 +60,7 @@ from phigen.targets.c.lattice.layout import Layout, layout_of
 from phigen.targets.c.lattice.loops import RowLoops, code
 from phigen.targets.c.lattice.loops import printed as loop_text
 from phigen.targets.c.lattice.sweep_functions import calls_of, driver_text, drivers
+from phigen.targets.c.loops import commented
 from phigen.targets.rendering import render
 
 
@@ -345,16 +347,7 @@ def _sums(program: Program, step: Sweeps) -> str:
 
 
 def _added(program: Program, step: Sweeps, layout: Layout) -> str:
-    """The function that adds the derivatives by parameters to those of the caller."""
-    member = members(program)
-    numbers = [(member[p.name], place) for place, p in enumerate(p for p in program.parameters if p.at == "all")]
-    sites = [(member[p], layout.bar(p)) for p in step.sites.parameters]
-    bonds = [(member[p], layout.bar(p)) for p in step.sites.at_bonds]
-    values = {
-        "NAME": program.name,
-        "numbers": numbers,
-        "sites": sites,
-        "bonds": bonds,
-        "numbers_only": not (sites or bonds),
-    }
-    return render("c", "lattice_bars.c", values)
+    """Return the functions that add the derivatives by parameters to those of the caller."""
+    bars = {p: layout.bar(p) for p in (*step.sites.parameters, *step.sites.at_bonds)}
+    added = sums_of_derivatives(program.parameters, members(program), bars)
+    return "\n".join(commented(one, program.name) for one in added)

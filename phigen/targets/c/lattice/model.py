@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import reduce
 
-from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import bounds
-from phigen.ir.passes.unread import discard_unread
-from phigen.scheme.kernel import Role
+from phigen.ir.lattice_parameters import are_allowed
 from phigen.scheme.policies import LatticeNewtonPolicy, LatticeSweepPolicy
 from phigen.scheme.program import MAX_NORMAL_VARIATE, Program
 from phigen.scheme.steps import Sweeps
@@ -24,7 +21,7 @@ from phigen.targets.c.lattice.layout import (
     switches,
 )
 from phigen.targets.c.lattice.loops import share
-from phigen.targets.c.loops import statements
+from phigen.targets.c.loops import commented
 from phigen.targets.header import plain
 from phigen.targets.rendering import render
 
@@ -152,15 +149,14 @@ def model(program: Program, step: Sweeps) -> str:
         "reductions": ", ".join(_braced(_reduction(r)) for r in program.observables.reductions),
         "joined": not program.noise,
         "late": has["LATE"],
-        "allowed": statements(_allowed(program, graph=layout.graph), program.name),
     }
     timed = step.refresh or (program.time and step.equation)
     prepare = render("c", "middles.c", values) if timed else ""
     prepare += function(program, step.prepare)
     prepare += "\n" + function(program, step.refresh) if step.refresh else ""
-    return (
-        "".join(render("c", f"{part}.c", values) for part in ("lattice", "lattice_flows", "lattice_allowed")) + prepare
-    )
+    allowed = are_allowed(program.parameters, members(program), graph=layout.graph)
+    texts = [*(render("c", f"{part}.c", values) for part in ("lattice", "lattice_flows"))]
+    return "".join([*texts, commented(allowed, program.name), "\n", prepare])
 
 
 def _constants(
@@ -247,29 +243,6 @@ def _tables_of_flows(step: Sweeps) -> dict[str, object]:
 def _moments(step: Sweeps) -> list[float]:
     """The time at which time-dependent coefficients are evaluated, as a fraction of the step, for each row."""
     return _by_flow(step, step.schedule.moments, 0.0)
-
-
-def _allowed(program: Program, *, graph: bool) -> ir.Function:
-    """Return the function whose value is 1 if all parameters are finite, and positive where they have to be."""
-    named, params, k = members(program), ir.fixed("params"), ir.fixed("k")
-    body, conditions = list[ir.Statement](), list[ir.Value]()
-    for p in program.parameters:
-        array, zero = ir.Member(params, named[p.name]), ir.Constant(0.0)
-        if p.at == "all":
-            conditions.append(ir.Called("isfinite", (array,)))
-            conditions += [ir.Binary(">" if p.positive else ">=", array, zero)] if p.bound else []
-            continue
-        wrong: ir.Value = ir.Prefix("not", ir.Called("isfinite", (ir.Entry(array, k),)))
-        if p.bound:
-            wrong = ir.Binary("or", wrong, ir.Binary("<=" if p.positive else "<", ir.Entry(array, k), zero))
-        refusal = (ir.Return(ir.Constant(0)),)
-        if p.values is not None:
-            body.append(ir.If(ir.Binary("==", array, ir.fixed("NULL")), refusal))
-        is_array, search = ir.Binary("!=", array, ir.fixed("NULL")), (ir.If(wrong, refusal),)
-        body.append(ir.Loop("search", search, "k", ir.Constant(0), ir.fixed(p.at), condition=is_array))
-    value = reduce(lambda a, b: ir.Binary("and", a, b), conditions) if conditions else ir.Constant(1)
-    parameters = ("params", "sites", *["bonds"] * graph)
-    return discard_unread(ir.Function("allowed", "", Role.OTHER, parameters, (*body, ir.Return(value))))
 
 
 def _reduction(reduction: Reduction) -> tuple[int, int]:

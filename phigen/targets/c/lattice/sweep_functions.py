@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir import row_drivers
+from phigen.ir.lattice_parameters import copies
 from phigen.ir.passes.by_rows import ROW
 from phigen.ir.passes.open_ends import NEAR_ENDS
 from phigen.ir.row_drivers import (
@@ -40,8 +41,7 @@ from phigen.targets.c.lattice.loops import (
     observables,
     printed,
 )
-from phigen.targets.c.loops import function
-from phigen.targets.rendering import render
+from phigen.targets.c.loops import commented, function
 
 
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
@@ -71,18 +71,10 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
 
 
 def parameters(program: Program, step: Sweeps) -> str:
-    """Print the function that copies parameters at sites and bonds to the arrays that loops read."""
-    layout, member = layout_of(program, step), members(program)
-    sites = [p for p in program.parameters if p.at == "sites"]
-    bonds = [p for p in program.parameters if p.at == "bonds"]
-    values = {
-        "NAME": program.name,
-        "arrays": [(member[p.name], layout.arrays.index(p.name), repr(float(p.value))) for p in sites],
-        "at_bonds": [(member[p.name], step.sites.at_bonds.index(p.name), repr(float(p.value))) for p in bonds],
-        "copied_arrays": " = ".join(f"s->params.{member[p.name]}" for p in sites),
-        "copied_at_bonds": " = ".join(f"s->params.{member[p.name]}" for p in bonds),
-    }
-    return render("c", "lattice_parameters.c", values)
+    """Print the functions that copy parameters at sites and bonds to the arrays that loops read."""
+    arrays = layout_of(program, step).arrays
+    listed = copies(program.parameters, members(program), arrays, step.sites.at_bonds)
+    return "".join(commented(copy, program.name) + "\n" for copy in listed)
 
 
 def drivers(loops: RowLoops) -> RowDrivers:

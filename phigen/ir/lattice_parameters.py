@@ -1,0 +1,128 @@
+"""Builders of the functions on the parameters of a lattice: tests, copies to rows, and sums of derivatives by them.
+
+Parameters have one value, or one at each site or bond. ``members`` are their names in the record of the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import reduce
+
+from phigen.ir import nodes as ir
+from phigen.ir.passes.unread import discard_unread
+from phigen.scheme.kernel import Role
+from phigen.spec.model import Parameter
+
+S, PARAMS, K, NULL = (ir.fixed(name) for name in ("s", "params", "k", "NULL"))
+BAR, PARAMS_BAR, DERIVATIVES = (ir.fixed(name) for name in ("bar", "params_bar", "derivatives"))
+_TYPES: Mapping[str, ir.ParameterType] = {
+    "s": ir.RecordType("solver"),
+    "params": ir.RecordType("params"),
+    "params_bar": ir.RecordType("params_bar", mutable=True),
+    "derivatives": ir.Pointer(),
+    "sites": ir.Type.SIZE,
+    "bonds": ir.Type.SIZE,
+}
+
+
+def _function(name: str, doc: str, parameters: Sequence[str], body: ir.Block, **types: ir.ParameterType) -> ir.Function:
+    known = {**_TYPES, **types}
+    listed = tuple((p, known[p]) for p in parameters if p in known)
+    return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))
+
+
+def are_allowed(parameters: Sequence[Parameter], members: Mapping[str, str], *, graph: bool) -> ir.Function:
+    """Return the function whose value is 1 if all parameters are finite, and positive where they have to be."""
+    body, conditions = list[ir.Statement](), list[ir.Value]()
+    for p in parameters:
+        array, zero = ir.Member(PARAMS, members[p.name]), ir.Constant(0.0)
+        if p.at == "all":
+            conditions.append(ir.Called("isfinite", (array,)))
+            conditions += [ir.Binary(">" if p.positive else ">=", array, zero)] if p.bound else []
+            continue
+        wrong: ir.Value = ir.Prefix("not", ir.Called("isfinite", (ir.Entry(array, K),)))
+        if p.bound:
+            wrong = ir.Binary("or", wrong, ir.Binary("<=" if p.positive else "<", ir.Entry(array, K), zero))
+        refusal = (ir.Return(ir.Constant(0)),)
+        if p.values is not None:
+            body.append(ir.If(ir.Binary("==", array, NULL), refusal))
+        is_array, search = ir.Binary("!=", array, NULL), (ir.If(wrong, refusal),)
+        body.append(ir.Loop("search", search, "k", ir.Constant(0), ir.fixed(p.at), condition=is_array))
+    value = reduce(lambda a, b: ir.Binary("and", a, b), conditions) if conditions else ir.Constant(1)
+    names = ("params", "sites", *["bonds"] * graph)
+    doc = "Whether all parameters are finite, and positive where required"
+    function = _function("allowed", doc, names, (*body, ir.Return(value)))
+    return replace(function, returns=ir.Type.FLAG)
+
+
+def copies(
+    parameters: Sequence[Parameter], members: Mapping[str, str], arrays: Sequence[str], at_bonds: Sequence[str]
+) -> Iterator[ir.Function]:
+    """Yield the functions that copy parameters at sites to ``arrays`` of rows, and parameters ``at_bonds``."""
+    sites, bonds = ([p for p in parameters if p.at == at] for at in ("sites", "bonds"))
+    solver = ir.RecordType("solver", mutable=True)
+    if sites:
+        body = [
+            ir.Call("put_parameter", (S, _row("x", arrays.index(p.name)), _of(PARAMS, p, members), _default(p)))
+            for p in sites
+        ]
+        doc = "Copy the parameters at sites into rows"
+        yield _function("put_parameters", doc, ("s", "params"), (*body, _copied(sites, members)), s=solver)
+    if bonds:
+        number = ir.Entry(ir.Member(S, "number"), K)
+        selected = (
+            (p, ir.Select(ir.Binary("!=", array, NULL), ir.Entry(array, number), _default(p)))
+            for p in bonds
+            for array in [_of(PARAMS, p, members)]
+        )
+        each = tuple(ir.Assign(ir.Entry(_row("at_bonds", at_bonds.index(p.name)), K), value) for p, value in selected)
+        count = ir.Entry(ir.Member(S, "bonds"), ir.Member(S, "sites"))
+        loop = ir.Loop("entries", each, "k", ir.Constant(0), count)
+        doc = "Copy the parameters at bonds, in the order of the bonds of each site"
+        yield _function("put_at_bonds", doc, ("s", "params"), (loop, _copied(bonds, members)), s=solver)
+
+
+def _copied(parameters: Sequence[Parameter], members: Mapping[str, str]) -> ir.Assign:
+    """Return the statement that forgets the arrays of the caller."""
+    first, *others = (_of(ir.Member(S, "params"), p, members) for p in parameters)
+    return ir.Assign(first, NULL, too=tuple(others))
+
+
+def sums_of_derivatives(
+    parameters: Sequence[Parameter], members: Mapping[str, str], bars: Mapping[str, int]
+) -> Iterator[ir.Function]:
+    """Yield the functions that add derivatives by parameters to those of the caller.
+
+    Parameters with one value have a number each. ``bars`` are the arrays of the others, in the order in which they are
+    added.
+    """
+    numbers = [p for p in parameters if p.at == "all"]
+    if numbers:
+        body = tuple(
+            ir.Assign(_of(PARAMS_BAR, p, members), ir.Entry(DERIVATIVES, ir.Constant(k)), adds=True)
+            for k, p in enumerate(numbers)
+        )
+        yield _function(
+            "add_numbers", "Add the derivatives by parameters with one value", ("derivatives", "params_bar"), body
+        )
+    by_name = {p.name: p for p in parameters}
+    calls = tuple(
+        ir.Call(f"add_at_{p.at}", (S, ir.Entry(BAR, ir.Constant(bar)), _of(PARAMS_BAR, p, members)))
+        for name, bar in bars.items()
+        for p in [by_name[name]]
+    )
+    doc = "Add the derivatives by parameters at sites and bonds"
+    yield _function("add_arrays", doc, ("s", "bar", "params_bar"), calls)
+
+
+def _of(record: ir.Value, parameter: Parameter, members: Mapping[str, str]) -> ir.Member:
+    return ir.Member(record, members[parameter.name])
+
+
+def _row(array: str, number: int) -> ir.Entry:
+    return ir.Entry(ir.Member(S, array), ir.Constant(number))
+
+
+def _default(parameter: Parameter) -> ir.Constant:
+    return ir.Constant(float(parameter.value))

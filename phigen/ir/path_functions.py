@@ -1,0 +1,393 @@
+"""Builders of the functions of paths ṁ = π(m)p: Taylor recurrences of the nodes of π(m)p, one order at a time.
+
+Each series is an array over the orders. All languages have the same recurrences; `PathLayout` says where values are.
+In SIMD lanes (`lane_functions`) the sums over orders are loops, and derivatives of the path are computed with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+from phigen.ir import nodes as ir
+from phigen.ir.passes.unread import discard_unread
+from phigen.ir.walk import names_in
+from phigen.scheme.kernel import Role
+from phigen.scheme.lowering import expand_powers
+from phigen.scheme.path import ConvolutionTerm, NodeSeries, PathSlopes, Recurrences, SeriesEntry
+from phigen.scheme.program import Program
+from phigen.scheme.steps import PathAdjoint
+from phigen.symbolic.expression import Expression, symbols_of
+from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, cotangent, momentum, variation
+
+#: Largest number of Taylor terms of a path; a path that needs more is divided into pieces.
+TERMS = 30
+
+#: Most statements in a loop over lanes: compile time is quadratic in the length.
+LONGEST_LOOP = 60
+
+COEF, P, F, S, E, M, K, J, LANE, FIELD, SHARE, SUM, FROM, TO = (
+    ir.fixed(name)
+    for name in ("coef", "p", "f", "s", "e", "m", "k", "j", "lane", "field", "share", "sum", "from", "to")
+)
+ZERO, ONE = ir.Constant(0), ir.Constant(1.0)
+
+
+class PathLayout:
+    """The places of the values of a path, in languages with arrays of numbers: one entry for each order of a series."""
+
+    def coefficient(self, i: int) -> ir.Value:
+        """Return coefficient i, a function of the parameters and the step."""
+        return _at(COEF, i)
+
+    def covector(self, i: int) -> ir.Value:
+        """Return component i of p."""
+        return _at(P, i)
+
+    def fixed(self, i: int) -> ir.Value:
+        """Return value i of those that are constant along a path."""
+        return _at(F, i)
+
+    def series(self, i: int) -> ir.Value:
+        """Return the array of the orders of series i."""
+        return _at(S, i)
+
+    def order(self, i: int, k: ir.Value) -> ir.Value:
+        """Return coefficient k of series i."""
+        return ir.Entry(self.series(i), k)
+
+    def following(self, i: int, k: ir.Value, value: ir.Value) -> ir.Statement:
+        """Return the statement that sets coefficient k of series i, the first that is not known."""
+        return ir.Assign(self.order(i, k), value)
+
+
+@dataclass(frozen=True)
+class PathFunctions:
+    """The recurrences of the path of a program, whose values a ``layout`` places."""
+
+    program: Program
+    path: Recurrences
+    layout: PathLayout
+
+    @property
+    def derived(self) -> list[tuple[int, NodeSeries]]:
+        """The series that follow from those of the coordinates, with their numbers."""
+        return [*enumerate(self.path.series)][self.program.dimension :]
+
+    def blocks(self) -> dict[str, ir.Function]:
+        """Return the statements of the path by their purpose, each as a function without parameters."""
+        parts = (self.fixed, self.first, self.rules, self.slopes, self.nodes, self.field)
+        return {part.__name__: ir.Function(part.__name__, "", Role.OTHER, (), part()) for part in parts}
+
+    def fixed(self) -> ir.Block:
+        """Return the statements that compute the values that are constant along the path."""
+        reads = self.reads(self.path.fixed)
+        return (*reads, *(ir.Assign(self.layout.fixed(i), _expanded(e)) for i, e in enumerate(self.path.fixed)))
+
+    def first(self) -> ir.Block:
+        """Return the statements that compute the coefficients of order 0."""
+        layout, derived = self.layout, self.derived
+        reads = self.reads(q.first for _, q in derived)
+        return (*reads, *(layout.following(i, ZERO, _expanded(q.first)) for i, q in derived))
+
+    def rules(self) -> ir.Block:
+        """Return the statements that compute the coefficients of order k ≥ 1."""
+        reads = self.reads(factor for _, q in self.derived for _, factor in q.linear)
+        return (*reads, *(self.layout.following(i, K, self._rule(q)) for i, q in self.derived))
+
+    def slopes(self) -> ir.Block:
+        """Return the statements that compute the coefficients of order k + 1 of the coordinates."""
+        after, layout = ir.plus(K, 1), self.layout
+        values = (ir.Binary("/", layout.order(slope, K), ir.Cast(after, "real")) for slope in self.path.slopes)
+        return tuple(layout.following(i, after, value) for i, value in enumerate(values))
+
+    def nodes(self) -> ir.Block:
+        """Return the statements that compute the values e of the derived series at one point."""
+        reads = self.reads((q.first for _, q in self.derived), at_point=True)
+        return (*reads, *(ir.Assign(_at(E, i), _expanded(q.first)) for i, q in self.derived))
+
+    def field(self) -> ir.Block:
+        """Return the statements that compute ṁ from these values."""
+        return tuple(ir.Assign(_at(FIELD, i), _at(E, slope)) for i, slope in enumerate(self.path.slopes))
+
+    def reads(self, expressions: Iterable[Expression], *, at_point: bool = False) -> list[ir.Statement]:
+        """Return the declarations of the symbols of expressions; series are those of one point, or of order 0."""
+        used = {*symbols_of(*expressions)}
+        listed = {momentum(c): self.layout.covector(i) for i, c in enumerate(self.program.coordinates)}
+        listed |= {coefficient(i): self.layout.coefficient(i) for i in range(self.program.step.coefficients)}
+        for i in range(len(self.path.series)):
+            listed[Symbol(SERIES, i)] = _at(E, i) if at_point else self.layout.order(i, ZERO)
+        listed |= {Symbol(FIXED, i): self.layout.fixed(i) for i in range(len(self.path.fixed))}
+        return [ir.in_place(s, place) for s, place in listed.items() if s in used]
+
+    def linear(self, q: NodeSeries) -> ir.Value | None:
+        """Return the sum of the terms that are multiples of other series; none without such terms."""
+        total: ir.Value | None = None
+        for index, factor in q.linear:
+            term = self.layout.order(index, K)
+            unit = factor.is_number and abs(factor.value) == 1
+            sign = "-" if unit and factor.value < 0 else "+"
+            term = term if unit else ir.Binary("*", _expanded(factor), term)
+            total = ir.Binary(sign, total, term) if total else ir.Prefix("-", term) if sign == "-" else term
+        return total
+
+    def _rule(self, q: NodeSeries) -> ir.Value:
+        linear = self.linear(q)
+        terms = [*([linear] if linear else []), *map(self._sum, q.terms)]
+        total = _sum(terms) if terms else ir.Constant(0.0)
+        return ir.Binary("/", ir.Grouped(total), self.layout.order(q.divisor, ZERO)) if q.divisor is not None else total
+
+    def _sum(self, t: ConvolutionTerm) -> ir.Value:
+        """Return the sum over orders, as a call of the runtime."""
+        exponent = (_exponent(t),) if t.kind == "power" else ()
+        return ir.Called(f"taylor_{t.kind}", (self.layout.series(t.a), self.layout.series(t.b), *exponent, K))
+
+
+def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Function]:
+    """Return the functions of a path: its first coefficients, those of order k, and its slope at a point m."""
+    build, n = PathFunctions(program, path, PathLayout()), ir.Constant(program.dimension)
+    series, orders = ir.Constant(len(path.series)), ir.Binary("+", ir.fixed("TERMS"), ir.Constant(1))
+    values = ir.Vector(ir.Constant(max(1, len(path.fixed))))
+    types: dict[str, ir.ParameterType] = {
+        "p": ir.Vector(n, constant=True),
+        "m": ir.Vector(n, constant=True),
+        "s": ir.Vector(orders, rows=series),
+        "f": values,
+        "k": ir.Type.FLAG,
+        "field": ir.Vector(n),
+    }
+
+    def function(name: str, doc: str, parameters: Sequence[str], *body: ir.Statement) -> ir.Function:
+        listed = {**types, **({"f": replace(values, constant=True)} if name == "order" else {})}
+        pairs = tuple((p, listed[p]) for p in parameters if p in listed)
+        return discard_unread(ir.Function(f"{kind}_{name}", doc, Role.OTHER, tuple(parameters), body, pairs))
+
+    rules = build.rules()
+    later = [ir.If(ir.Binary(">", K, ZERO), rules)] if rules else []
+    point: list[ir.Statement] = [ir.Declare(ir.Vector(series), ((E.symbol, ir.Constant(None)),), mutable=True)]
+    point += [ir.Declare(values, ((F.symbol, ir.Constant(None)),), mutable=True)] * bool(path.fixed)
+    of_series = f"First coefficients of the series of a {kind}; those of the coordinates are given"
+    of_order = "Coefficient k of the series, and coefficient k + 1 of the coordinates"
+    at_point = (*point, *build.fixed(), ir.Copy(E, M, n), *build.nodes(), *build.field())
+    return [
+        function("begin", of_series, ("coef", "p", "s", "f"), *build.fixed(), *build.first()),
+        function("order", of_order, ("coef", "p", "s", "f", "k"), *later, *build.slopes()),
+        function("field", f"Slope of the {kind} at a point m", ("coef", "p", "m", "field"), *at_point),
+    ]
+
+
+def tangent_program(program: Program) -> Program:
+    """Return the program with the coordinates of its tangent path: the state, then its variation."""
+    return replace(program, coordinates=(*program.coordinates, *map(variation, program.coordinates)))
+
+
+def adjoint_program(program: Program, path: PathAdjoint) -> Program:
+    """Return the program with the coordinates of the path of the reverse pass: the state, then all cotangents."""
+    names = program.coordinates
+    bars = [
+        *map(cotangent, names),
+        *(cotangent(momentum(c)) for c in names),
+        *(cotangent(coefficient(k)) for k in path.used),
+    ]
+    return replace(program, coordinates=(*names, *bars))
+
+
+# ---- SIMD lanes
+
+
+class _LaneLayout(PathLayout):
+    """The places in a record e of expansions, in one lane; the series of derivatives continue those of the path."""
+
+    def __init__(self, path: Recurrences) -> None:
+        self._series, self._fixed = len(path.series), len(path.fixed)
+
+    def coefficient(self, i: int) -> ir.Value:
+        return _in_lane(_at(COEF, i))
+
+    def covector(self, i: int) -> ir.Value:
+        return _in_lane(_at(ir.Member(E, "p"), i))
+
+    def fixed(self, i: int) -> ir.Value:
+        further = i - self._fixed
+        place = _at(ir.Member(E, "fixed"), i) if further < 0 else _at(ir.Member(E, "slope_fixed"), further)
+        return _in_lane(place)
+
+    def series(self, i: int) -> ir.Value:
+        further = i - self._series
+        return _at(ir.Member(E, "s"), i) if further < 0 else _at(ir.Member(E, "slope"), further)
+
+    def order(self, i: int, k: ir.Value) -> ir.Value:
+        return _in_lane(super().order(i, k))
+
+
+def lane_functions(program: Program, path: Recurrences, slopes: PathSlopes, used: Sequence[int]) -> list[ir.Function]:
+    """Return the functions of a path and its derivatives in SIMD lanes, also along the coefficients in ``used``."""
+    whole = Recurrences((*path.series, *slopes.series), path.slopes, (*path.fixed, *slopes.fixed))
+    build = _LaneFunctions(PathFunctions(program, whole, _LaneLayout(path)))
+    base, n = len(path.series), program.dimension
+    along_m = [(e.row * 2 * n + e.column, SHARE, e) for e in slopes.jacobian]
+    half = ir.Binary("*", ir.Constant(0.5), SHARE)
+    along_p = [(e.row * 2 * n + n + e.column, half, e) for e in slopes.tensor]
+    listed = [
+        build.follow("follow", "the series that follow from those of the coordinates", range(n, base)),
+        build.follow("follow_slopes", "the further series", range(base, len(whole.series))),
+        build.variation("vary_by", "v", slopes.jacobian, 2 * n, "the derivatives"),
+        build.source("vary_source", "v", [*along_m, *along_p], "the derivatives"),
+    ]
+    if used:
+        along = [(e.row * len(used) + e.column, SHARE, e) for e in slopes.along]
+        listed += [
+            build.variation("vary_along_by", "w", slopes.jacobian, len(used), "the derivatives by coefficients"),
+            build.source("vary_along_source", "w", along, "the derivatives by coefficients"),
+        ]
+    return listed
+
+
+@dataclass(frozen=True)
+class _LaneFunctions:
+    path: PathFunctions
+
+    def follow(self, name: str, purpose: str, numbers: range) -> ir.Function:
+        """Return the function of coefficient k ≥ 1 of the series of these numbers.
+
+        It adds the contributions of orders j and k − j to sums over orders, then the remaining terms, which may need
+        coefficients of order k.
+        """
+        layout, between, ends = self.path.layout, list[ir.Statement](), list[ir.Statement]()
+        series = [(i, self.path.path.series[i]) for i in numbers]
+        for i, q in series:
+            terms = list[ir.Value]()
+            for t in q.terms:
+                total = _in_lane(_at(SUM, len(between)))
+                contribution, rest = _orders(layout, t)
+                terms += [total if t.kind == "product" else ir.Binary("*", SHARE, total), *rest]
+                between.append(ir.Assign(total, contribution, adds=True))
+            value = _sum(terms) if terms else self.path.linear(q) or ir.Constant(0.0)
+            value = ir.Binary("/", ir.Grouped(value), layout.order(q.divisor, ZERO)) if q.divisor is not None else value
+            ends.append(ir.Assign(layout.order(i, K), value))
+        reads = self.path.reads(factor for _, q in series for _, factor in q.linear)
+        sums = ir.Declare(
+            ir.Vector(ir.Constant(max(1, len(between))), lanes=True), ((SUM.symbol, ir.Constant(None)),), mutable=True
+        )
+        over_orders = ir.Loop("stages", tuple(_over_lanes(between)), "j", ir.Constant(1), K)
+        body = (*reads, sums, ir.Clear(SUM, None, None), over_orders, *_over_lanes(ends))
+        share = [ir.real(SHARE.symbol, ir.Binary("/", ONE, ir.Cast(K, "real")))] * (SHARE.symbol in names_in(body))
+        doc = f"Coefficient k >= 1 of {purpose}: convolution sums over the orders between 0 and k, then the remaining"
+        return _lane_function(name, f"{doc} terms", ("coef", "e", "k"), (*share, *body))
+
+    def variation(self, name: str, array: str, jacobian: Sequence[SeriesEntry], width: int, whose: str) -> ir.Function:
+        """Return the function that adds the product of ∂(π p)/∂m and the derivatives so far, rows of a width."""
+        statements = list[ir.Statement]()
+        for e in jacobian:
+            entry = ir.Binary("*", SHARE, self.path.layout.order(e.series, J))
+            statements.append(ir.real(_entry(e).symbol, entry))
+        for row in range(self.path.program.dimension):
+            entries = [e for e in jacobian if e.row == row]
+            for k in range(width if entries else 0):
+                products = [ir.Binary("*", _entry(e), _in_lane(_at(FROM, e.column * width + k))) for e in entries]
+                statements.append(ir.Assign(_in_lane(_at(TO, row * width + k)), _sum(products), adds=True))
+        before = ir.Entry(ir.Member(E, array), ir.Binary("-", K, J))
+        doc = f"Contribution of order j of d(pi p)/dm to order k + 1 of {whose}"
+        return _of_order(name, doc, ("e", "j", "k"), array, statements, {FROM: before})
+
+    def source(
+        self, name: str, array: str, entries: Sequence[tuple[int, ir.Value, SeriesEntry]], whose: str
+    ) -> ir.Function:
+        """Return the function that adds order k of entries of ∂(π p)/∂m and ½π, or ∂(π p)/∂c, times factors."""
+        statements = [
+            ir.Assign(_in_lane(_at(TO, i)), ir.Binary("*", factor, self.path.layout.order(e.series, K)), adds=True)
+            for i, factor, e in entries
+        ]
+        doc = f"Contribution of order k of the entries of pi to order k + 1 of {whose}"
+        return _of_order(name, doc, ("e", "k"), array, statements, {})
+
+
+def _of_order(
+    name: str,
+    doc: str,
+    parameters: Sequence[str],
+    array: str,
+    statements: Sequence[ir.Statement],
+    places: dict[ir.Name, ir.Value],
+) -> ir.Function:
+    """Return the function that adds to order k + 1 of an array of derivatives, in one loop over lanes."""
+    if not statements:
+        return _lane_function(name, doc, parameters, ())
+    pointers = {**places, TO: ir.Entry(ir.Member(E, array), ir.plus(K, 1))}
+    body = (
+        ir.Declare(ir.Pointer(constant=False, lanes=True), tuple((n.symbol, place) for n, place in pointers.items())),
+        ir.real(SHARE.symbol, ir.Binary("/", ONE, ir.Cast(ir.plus(K, 1), "real"))),
+        _lanes(statements),
+    )
+    return _lane_function(name, doc, parameters, body)
+
+
+def _lane_function(name: str, doc: str, parameters: Sequence[str], body: ir.Block) -> ir.Function:
+    types: dict[str, ir.ParameterType] = {
+        "coef": ir.Vector(None, lanes=True, restricted=True),
+        "e": ir.RecordType("expansion", mutable=True),
+        "j": ir.Type.FLAG,
+        "k": ir.Type.FLAG,
+    }
+    listed = tuple((p, types[p]) for p in parameters)
+    return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))
+
+
+def _lanes(statements: Iterable[ir.Statement]) -> ir.Loop:
+    return ir.Loop("lanes", tuple(statements), "lane", ZERO, ir.fixed("LANES"), independent="LANE")
+
+
+def _over_lanes(statements: Sequence[ir.Statement]) -> Iterator[ir.Loop]:
+    """Yield loops over all lanes of limited length."""
+    for start in range(0, len(statements), LONGEST_LOOP):
+        yield _lanes(statements[start : start + LONGEST_LOOP])
+
+
+def _orders(layout: PathLayout, t: ConvolutionTerm) -> tuple[ir.Value, list[ir.Value]]:
+    """Return the parts of one sum over orders (see `ConvolutionTerm`): the term of a_j b_{k-j}, without the factor 1/k
+    of some kinds, and the terms with a coefficient of order 0."""
+    a, b, real = layout.order(t.a, J), layout.order(t.b, ir.Binary("-", K, J)), ir.Cast(J, "real")
+    last = (layout.order(t.a, K), layout.order(t.b, ZERO))
+    match t.kind:
+        case "product" if t.a == t.b:
+            return _product(a, b), [_product(ir.Constant(2.0), *last)]
+        case "product":
+            return _product(a, b), [_product(layout.order(t.a, ZERO), layout.order(t.b, K)), _product(*last)]
+        case "chain":
+            return _product(real, a, b), [_product(*last)]
+    weight = ir.Binary("-", _product(ir.Binary("+", _exponent(t), ONE), real), ir.Cast(K, "real"))
+    return _product(weight, a, b), [_product(_exponent(t), *last)]
+
+
+# ---- values
+
+
+def _at(array: ir.Value, place: int) -> ir.Entry:
+    return ir.Entry(array, ir.Constant(place))
+
+
+def _in_lane(array: ir.Value) -> ir.Entry:
+    return ir.Entry(array, LANE)
+
+
+def _entry(e: SeriesEntry) -> ir.Name:
+    return ir.fixed(f"a{e.row}_{e.column}")
+
+
+def _expanded(e: Expression) -> Expression:
+    return expand_powers([e])[0]
+
+
+def _sum(terms: Sequence[ir.Value]) -> ir.Value:
+    return reduce(lambda a, b: ir.Binary("+", a, b), terms)
+
+
+def _product(*factors: ir.Value) -> ir.Value:
+    return reduce(lambda a, b: ir.Binary("*", a, b), factors)
+
+
+def _exponent(t: ConvolutionTerm) -> ir.Value:
+    """Return the exponent of a power as a quotient."""
+    numerator, denominator = (ir.Constant(float(n)) for n in (t.exponent.numerator, t.exponent.denominator))
+    return ir.Binary("/", numerator, denominator)
