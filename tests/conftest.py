@@ -15,6 +15,8 @@ from phigen.runtime import toolchain
 
 #: Rooms whose files share what takes long to make.
 WHOLE = ("tests/report/",)
+#: Of the cases of tests with the mark `thin` --all makes one in so many; --corpus makes all.
+ONE_IN = 2
 #: Files whose tests share nothing.
 APART = ("tests/random/test_differential.py",)
 
@@ -48,7 +50,8 @@ def pytest_configure(config):
         "markers", "corpus: of the corpus, systems beside `systems.QUICK` are slow, and those like others need --corpus"
     )
     config.addinivalue_line(
-        "markers", "thin(n): of its quick cases one in n is, drawn by their names, and the others slow"
+        "markers",
+        "thin(n): of its quick cases one in n is, drawn by their names; of all its cases, one in two is made by --all",
     )
     config.addinivalue_line("markers", "few(*cases, of): of the cases `of`, those beside the named ones are slow")
 
@@ -57,27 +60,25 @@ def pytest_collection_modifyitems(config, items):
     named = any("::" in argument for argument in config.args)
     if named or config.option.corpus:
         return
-    everything = config.option.all or config.option.markexpr
-    remaining = [item for item in items if not (_is_alike if everything else _is_slow)(item)]
-    if not everything:
-        remaining = _thinned(remaining)
-    selected = {*remaining}
+    selected = _thinned([item for item in items if not _is_slow(item)], lambda mark: mark.args[0])
+    if config.option.all or config.option.markexpr:
+        selected |= _thinned([item for item in items if not _is_alike(item)], lambda mark: ONE_IN)
+    remaining = [item for item in items if item in selected]
     config.hook.pytest_deselected(items=[item for item in items if item not in selected])
     items[:] = remaining
 
 
-def _thinned(items):
+def _thinned(items, one_in):
     """The items without most cases of tests with the mark `thin`; by chance, so that all of two parameters are seen."""
     cases = defaultdict(list)
     for item in items:
         if item.get_closest_marker("thin"):
             cases[item.nodeid.partition("[")[0]].append(item)
-    slow = set()
+    left_out = set()
     for several in cases.values():
-        one_in = several[0].get_closest_marker("thin").args[0]
         several.sort(key=lambda item: zlib.crc32(item.name.encode()))
-        slow.update(several[-(-len(several) // one_in) :])
-    return [item for item in items if item not in slow]
+        left_out.update(several[-(-len(several) // one_in(several[0].get_closest_marker("thin"))) :])
+    return {item for item in items if item not in left_out}
 
 
 def _is_alike(item):

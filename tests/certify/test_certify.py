@@ -117,6 +117,7 @@ def library(files: dict[str, str]) -> Any:
     return compiled.load(files)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("name", slow_but(["pendulum", "charged_particle"], of=SYSTEMS))
 def test_steps_of_the_compiled_c_are_within_the_bound(name: str) -> None:
     c, files = certificate(name)

@@ -48,6 +48,7 @@ def name_of(row):
     return "-".join(row[:2])
 
 
+@pytest.mark.thin(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("row", ROWS, ids=name_of)
 def test_proposed_settings_reach_their_accuracy_and_hardly_more(row):

@@ -221,6 +221,7 @@ def test_second_time_leaves_files_alone(phigen, vendored):
     assert [p.stat().st_mtime_ns for p in EXT.iterdir()] == before
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize(
     ("before", "after", "told"),
     [

@@ -85,6 +85,7 @@ def difference(f, width=1e-3):
     return sum(w * (f(k * width) - f(-k * width)) for k, w in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))) / width
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_pullback_is_the_gradient_of_the_run(kind):
     """All rows have a cotangent. NumPy and the small C agree with the fast C."""

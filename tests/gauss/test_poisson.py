@@ -102,6 +102,7 @@ def test_written_systems_step_by_poisson_maps(name):
 MATRICES = {"sl(3)": 8, "su(3)": 8, "sp(4)": 10, "so(5)": 10, "gl(3)": 9}
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("name", slow_but(("su(3)",), MATRICES))
 def test_matrix_algebras_step_by_poisson_maps(name):
     n = MATRICES[name]

@@ -50,6 +50,7 @@ def test_blocks_and_groups_equal_single_steps(name, tmp_path):
     exercise(compiled(name), "-O0", tmp_path)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["rigid_body", "toda3", "volterra5"])
 def test_vectorised_blocks_and_groups_equal_single_steps(name, tmp_path):

@@ -212,6 +212,7 @@ def test_further_code_is_clean_under_sanitizers(case, tmp_path):
     check_with_sanitizers("clang", compilation, tmp_path)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("name", slow_but(["toda3"], ["toda3", "nambu_pendulum", "pendulum_euler"]))
 def test_whole_interface_is_clean_under_valgrind(name, sources):
     """Uninitialised memory in particular, which the sanitizers do not see."""

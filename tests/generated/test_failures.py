@@ -346,6 +346,7 @@ def members_of(name, count):
 QUICK_MEMBERS = [*product(["c"], NAMES), *product(["numpy"], ["rigid_body", "pendulum_euler", "nambu_pendulum"])]
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize(("target", "name"), slow_but(QUICK_MEMBERS, product(TARGETS, NAMES)))
 def test_members_of_an_ensemble_are_trajectories(name, target):
     start, at = members_of(name, 5)

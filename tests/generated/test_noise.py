@@ -417,6 +417,7 @@ def test_a_source_without_a_flow_in_closed_form_is_named():
         compile_text(text)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", slow_but(["dated"], ["dated", "thermal", "split"]))
 def test_verification_asks_for_what_is_promised(kind):

@@ -61,6 +61,7 @@ def test_short_code_is_short_for_any_number_of_sites() -> None:
         assert sum(len(text.splitlines()) for text in files.values()) <= most, path.stem
 
 
+@pytest.mark.thin(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_short_code_with_transposes_has_no_function_that_nothing_calls(path: Path, tmp_path: Path) -> None:

@@ -201,6 +201,7 @@ def test_increments_are_independent_and_of_variance_h() -> None:
     np.testing.assert_array_equal(module._draw(sites, 0), -second)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("name", ["bath", "langevin", "damped", "cool", "hot"])
 def test_c_makes_the_steps_of_numpy_and_goes_on_with_the_same_bits(name: str, tmp_path: Path) -> None:
     x, values = given(name)
@@ -313,6 +314,7 @@ def test_damping_by_colours_takes_energy_in_every_step_and_keeps_spins(name: str
     assert np.abs(found.x[20] - exact).max() / np.abs(fine - exact).max() == pytest.approx(4, rel=0.1)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["series", "splitting"])
 def test_an_open_chain_of_spins_has_its_energy_at_every_temperature(scheme: str) -> None:

@@ -102,6 +102,7 @@ def test_steps_follow_h_with_their_order(name: str, sizes: tuple[int, ...]) -> N
     assert 3.7 < np.log2(errors[0] / errors[1]) < 4.5
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("profile", ["fast", pytest.param("small", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("name", "sizes"), IN_C)
 def test_c_makes_the_steps_of_numpy(name: str, sizes: tuple[int, ...], profile: str) -> None:
@@ -147,6 +148,7 @@ def test_sizes_that_colours_fit_have_the_bits_of_a_solver_without_a_seam(name: s
     assert np.array_equal(with_seam, without)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("name", "sizes"), IN_C)
 def test_pullback_is_the_gradient_of_the_run(name: str, sizes: tuple[int, ...], target: str) -> None:

@@ -90,6 +90,7 @@ def test_the_derivative_is_that_of_the_ordinary_system(name: str) -> None:
     np.testing.assert_allclose(carried.reshape(x.size, x.size).T, matrix, rtol=0, atol=1e-13)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["sheet", "dragged"])
 def test_steps_with_tangent_vectors_are_those_without_on_any_number_of_threads(name: str) -> None:

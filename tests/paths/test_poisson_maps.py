@@ -69,6 +69,7 @@ def test_the_defect_of_a_map_that_is_not_poisson_is_seen():
 
 
 #: Of those that follow paths anyway tests/generated/test_conservation.py says the same.
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("name", slow_but(["engel_geodesics", "maxwell_bloch"], WITH_CASIMIRS))
 def test_casimirs_do_not_drift_in_100_000_steps(name):
     compilation, at = by_paths(name), steady(name)

@@ -73,6 +73,7 @@ def test_step_is_a_poisson_map_and_the_generated_one(kind, seed):
         assert np.max(np.abs(np.array(end) - image)) <= 8 * EPS * np.max(np.abs(image))
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("order", slow_but([2], [2, 4]))
 @pytest.mark.parametrize(("kind", "seed"), DRAWS)
 def test_observed_order_is_the_stated_one(kind, seed, order):

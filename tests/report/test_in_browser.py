@@ -190,6 +190,7 @@ def test_where_rk4_is_closer_the_panel_says_so(browser, made, ours, theirs, said
     assert browser.value(f"whereRk4IsCloser({{groups: [{{name: 'energy'}}], {histories}}})") == said
 
 
+@pytest.mark.thin(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["lotka_volterra", "nambu_pendulum", "pendulum", "rigid_body"])
 def test_panels_of_the_corpus_begin_with_half_of_a_step_that_works(browser, tmp_path, name):

@@ -51,6 +51,7 @@ def test_rounding_up_is_said():
     assert "order 3 was asked for" in " ".join(compile_text(BODY + "order: 3\n").program.about.facts)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("name", slow_but({*NAMES} - {"vortices3", "ablowitz_ladik3", "guiding_centre"}))
 def test_generating_function_is_the_cheapest_of_its_forms_and_all_are_equal(name):
     compilation = compiled(name)

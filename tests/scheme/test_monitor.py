@@ -82,6 +82,7 @@ def test_all_targets_make_the_same_steps_and_take_the_same_time(kepler):
     np.testing.assert_allclose(js, [*numpy.x[-1], numpy.t[-1]], rtol=0, atol=1e-12)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("extra", slow_but([""], ["", "birealisation: karasev", "composition: suzuki"]))
 def test_verification_finds_the_order_in_tau_and_of_the_time_and_no_poisson_defect(extra):

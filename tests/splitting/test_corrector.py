@@ -96,6 +96,7 @@ def test_states_do_not_depend_on_the_outputs(profile):
         np.testing.assert_allclose(ends, ends[:1] * 3, rtol=0, atol=1e-13)
 
 
+@pytest.mark.thin(1)
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("stride", [1, 4, 9, None])
 def test_gradients_of_runs_are_differences(target, stride):
