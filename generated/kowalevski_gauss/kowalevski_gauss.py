@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 72 additions, 95 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: c04edabaa57b47059d0c99dbc158014482641041f3acae3b3291fe13629437c7
+# body-sha256: cd7a2cf1e02b0146bf81dab59e283d8fca3b12ab3c813037c50ee58756e284a3
 import numpy as np
 
 VERSION = "0.1.0"
@@ -210,7 +210,7 @@ def _next_frame(coef, z, k):
 
 
 MOST_RISING = 3  # growing changes after transients: with more sweeps of this kind, the step is too large
-SOLVED = 2e-18  # largest squared change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs
+SOLVED = 2e-18  # largest expected change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs
 STALLED = 0.8  # sweeps end when a change exceeds this fraction of the one before ...
 ROUNDING = 4e-16  # ... and is below this; a fraction of 0.4 let Casimirs drift;
 NEARLY_ROUNDING = 2e-14  # ... or with the second change below this that is not smaller than the one before

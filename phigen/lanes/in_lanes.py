@@ -43,9 +43,10 @@ PACKS_PER_GROUP = 4
 #: Arrays over stages and unknowns that a batch of members of a Gauss step needs: increments of three steps, unknowns.
 MEMBER_BATCHES = 4
 
-#: Most stages of members in batches where sweeps of one trajectory iterate momenta only. With eight stages batches of
-#: Hénon and Heiles' system took 1.02 times as long as its members one by one, with six 0.63 times.
-MAX_BATCHED_STAGES_OF_REDUCED = 6
+#: Most stages of members in batches; most where sweeps of one trajectory iterate momenta only, those of a batch all
+#: unknowns, and functions are called. With eight stages batches of the Kowalevski top took 1.13 times as long as their
+#: members one by one, with six 0.85 times; those of two pendulums 1.15 times with four stages, 0.6 times with two.
+MAX_BATCHED_STAGES, MAX_BATCHED_STAGES_WITH_FUNCTIONS = 6, 3
 
 _DOUBLE = 8
 
@@ -274,12 +275,15 @@ def _stages(program: Program, step: Gauss) -> Stages:
 def _batched_stages(program: Program, step: Gauss) -> tuple[LaneKernel, ...]:
     """Return the kernels of a Gauss step for members in lanes; none if single members are faster, or stack is short."""
     arrays = MEMBER_BATCHES * step.tableau.stages * step.unknowns + 6 * program.dimension
-    if not _is_lowered(program) or program.time or program.monitor or _DOUBLE * LANES * arrays > MAX_STACK_BYTES:
+    if _DOUBLE * LANES * arrays > MAX_STACK_BYTES:
         return ()
-    if step.reduced and step.tableau.stages > MAX_BATCHED_STAGES_OF_REDUCED:
+    calls_functions = program.about.operations["functions"] > 0
+    limit = MAX_BATCHED_STAGES_WITH_FUNCTIONS if step.reduced and calls_functions else MAX_BATCHED_STAGES
+    if step.tableau.stages > limit:
         return ()
-    named = {"member_field": step.slope, "member_change": step.change, "member_frame": step.frame}
-    return tuple(LaneKernel(replace(kernel, name=name)) for name, kernel in named.items() if kernel)
+    elapsed = program.monitor.elapsed if program.monitor else None
+    named = {"field": step.slope, "change": step.change, "frame": step.frame, "elapsed": elapsed}
+    return tuple(LaneKernel(replace(kernel, name=f"member_{name}")) for name, kernel in named.items() if kernel)
 
 
 def _newton(program: Program, step: Newton) -> Blocks | None:

@@ -94,7 +94,7 @@ class GaussPolicy(Policy):
         3, "growing changes after transients: with more sweeps of this kind, the step is too large"
     )
     solved: float = number(
-        2e-18, "largest squared change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs"
+        2e-18, "largest expected change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs"
     )
     stalled: float = number(0.8, "sweeps end when a change exceeds this fraction of the one before ...")
     rounding: float = number(4e-16, "... and is below this; a fraction of 0.4 let Casimirs drift;")
@@ -159,7 +159,7 @@ class GaussTangentPolicy(Policy):
 class GaussAdjointPolicy(Policy):
     """Sweeps of the transposed equations of Gauss stages."""
 
-    adjoint_solved: float = number(1e-17, "largest squared change by a further sweep, relative to the cotangents;")
+    adjoint_solved: float = number(1e-17, "largest expected change by a further sweep, relative to the cotangents;")
     adjoint_stalled: float = number(0.8, "a change that exceeds this fraction of the one before ...")
     adjoint_rounding: float = number(1e-12, "... and is below this is rounding; the second one ends the sweeps")
 

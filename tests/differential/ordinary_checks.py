@@ -283,6 +283,24 @@ def members(trial: Trial) -> None:
             )
             run = solver.integrate(x[m], sizes[m], steps, 4, **begin, **each)
             expect_close(rows[:, m], run.x, trial.part(target, 1e-12), f"{target}: member {m} of {many} and its run")
+        _expect_unmoved_by_failure(trial, target, rows, (x, sizes, given, since))
+
+
+def _expect_unmoved_by_failure(trial: Trial, target: str, rows: Floats, many: Any) -> None:
+    """Members follow their trajectories if another one fails, as one that starts far from all others may."""
+    x, sizes, given, since = many
+    far = x.copy()
+    far[1] = 1e150
+    try:
+        ends = trial.solvers[target].ensemble(far, sizes, 6, **since, **given)
+    except StepError as failed:
+        if failed.status == "BAD_ARGUMENT":
+            return  # a start where the monitor is not positive is refused, in NumPy before any step
+        ends = failed.trajectory
+        if list(failed.members) != [1]:
+            raise
+    others = np.arange(len(x)) != 1
+    expect_close(ends[others], rows[-1][others], trial.part(target, 1e-12), f"{target}: members beside one far away")
 
 
 def _many(trial: Trial, many: int) -> tuple[Floats, Floats, dict[str, Floats], dict[str, Any]]:

@@ -26,6 +26,25 @@ hamiltonian: p**2/2 + a*q**4/4
 scheme: gauss
 """
 
+DRIVEN = """
+coordinates: [q, p]
+time: t
+parameters: {a: 0.7}
+poisson:
+  canonical: {q: [q], p: [p]}
+hamiltonian: p**2/2 + a*q**4/4 + q*cos(2*t)/5
+scheme: gauss
+"""
+COMET = """
+coordinates: [q1, q2, p1, p2]
+parameters: {a: 1}
+poisson:
+  canonical: {q: [q1, q2], p: [p1, p2]}
+hamiltonian: (p1**2 + p2**2)/2 - a/sqrt(q1**2 + q2**2)
+monitor: (q1**2 + q2**2)**(3/4)
+scheme: gauss
+"""
+
 
 @pytest.mark.parametrize(("text", "order"), [(TOP, 4), pytest.param(OSCILLATOR, 12, marks=pytest.mark.slow)])
 def test_members_in_lanes_follow_their_own_trajectories(text, order):
@@ -39,6 +58,25 @@ def test_members_in_lanes_follow_their_own_trajectories(text, order):
     for m in range(11):
         alone = method.integrate(starts[m], steps[m], 60, stride=20, parameters={"a": a[m]})
         np.testing.assert_allclose(frames[:, m], alone.x[-len(frames) :], rtol=0, atol=3e-14)
+
+
+@pytest.mark.parametrize("text", [DRIVEN, COMET])
+def test_batches_follow_the_time_and_energy_level_of_each_member(text):
+    """The batch of the first four ends when two have failed, and the others continue one by one."""
+    method = solver(compile_text(text + "order: 4\n"), "c")
+    draws = np.random.default_rng(3)
+    starts = draws.uniform(0.5, 0.7, (6, len(method.coordinates)))
+    failing = [1, 2]
+    starts[1], starts[2] = 1e200, 60.0 if text is DRIVEN else 1e180  # not finite, or sweeps diverge
+    start_times = {"t0": draws.uniform(-1, 1, 6)} if text is DRIVEN else {}
+    steps, a = draws.uniform(0.05, 0.1, 6), draws.uniform(0.9, 1.0, 6)
+    with pytest.raises(StepError) as failed:
+        method.ensemble(starts, steps, 30, stride=10, parameters={"a": a}, **start_times)
+    assert list(failed.value.members) == failing
+    for m in {*range(6)} - {*failing}:
+        start_time = {name: float(times[m]) for name, times in start_times.items()}
+        alone = method.integrate(starts[m], steps[m], 30, stride=10, parameters={"a": a[m]}, **start_time)
+        np.testing.assert_allclose(failed.value.trajectory[:, m], alone.x, rtol=0, atol=3e-14)
 
 
 def test_member_that_fails_does_not_stop_its_batch():

@@ -19,7 +19,7 @@ from phigen.spec.model import Parameter
 from phigen.targets.c import functions
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
-from phigen.targets.c.gauss import SINGLE_POLICY
+from phigen.targets.c.gauss import policy as gauss_policy
 from phigen.targets.c.kernels import declaration, function
 from phigen.targets.c.lanes import KNOTS, remembered, travels
 from phigen.targets.c.lanes import printed as kernels_in_lanes
@@ -74,7 +74,7 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     """Return the assembly of a solver, and the files of the runtime from which header and source start."""
     lanes = in_lanes(program)
     has = switches(program, lanes)
-    constants, real = policies(program), FLOAT if program.single else DOUBLE
+    constants, real = policies(program, staged=has["STAGED"]), FLOAT if program.single else DOUBLE
     step = program.step.swept
     if step is None:
         return Amalgam(program.name, has, constants | printed(program, lanes, has), real), "solver.h", "runtime.c"
@@ -98,10 +98,13 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     return Amalgam(program.name, has, constants | texts, real), "lattice.h", "lattice.c"
 
 
-def policies(program: Program) -> dict[str, str]:
-    """Return the headers with the constants of policies; sizes of arrays are declared with the solver."""
+def policies(program: Program, *, staged: bool = False) -> dict[str, str]:
+    """Return the headers with the constants of policies; sizes of arrays are declared with the solver.
+
+    ``staged`` are Gauss methods with their stages in lanes.
+    """
     sizes = ("DIFFERENCES", "DIRECTIONS")
-    policy_by_name = policies_of(program) | ({"gauss_policy": SINGLE_POLICY} if program.single else {})
+    policy_by_name = policies_of(program) | {"gauss_policy": gauss_policy(single=program.single, staged=staged)}
     texts = {f"{name}.h": C.text(policy, sizes) for name, policy in policy_by_name.items()}
     return {file: text.replace("PHI_", f"{program.name}_") for file, text in texts.items()}
 

@@ -13,13 +13,16 @@ enum {
     PHI_GROUP = PHI_LANES, /* members, one in each lane */
     PHI_FEWEST = PHI_LANES > 4 ? 7 : 3 /* measured: fewer members are faster one by one, with their stages in lanes */
 };
+/* As PHI_SOLVED, for the slowest member. With PHI_SOLVED the energy drifts by 1e-18 of its size in each step. */
+#define PHI_GROUP_SOLVED (0.25 * PHI_SOLVED)
 
 /* Values of the unknowns of all members, for each stage. */
 typedef phi_lanes phi_batch[PHI_NODES][PHI_UNKNOWNS];
 
 /* Members of an ensemble, one in each lane. */
 typedef struct {
-    phi_lanes x[PHI_DIM], carry[PHI_DIM], coef[PHI_COEFFICIENTS];
+    phi_lanes x[PHI_POINT]; /* the coordinates, and the time if H depends on it */
+    phi_lanes carry[PHI_DIM], coef[PHI_COEFFICIENTS];
     phi_lanes weights[PHI_NODES][1]; /* h b_j */
     phi_batch increments[PHI_EARLIER];    /* stage increments of the last steps, in the frame of the end of the last one */
     int latest;    /* index of the last step in moves */
@@ -30,6 +33,11 @@ typedef struct {
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
     int active[PHI_LANES];        /* whether the lane holds a member that has not failed */
     size_t steps_left[PHI_LANES]; /* steps left to make, for lanes whose member has left */
+    PHI_GAUGES_OF_MEMBERS
+#if PHI_TIMED
+    double t0[PHI_LANES], h[PHI_LANES]; /* initial times and steps */
+    size_t steps;                       /* steps made */
+#endif
 } phi_group;
 
 /* Predict the unknowns of stage i by the increments of the last steps. */
@@ -150,9 +158,9 @@ static void phi_group_solve(phi_group *group, phi_batch now)
         phi_group_sweep(group, scale, z, now, tested ? sum : NULL);
         if (tested) {
             const double square = phi_group_change(group, sum);
-            const int solved = square * (group->rate * group->rate) <= PHI_SOLVED * PHI_SOLVED;
+            const int solved = square * (group->rate * group->rate) <= PHI_GROUP_SOLVED * PHI_GROUP_SOLVED;
             judgement = solved ? 1 : phi_judge(&group->rate, &group->sweeps, &progress, sweep, sqrt(square));
-            if (solved) group->sweeps = square <= 16.0 * PHI_SOLVED * PHI_SOLVED ? sweep - 1 : sweep;
+            if (solved) group->sweeps = square <= 16.0 * PHI_GROUP_SOLVED * PHI_GROUP_SOLVED ? sweep - 1 : sweep;
             if (group->sweeps < 2) group->sweeps = 2;
             if (judgement != 0) break;
         }
@@ -207,6 +215,31 @@ static void phi_group_advance(phi_group *group, phi_lanes change[PHI_DIM])
         }
 }
 
+#if PHI_MONITOR
+/* Members for which the physical time of a step does not have the sign of h leave, as in a single step. */
+static void phi_group_pass(phi_group *group, phi_batch now)
+{
+    phi_lanes z[PHI_UNKNOWNS], elapsed[1], sum = { 0.0 };
+    for (int i = 0; i < PHI_NODES; ++i) {
+        phi_mix_members(phi_mixing, i, now, z);
+        phi_member_elapsed_lanes(group->coef, group->x, z, group->weights[i], elapsed);
+        for (int lane = 0; lane < PHI_LANES; ++lane) sum[lane] += elapsed[0][lane];
+    }
+    for (int lane = 0; lane < PHI_LANES; ++lane)
+        group->active[lane] = group->active[lane] && sum[lane] * group->weights[0][0][lane] > 0.0;
+}
+
+#endif
+#if PHI_TIMED
+/* The time of each member after a step. */
+static void phi_group_pass(phi_group *group)
+{
+    ++group->steps;
+    for (int lane = 0; lane < PHI_LANES; ++lane)
+        group->x[PHI_DIM][lane] = group->t0[lane] + (double)group->steps * group->h[lane];
+}
+
+#endif
 /* Make one step of all active members. Returns the number of members that are still active. */
 static int phi_group_step(phi_group *group, size_t remaining)
 {
@@ -222,8 +255,14 @@ static int phi_group_step(phi_group *group, size_t remaining)
             for (int lane = 0; lane < PHI_LANES; ++lane) end[k][lane] += now[i][k][lane];
         }
     phi_member_change_lanes(group->coef, group->x, end, change);
+#if PHI_MONITOR
+    phi_group_pass(group, now);
+#endif
     phi_group_advance(group, change);
     phi_group_remember(group, end, now);
+#if PHI_TIMED
+    phi_group_pass(group);
+#endif
     for (int lane = 0; lane < PHI_LANES; ++lane) {
         if (!group->active[lane] && group->steps_left[lane] == 0) group->steps_left[lane] = remaining;
         active += group->active[lane];
@@ -241,6 +280,11 @@ static phi_status phi_group_join(phi_group *group, int lane, const phi_members *
     if (status != PHI_OK) return status;
     for (int k = 0; k < PHI_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
     for (int i = 0; i < PHI_NODES; ++i) group->weights[i][0][lane] = s.h * phi_weights[i];
+    PHI_COPY_GAUGE(group->gauge[lane], s.gauge)
+#if PHI_TIMED
+    group->x[PHI_DIM][lane] = group->t0[lane] = s.t;
+    group->h[lane] = s.h;
+#endif
     group->active[lane] = 1;
     return status;
 }

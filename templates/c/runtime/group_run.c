@@ -29,6 +29,10 @@ static phi_status phi_group_end(const phi_group *group, int lane, const phi_memb
     } else if (group->steps_left[lane] > 0) {
         const phi_status begun = phi_begin_member(all, m, x PHI_AND_GAUGE(group->gauge[lane]), &s);
         for (int i = 0; i < PHI_DIM && begun == PHI_OK; ++i) s.carry[i] = group->carry[i][lane];
+#if PHI_TIMED
+        if (begun == PHI_OK) s.steps = all->steps - group->steps_left[lane];
+        if (begun == PHI_OK) s.t = s.t_before_h + (double)s.steps * s.h;
+#endif
         status = phi_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
         if (begun == PHI_OK) memcpy(x, s.x, sizeof x);
     }
