@@ -110,6 +110,7 @@ def _values(compilation: Compilation, language: BindingLanguage) -> dict[str, ob
         "after_rotation": about.element - 3 * about.position + 1,
         "position": about.position,
         "kicks": program.offers("kicks"),
+        "interpolated": program.step.kind.collocates,
         "real": language.reals[about.single],
         "parameters": [
             (field, member, repr(value), described[p])

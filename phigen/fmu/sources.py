@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from phigen.fmu.variables import Variable, first_numbers, first_run
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.emitter import runtime_of
-from phigen.targets.c.language import members
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.real import literal
 from phigen.targets.header import sealed
@@ -46,7 +45,6 @@ def token_of(compilation: Compilation, files: dict[str, str]) -> str:
 
 def _model(compilation: Compilation, variables: Sequence[Variable], token: str) -> str:
     program, spec = compilation.program, compilation.spec
-    struct = list(members(program).values())
     digits = literal if program.single else repr
     run, numbers = first_run(spec), first_numbers(compilation)
     starts = [v.start for v in variables if v.start is not None]
@@ -62,8 +60,6 @@ def _model(compilation: Compilation, variables: Sequence[Variable], token: str) 
             "token": token,
             "numbers": list(numbers.items()),
             "most": max(1, len(program.casimirs), len(program.observed)),
-            "before_last": list(enumerate(struct[:-1])),
-            "last": struct[-1] if struct else "",
             "parameters": ", ".join(digits(v) for v in parameters) or "0",
             "start": ", ".join(digits(float(x)) for x in run.initial),
             "attitude": ", ".join(digits(v) for v in attitude),

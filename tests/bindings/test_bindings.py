@@ -4,10 +4,12 @@ import re
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from tools import run, tool
 
+import phigen
 from phigen import resources
 from phigen import spec as specs
 from phigen.bindings.emitter import LANGUAGES, binding
@@ -131,6 +133,10 @@ again = tumbler_mex([0.01 1 0.01], 0.1, 300, 300, struct("I2", 2, "I3", 3));
 printf("%d\\n", isequal(again(:, end), x(:, end)));
 moved = tumbler_mex([0.01 1 0.01], 0.1, 300, 300, struct("I2", 2.5));
 printf("%d\\n", isequal(moved(:, end), x(:, end)));
+parts = tumbler_mex([0.01 1 0.01], 0.1, [100 200], 100, struct("I2", {2, 2.5}));
+first = tumbler_mex([0.01 1 0.01], 0.1, 100, 100);
+second = tumbler_mex(first(:, end), 0.1, 200, 200, struct("I2", 2.5));
+printf("%d %d\\n", columns(parts), norm(parts(:, end) - second(:, end)) < 1e-13);
 function refused(varargin)
   try, tumbler_mex(varargin{:}); catch e, disp(e.message), end
 end
@@ -138,16 +144,21 @@ refused([1 2], 0.1, 3, 1);
 refused([1 2 3], 0.1, 3, 1, struct("Q", 2));
 refused([1 2 3], 0.1, 3, 1, struct("I1", [1 2]));
 refused([1 2 3], 0.1, 3, 0);
+refused([1 2 3], 0.1, [3 3], 1, struct("I1", 2));
+refused([1 2 3], 0.1, [3 3], 2, struct("I1", {2, 3}));
 refused([NaN 2 3], 0.1, 3, 1);
 refused([1 2 3], 100, 30, 1);
 """
 ANSWERS = """3 31 31 31
 {expected}1
 0
+4 1
 tumbler_mex: x0 has 3 real numbers
 tumbler_mex: there is no parameter Q: the spec has I1, I2, I3
 tumbler_mex: I1 is one real number
 tumbler_mex: stride is a whole number, at least 1
+tumbler_mex: parameters needs as many structs as steps has numbers
+tumbler_mex: each number of steps is a multiple of stride
 tumbler_mex: bad argument: a null pointer, or values that are not allowed
 tumbler_mex: no convergence: the step is too large, after 0 steps
 """
@@ -248,24 +259,113 @@ fn main() {
 }
 
 
+def written(source, programs, folder):
+    """Write the C and bindings of a system; compile programs by language to ``by_LANGUAGE``. Return its compilation."""
+    compilation = compile_proved(specs.loads(source))
+    name = compilation.spec.name
+    for file, text in emit(compilation.program, "c", "x").items():
+        (folder / file).write_text(text, encoding="utf-8")
+    for language, program in programs.items():
+        for file, text in binding(compilation, language).items():
+            (folder / file).parent.mkdir(parents=True, exist_ok=True)
+            (folder / file).write_text(text.replace("//! ", "// ").replace("#![", "// #!["), encoding="utf-8")
+        (folder / f"main.{language}").write_text(program, encoding="utf-8")
+    run([tool("gcc"), "-std=c99", "-ffp-contract=off", "-c", f"{name}.c"], folder)
+    library = [f"{name}.o", "-lm", "-o"]
+    run([tool("g++"), "-std=c++11", "-x", "c++", "main.cpp", "-x", "none", *library, "by_cpp"], folder)
+    run([tool("gfortran"), "-x", "f95", f"{name}.f90", "main.fortran", "-x", "none", *library, "by_fortran"], folder)
+    linked = [f"-Clink-arg={name}.o", "-Clink-arg=-lm", "-o", "by_rust"]
+    run([tool("rustc"), "--edition=2021", "-Adead_code", "main.rust", *linked], folder)
+    return compilation
+
+
 @pytest.mark.slow
 def test_attitudes_and_positions_can_be_set(tmp_path):
-    compilation = compile_proved(specs.loads(FLUID))
-    for file, text in emit(compilation.program, "c", "x").items():
-        (tmp_path / file).write_text(text, encoding="utf-8")
-    for language, program in SETTERS.items():
-        for file, text in binding(compilation, language).items():
-            (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
-            (tmp_path / file).write_text(text.replace("//! ", "// ").replace("#![", "// #!["), encoding="utf-8")
-        (tmp_path / f"main.{language}").write_text(program, encoding="utf-8")
-    run([tool("gcc"), "-std=c99", "-c", "hull.c"], tmp_path)
-    library = ["hull.o", "-lm", "-o"]
-    run([tool("g++"), "-std=c++11", "-x", "c++", "main.cpp", "-x", "none", *library, "by_cpp"], tmp_path)
-    run([tool("gfortran"), "-x", "f95", "hull.f90", "main.fortran", "-x", "none", *library, "by_fortran"], tmp_path)
-    linked = ["-Clink-arg=hull.o", "-Clink-arg=-lm", "-o", "by_rust"]
-    run([tool("rustc"), "--edition=2021", "-Adead_code", "main.rust", *linked], tmp_path)
+    written(FLUID, SETTERS, tmp_path)
     for language in SETTERS:
         assert run([tmp_path / f"by_{language}"], tmp_path).strip() == "0.0 0.6 0.0 0.8 5.0 6.0 7.0 refused"
+
+
+SWING = """phigen: 1
+name: swing
+coordinates: [q, p]
+parameters: {g: {value: 1, positive: true}}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - g*cos(q)
+scheme: gauss
+order: 4
+profile: small
+"""
+#: Programs that change a parameter of a running solver, interpolate, and print whether mistakes are refused.
+CHANGES = {
+    "cpp": """#include <cstdio>
+#include "swing.hpp"
+int main()
+{
+    swing_phigen::Solver s({1, 0});
+    s.integrate(0.1, 3);
+    swing_phigen::Parameters p = s.parameters();
+    p.g = 2;
+    s.set_parameters(p);
+    try { s.interpolate({0.5}); } catch (const swing_phigen::Error &) { std::printf("refused "); }
+    s.integrate(0.1, 3);
+    for (const auto &x : s.interpolate({0.5, 1})) std::printf("%.12f %.12f ", x[0], x[1]);
+    std::printf("%.12f %.12f %.12f %zu ", s.state()[0], s.state()[1], s.hamiltonian(), s.steps_done());
+    p.g = -1;
+    try { s.set_parameters(p); } catch (const swing_phigen::Error &) { std::printf("refused"); }
+}
+""",
+    "fortran": """program main
+  use swing_phigen
+  type(swing_solver) :: s
+  type(swing_params) :: p
+  integer :: status
+  real(swing_real) :: x(2, 2)
+  call s%init([1, 0]*1.0_swing_real)
+  call s%integrate(0.1_swing_real, 3)
+  p%g = 2
+  call s%set_parameters(p)
+  call s%interpolate([0.5_swing_real], x(:, :1), status)
+  if (status /= swing_ok) write (*, "(a)", advance="no") "refused "
+  call s%integrate(0.1_swing_real, 3)
+  call s%interpolate([0.5_swing_real, 1.0_swing_real], x)
+  write (*, "(7(f15.12, 1x), i0, 1x)", advance="no") x, s%state(), s%hamiltonian(), s%steps_done()
+  p%g = -1
+  call s%set_parameters(p, status)
+  if (status /= swing_ok .and. s%hamiltonian() < -1) print "(a)", "refused"
+end program
+""",
+    "rust": """include!("rust/src/lib.rs");
+extern crate std;
+fn main() {
+    let mut s = Solver::new(&[1.0, 0.0], &Parameters::default()).unwrap();
+    s.integrate(0.1, 3).unwrap();
+    s.set_parameters(&Parameters { g: 2.0 }).unwrap();
+    if s.interpolate(&[0.5]).is_err() { std::print!("refused ") }
+    s.integrate(0.1, 3).unwrap();
+    for x in s.interpolate(&[0.5, 1.0]).unwrap() { std::print!("{:.12} {:.12} ", x[0], x[1]) }
+    let (x, g) = (s.state(), Parameters { g: 2.0 });
+    std::print!("{:.12} {:.12} {:.12} {} ", x[0], x[1], hamiltonian(&g, &x), s.steps_done());
+    if s.set_parameters(&Parameters { g: -1.0 }).is_err() { std::print!("refused") }
+}
+""",
+}
+
+
+@pytest.mark.slow
+def test_parameters_of_a_running_solver_can_be_changed(tmp_path):
+    compilation = written(SWING, CHANGES, tmp_path)
+    solver = phigen.compile(compilation.spec)
+    before = solver.integrate([1, 0], h=0.1, steps=3).x[-1]
+    x = solver.integrate(before, h=0.1, steps=3, g=2).x
+    half = solver.integrate(x[-2], h=0.05, steps=1, g=2).x[-1]
+    energy = x[-1, 1] ** 2 / 2 - 2 * np.cos(x[-1, 0])
+    for language in CHANGES:
+        first, *numbers, steps, last = run([tmp_path / f"by_{language}"], tmp_path).split()
+        assert (first, steps, last) == ("refused", "6", "refused"), language
+        found = np.array([float(number) for number in numbers])
+        assert np.abs(found - [*half, *x[-1], *x[-1], energy]).max() < 1e-6, language
+        assert np.abs(found[2:] - [*x[-1], *x[-1], energy]).max() < 3e-12, language
 
 
 def test_hand_edits_stay_and_lattices_are_refused(tumbler):

@@ -5,15 +5,15 @@
 
 static int reports;
 
-static void hear(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message)
+static void hear(void *environment, fmi3Status status, const char *category, const char *message)
 {
     (void)environment;
     (void)status;
     if (category != NULL && message != NULL) ++reports;
 }
 
-static void update(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean set, fmi3Boolean get,
-    fmi3Boolean finished, fmi3Boolean can_return, fmi3Boolean *early, fmi3Float64 *when)
+static void update(void *environment, double time, bool set, bool get,
+    bool finished, bool can_return, bool *early, double *when)
 {
     (void)environment;
     (void)set;
@@ -35,14 +35,14 @@ int main(void)
 {
     bool event, terminate, early;
     double reached, at[2], x[2];
-    fmi3Int32 seed = 1;
-    fmi3ValueReference whole[1];
-    fmi3FMUState copy = NULL, read = NULL;
+    int32_t seed = 1;
+    uint32_t whole[1];
+    void *copy = NULL, *read = NULL;
     unsigned char bytes[1 << 15];
     size_t size;
-    const fmi3ValueReference first[2] = { FMU(STATE), FMU(STATE) + 1 }, parameter[1] = { FMU(PARAMETER) };
-    const fmi3ValueReference beyond[1] = { FMU(END) };
-    fmi3Instance unit = PREFIXED(InstantiateCoSimulation)("unit", TOKEN, NULL, false, true, true, true, NULL, 0, NULL,
+    const uint32_t first[2] = { FMU(STATE), FMU(STATE) + 1 }, parameter[1] = { FMU(PARAMETER) };
+    const uint32_t beyond[1] = { FMU(END) };
+    void *unit = PREFIXED(InstantiateCoSimulation)("unit", TOKEN, NULL, false, true, true, true, NULL, 0, NULL,
         hear, update);
     MUST(PREFIXED(InstantiateCoSimulation)("u", "other", NULL, false, true, true, true, NULL, 0, NULL, hear, update) == NULL);
     MUST(reports == 1);

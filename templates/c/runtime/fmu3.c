@@ -3,310 +3,214 @@
 
 /* ---- FMI 3.0 ---- */
 
-#ifndef fmi3Functions_h /* the headers of the standard may be included before this file */
-typedef void *fmi3Instance, *fmi3InstanceEnvironment, *fmi3FMUState;
-typedef uint32_t fmi3ValueReference;
-typedef float fmi3Float32;
-typedef double fmi3Float64;
-typedef int8_t fmi3Int8;
-typedef uint8_t fmi3UInt8;
-typedef int16_t fmi3Int16;
-typedef uint16_t fmi3UInt16;
-typedef int32_t fmi3Int32;
-typedef uint32_t fmi3UInt32;
-typedef int64_t fmi3Int64;
-typedef uint64_t fmi3UInt64;
-typedef bool fmi3Boolean, fmi3Clock;
-typedef const char *fmi3String;
-typedef uint8_t fmi3Byte;
-typedef const fmi3Byte *fmi3Binary;
-typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Status;
-typedef enum { fmi3Independent, fmi3Constant, fmi3Fixed, fmi3Tunable, fmi3Discrete, fmi3Dependent } fmi3DependencyKind;
-typedef enum { fmi3IntervalNotYetKnown, fmi3IntervalUnchanged, fmi3IntervalChanged } fmi3IntervalQualifier;
-typedef void (*fmi3LogMessageCallback)(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
-    fmi3String message);
-typedef void (*fmi3ClockUpdateCallback)(fmi3InstanceEnvironment environment);
-typedef void (*fmi3IntermediateUpdateCallback)(fmi3InstanceEnvironment environment, fmi3Float64 time,
-    fmi3Boolean setRequested, fmi3Boolean getAllowed, fmi3Boolean stepFinished, fmi3Boolean canReturnEarly,
-    fmi3Boolean *earlyReturnRequested, fmi3Float64 *earlyReturnTime);
-typedef void (*fmi3LockPreemptionCallback)(void);
-typedef void (*fmi3UnlockPreemptionCallback)(void);
+/* The standard prescribes parameters that this FMU does not need. */
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
 /* Exported names: plain in a library, with a prefix if several FMUs are linked into one program. */
+#define FMI_JOINED(prefix, name) prefix##name
+#define FMI_PREFIXED(prefix, name) FMI_JOINED(prefix, name)
 #if defined(FMI3_FUNCTION_PREFIX) && !defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
-#define FMI3_PASTED(prefix, name) prefix##fmi3##name
-#define FMI3_PREFIXED(prefix, name) FMI3_PASTED(prefix, name)
-#define FMI3_NAME(name) FMI3_PREFIXED(FMI3_FUNCTION_PREFIX, name)
+#define FMI3_NAME(name) FMI_PREFIXED(FMI3_FUNCTION_PREFIX, fmi3##name)
 #else
 #define FMI3_NAME(name) fmi3##name
 #endif
 #ifdef _WIN32
-#define FMI3_SHARED __declspec(dllexport)
+#define FMI_SHARED __declspec(dllexport)
 #elif defined(__GNUC__)
-#define FMI3_SHARED __attribute__((visibility("default")))
+#define FMI_SHARED __attribute__((visibility("default")))
 #else
-#define FMI3_SHARED
+#define FMI_SHARED
 #endif
-#define FMI3_STATUS(name) FMI3_SHARED fmi3Status FMI3_NAME(name)
+#define FMI3_STATUS(name) FMI_SHARED fmi3Status FMI3_NAME(name)
 
-FMI3_SHARED const char *FMI3_NAME(GetVersion)(void) { return "3.0"; }
+FMI_SHARED const char *FMI3_NAME(GetVersion)(void) { return "3.0"; }
 
-static void phi_fmi3_log(void *of, const char *message)
+/* Return OK if a condition holds; else report the reason why a call failed. */
+static fmi3Status phi_fmi3_demand(bool condition, void *of, const char *reason)
 {
-    phi_fmu *instance = (phi_fmu *)of;
-    const fmi3LogMessageCallback log = (fmi3LogMessageCallback)instance->callback;
-    log(instance->environment, fmi3Error, "logStatusError", message);
+    if (!condition && of != NULL) phi_fmu_say((phi_fmu *)of, reason);
+    return condition ? fmi3OK : fmi3Error;
 }
 
-static fmi3Status phi_fmi3_refuse(fmi3Instance of, const char *message)
+static phi_fmu_state *phi_fmi3_state(void *of) { return &((phi_fmu *)of)->state; }
+
+/* Change from one of several modes to another one. The call is refused in all other modes. */
+static fmi3Status phi_fmi3_enter(void *of, int from, int to)
 {
-    if (of != NULL) phi_fmu_say((phi_fmu *)of, message);
-    return fmi3Error;
+    const bool allowed = of != NULL && (phi_fmi3_state(of)->mode & from) != 0;
+    if (allowed) phi_fmi3_state(of)->mode = to;
+    return phi_fmi3_demand(allowed, of, "this call is not allowed in the mode of the FMU");
 }
 
-static phi_fmu_state *phi_fmi3_state(fmi3Instance of) { return &((phi_fmu *)of)->state; }
-
-/* Refuse a call in any other mode than the one in which it is allowed. */
-static fmi3Status phi_fmi3_expect(fmi3Instance of, phi_fmu_mode mode)
+FMI3_STATUS(SetDebugLogging)(void *of, bool on, size_t count, const char *const categories[])
 {
-    if (of != NULL && phi_fmi3_state(of)->mode == (int32_t)mode) return fmi3OK;
-    return phi_fmi3_refuse(of, "this call is not allowed in the mode of the FMU");
+    if (of != NULL) ((phi_fmu *)of)->logging = on;
+    return of != NULL ? fmi3OK : fmi3Error;
 }
 
-/* Change from one mode to the next. */
-static fmi3Status phi_fmi3_enter(fmi3Instance of, phi_fmu_mode from, phi_fmu_mode to)
+FMI_SHARED void *FMI3_NAME(InstantiateCoSimulation)(const char *name, const char *token, const char *resources,
+    bool visible, bool logging, bool events, bool early, const uint32_t required[], size_t count, void *environment,
+    fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update)
 {
-    if (phi_fmi3_expect(of, from) != fmi3OK) return fmi3Error;
-    phi_fmi3_state(of)->mode = (int32_t)to;
-    return fmi3OK;
-}
-
-FMI3_STATUS(SetDebugLogging)(fmi3Instance of, fmi3Boolean on, size_t count, const fmi3String categories[])
-{
-    (void)count;
-    (void)categories;
-    if (of == NULL) return fmi3Error;
-    ((phi_fmu *)of)->logging = on;
-    return fmi3OK;
-}
-
-FMI3_SHARED fmi3Instance FMI3_NAME(InstantiateCoSimulation)(fmi3String name, fmi3String token, fmi3String resources,
-    fmi3Boolean visible, fmi3Boolean logging, fmi3Boolean events, fmi3Boolean early, const fmi3ValueReference required[],
-    size_t count, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
-    fmi3IntermediateUpdateCallback update)
-{
-    phi_fmu *instance = phi_fmu_instantiate(name, token);
-    (void)resources;
-    (void)visible;
-    (void)events;
-    (void)required;
-    (void)count;
+    phi_fmu *instance = phi_fmu_instantiate(name, token, environment, logging);
     if (instance == NULL) {
         if (log != NULL) log(environment, fmi3Error, "logStatusError", "wrong instantiation token, or no memory");
         return NULL;
     }
-    instance->environment = environment;
-    instance->log = phi_fmi3_log;
-    instance->callback = (void (*)(void))log;
-    instance->update = (void (*)(void))update;
-    instance->logging = logging;
+    instance->log_3 = log;
+    instance->update = update;
     instance->may_return_early = early;
     return instance;
 }
 
-FMI3_SHARED fmi3Instance FMI3_NAME(InstantiateModelExchange)(fmi3String name, fmi3String token, fmi3String resources,
-    fmi3Boolean visible, fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
+/* There are no instances of other kinds. */
+FMI_SHARED void *FMI3_NAME(InstantiateModelExchange)(const char *name, const char *token, const char *resources,
+    bool visible, bool logging, void *environment, fmi3LogMessageCallback log)
 {
-    (void)name;
-    (void)token;
-    (void)resources;
-    (void)visible;
-    (void)logging;
-    if (log != NULL) log(environment, fmi3Error, "logStatusError", "this FMU is for co-simulation");
     return NULL;
 }
 
-FMI3_SHARED fmi3Instance FMI3_NAME(InstantiateScheduledExecution)(fmi3String name, fmi3String token, fmi3String resources,
-    fmi3Boolean visible, fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
-    fmi3ClockUpdateCallback clock, fmi3LockPreemptionCallback lock, fmi3UnlockPreemptionCallback unlock)
+FMI_SHARED void *FMI3_NAME(InstantiateScheduledExecution)(const char *name, const char *token, const char *resources,
+    bool visible, bool logging, void *environment, fmi3LogMessageCallback log, void (*clock)(void *environment),
+    void (*lock)(void), void (*unlock)(void))
 {
-    (void)clock;
-    (void)lock;
-    (void)unlock;
-    return FMI3_NAME(InstantiateModelExchange)(name, token, resources, visible, logging, environment, log);
+    return NULL;
 }
 
-FMI3_SHARED void FMI3_NAME(FreeInstance)(fmi3Instance of) { phi_fmu_free((phi_fmu *)of); }
+FMI_SHARED void FMI3_NAME(FreeInstance)(void *of) { free(of); }
 
-FMI3_STATUS(EnterInitializationMode)(fmi3Instance of, fmi3Boolean has_tolerance, fmi3Float64 tolerance,
-    fmi3Float64 start, fmi3Boolean has_stop, fmi3Float64 stop)
+FMI3_STATUS(EnterInitializationMode)(void *of, bool has_tolerance, double tolerance, double start, bool has_stop,
+    double stop)
 {
-    (void)has_tolerance;
-    (void)tolerance;
-    if (phi_fmi3_expect(of, PHI_INSTANTIATED) != fmi3OK) return fmi3Error;
-    if (!phi_fmu_experiment(phi_fmi3_state(of), start, has_stop, stop))
-        return phi_fmi3_refuse(of, "the start time is not finite, or the stop time lies before it");
-    return phi_fmi3_enter(of, PHI_INSTANTIATED, PHI_INITIALISING);
+    if (!isfinite(start) || (has_stop && !(stop >= start)))
+        return phi_fmi3_demand(false, of, "the start time is not finite, or the stop time lies before it");
+    if (phi_fmi3_enter(of, PHI_INSTANTIATED, PHI_INITIALISING) != fmi3OK) return fmi3Error;
+    phi_fmi3_state(of)->time = start;
+    phi_fmi3_state(of)->stop = has_stop ? stop : HUGE_VAL;
+    return fmi3OK;
 }
 
-FMI3_STATUS(ExitInitializationMode)(fmi3Instance of)
+/* If this fails, values may be set, and initialisation computed again. */
+FMI3_STATUS(ExitInitializationMode)(void *of)
 {
-    if (phi_fmi3_expect(of, PHI_INITIALISING) != fmi3OK) return fmi3Error;
+    if (phi_fmi3_enter(of, PHI_INITIALISING, PHI_INITIALISING) != fmi3OK) return fmi3Error;
     const phi_status status = phi_fmu_start(phi_fmi3_state(of));
-    if (status != PHI_OK) return phi_fmi3_refuse(of, phi_status_string(status)); /* values may be set, and initialisation computed again */
-    return phi_fmi3_enter(of, PHI_INITIALISING, PHI_STEPPING);
+    if (status == PHI_OK) return phi_fmi3_enter(of, PHI_INITIALISING, PHI_STEPPING);
+    return phi_fmi3_demand(false, of, phi_status_string(status));
 }
 
-FMI3_STATUS(EnterEventMode)(fmi3Instance of) { return phi_fmi3_enter(of, PHI_STEPPING, PHI_AT_EVENT); }
+FMI3_STATUS(EnterEventMode)(void *of) { return phi_fmi3_enter(of, PHI_STEPPING, PHI_AT_EVENT); }
 
 /* After initialisation with events the mode is already that of steps. */
-FMI3_STATUS(EnterStepMode)(fmi3Instance of)
+FMI3_STATUS(EnterStepMode)(void *of) { return phi_fmi3_enter(of, PHI_STEPPING | PHI_AT_EVENT, PHI_STEPPING); }
+
+FMI3_STATUS(Terminate)(void *of) { return phi_fmi3_enter(of, ~0, PHI_TERMINATED); }
+
+FMI3_STATUS(Reset)(void *of)
 {
-    if (of != NULL && phi_fmi3_state(of)->mode == PHI_STEPPING) return fmi3OK;
-    return phi_fmi3_enter(of, PHI_AT_EVENT, PHI_STEPPING);
+    if (of != NULL) phi_fmu_reset(phi_fmi3_state(of));
+    return of != NULL ? fmi3OK : fmi3Error;
 }
 
-FMI3_STATUS(Terminate)(fmi3Instance of)
+#define FMI3_VARIABLES void *of, const uint32_t v[], size_t n
+
+FMI3_STATUS(GetFloat64)(FMI3_VARIABLES, double x[], size_t m)
 {
-    if (of == NULL) return fmi3Error;
-    phi_fmi3_state(of)->mode = PHI_TERMINATED;
-    return fmi3OK;
+    bool exist = of != NULL && n == m;
+    for (size_t k = 0; exist && k < n; ++k) exist = phi_fmu_get(phi_fmi3_state(of), v[k], &x[k]);
+    return phi_fmi3_demand(exist, of, "no such variable");
 }
 
-FMI3_STATUS(Reset)(fmi3Instance of)
+FMI3_STATUS(SetFloat64)(FMI3_VARIABLES, const double x[], size_t m)
 {
-    if (of == NULL) return fmi3Error;
-    phi_fmu_reset(phi_fmi3_state(of));
-    return fmi3OK;
+    bool allowed = of != NULL && n == m;
+    for (size_t k = 0; allowed && k < n; ++k) allowed = phi_fmu_set(phi_fmi3_state(of), v[k], x[k]);
+    return phi_fmi3_demand(allowed, of, "the variable cannot be set now, or to this value");
 }
 
-FMI3_STATUS(GetFloat64)(fmi3Instance of, const fmi3ValueReference variables[], size_t count,
-    fmi3Float64 values[], size_t value_count)
+FMI3_STATUS(GetInt32)(FMI3_VARIABLES, int32_t x[], size_t m)
 {
-    if (of == NULL || count != value_count) return fmi3Error;
-    for (size_t k = 0; k < count; ++k)
-        if (!phi_fmu_get(phi_fmi3_state(of), variables[k], &values[k])) return phi_fmi3_refuse(of, "no such variable");
-    return fmi3OK;
+    bool exist = of != NULL && n == m;
+    for (size_t k = 0; exist && k < n; ++k) exist = phi_fmu_is_whole(v[k]);
+    for (size_t k = 0; exist && k < n; ++k) x[k] = phi_fmi3_state(of)->seed;
+    return phi_fmi3_demand(exist, of, "no such variable");
 }
 
-FMI3_STATUS(SetFloat64)(fmi3Instance of, const fmi3ValueReference variables[], size_t count,
-    const fmi3Float64 values[], size_t value_count)
+FMI3_STATUS(SetInt32)(FMI3_VARIABLES, const int32_t x[], size_t m)
 {
-    if (of == NULL || count != value_count) return fmi3Error;
-    for (size_t k = 0; k < count; ++k)
-        if (!phi_fmu_set(phi_fmi3_state(of), variables[k], values[k]))
-            return phi_fmi3_refuse(of, "the variable cannot be set now, or to this value");
-    return fmi3OK;
-}
-
-FMI3_STATUS(GetInt32)(fmi3Instance of, const fmi3ValueReference variables[], size_t count, fmi3Int32 values[],
-    size_t value_count)
-{
-    if (of == NULL || count != value_count) return fmi3Error;
-    for (size_t k = 0; k < count; ++k)
-        if (!phi_fmu_get_whole(phi_fmi3_state(of), variables[k], &values[k])) return phi_fmi3_refuse(of, "no such variable");
-    return fmi3OK;
-}
-
-FMI3_STATUS(SetInt32)(fmi3Instance of, const fmi3ValueReference variables[], size_t count,
-    const fmi3Int32 values[], size_t value_count)
-{
-    if (of == NULL || count != value_count) return fmi3Error;
-    for (size_t k = 0; k < count; ++k)
-        if (!phi_fmu_set_whole(phi_fmi3_state(of), variables[k], values[k]))
-            return phi_fmi3_refuse(of, "the variable cannot be set now, or to this value");
-    return fmi3OK;
+    bool allowed = of != NULL && n == m && phi_fmi3_state(of)->mode <= PHI_INITIALISING;
+    for (size_t k = 0; allowed && k < n; ++k) allowed = phi_fmu_is_whole(v[k]) && x[k] >= 0;
+    for (size_t k = 0; allowed && k < n; ++k) phi_fmi3_state(of)->seed = x[k];
+    return phi_fmi3_demand(allowed, of, "the variable cannot be set now, or to this value");
 }
 
 /* Types without variables: calls for 0 variables succeed, all others fail. */
-static fmi3Status phi_fmi3_none(fmi3Instance of, size_t count)
-{
-    return of != NULL && count == 0 ? fmi3OK : phi_fmi3_refuse(of, "no such variable");
-}
+static fmi3Status phi_fmi3_none(void *of, size_t n) { return phi_fmi3_demand(of != NULL && n == 0, of, "no such variable"); }
 
-#define FMI3_NONE(name, type) \
-    FMI3_STATUS(name)(fmi3Instance of, const fmi3ValueReference v[], size_t n, type x[], size_t m) \
+FMI3_STATUS(GetString)(FMI3_VARIABLES, const char *x[], size_t m) { return phi_fmi3_none(of, n | m); }
+FMI3_STATUS(SetString)(FMI3_VARIABLES, const char *const x[], size_t m) { return phi_fmi3_none(of, n | m); }
+#define FMI3_NONE(type, of_c) \
+    FMI3_STATUS(Get##type)(FMI3_VARIABLES, of_c x[], size_t m) \
     { \
-        (void)v; \
-        (void)x; \
+        return phi_fmi3_none(of, n | m); \
+    } \
+    FMI3_STATUS(Set##type)(FMI3_VARIABLES, const of_c x[], size_t m) \
+    { \
         return phi_fmi3_none(of, n | m); \
     }
-FMI3_NONE(GetFloat32, fmi3Float32)
-FMI3_NONE(GetInt8, fmi3Int8)
-FMI3_NONE(GetUInt8, fmi3UInt8)
-FMI3_NONE(GetInt16, fmi3Int16)
-FMI3_NONE(GetUInt16, fmi3UInt16)
-FMI3_NONE(GetUInt32, fmi3UInt32)
-FMI3_NONE(GetInt64, fmi3Int64)
-FMI3_NONE(GetUInt64, fmi3UInt64)
-FMI3_NONE(GetBoolean, fmi3Boolean)
-FMI3_NONE(GetString, fmi3String)
-FMI3_NONE(SetFloat32, const fmi3Float32)
-FMI3_NONE(SetInt8, const fmi3Int8)
-FMI3_NONE(SetUInt8, const fmi3UInt8)
-FMI3_NONE(SetInt16, const fmi3Int16)
-FMI3_NONE(SetUInt16, const fmi3UInt16)
-FMI3_NONE(SetUInt32, const fmi3UInt32)
-FMI3_NONE(SetInt64, const fmi3Int64)
-FMI3_NONE(SetUInt64, const fmi3UInt64)
-FMI3_NONE(SetBoolean, const fmi3Boolean)
-FMI3_NONE(SetString, const fmi3String)
+FMI3_NONE(Float32, float)
+FMI3_NONE(Int8, int8_t)
+FMI3_NONE(UInt8, uint8_t)
+FMI3_NONE(Int16, int16_t)
+FMI3_NONE(UInt16, uint16_t)
+FMI3_NONE(UInt32, uint32_t)
+FMI3_NONE(Int64, int64_t)
+FMI3_NONE(UInt64, uint64_t)
+FMI3_NONE(Boolean, bool)
 
 /* Functions for model exchange, scheduled execution, clocks, binary variables, arrays and derivatives: always refused. */
-#define FMI3_ABSENT(name, arguments) \
-    FMI3_STATUS(name) arguments { return fmi3Error; }
-#if defined(__GNUC__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wunused-parameter"
-#endif
-FMI3_ABSENT(GetBinary, (fmi3Instance of, const fmi3ValueReference v[], size_t n, size_t sizes[], fmi3Binary x[], size_t m))
-FMI3_ABSENT(SetBinary, (fmi3Instance of, const fmi3ValueReference v[], size_t n, const size_t sizes[],
-    const fmi3Binary x[], size_t m))
-FMI3_ABSENT(GetClock, (fmi3Instance of, const fmi3ValueReference v[], size_t n, fmi3Clock x[]))
-FMI3_ABSENT(SetClock, (fmi3Instance of, const fmi3ValueReference v[], size_t n, const fmi3Clock x[]))
-FMI3_ABSENT(GetNumberOfVariableDependencies, (fmi3Instance of, fmi3ValueReference v, size_t *n))
-FMI3_ABSENT(GetVariableDependencies, (fmi3Instance of, fmi3ValueReference v, size_t at[], fmi3ValueReference on[],
-    size_t at_on[], fmi3DependencyKind kinds[], size_t n))
-FMI3_ABSENT(GetDirectionalDerivative, (fmi3Instance of, const fmi3ValueReference u[], size_t n,
-    const fmi3ValueReference v[], size_t m, const fmi3Float64 seed[], size_t k, fmi3Float64 x[], size_t l))
-FMI3_ABSENT(GetAdjointDerivative, (fmi3Instance of, const fmi3ValueReference u[], size_t n,
-    const fmi3ValueReference v[], size_t m, const fmi3Float64 seed[], size_t k, fmi3Float64 x[], size_t l))
-FMI3_ABSENT(EnterConfigurationMode, (fmi3Instance of))
-FMI3_ABSENT(ExitConfigurationMode, (fmi3Instance of))
-FMI3_ABSENT(GetIntervalDecimal, (fmi3Instance of, const fmi3ValueReference v[], size_t n, fmi3Float64 x[],
-    fmi3IntervalQualifier q[]))
-FMI3_ABSENT(GetIntervalFraction, (fmi3Instance of, const fmi3ValueReference v[], size_t n, fmi3UInt64 x[],
-    fmi3UInt64 y[], fmi3IntervalQualifier q[]))
-FMI3_ABSENT(GetShiftDecimal, (fmi3Instance of, const fmi3ValueReference v[], size_t n, fmi3Float64 x[]))
-FMI3_ABSENT(GetShiftFraction, (fmi3Instance of, const fmi3ValueReference v[], size_t n, fmi3UInt64 x[], fmi3UInt64 y[]))
-FMI3_ABSENT(SetIntervalDecimal, (fmi3Instance of, const fmi3ValueReference v[], size_t n, const fmi3Float64 x[]))
-FMI3_ABSENT(SetIntervalFraction, (fmi3Instance of, const fmi3ValueReference v[], size_t n, const fmi3UInt64 x[],
-    const fmi3UInt64 y[]))
-FMI3_ABSENT(SetShiftDecimal, (fmi3Instance of, const fmi3ValueReference v[], size_t n, const fmi3Float64 x[]))
-FMI3_ABSENT(SetShiftFraction, (fmi3Instance of, const fmi3ValueReference v[], size_t n, const fmi3UInt64 x[],
-    const fmi3UInt64 y[]))
-FMI3_ABSENT(EvaluateDiscreteStates, (fmi3Instance of))
-FMI3_ABSENT(GetOutputDerivatives, (fmi3Instance of, const fmi3ValueReference v[], size_t n, const fmi3Int32 orders[],
-    fmi3Float64 x[], size_t m))
-FMI3_ABSENT(EnterContinuousTimeMode, (fmi3Instance of))
-FMI3_ABSENT(CompletedIntegratorStep, (fmi3Instance of, fmi3Boolean no_earlier, fmi3Boolean *event, fmi3Boolean *end))
-FMI3_ABSENT(SetTime, (fmi3Instance of, fmi3Float64 time))
-FMI3_ABSENT(SetContinuousStates, (fmi3Instance of, const fmi3Float64 x[], size_t n))
-FMI3_ABSENT(GetContinuousStateDerivatives, (fmi3Instance of, fmi3Float64 x[], size_t n))
-FMI3_ABSENT(GetEventIndicators, (fmi3Instance of, fmi3Float64 x[], size_t n))
-FMI3_ABSENT(GetContinuousStates, (fmi3Instance of, fmi3Float64 x[], size_t n))
-FMI3_ABSENT(GetNominalsOfContinuousStates, (fmi3Instance of, fmi3Float64 x[], size_t n))
-FMI3_ABSENT(GetNumberOfEventIndicators, (fmi3Instance of, size_t *n))
-FMI3_ABSENT(GetNumberOfContinuousStates, (fmi3Instance of, size_t *n))
-FMI3_ABSENT(ActivateModelPartition, (fmi3Instance of, fmi3ValueReference v, fmi3Float64 time))
-#if defined(__GNUC__)
-#pragma GCC diagnostic pop
-#endif
+#define FMI3_ABSENT(name, parameters) \
+    FMI3_STATUS(name) parameters { return fmi3Error; }
+FMI3_ABSENT(GetBinary, (FMI3_VARIABLES, size_t sizes[], const uint8_t *x[], size_t m))
+FMI3_ABSENT(SetBinary, (FMI3_VARIABLES, const size_t sizes[], const uint8_t *const x[], size_t m))
+FMI3_ABSENT(GetClock, (FMI3_VARIABLES, bool x[]))
+FMI3_ABSENT(SetClock, (FMI3_VARIABLES, const bool x[]))
+FMI3_ABSENT(GetNumberOfVariableDependencies, (void *of, uint32_t v, size_t *n))
+FMI3_ABSENT(GetVariableDependencies, (void *of, uint32_t v, size_t at[], uint32_t on[], size_t at_on[],
+    fmi3DependencyKind kinds[], size_t n))
+FMI3_ABSENT(GetDirectionalDerivative, (FMI3_VARIABLES, const uint32_t by[], size_t m, const double seed[], size_t k,
+    double x[], size_t l))
+FMI3_ABSENT(GetAdjointDerivative, (FMI3_VARIABLES, const uint32_t by[], size_t m, const double seed[], size_t k,
+    double x[], size_t l))
+FMI3_ABSENT(EnterConfigurationMode, (void *of))
+FMI3_ABSENT(ExitConfigurationMode, (void *of))
+FMI3_ABSENT(GetIntervalDecimal, (FMI3_VARIABLES, double x[], fmi3IntervalQualifier q[]))
+FMI3_ABSENT(GetIntervalFraction, (FMI3_VARIABLES, uint64_t x[], uint64_t y[], fmi3IntervalQualifier q[]))
+FMI3_ABSENT(GetShiftDecimal, (FMI3_VARIABLES, double x[]))
+FMI3_ABSENT(GetShiftFraction, (FMI3_VARIABLES, uint64_t x[], uint64_t y[]))
+FMI3_ABSENT(SetIntervalDecimal, (FMI3_VARIABLES, const double x[]))
+FMI3_ABSENT(SetIntervalFraction, (FMI3_VARIABLES, const uint64_t x[], const uint64_t y[]))
+FMI3_ABSENT(SetShiftDecimal, (FMI3_VARIABLES, const double x[]))
+FMI3_ABSENT(SetShiftFraction, (FMI3_VARIABLES, const uint64_t x[], const uint64_t y[]))
+FMI3_ABSENT(EvaluateDiscreteStates, (void *of))
+FMI3_ABSENT(GetOutputDerivatives, (FMI3_VARIABLES, const int32_t orders[], double x[], size_t m))
+FMI3_ABSENT(EnterContinuousTimeMode, (void *of))
+FMI3_ABSENT(CompletedIntegratorStep, (void *of, bool no_earlier, bool *event, bool *end))
+FMI3_ABSENT(SetTime, (void *of, double time))
+FMI3_ABSENT(SetContinuousStates, (void *of, const double x[], size_t n))
+FMI3_ABSENT(GetContinuousStateDerivatives, (void *of, double x[], size_t n))
+FMI3_ABSENT(GetEventIndicators, (void *of, double x[], size_t n))
+FMI3_ABSENT(GetContinuousStates, (void *of, double x[], size_t n))
+FMI3_ABSENT(GetNominalsOfContinuousStates, (void *of, double x[], size_t n))
+FMI3_ABSENT(GetNumberOfEventIndicators, (void *of, size_t *n))
+FMI3_ABSENT(GetNumberOfContinuousStates, (void *of, size_t *n))
+FMI3_ABSENT(ActivateModelPartition, (void *of, uint32_t v, double time))
 
 /* Newly set parameters take effect with the next step; events do nothing else. */
-FMI3_STATUS(UpdateDiscreteStates)(fmi3Instance of, fmi3Boolean *again, fmi3Boolean *terminate,
-    fmi3Boolean *nominals, fmi3Boolean *states, fmi3Boolean *has_next, fmi3Float64 *next)
+FMI3_STATUS(UpdateDiscreteStates)(void *of, bool *again, bool *terminate, bool *nominals, bool *states, bool *has_next,
+    double *next)
 {
     if (of == NULL) return fmi3Error;
     *again = *terminate = *nominals = *states = *has_next = false;
@@ -314,23 +218,22 @@ FMI3_STATUS(UpdateDiscreteStates)(fmi3Instance of, fmi3Boolean *again, fmi3Boole
     return fmi3OK;
 }
 
-FMI3_STATUS(GetFMUState)(fmi3Instance of, fmi3FMUState *state)
+FMI3_STATUS(GetFMUState)(void *of, void **state)
 {
     if (of == NULL || state == NULL) return fmi3Error;
-    if (*state == NULL) *state = calloc(1, sizeof(phi_fmu_state));
-    if (*state == NULL) return phi_fmi3_refuse(of, "no memory");
-    memcpy(*state, phi_fmi3_state(of), sizeof(phi_fmu_state));
+    if (*state == NULL) *state = malloc(sizeof(phi_fmu_saved));
+    if (*state != NULL) phi_fmu_save(phi_fmi3_state(of), (phi_fmu_saved *)*state);
+    return phi_fmi3_demand(*state != NULL, of, "no memory");
+}
+
+FMI3_STATUS(SetFMUState)(void *of, void *state)
+{
+    if (of == NULL || state == NULL) return fmi3Error;
+    memcpy(phi_fmi3_state(of), &((phi_fmu_saved *)state)->state, sizeof(phi_fmu_state));
     return fmi3OK;
 }
 
-FMI3_STATUS(SetFMUState)(fmi3Instance of, fmi3FMUState state)
-{
-    if (of == NULL || state == NULL) return fmi3Error;
-    memcpy(phi_fmi3_state(of), state, sizeof(phi_fmu_state));
-    return fmi3OK;
-}
-
-FMI3_STATUS(FreeFMUState)(fmi3Instance of, fmi3FMUState *state)
+FMI3_STATUS(FreeFMUState)(void *of, void **state)
 {
     if (of == NULL || state == NULL) return fmi3Error;
     free(*state);
@@ -338,55 +241,42 @@ FMI3_STATUS(FreeFMUState)(fmi3Instance of, fmi3FMUState *state)
     return fmi3OK;
 }
 
-FMI3_STATUS(SerializedFMUStateSize)(fmi3Instance of, fmi3FMUState state, size_t *size)
+FMI3_STATUS(SerializedFMUStateSize)(void *of, void *state, size_t *size)
 {
     if (of == NULL || state == NULL || size == NULL) return fmi3Error;
-    *size = PHI_FMU_BYTES;
+    *size = sizeof(phi_fmu_saved);
     return fmi3OK;
 }
 
-FMI3_STATUS(SerializeFMUState)(fmi3Instance of, fmi3FMUState state, fmi3Byte bytes[], size_t size)
+FMI3_STATUS(SerializeFMUState)(void *of, void *state, uint8_t bytes[], size_t size)
 {
-    if (of == NULL || state == NULL || bytes == NULL || size < PHI_FMU_BYTES) return fmi3Error;
-    phi_fmu_write((const phi_fmu_state *)state, bytes);
+    if (of == NULL || state == NULL || bytes == NULL || size < sizeof(phi_fmu_saved)) return fmi3Error;
+    memcpy(bytes, state, sizeof(phi_fmu_saved));
     return fmi3OK;
 }
 
-FMI3_STATUS(DeserializeFMUState)(fmi3Instance of, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
+/* If this fails, *state is unchanged. */
+FMI3_STATUS(DeserializeFMUState)(void *of, const uint8_t bytes[], size_t size, void **state)
 {
-    phi_fmu_state *fresh;
+    phi_fmu_saved saved;
     if (of == NULL || state == NULL) return fmi3Error;
-    fresh = (phi_fmu_state *)(*state == NULL ? calloc(1, sizeof *fresh) : *state);
-    if (fresh == NULL) return phi_fmi3_refuse(of, "no memory");
-    if (!phi_fmu_read(fresh, bytes, size)) {
-        if (*state == NULL) free(fresh);
-        return phi_fmi3_refuse(of, "the bytes are not those of a state of this FMU");
-    }
-    *state = fresh;
-    return fmi3OK;
+    if (!phi_fmu_read(&saved, bytes, size))
+        return phi_fmi3_demand(false, of, "the bytes are not those of a state of this FMU");
+    if (*state == NULL) *state = malloc(sizeof saved);
+    if (*state != NULL) memcpy(*state, &saved, sizeof saved);
+    return phi_fmi3_demand(*state != NULL, of, "no memory");
 }
 
-/* Report a whole step to the environment, which may end the communication step. */
-static bool phi_fmi3_listener(phi_fmu *instance, double time)
-{
-    const fmi3IntermediateUpdateCallback update = (fmi3IntermediateUpdateCallback)instance->update;
-    fmi3Boolean requested = false;
-    fmi3Float64 until = time;
-    update(instance->environment, time, false, true, true, instance->may_return_early, &requested, &until);
-    return requested && instance->may_return_early && until <= time;
-}
-
-FMI3_STATUS(DoStep)(fmi3Instance of, fmi3Float64 from, fmi3Float64 size, fmi3Boolean no_earlier,
-    fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *reached)
+FMI3_STATUS(DoStep)(void *of, double from, double size, bool no_earlier, bool *event, bool *terminate, bool *early,
+    double *reached)
 {
     phi_fmu *instance = (phi_fmu *)of;
-    phi_status status;
-    (void)no_earlier;
-    if (instance == NULL || event == NULL || terminate == NULL || early == NULL || reached == NULL) return fmi3Error;
+    if (of == NULL || event == NULL || terminate == NULL || early == NULL || reached == NULL) return fmi3Error;
     *event = *terminate = *early = false;
     *reached = instance->state.time;
-    if (!phi_fmu_may_step(&instance->state, from, size)) return phi_fmi3_refuse(of, "a step from another time or mode, or beyond the stop time");
-    status = phi_fmu_do_step(instance, from + size, instance->update == NULL ? NULL : phi_fmi3_listener);
+    if (!phi_fmu_may_step(&instance->state, from, size))
+        return phi_fmi3_demand(false, of, "a step from another time or mode, or beyond the stop time");
+    const phi_status status = phi_fmu_do_step(instance, from + size);
     *reached = instance->state.time;
     *early = status == PHI_OK && *reached < from + size;
     return status == PHI_OK ? fmi3OK : fmi3Discard;

@@ -75,6 +75,7 @@ PHI_RUN(phi_solver *s, double h, size_t steps PHI_AND_RECORD)
 
 #include "step_of_run.c"
 #include "placing.c"
+#include "parameters.c"
 #include "interpolate.c"
 
 #include "status.c"

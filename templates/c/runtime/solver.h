@@ -73,6 +73,15 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM]);
 phi_status phi_kick(phi_solver *s, const double change[PHI_DIM]);
 
+/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged. PHI_BAD_ARGUMENT, with *s
+   unchanged, for parameters that phi_init refuses. */
+#if PHI_MONITOR
+/* The energy level e becomes -H with the new parameters. */
+#elif PHI_GAUGE
+/* The gauge is unchanged. */
+#endif
+phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
+
 /* As phi_integrate, with given increments of the noise: dw[k * PHI_DRAWS + i] is that of source i in step k. NULL for
    random ones. */
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw);
