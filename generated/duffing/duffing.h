@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 918a6e27ceda27c59aa757cc12a16e5722cebb418789316d275643e9bd68d41a
+ * body-sha256: 04039d9c64934c7914fbc68ed9c796786ca2bf4d6dc8ecf4fafa44b6d4ba1685
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -71,6 +71,10 @@ duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps);
    with *s unchanged, if the new state is not finite. */
 duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM]);
 duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM]);
+
+/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
+   duffing_BAD_ARGUMENT, with *s unchanged, for parameters that duffing_init refuses. */
+duffing_status duffing_set_parameters(duffing_solver *s, const duffing_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f84abb67f4c0ff395680e959a42f718da5b90a7dff74d336e851ce05bc016aaf
+ * body-sha256: aa3a61fc4f69f67f569f5deb8f3fb315ec1dd777cd41845d86e099e54d73c131
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -370,6 +370,20 @@ export class Solver {
     Object.assign(twin, { t, steps, evaluations });
     twin.carry.set(this.carry);
     return twin;
+  }
+
+  /**
+   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws StepError
+   * for values that are not admissible; then nothing changes.
+   *
+   * @param {Partial<Parameters>} changes
+   * @returns {this}
+   */
+  setParameters(changes) {
+    const params = admitted({ ...this.params, ...changes });
+    this.params = params;
+    this.h = NaN; // so that the next step computes the coefficients
+    return this;
   }
 
   /**

@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5930f6947cb5d161db5991dee421eb36059dacddcc97804cf5a5be54918449d3
+ * body-sha256: 647dec6dfa0f57f55675e0a72c080b7aeac57b6a157a145e24cf109a1abf6767
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -72,6 +72,11 @@ guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double 
    guiding_centre_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const double x[guiding_centre_DIM]);
 guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM]);
+
+/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
+   guiding_centre_BAD_ARGUMENT, with *s unchanged, for parameters that guiding_centre_init refuses. */
+guiding_centre_status guiding_centre_set_parameters(guiding_centre_solver *s,
+    const guiding_centre_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 52f1c727fb41b92a7944be9afd1c181e2f57b9646c9b53d3bc99e6689d50dcb8
+ * body-sha256: d62cc9923891718624ac3f8be86f6f74fede99adcd2945bf3d9fda270e9d5c28
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -76,6 +76,12 @@ kepler_eccentric_status kepler_eccentric_set_state(kepler_eccentric_solver *s,
     const double x[kepler_eccentric_DIM]);
 kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
     const double change[kepler_eccentric_DIM]);
+
+/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
+   kepler_eccentric_BAD_ARGUMENT, with *s unchanged, for parameters that kepler_eccentric_init refuses. */
+/* The energy level e becomes -H with the new parameters. */
+kepler_eccentric_status kepler_eccentric_set_parameters(kepler_eccentric_solver *s,
+    const kepler_eccentric_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

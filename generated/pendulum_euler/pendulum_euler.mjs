@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bfe20a7153aaddaa8b371064f6a011e80eb93abef0a5cd4fcea3719ccdbc0858
+ * body-sha256: 12c97c32f90c80d449fb035ebdb9dac4df8254b763f131208872e4f6815a20b7
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -250,6 +250,20 @@ export class Solver {
     Object.assign(twin, { t, steps, evaluations });
     twin.carry.set(this.carry);
     return twin;
+  }
+
+  /**
+   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws StepError
+   * for values that are not admissible; then nothing changes.
+   *
+   * @param {Partial<Parameters>} changes
+   * @returns {this}
+   */
+  setParameters(changes) {
+    const params = admitted({ ...this.params, ...changes });
+    this.params = params;
+    this.h = NaN; // so that the next step computes the coefficients
+    return this;
   }
 
   /**

@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e5c0967d43d9365299b8b2ec8011c91c991f7e44647c547fa4a7d5d357c36681
+ * body-sha256: e8eac9f938e836d20f580b4338dbd3608040171a89a59475de91aed7612d7df8
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -70,6 +70,11 @@ predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, 
    predator_prey_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 predator_prey_status predator_prey_set_state(predator_prey_solver *s, const double x[predator_prey_DIM]);
 predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM]);
+
+/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
+   predator_prey_BAD_ARGUMENT, with *s unchanged, for parameters that predator_prey_init refuses. */
+predator_prey_status predator_prey_set_parameters(predator_prey_solver *s,
+    const predator_prey_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

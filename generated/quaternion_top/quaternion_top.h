@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 28422abdd87697275531917b0a311ea1603fc1a189c100372d9bd0ff06ee567a
+ * body-sha256: 3b8a9a28013b2bf6089ccd9a95885763e411eeca6e88edebd579402f7c449450
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -78,6 +78,12 @@ quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double 
    quaternion_top_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const double x[quaternion_top_DIM]);
 quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double change[quaternion_top_DIM]);
+
+/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
+   quaternion_top_BAD_ARGUMENT, with *s unchanged, for parameters that quaternion_top_init refuses. */
+/* The gauge is unchanged. */
+quaternion_top_status quaternion_top_set_parameters(quaternion_top_solver *s,
+    const quaternion_top_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f55b1992b3d0918e1e24be2101a89caa7d07fc5bed60abca9cf936cfaa25bef2
+ * body-sha256: cfcf75982e7b1a6ca8f5809126a58c9531c44874187f1cd27a56dcc81d0a83b9
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -670,6 +670,20 @@ export class Solver {
     Object.assign(twin, { t, steps, evaluations });
     twin.carry.set(this.carry);
     return twin;
+  }
+
+  /**
+   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws StepError
+   * for values that are not admissible; then nothing changes.
+   *
+   * @param {Partial<Parameters>} changes
+   * @returns {this}
+   */
+  setParameters(changes) {
+    const params = admitted({ ...this.params, ...changes });
+    this.params = params;
+    this.h = NaN; // so that the next step computes the coefficients
+    return this;
   }
 
   /**

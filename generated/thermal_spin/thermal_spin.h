@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 49afd0605d5e2470d1e43938a64ea54626359a64d320fa447bec577c9dc495ff
+ * body-sha256: b3a75c169377f87d61924cda8528473d83930776ca75cb2c1a760e4f02ec2586
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -78,6 +78,10 @@ thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h, siz
    thermal_spin_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 thermal_spin_status thermal_spin_set_state(thermal_spin_solver *s, const double x[thermal_spin_DIM]);
 thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double change[thermal_spin_DIM]);
+
+/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
+   thermal_spin_BAD_ARGUMENT, with *s unchanged, for parameters that thermal_spin_init refuses. */
+thermal_spin_status thermal_spin_set_parameters(thermal_spin_solver *s, const thermal_spin_params *params);
 
 /* As thermal_spin_integrate, with given increments of the noise: dw[k * thermal_spin_DRAWS + i] is that of
    source i in step k. NULL for random ones. */

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 02cab7dfcd07f065dcafe0c3d3c0e58b37eec74f4fc65b2af56582984add4db0
+ * body-sha256: 476480505859264d9e591e9c7e725b4f11cd5d7d24cd79107cbfff1435585b60
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -476,6 +476,20 @@ export class Solver {
     twin.carry.set(this.carry);
     twin.dw.set(this.dw);
     return twin;
+  }
+
+  /**
+   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws StepError
+   * for values that are not admissible; then nothing changes.
+   *
+   * @param {Partial<Parameters>} changes
+   * @returns {this}
+   */
+  setParameters(changes) {
+    const params = admitted({ ...this.params, ...changes });
+    this.params = params;
+    this.h = NaN; // so that the next step computes the coefficients
+    return this;
   }
 
   /**

@@ -49,6 +49,7 @@ _EXTRAS = {
     "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
     "set_state": (_INT, (_POINTER, _POINTER)),
     "kick": (_INT, (_POINTER, _POINTER)),
+    "set_parameters": (_INT, (_POINTER, _POINTER)),
     "interpolate": (_INT, (_POINTER, _POINTER, _SIZE, _POINTER)),
     "solver_time": (_DOUBLE, (_POINTER,)),
     "monitor": (_DOUBLE, (_POINTER, _POINTER)),

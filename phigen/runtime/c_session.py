@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -133,6 +133,14 @@ class CSession:
     def kick(self, change: Floats) -> None:
         """See `Session`."""
         self._move("kick", change)
+
+    def set_parameters(self, parameters: Mapping[str, float]) -> None:
+        """See `Session`."""
+        with np.errstate(over="ignore"):
+            values = np.array(list(parameters.values()), dtype=self._real)
+        status = self._c.set_parameters(self.address, values.ctypes.data) if parameters else 0
+        if status:
+            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
 
     def _move(self, function: str, by: Floats) -> None:
         if not hasattr(self._c, function):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self, cast
@@ -27,9 +28,9 @@ class LiveSession:
 
     Properties of the state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by
     name), ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps; `kick` and assignment to
-    ``x`` change the state, but neither the predictors of the solver nor a gauge. With a monitor, the energy level e
-    becomes −H of the new state. ``copy()`` returns an independent session. A session continues with the same bits
-    after pickling.
+    ``x`` change the state, but neither the predictors of the solver nor a gauge; `set_parameters` changes parameters.
+    With a monitor, the energy level e becomes −H after each of these changes. ``copy()`` returns an independent
+    session. A session continues with the same bits after pickling.
     """
 
     def __init__(
@@ -59,6 +60,20 @@ class LiveSession:
         If the new state is on another leaf, ``leaf`` has the Casimirs of that leaf from then on.
         """
         self._move(self._session.kick, self._checked(change, "change"))
+        return self
+
+    def set_parameters(self, parameters: Mapping[str, float] | None = None, /, **more: float) -> Self:
+        """Replace parameters, and return the session; state, time, attitude and random numbers are unchanged.
+
+        Raises `TypeError` and `ValueError` for names and values that are not admissible; nothing changes then.
+        """
+        changes = arguments.together(parameters, more)
+        values = self.solver.values({**self.parameters, **changes}, {})
+        try:
+            self._session.set_parameters(values)
+        except BackendError as error:
+            raise self.solver.failure(error, math.nan, None, values) from error
+        self.parameters = values
         return self
 
     def step(self, h: float, steps: int = 1) -> Self:
@@ -163,6 +178,10 @@ class LiveLattice(LiveSession):
 
     def __init__(self, solver: LatticeSolver, at: Beginning) -> None:
         super().__init__(solver, cast("Session", LatticeCourse(solver, at)), at.values, at.t0)
+
+    def set_parameters(self, parameters: Mapping[str, float] | None = None, /, **more: float) -> Self:
+        """Raise `TypeError`: the parameters of a lattice are fixed during a session."""
+        raise TypeError("the parameters of a lattice are fixed: start another session at x, with t0")
 
     @property
     def energy(self) -> float:

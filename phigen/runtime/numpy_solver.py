@@ -135,6 +135,21 @@ class NumpySession:
                 element[:4] /= np.sqrt(element[:4] @ element[:4])
             self.turn_from(element)
 
+    def set_parameters(self, parameters: Mapping[str, float]) -> None:
+        """See `Session`."""
+        values = self._module._values(dict(parameters))
+        monitored = hasattr(self._module, "_refused")
+        if not self._module._admissible(values) or (monitored and len(self._module._refused(values, self._x))):
+            raise BackendError("BAD_ARGUMENT", self.steps, self._x.copy())
+        element = None if self._turned is None else self.element()
+        self._t, self._counted = self._now(), self.steps
+        self._parameters = dict(parameters)
+        if monitored:  # e = -H
+            self._gauge = self._module.gauge(self._x[0], **self._parameters)
+        self._h, self._stages, self._memory = np.nan, [], []
+        if element is not None:
+            self.turn_from(element)
+
     def _values(self) -> Any:
         return self._module._values(dict(self._parameters))
 

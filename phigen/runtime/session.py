@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, Self
 
 import numpy as np
@@ -59,6 +59,13 @@ class Session(Followed, Protocol):
 
     The states have the same bits however the steps are divided into calls.
     """
+
+    def set_parameters(self, parameters: Mapping[str, float]) -> None:
+        """Replace all parameters; state, time, attitude and random numbers are unchanged.
+
+        With a monitor, the energy level becomes −H. Raises `BackendError` for values that are not admissible.
+        """
+        ...
 
     def advance_along(self, h: float, increments: Floats) -> None:
         """Make one step for each row of the increments of the noise (steps, draws), which replace random ones."""

@@ -635,6 +635,8 @@ JAVASCRIPT = """(() => {
   s.integrate(-0.03, 30);
   const found = [[...s.attitude], [...(s.position ?? [])]];
   s.kick(s.x.map((x) => 0.1 * x)).step(0.05);
+  const params = Object.entries(s.params).map(([name, value]) => [name, 1.1 * value]);
+  s.setParameters(Object.fromEntries(params)).step(0.05);
   return [...found, [...s.attitude], [...(s.position ?? [])]];
 })()"""
 
@@ -652,5 +654,6 @@ def test_javascript_has_the_attitude_of_numpy_after_kicks_too(case):
     assert found[0] == pytest.approx(session.attitude.ravel(), abs=3e-15)
     assert not expected.position or found[1] == pytest.approx(session.position, abs=3e-15)
     session.kick(0.1 * session.x).step(0.05)
+    session.set_parameters({name: 1.1 * value for name, value in session.parameters.items()}).step(0.05)
     assert turned == pytest.approx(session.attitude.ravel(), abs=3e-15)
     assert not expected.position or moved == pytest.approx(session.position, abs=3e-15)

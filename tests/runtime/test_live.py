@@ -27,10 +27,11 @@ def test_kicked_sessions_of_c_and_numpy_are_one_trajectory(name):
         kick = 1e-2 * np.array(at.x)
         session.step(at.h, 20).kick(kick).step(at.h).kick(-0.9 * kick).step(0.5 * at.h, 10)
         session.x = 0.7 * session.x
-        session.step(at.h, 3)
+        session.step(at.h, 3).set_parameters({name: 1.1 * value for name, value in session.parameters.items()})
+        session.step(at.h, 10)
         found.append([*session.x, session.t, session.energy, *session.casimirs.values()])
         found[-1] += [] if session.attitude is None else session.attitude.tolist()
-        assert session.steps == 34
+        assert session.steps == 44
     assert np.allclose(found[0], found[1], rtol=1e-11, atol=1e-12)
 
 
@@ -122,3 +123,27 @@ def test_what_is_not_allowed_leaves_all_as_it_was(target):
     with pytest.raises(StepError):
         session.step(1e300)
     assert (session.x.tolist(), session.steps) == (before.tolist(), 3)
+
+
+@pytest.mark.thin(2)
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_after_a_change_of_parameters_a_session_goes_on_as_one_that_starts_there(name, target):
+    """The gauge is the old one, by which steps differ within their error."""
+    session, at = session_of(name, target)
+    unknown = {"unknown": 1.0}
+    before = session.step(at.h, 20).parameters
+    changed = {p: 1.2 * value for p, value in before.items()}
+    when = {"t0": session.t} if name == "duffing" else {}
+    first = {} if session.attitude is None else {"attitude0": session.attitude}
+    still = session.solver.session(session.x, parameters=before, **when, **first).step(at.h, 30)
+    fresh = session.solver.session(session.x, parameters=changed, **when, **first).step(at.h, 30)
+    with pytest.raises(TypeError, match="unknown"):
+        session.set_parameters(unknown)
+    with pytest.raises(ValueError, match="must be finite|nan"):
+        session.set_parameters(dict.fromkeys(before, np.nan))
+    found = session.set_parameters(changed).step(at.h, 30)
+    assert found.parameters == changed
+    off, size = np.abs(found.x - fresh.x).max(), np.abs(fresh.x - still.x).max()
+    assert off < 1e-8 * size
+    assert found.attitude is None or found.attitude == pytest.approx(fresh.attitude, abs=1e-8)

@@ -63,7 +63,7 @@ MODULES = {
     "level_stages": "MONITOR && IMPLICIT",
     "level_gauss": "MONITOR && GAUSS",
     "level_flows": "MONITOR && SPLITTING",
-    "level_moved": "MONITOR && KICKED",
+    "level_moved": "MONITOR",
     "attitude": "ATTITUDE",
     "attitude_first": "ATTITUDE && !RATE_OF_GAUGE",
     "attitude_gauge": "RATE_OF_GAUGE",

@@ -15,7 +15,10 @@ import { takeDraws } from "./philox.mjs";
 import { takeTime } from "./timed.mjs";
 import { takeGauge } from "./gauge_taken.mjs";
 import { expectPassingTime } from "./level.mjs";
+import { takeLevel } from "./level_moved.mjs";
 import { beginAttitude, elementOf } from "./attitude.mjs";
+import { restartAttitude } from "./attitude_gauge.mjs";
+import { forgetSteps } from "./gauss.mjs";
 import { renew } from "./renewed_stages.mjs";
 
 // ---- The solver ----
@@ -176,6 +179,24 @@ export class Solver {
     Object.assign(twin, { t, steps, evaluations });
     // #state copied
     return twin;
+  }
+
+  /**
+   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws StepError
+   * for values that are not admissible; then nothing changes.
+   *
+   * @param {Partial<Parameters>} changes
+   * @returns {this}
+   */
+  setParameters(changes) {
+    const params = admitted({ ...this.params, ...changes });
+    takeLevel({ ...this, params, h: NaN }, this.x);
+    this.params = params;
+    this.h = NaN; // so that the next step computes the coefficients
+    takeLevel(this, this.x);
+    forgetSteps(this);
+    restartAttitude(this);
+    return this;
   }
 
   // #members kicks
