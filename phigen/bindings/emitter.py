@@ -41,7 +41,7 @@ class BindingLanguage:
 LANGUAGES = {
     "cpp": BindingLanguage({"NAME.hpp": ("cpp.hpp",)}, "//", ("double", "float")),
     "fortran": BindingLanguage(
-        {"NAME.f90": ("fortran.f90", "fortran_procedures.f90", "fortran_status.f90")},
+        {"NAME.f90": tuple(f"fortran{part}.f90" for part in ("", "_interface", "_procedures", "_optional", "_status"))},
         "!",
         ("c_double", "c_float"),
         caseless=True,
@@ -50,7 +50,7 @@ LANGUAGES = {
     "matlab": BindingLanguage({"NAME_mex.c": ("matlab.c",)}, "//", ("double", "float")),
     "rust": BindingLanguage(
         {
-            "rust/src/lib.rs": ("rust.rs", "rust_solver.rs"),
+            "rust/src/lib.rs": ("rust.rs", "rust_model.rs", "rust_solver.rs"),
             "rust/build.rs": ("rust_build.rs",),
             "rust/Cargo.toml": ("rust.toml",),
         },

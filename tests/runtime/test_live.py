@@ -140,7 +140,7 @@ def test_after_a_change_of_parameters_a_session_goes_on_as_one_that_starts_there
     fresh = session.solver.session(session.x, parameters=changed, **when, **first).step(at.h, 30)
     with pytest.raises(TypeError, match="unknown"):
         session.set_parameters(unknown)
-    with pytest.raises(ValueError, match="must be finite|nan"):
+    with pytest.raises(ValueError, match=r"must be finite|nan"):
         session.set_parameters(dict.fromkeys(before, np.nan))
     found = session.set_parameters(changed).step(at.h, 30)
     assert found.parameters == changed
