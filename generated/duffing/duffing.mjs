@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: aa3a61fc4f69f67f569f5deb8f3fb315ec1dd777cd41845d86e099e54d73c131
+ * body-sha256: fca5cb7753e47a017108140f1836d6c24eea6ba590e66494ee4b2946c680b033
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -373,8 +373,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws StepError
-   * for values that are not admissible; then nothing changes.
+   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws
+   * StepError for values that are not admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}

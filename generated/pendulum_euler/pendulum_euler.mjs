@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 12c97c32f90c80d449fb035ebdb9dac4df8254b763f131208872e4f6815a20b7
+ * body-sha256: 4d0da004fed23137a091f6a56c2c580dca9796cea92fb75f3b47056d2ca7a4e6
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -253,8 +253,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws StepError
-   * for values that are not admissible; then nothing changes.
+   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws
+   * StepError for values that are not admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}

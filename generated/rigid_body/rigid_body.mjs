@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cfcf75982e7b1a6ca8f5809126a58c9531c44874187f1cd27a56dcc81d0a83b9
+ * body-sha256: 66ddbcd8ec6e40f5bcb4223239214afbdaaba17e5c78efde384935c7ace8bb79
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -673,8 +673,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws StepError
-   * for values that are not admissible; then nothing changes.
+   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws
+   * StepError for values that are not admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 476480505859264d9e591e9c7e725b4f11cd5d7d24cd79107cbfff1435585b60
+ * body-sha256: a649b102aac7352f7280ede384933346550c4496338630e8b992dbced4cedb0b
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -479,8 +479,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws StepError
-   * for values that are not admissible; then nothing changes.
+   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws
+   * StepError for values that are not admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}

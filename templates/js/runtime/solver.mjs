@@ -182,8 +182,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws StepError
-   * for values that are not admissible; then nothing changes.
+   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws
+   * StepError for values that are not admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}
