@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 043c799002dc2a9b79a97433a45e2b98fdcb7da8aac78abdc38637653932efc4
+ * body-sha256: 4729dada9f1b23744b14beed591f0bb70f2f4a4587c16eb5a44838cd79cb4cf3
  */
 #include "duffing.h"
 #include <float.h>
@@ -392,6 +392,20 @@ duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM])
     memcpy(from, s->x, sizeof from);
     if (!duffing_advance(s, change, s->carry)) return duffing_BAD_ARGUMENT;
     for (int i = 0; i < duffing_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
+    return duffing_OK;
+}
+
+duffing_status duffing_set_parameters(duffing_solver *s, const duffing_params *params)
+{
+    if (s == NULL || params == NULL) return duffing_BAD_ARGUMENT;
+    duffing_solver changed = *s;
+    changed.params = *params;
+    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
+    duffing_prepare(&changed.params, duffing_PROBE_STEP, changed.coef);
+    if (!duffing_finite(changed.x, duffing_DIM) || !duffing_allowed(&changed.params)
+        || !duffing_finite(changed.coef, duffing_COEFFICIENTS))
+        return duffing_BAD_ARGUMENT;
+    *s = changed;
     return duffing_OK;
 }
 

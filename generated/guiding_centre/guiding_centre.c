@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 5ea8a98a29b3f9801ebcd0d191b1cc1709b3bc0cacf007fd9c3eea8b1f46ab81
+ * body-sha256: 1dc40e008e0b68daa73b6276cc1584a257dcfff7b511c3ca0734d1e68d4263fc
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -702,6 +702,21 @@ guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double
     if (!guiding_centre_advance(s, change, s->carry)) return guiding_centre_BAD_ARGUMENT;
     for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
         for (int i = 0; i < guiding_centre_DIM; ++i) s->history[stage].difference[0][i] += s->x[i] - from[i];
+    return guiding_centre_OK;
+}
+
+guiding_centre_status guiding_centre_set_parameters(guiding_centre_solver *s,
+    const guiding_centre_params *params)
+{
+    if (s == NULL || params == NULL) return guiding_centre_BAD_ARGUMENT;
+    guiding_centre_solver changed = *s;
+    changed.params = *params;
+    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
+    guiding_centre_prepare(&changed.params, guiding_centre_PROBE_STEP, changed.coef[0]);
+    if (!guiding_centre_finite(changed.x, guiding_centre_DIM) || !guiding_centre_allowed(&changed.params)
+        || !guiding_centre_finite(changed.coef[0], guiding_centre_COEFFICIENTS))
+        return guiding_centre_BAD_ARGUMENT;
+    *s = changed;
     return guiding_centre_OK;
 }
 

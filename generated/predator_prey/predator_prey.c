@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 4cc748874cddd4a95ce080f1881c3a5f3f3b3f490bbad10e8613e6f6a6235b02
+ * body-sha256: 554b2e90b8b1f91fa79ce99343271bd71f7561112217108a0bb81bd37bb0e0a9
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -361,6 +361,20 @@ predator_prey_status predator_prey_kick(predator_prey_solver *s, const double ch
     memcpy(from, s->x, sizeof from);
     if (!predator_prey_advance(s, change, s->carry)) return predator_prey_BAD_ARGUMENT;
     for (int i = 0; i < predator_prey_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
+    return predator_prey_OK;
+}
+
+predator_prey_status predator_prey_set_parameters(predator_prey_solver *s, const predator_prey_params *params)
+{
+    if (s == NULL || params == NULL) return predator_prey_BAD_ARGUMENT;
+    predator_prey_solver changed = *s;
+    changed.params = *params;
+    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
+    predator_prey_prepare(&changed.params, predator_prey_PROBE_STEP, changed.coef);
+    if (!predator_prey_finite(changed.x, predator_prey_DIM) || !predator_prey_allowed(&changed.params)
+        || !predator_prey_finite(changed.coef, predator_prey_COEFFICIENTS))
+        return predator_prey_BAD_ARGUMENT;
+    *s = changed;
     return predator_prey_OK;
 }
 

@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: several steps or members at once; Newton's method in
  *   lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members:
  *   implicit steps; Ensembles
- * body-sha256: c5e523aa32df7993bb9b98b52e898452a1db8480629a55da6d297f6748ea7bf5
+ * body-sha256: d18e8f83beb5e5c1d35f984ca1df4b56e7325d15095621a57429f833f43475b3
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -946,6 +946,20 @@ rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigi
     memcpy(from, s->x, sizeof from);
     if (!rigid_body_advance(s, change, s->carry)) return rigid_body_BAD_ARGUMENT;
     rigid_body_move_guesses(s, from);
+    return rigid_body_OK;
+}
+
+rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_body_params *params)
+{
+    if (s == NULL || params == NULL) return rigid_body_BAD_ARGUMENT;
+    rigid_body_solver changed = *s;
+    changed.params = *params;
+    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
+    rigid_body_prepare(&changed.params, changed.gauge, rigid_body_PROBE_STEP, changed.coef);
+    if (!rigid_body_finite(changed.x, rigid_body_DIM) || !rigid_body_allowed(&changed.params)
+        || !rigid_body_finite(changed.coef, rigid_body_COEFFICIENTS))
+        return rigid_body_BAD_ARGUMENT;
+    *s = changed;
     return rigid_body_OK;
 }
 

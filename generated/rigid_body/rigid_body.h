@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 32969739894d7f4afc3c97e56da0f8258f353202aa473851900c20a9fc945cb3
+ * body-sha256: 217bbbc8b2895a9ab88eacbf9bcb4709334d0bf4fd91a75aa08c1ab7d52320b0
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -103,6 +103,11 @@ rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t st
    rigid_body_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 rigid_body_status rigid_body_set_state(rigid_body_solver *s, const double x[rigid_body_DIM]);
 rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigid_body_DIM]);
+
+/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
+   rigid_body_BAD_ARGUMENT, with *s unchanged, for parameters that rigid_body_init refuses. */
+/* The gauge is unchanged. */
+rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_body_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 47068a45e4d6225cfd6d4ee1a2c75c37181e195bd77f179226bdecc76195f7d1
+ * body-sha256: 9a85f95befe7e73bdcb1838dd4f56392f2c980b11c290d1bdbf81449815b4c6c
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -489,6 +489,20 @@ thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double chang
 {
     if (s == NULL || change == NULL) return thermal_spin_BAD_ARGUMENT;
     if (!thermal_spin_advance(s, change, s->carry)) return thermal_spin_BAD_ARGUMENT;
+    return thermal_spin_OK;
+}
+
+thermal_spin_status thermal_spin_set_parameters(thermal_spin_solver *s, const thermal_spin_params *params)
+{
+    if (s == NULL || params == NULL) return thermal_spin_BAD_ARGUMENT;
+    thermal_spin_solver changed = *s;
+    changed.params = *params;
+    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
+    thermal_spin_prepare(&changed.params, thermal_spin_PROBE_STEP, changed.coef);
+    if (!thermal_spin_finite(changed.x, thermal_spin_DIM) || !thermal_spin_allowed(&changed.params)
+        || !thermal_spin_finite(changed.coef, thermal_spin_COEFFICIENTS))
+        return thermal_spin_BAD_ARGUMENT;
+    *s = changed;
     return thermal_spin_OK;
 }
 
