@@ -10,7 +10,8 @@ import click
 
 from phigen.cli.arguments import FIGURES, file_ending, one_spec, run_option, settings_option
 from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
-from phigen.cli.existing import force_option, wrote
+from phigen.cli.existing import expect_same_origin, force_option, wrote
+from phigen.cli.experiment import run_of
 from phigen.cli.sources import load_one
 from phigen.cli.tune import initial_value_problem
 from phigen.errors import SpecError
@@ -58,6 +59,7 @@ def command(
     the system are left out.
     """
     from phigen.compiler import compile_proved
+    from phigen.runtime.origin import origin_of
     from phigen.tuning.comparison import compare
 
     for value, option in ((horizon, "--horizon"), (budget, "--budget")):
@@ -70,6 +72,8 @@ def command(
         require_matplotlib()
     spec = load_one(spec_file)
     _expect_comparable(spec)
+    origin = origin_of(spec, run_of(spec, name), "compare")
+    expect_same_origin({"--plot": plot}, origin)
     compilation = compile_proved(spec.for_running(tangent=spec.lattice is None))
     run, problem = initial_value_problem(console, compilation, name, settings, horizon, "energy")
     result = compare(compilation, problem, compared_orders, equal=equal, budget=budget, note=console.note)
@@ -80,7 +84,7 @@ def command(
     if plot:
         from phigen.drawing import comparison, figures
 
-        figures.save(comparison.figure(result, f"{spec.name}, run {run.name}"), plot)
+        figures.save(comparison.figure(result, f"{spec.name}, run {run.name}"), plot, str(origin))
         console.note(wrote(plot))
 
 

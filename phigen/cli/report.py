@@ -10,7 +10,7 @@ import click
 
 from phigen.cli.arguments import expect_writable, one_spec, order_option, run_option, scheme_option
 from phigen.cli.console import Console, out_document, pass_console, verbosity
-from phigen.cli.existing import expect_replaceable, force_option, wrote
+from phigen.cli.existing import expect_replaceable, expect_same_origin, force_option, wrote
 from phigen.cli.experiment import prepared, run_of
 from phigen.cli.sources import load_one
 from phigen.errors import CheckError
@@ -56,6 +56,8 @@ def command(
     from phigen.proofs.examination import refutation
     from phigen.report.document import document
     from phigen.report.lattice_page import lattice_document
+    from phigen.report.page import with_origin
+    from phigen.runtime.origin import origin_of
 
     spec = load_one(spec_file)
     if panel:
@@ -66,6 +68,8 @@ def command(
         expect_writable(Path(target), "--output")
         expect_replaceable(Path(target), "--output")
     run = run_of(spec, name) if spec.runs or name or lyapunov else None
+    origin = origin_of(spec, run, "report")
+    expect_same_origin({"--output": None if output == "-" else Path(target)}, origin)
     if run is None:
         console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
     experiment = prepared(spec, name) if run and not spec.lattice else None
@@ -86,7 +90,7 @@ def command(
             examination, examination.compilation, experiment, written, scheme, lyapunov, quick, console
         )
         page, figures = document(material), bool(material.methods)
-    write_page(page, figures, output, target, console)
+    write_page(with_origin(page, str(origin)), figures, output, target, console)
     if failures:
         raise failures[0]
 
@@ -94,7 +98,9 @@ def command(
 def write_panel(spec: Spec, name: str | None, output: str | None, measuring: bool, console: Console) -> None:
     """Write the page of the live panel of a run, or print it. Raises `NoPanelError`."""
     from phigen.compiler import compile_proved
+    from phigen.report.page import with_origin
     from phigen.report.panel import panel_page
+    from phigen.runtime.origin import origin_of
 
     if measuring:
         raise click.UsageError("--panel measures nothing: leave out --lyapunov and --quick")
@@ -102,7 +108,10 @@ def write_panel(spec: Spec, name: str | None, output: str | None, measuring: boo
     if output != "-":
         expect_writable(Path(target), "--output")
         expect_replaceable(Path(target), "--output")
-    html = panel_page(compile_proved(spec), run_of(spec, name))
+    run = run_of(spec, name)
+    origin = origin_of(spec, run, "panel")
+    expect_same_origin({"--output": None if output == "-" else Path(target)}, origin)
+    html = with_origin(panel_page(compile_proved(spec), run), str(origin))
     if output == "-":
         out_document(html)
         return

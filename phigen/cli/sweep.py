@@ -17,7 +17,7 @@ from phigen.cli.arguments import (
     target_option,
 )
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.existing import force_option, wrote
+from phigen.cli.existing import expect_same_origin, force_option, wrote
 from phigen.cli.sources import load_one
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ def command(
     """
     from phigen.cli.energy_warning import sweep_warning
     from phigen.progress import stage
+    from phigen.runtime.origin import origin_of
     from phigen.sweeping.sweep import SweepSetting, made
 
     if scheduler and workers:
@@ -94,6 +95,8 @@ def command(
     if shown and shown not in sweep.stored:
         stored = ", ".join(sweep.stored)
         raise click.BadParameter(f"{shown!r} is not stored; the sweep stores {stored}", param_hint="--show")
+    origin = origin_of(spec, sweep, "sweep")
+    expect_same_origin({"--plot": plot}, origin)
     setting = SweepSetting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme, profile)
     with console.watching(), stage(f"sweep {sweep.name}") as progress:
 
@@ -117,7 +120,7 @@ def command(
     if plot:
         from phigen.drawing.sweep_map import draw
 
-        draw(setting.output, plot, shown)
+        draw(setting.output, plot, shown, str(origin))
         console.note(wrote(plot))
 
 

@@ -10,7 +10,7 @@ import click
 
 from phigen.cli.arguments import FIGURES, file_ending, one_spec, profile_option, run_option, settings_option
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.existing import force_option, wrote
+from phigen.cli.existing import expect_same_origin, force_option, wrote
 from phigen.cli.experiment import loaded, prepared, run_of
 from phigen.cli.sources import load_one
 from phigen.cli.tune_summary import described, print_monitors, print_tuning, unreached
@@ -72,6 +72,7 @@ def command(
     """
     from phigen.api import chosen_target
     from phigen.compiler import compile_proved
+    from phigen.runtime.origin import origin_of
     from phigen.tuning.study import tune
 
     _expect_positive(horizon, "--horizon")
@@ -91,6 +92,8 @@ def command(
         place = ("damping",) if ("damping",) in spec.locations else ("forces",)
         message = "forces change the energy, so its change is not an error of the method"
         raise SpecError([spec.diagnostic(place, message, "--measure orbit compares with a reference solution")])
+    origin = origin_of(spec, run_of(spec, name), "tune")
+    expect_same_origin({"--plot": plot}, origin)
     compilation = compile_proved(spec.for_running(profile=profile))
     chosen_target("auto", console.note)
     run, problem = initial_value_problem(console, compilation, name, settings, horizon, measure)
@@ -104,7 +107,7 @@ def command(
     if plot:
         from phigen.drawing import figures
 
-        figures.save(figures.tuning_figure(tuning, f"{spec.name}, run {run.name}"), str(plot))
+        figures.save(figures.tuning_figure(tuning, f"{spec.name}, run {run.name}"), plot, str(origin))
         console.note(wrote(plot))
     if not tuning.winner:
         raise CheckError(unreached(tuning))

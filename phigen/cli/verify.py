@@ -21,8 +21,8 @@ from phigen.cli.arguments import (
     scheme_option,
 )
 from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
-from phigen.cli.existing import force_option, wrote
-from phigen.cli.experiment import Experiment, expect_system, prepared
+from phigen.cli.existing import expect_same_origin, force_option, wrote
+from phigen.cli.experiment import Experiment, expect_system, prepared, run_of
 from phigen.cli.failures import Collector
 from phigen.cli.resizing import resized, sizes_option
 from phigen.cli.sources import load_all
@@ -73,6 +73,7 @@ def command(
     a measurement misses its bound.
     """
     from phigen.compiler import compile_proved
+    from phigen.runtime.origin import origin_of
 
     collector, verifications = Collector(), []
     specs = load_all(spec_files, collector)
@@ -87,6 +88,7 @@ def command(
             spec = resized(source, name, sizes)
             if plot:
                 expect_system(spec)
+                expect_same_origin({"--plot": plot}, origin_of(spec, run_of(spec, name), "verify"))
             compilation = compile_proved(
                 spec.for_running(order=order, scheme=scheme, profile=profile, adjoint=adjoint, tangent=True)
             )
@@ -106,10 +108,13 @@ def command(
 
 def _draw(path: Path, compilation: Compilation, experiment: Experiment, console: Console) -> None:
     from phigen.drawing import figures
+    from phigen.runtime.origin import origin_of
     from phigen.study.backward import NotOfferedError
 
+    origin = str(origin_of(compilation.spec, experiment.run, "verify"))
+
     try:
-        figures.save(figures.constancy_figure(constancy_of(compilation, experiment)), path)
+        figures.save(figures.constancy_figure(constancy_of(compilation, experiment)), path, origin)
     except (NotOfferedError, StepError) as error:
         console.warn(f"{compilation.spec.name}: the modified Hamiltonian cannot be drawn: {error}")
         return
@@ -163,7 +168,6 @@ def verified_lattice(
     """The same for a lattice."""
     from phigen.api import chosen_target, lattice_solver_of
     from phigen.cli.endings import ended
-    from phigen.cli.experiment import run_of
     from phigen.cli.lattice_experiment import LatticeExperiment
     from phigen.lattice.states import start_of
     from phigen.study.lattice_verification import verify_lattice

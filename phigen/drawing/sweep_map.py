@@ -28,10 +28,10 @@ _PANELS, _COLUMNS = 6, 3
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 
 
-def draw(store: Path, path: Path, shown: str | None = None) -> None:
+def draw(store: Path, path: Path, shown: str | None = None, origin: str = "") -> None:
     """Draw a variable of a store into a file; by default all kept observables, else the first other variable.
 
-    Raises `FileError` if the store has no variable with this name.
+    The text ``origin`` goes into its metadata. Raises `FileError` if the store has no variable with this name.
     """
     import xarray
 
@@ -49,7 +49,7 @@ def draw(store: Path, path: Path, shown: str | None = None) -> None:
         names = [shown] if shown else [n for n in observed if not n.startswith(("std(", "error("))] or known[:1]
         logarithmic = {axis.name for axis in plan.axes if axis.scale == "log"}
         varied = {axis.name for axis in plan.drawn} | {*plan.listed}
-        save(_figure(data, names[:_PANELS], logarithmic, varied), path)
+        save(_figure(data, names[:_PANELS], logarithmic, varied), path, origin)
 
 
 @styled

@@ -124,6 +124,12 @@ def alone(title: str, body: Markup, solvers: str, panel: Sequence[str]) -> str:
     return _complete("alone", [_short(script) for script in scripts], title=title, body=body)
 
 
+def with_origin(html: str, origin: str) -> str:
+    """Return a page that names its origin in its metadata."""
+    generator = '<meta name="generator"'
+    return html.replace(generator, f'<meta name="source" content="{escape(origin)}">\n{generator}', 1)
+
+
 def _short(script: str) -> str:
     """Return a script without comment lines and without indentation."""
     lines = (line.strip() for line in script.splitlines())

@@ -1,9 +1,9 @@
 """Origins of files: which run of which spec wrote a table, a store, a figure or a film.
 
-An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``. It is an array ``origin`` of a ``.npz``, an
-attribute of a Zarr store, and in the metadata of figures and films. A ``.csv`` has no place for it that all readers
-skip, so it is in the companion ``FILE-metadata.json``, where the W3C recommendation "Metadata Vocabulary for Tabular
-Data" has the metadata of a table.
+An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``, followed by the command if that is not
+``phigen run``. It is an array ``origin`` of a ``.npz``, an attribute of a Zarr store, and in the metadata of figures,
+films and pages. A ``.csv`` has no place for it that all readers skip, so it is in the companion ``FILE-metadata.json``,
+where the W3C recommendation "Metadata Vocabulary for Tabular Data" has the metadata of a table.
 """
 
 from __future__ import annotations
@@ -18,25 +18,32 @@ from urllib.parse import quote, unquote
 import numpy as np
 
 from phigen.spec.identity import digest
-from phigen.spec.model import Run, Spec
+from phigen.spec.model import Run, Spec, SweepSettings
 from phigen.writing import write
 
-_FORM = re.compile(rb"phigen origin: (\S+) (\S+) ([0-9a-f]{16})(?![0-9a-f])")
+_FORM = re.compile(rb"phigen origin: (\S+) (\S+) ([0-9a-f]{16})(?![0-9a-f])(?: by (\w+))?")
 
 
 @dataclass(frozen=True)
 class Origin:
-    """A run of a spec, with a `phigen.spec.identity.digest` of the equations and observables of the spec."""
+    """A run of a spec, with a `phigen.spec.identity.digest` of the equations and observables of the spec.
+
+    ``command`` is the command of phigen that wrote the file. For sweeps ``run`` is the name of the sweep.
+    """
 
     spec: str
     run: str
     digest: str
+    command: str = "run"
 
     def __str__(self) -> str:
-        return f"phigen origin: {quote(self.spec)} {quote(self.run)} {self.digest}"
+        by = "" if self.command == "run" else f" by {self.command}"
+        return f"phigen origin: {quote(self.spec)} {quote(self.run)} {self.digest}{by}"
 
     def difference(self, other: Origin) -> str:
         """Return how another origin differs, as the end of the sentence "the file holds …"; "" if it does not."""
+        if self.command != other.command:
+            return f"a result of phigen {other.command}, not of phigen {self.command}"
         if (self.spec, self.run) != (other.spec, other.run):
             return f"the run {other.run} of {other.spec}, not the run {self.run} of {self.spec}"
         if self.digest != other.digest:
@@ -44,9 +51,9 @@ class Origin:
         return ""
 
 
-def origin_of(spec: Spec, run: Run) -> Origin:
-    """Return the origin of the files of a run."""
-    return Origin(spec.name, run.name, digest(spec))
+def origin_of(spec: Spec, run: Run | SweepSettings | None, command: str = "run") -> Origin:
+    """Return the origin of the files of a command about a run or a sweep; None stands for a spec without runs."""
+    return Origin(spec.name, run.name if run else "-", digest(spec), command)
 
 
 def companion(path: Path) -> Path:
@@ -98,4 +105,5 @@ def _header(path: Path) -> list[str]:
 
 def _within(data: bytes) -> Origin | None:
     match = _FORM.search(data)
-    return Origin(*(unquote(part.decode("ascii", "replace")) for part in match.groups())) if match else None
+    parts = match.groups(default=b"run") if match else ()
+    return Origin(*(unquote(part.decode("ascii", "replace")) for part in parts)) if parts else None

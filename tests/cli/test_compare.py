@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import phigen as package
+from phigen.runtime.origin import read_origin
 
 BODY = """\
 phigen: 1
@@ -32,6 +33,7 @@ def body(in_tmp):
 def test_numbers_are_those_of_the_methods(phigen, body, equal):
     done = phigen("compare", body, "--equal", equal, "--budget", "300", "--json", "--plot", "c.svg")
     assert done.exit_code == 0, done.stderr
+    assert str(read_origin(Path("c.svg"))).endswith(" by compare")
     found = json.loads(done.stdout)
     entries = {entry["title"]: entry for entry in found["methods"] if not entry["refusal"]}
     assert {"RK4", "DOP853", "exponential, order 4", "cayley, order 2"} <= set(entries)

@@ -56,6 +56,11 @@ def test_pages_of_others_are_replaced_by_force_only(phigen, in_tmp):
     (in_tmp / "page.html").write_bytes(MINE)
     assert phigen("report", "pendulum", "--panel", "-o", "page.html").exit_code == 2
     assert "replaced page.html" in phigen("report", "pendulum", "--panel", "-o", "page.html", "--force").stderr
+    assert "replaced page.html" in phigen("report", "pendulum", "--panel", "-o", "page.html").stderr
+    refused = phigen("report", "harmonic_oscillator", "--panel", "-o", "page.html")
+    assert refused.exit_code == 2
+    assert "'page.html' holds the run libration of pendulum, not the run swing" in refused.stderr
+    assert "a result of phigen panel, not of phigen report" in phigen("report", "pendulum", "-o", "page.html").stderr
 
 
 OSCILLATOR = """phigen: 1
@@ -67,6 +72,17 @@ runs:
   r: {initial: [1, 0], step: 0.1, steps: 5, section: p}
   s: {initial: [1, 0], step: 0.1, steps: 5, section: q}
 """
+
+
+@pytest.mark.parametrize("command", ["compare", "tune", "verify", "sweep"])
+def test_figures_of_other_commands_are_replaced_by_force_only(phigen, write, in_tmp, command):
+    spec = write("spec.yaml", f"{OSCILLATOR}sweeps: {{r: {{over: {{q: [1, 2]}}}}}}\n")
+    drawn = f"<svg><!-- phigen origin: swing r {16 * '0'} --></svg>".encode()
+    (in_tmp / "a.svg").write_bytes(drawn)
+    refused = phigen(command, spec, "--plot", "a.svg")
+    assert refused.exit_code == 2
+    assert f"'a.svg' holds a result of phigen run, not of phigen {command}; --force replaces it" in refused.stderr
+    assert (in_tmp / "a.svg").read_bytes() == drawn
 
 
 @pytest.mark.parametrize(

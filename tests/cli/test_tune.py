@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from phigen import resources
+from phigen.runtime.origin import read_origin
 
 SPECS = resources.bundled_specs()
 
@@ -25,6 +26,7 @@ def test_pasted_lines_reach_the_accuracy_at_the_proposed_step(phigen, in_tmp):
     path = SPECS / "henon_heiles.yaml"
     done = phigen("tune", path, "--accuracy", "1e-6", "--horizon", "500", "--budget", "3", "--json", "--plot", "w.svg")
     assert done.exit_code == 0, done.stderr
+    assert str(read_origin(in_tmp / "w.svg")).endswith(" by tune")
     found = json.loads(done.stdout)
     best = found["winner"]
     assert best["error"] <= 1e-6

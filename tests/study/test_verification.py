@@ -15,6 +15,7 @@ from phigen.cli import group
 from phigen.compiler import compile_spec, emit
 from phigen.runtime.interface import Interface
 from phigen.runtime.numpy_solver import NumpySolver
+from phigen.runtime.origin import read_origin
 from phigen.runtime.solver import Solver
 from phigen.scheme.assemble import build_program
 from phigen.study import backward, measures, verification
@@ -264,6 +265,7 @@ def test_command_draws_the_modified_hamiltonian_of_one_spec(tmp_path):
     assert done.exit_code == 0
     assert picture.read_text(encoding="utf-8").count("<path") > 10
     assert f"wrote {picture}" in done.stderr
+    assert str(read_origin(picture)).endswith(" by verify")
 
 
 def test_derivatives_are_compared_near_a_singularity_too():

@@ -27,6 +27,7 @@ dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
 pytest.importorskip("zarr")
 
+from phigen.runtime.origin import read_origin  # noqa: E402
 from phigen.sweeping import cluster as clusters  # noqa: E402
 from phigen.sweeping import sweep as sweeping  # noqa: E402
 
@@ -125,6 +126,7 @@ def test_what_is_kept_of_members_is_that_of_single_runs(spec, cluster, tmp_path,
     assert done.exit_code == 0, done.output
     assert "6 members (I2 2 × x1 3), 6 made now" in done.output
     assert "<svg" in (tmp_path / "map.svg").read_text()
+    assert str(read_origin(tmp_path / "map.svg")).endswith(" by sweep")
     data = xarray.open_zarr(store).load()
     assert data.sizes == {"I2": 2, "x1": 3, "coordinate": 3, "frame": 3}
     solver = phigen.compile(spec, tangent=True)
@@ -514,7 +516,7 @@ def drawn(store, monkeypatch, shown=None):
     from phigen.drawing import sweep_map
 
     figures = []
-    monkeypatch.setattr(sweep_map, "save", lambda figure, path: figures.append(figure))
+    monkeypatch.setattr(sweep_map, "save", lambda figure, path, origin: figures.append(figure))
     sweep_map.draw(store, store.with_suffix(".svg"), shown)
     return figures[0].get_axes()
 
