@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import math
 
+from phigen.api import chosen_target
+from phigen.compilation import Compilation
 from phigen.geometry.conservation import LARGE_ENERGY_ERROR, RELATIVE, SITES, TERMS, Unit
+from phigen.runtime.solver import Solver
 from phigen.spec.model import Spec
-from phigen.study.summary import Summary
+from phigen.study.summary import Drift, Summary
+from phigen.tuning.equal_work import rk4_energy_error
+from phigen.tuning.problem import Problem
 from phigen.tuning.search import rounded_down
 
 #: Target energy error of the proposed step: small enough that orbits keep their shape.
 AIM = 1e-3
+
+#: Energy errors above this are compared with those of RK4 at the same cost, in runs of at most this number of steps.
+COMPARED, MOST_STEPS = 1e-3, 1_000_000
+#: Factor by which the energy error of RK4 must be smaller, so that the noise of clocks does not decide.
+CLEARLY = 2.0
 
 _SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the start", SITES: "Σ |energy of a site|"}
 
@@ -37,6 +47,30 @@ def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -
     said = f"the energy error reaches {_multiple(error)} {_SCALES[unit.kind]}: do not trust these states"
     tune = "" if spec.time else f"; phigen tune {spec.file} measures which step is needed"
     return f"{said}\n  hint: try --step {advised_step(error, h, order):g}{tune}"
+
+
+def compares_with_rk4(compilation: Compilation, target: str) -> bool:
+    """Return whether runs are compared with RK4: in C, of systems that conserve their energy, with equal steps in t."""
+    return chosen_target(target) == "c" and not compilation.system.driven and compilation.spec.monitor is None
+
+
+def rk4_warning(compilation: Compilation, problem: Problem, solver: Solver, energy: Drift) -> str:
+    """Return the warning about an energy error that RK4 with as much processor time does not make; else empty.
+
+    Only errors above `COMPARED` are compared. Over longer runs the error of RK4 grows, and that of the solver need not.
+    """
+    spec, known = compilation.spec, energy.unit.kind in _SCALES and not energy.unit.moves
+    steps = problem.horizon / problem.step
+    if not (known and COMPARED < energy.error <= LARGE_ENERGY_ERROR and steps <= MOST_STEPS):
+        return ""
+    theirs = rk4_energy_error(compilation, solver.backend, problem)
+    if not theirs < energy.error / CLEARLY:
+        return ""
+    said = f"the energy error reaches {energy.error:.1e} of {_SCALES[energy.unit.kind]}"
+    order = f"--order {solver.order + 2 - solver.order % 2}"
+    hint = f"try {order}, or --step {advised_step(energy.error, problem.step * problem.direction, solver.order):g}"
+    more = "RK4 with as much processor time reaches"
+    return f"{said}; {more} {theirs:.1e} in this run\n  hint: {hint}; phigen compare {spec.file} --equal work"
 
 
 def sweep_warning(count: int, members: int, largest: float, h: float, order: int) -> str:

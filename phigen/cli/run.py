@@ -127,9 +127,10 @@ def command(
     """
     from phigen.api import compilation_of
     from phigen.cli.endings import ended, timed
-    from phigen.cli.energy_warning import summary_warning
+    from phigen.cli.energy_warning import compares_with_rk4, rk4_warning, summary_warning
     from phigen.cli.past import extended, past_of, started_from
     from phigen.cli.recording import Files, Recorder, compared, opened_recorder, record
+    from phigen.cli.tune import problem_of
     from phigen.runtime.origin import mark, origin_of
 
     if plot:
@@ -181,6 +182,9 @@ def command(
         watch, drawn[method] = compared(compilation, solver, experiment, method, console, recorder.time)
         summaries.append(watch.summary())
     warning = summary_warning(spec, summaries[0], recorder.experiment.h, solver.order)
+    if comparable and not warning and compares_with_rk4(compilation, target):
+        problem = problem_of(compilation, recorder.experiment, None, console)
+        warning = rk4_warning(compilation, problem, solver, summaries[0].energy)
     if as_json:
         out_json(finite(described_run(compilation, recorder, summaries)))
     else:

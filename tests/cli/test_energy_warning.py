@@ -40,6 +40,23 @@ def test_a_large_energy_error_is_a_warning_with_a_step_that_mends_it(phigen, wri
     assert "warning" not in phigen("run", path, "-t", "numpy", "-q").stderr
 
 
+@pytest.mark.slow  # it compiles the solver and RK4
+@pytest.mark.parametrize(("order", "warned"), [(2, True), (6, False)])
+def test_an_energy_error_that_rk4_does_not_make_at_equal_cost_is_a_warning(phigen, order, warned):
+    found = phigen("run", "kepler", "--order", order, "--step", 0.1, "--steps", 1000, "-t", "c", "--json")
+    assert found.exit_code == 0
+    error = json.loads(found.stdout)["methods"][0]["energy"]["error"]
+    assert (1e-3 < error < 0.1) == warned
+    said = re.search(
+        r"warning: the energy error reaches (\S+) of .*; RK4 with .* reaches (\S+) in this run", found.stderr
+    )
+    assert bool(said) == warned, found.stderr
+    if said:
+        assert float(said[1]) == pytest.approx(error, rel=0.1)
+        assert 1e-9 < float(said[2]) < error / 2
+        assert "hint: try --order 4, or --step" in found.stderr
+
+
 def test_an_energy_that_noise_changes_is_no_error(phigen):
     found = phigen("run", "thermal_spin", "-t", "numpy", "--steps", "100", "-v")
     assert found.exit_code == 0

@@ -1,0 +1,35 @@
+"""RK4 at the cost of a solver: the largest energy error over the same run."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from phigen.compilation import Compilation
+from phigen.runtime.backend import Backend
+from phigen.tuning.problem import Classical, Problem, steps_in
+from phigen.tuning.timing import nanoseconds_per_step
+
+#: Largest number of states at which the energy is examined.
+ROWS = 2000
+
+
+def rk4_energy_error(compilation: Compilation, solver: Backend, problem: Problem) -> float:
+    """Return the energy error of RK4 whose run takes as much processor time as that of the solver.
+
+    Infinity if RK4 breaks down, NaN if steps cannot be timed. Raises `ToolchainError` without a compiler.
+    """
+    state = problem.start.copy()
+    rk4 = Classical(problem.classical(compilation, ["rk4"], state).runners["rk4"], state, problem)
+    steps = steps_in(problem.horizon, problem.step)
+    cost = nanoseconds_per_step(problem.method(solver), problem.step, steps)
+    ratio = nanoseconds_per_step(rk4, problem.step, steps) / cost
+    if not math.isfinite(ratio):
+        return math.nan
+    steps = steps_in(problem.horizon, problem.step * ratio)
+    states = rk4.rows(problem.horizon / steps, steps, max(1, steps // ROWS))
+    if states is None or not np.isfinite(states).all():
+        return math.inf
+    energies = problem.energies(states)
+    return float(np.max(problem.unit.errors(energies, float(energies[0]))))
