@@ -21,6 +21,9 @@ from phigen.symbolic.symbols import LEVEL
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
 
+#: Single precision where library functions have one name for all types, as on devices.
+OVERLOADED = "overloaded float"
+
 
 @dataclass(frozen=True)
 class About:
@@ -208,7 +211,7 @@ class Program:
     @property
     def single(self) -> bool:
         """Whether the C computes in single precision."""
-        return self.extras.real == "float"
+        return self.extras.real != "double"
 
     @property
     def searches_gauge(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from phigen.targets.names import Scope
@@ -15,16 +15,16 @@ class Language:
     """Spelling of formulas in a language.
 
     ``functions`` are the names of functions, or texts with ``{0}`` for the argument, including functions that the
-    generated file defines. ``point`` follows integers. ``real`` is a literal of a number in double precision.
+    generated file defines. ``whole`` and ``real`` are the literals of integers and of other numbers.
     """
 
     reserved: Reserved
     functions: Mapping[str, str]
     constants: Mapping[str, str]
-    point: str = ".0"
-    real: str = "{0!r}"
+    whole: Callable[[int], str] = "{}.0".format
+    real: Callable[[float], str] = repr
 
     def printer(self, scope: Scope) -> Printer:
         """Return a printer of lowered trees with the names of a scope."""
         power = self.functions["power"]
-        return Printer(lambda n: scope[n], self.functions, self.constants, power, self.point, self.real)
+        return Printer(lambda n: scope[n], self.functions, self.constants, power, self.whole, self.real)

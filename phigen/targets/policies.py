@@ -25,13 +25,19 @@ def policies_of(program: Program) -> dict[str, Policy]:
 
 @dataclass(frozen=True)
 class PolicySpelling:
-    """Spelling of constants in a language: powers of two with a negative exponent, and all constants of a policy."""
+    """Spelling of constants in a language: powers of two with a negative exponent, and all constants of a policy.
+
+    ``rounded`` spells real numbers that are to be rounded to another precision.
+    """
 
     power: str
     written: Callable[[list[tuple[PolicyConstant, str]]], str]
+    rounded: Callable[[float], str] | None = None
 
     def value(self, value: float) -> str:
         """Return a number as text."""
+        if self.rounded and isinstance(value, float):
+            return self.rounded(value)
         part, exponent = math.frexp(value)
         if part == 0.5 and exponent - 1 < _LEAST_EXPONENT:
             return self.power.format(exponent - 1)
@@ -44,7 +50,7 @@ class PolicySpelling:
 
 
 def _c(constants: list[tuple[PolicyConstant, str]]) -> str:
-    """Return declarations in C: macros for real numbers, which `single` adapts, and enumerators for integers."""
+    """Return declarations in C: macros for real numbers, and enumerators for integers."""
     whole = [(f"PHI_{c.name} = {value},", c.about) for c, value in constants if isinstance(c.value, int)]
     real = [(f"#define PHI_{c.name} {value}", c.about) for c, value in constants if isinstance(c.value, float)]
     lines = ["enum {", *(f"    {line}" for line in _aligned(whole)), "};"] if whole else []

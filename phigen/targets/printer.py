@@ -22,12 +22,12 @@ class Printer:
         functions: Mapping[str, str],
         constants: Mapping[str, str],
         power: str,
-        point: str = ".0",
-        real: str = "{0!r}",
+        whole: Callable[[int], str] = "{}.0".format,
+        real: Callable[[float], str] = repr,
     ) -> None:
-        """``point`` follows integers, ``real`` is the text of any other number."""
-        self.name, self.functions, self.constants, self.power, self.point = name, functions, constants, power, point
-        self.real = real
+        """``whole`` returns an integer as text, ``real`` any other number."""
+        self.name, self.functions, self.constants, self.power = name, functions, constants, power
+        self.whole, self.real = whole, real
 
     def __call__(self, e: Expression) -> str:
         """Return the tree as text."""
@@ -43,11 +43,11 @@ class Printer:
         if value < 0:
             return "-" + self.literal(-value)[0], SUM
         if value.denominator == 1 and value < 2**53:
-            return f"{value.numerator}{self.point}", ATOM
+            return self.whole(value.numerator), ATOM
         as_float = value.numerator / value.denominator
         if Fraction(as_float) == value or value.denominator > 10**6 or value.numerator > 10**6:
-            return self.real.format(as_float), ATOM
-        return f"{value.numerator}{self.point} / {value.denominator}{self.point}", PRODUCT
+            return self.real(as_float), ATOM
+        return f"{self.whole(value.numerator)} / {self.whole(value.denominator)}", PRODUCT
 
     def _visit(self, e: Expression, args: list[Printed]) -> Printed:
         match e.op:
@@ -65,7 +65,7 @@ class Printer:
                 for divisor, other in ((1, 0), (0, 1)):
                     if e.args[divisor].op == "pow" and e.args[divisor].value == -1:
                         return (
-                            f"{_in(args[other], PRODUCT)} / {args[divisor][0].removeprefix(f'1{self.point} / ')}",
+                            f"{_in(args[other], PRODUCT)} / {args[divisor][0].removeprefix(f'{self.whole(1)} / ')}",
                             PRODUCT,
                         )
                 return f"{_in(args[0], PRODUCT)} * {_in(args[1], ATOM)}", PRODUCT
@@ -83,7 +83,7 @@ class Printer:
             inner = _in(base, ATOM)
             return f"{inner} * {inner}", PRODUCT
         if exponent == -1:
-            return f"1{self.point} / {_in(base, ATOM)}", PRODUCT
+            return f"{self.whole(1)} / {_in(base, ATOM)}", PRODUCT
         if exponent == Fraction(1, 2):
             return f"{self.functions['sqrt']}({base[0]})", ATOM
         if exponent == Fraction(1, 3):

@@ -95,7 +95,7 @@ class Spelling:
             case ir.Constant(str() as text):
                 return self.dialect.quote.format(text), _ATOM
             case ir.Constant(float() as number):
-                return self.dialect.language.real.format(number), _ATOM
+                return self.dialect.language.real(number), _ATOM
             case ir.Constant(number):
                 return repr(number), _ATOM
             case ir.Member(record, name):

@@ -5,11 +5,15 @@ from __future__ import annotations
 from textwrap import dedent
 
 from ir.ir_text import text
+from support import as_given
 
 from phigen.ir import nodes as ir
 from phigen.ir.flow_functions import FlowFunctions, FlowTransposes, Transposed, group_schedule
 from phigen.scheme.alternation import Schedule
 from phigen.targets.c.loops import commented
+
+PROGRAM = as_given("duffing").program
+NAME = PROGRAM.name
 
 #: Kick, then three times drift and kick, with a row of coefficients each.
 SCHEDULE = Schedule((0.1, *[0.3, 0.3] * 3), 3, ((1, 0), (0, 1)))
@@ -54,10 +58,10 @@ def test_cotangents_are_added_where_a_flow_has_read():
     flow = Transposed(state=[1], row=[0], before=[], reads=[(0, 1)], far=True, far_back=False)
     transposes = FlowTransposes([flow, flow], 2, 3)
     assert "      bar[1] += back[0]\n      coef_bar[0] += slopes[0]" in text(transposes.back())
-    stored = commented(transposes.group_flows(), "top")
-    assert "top_lanes tape[top_BACK_PACKS][2])" in stored
+    stored = commented(transposes.group_flows(), PROGRAM)
+    assert f"{NAME}_lanes tape[{NAME}_BACK_PACKS][2])" in stored
     assert "memcpy(tape[k][0], group->pack[k].x[0], 1 * sizeof tape[k][0]);" in stored
-    assert "if (group->far) top_flow2_far_lanes(row, 1, group);" in stored
+    assert f"if (group->far) {NAME}_flow2_far_lanes(row, 1, group);" in stored
 
 
 def test_an_inverse_flow_needs_no_tape():

@@ -13,7 +13,7 @@ from phigen.symbolic.expression import symbol
 from phigen.targets.c.loops import commented
 
 PROGRAM = as_given("nambu_pendulum").program
-COORDINATES = PROGRAM.coordinates
+COORDINATES, NAME = PROGRAM.coordinates, PROGRAM.name
 
 
 def path():
@@ -44,8 +44,8 @@ def test_orders_of_a_path_follow_each_other():
 def test_sums_over_orders_are_loops_over_lanes():
     slopes = PathSlopes((), (), (), ())
     follow, further, *_ = lane_functions(PROGRAM, path(), slopes, ())
-    printed = commented(follow, "top")
-    assert "static void top_follow(top_lanes coef[restrict], top_expansion *e, int k)" in printed
+    printed = commented(follow, PROGRAM)
+    assert f"static void {NAME}_follow({NAME}_lanes coef[restrict], {NAME}_expansion *e, int k)" in printed
     assert "            sum[0][lane] += e->s[1][j][lane] * e->s[0][k - j][lane];" in printed
     value = "e->s[1][0][lane] * e->s[0][k][lane] + e->s[1][k][lane] * e->s[0][0][lane];"
     assert f"e->s[3][k][lane] = sum[0][lane] + {value}" in printed

@@ -6,6 +6,7 @@ from textwrap import dedent
 from ir.ir_text import text
 from ir.test_passes import lattice
 from ir.test_row_passes import rows
+from support import as_given
 
 from phigen.ir import nodes as ir
 from phigen.ir.row_drivers import (
@@ -102,4 +103,4 @@ def test_the_flag_far_selects_the_full_range_form() -> None:
 def test_c_selects_the_function_of_one_call_by_a_flag() -> None:
     (choice,) = in_forms({"_far": (DRIFT,), "_near": (replace(DRIFT, name="drift_near"),)})
     printed = ir.Function("sweep", "", ir.Role.OTHER, PARAMETERS, (choice,))
-    assert statements(printed, "toda") == ["    (far ? toda_drift : toda_drift_near)(coef, &row);"]
+    assert statements(printed, as_given("toda").program) == ["    (far ? toda_drift : toda_drift_near)(coef, &row);"]

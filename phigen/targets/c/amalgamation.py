@@ -44,7 +44,7 @@ class Amalgam:
         self._defined |= set(self.left_out.values())
         self._not_called = re.compile(rf" +((if|for) \(.*\) )?({'|'.join(calls_left_out(self.switches))})\(.*\);$")
         for definition in phrases.definitions(self.switches):
-            self._macros.define(definition)
+            self._macros.define(self.real.spelt(definition))
 
     @property
     def left_out(self) -> dict[str, str]:
@@ -122,7 +122,7 @@ class Amalgam:
         return holds(condition.replace("PHI_", ""), self.switches)
 
     def _printed(self, lines: Sequence[str]) -> list[str]:
-        """Return lines that were printed for the solver with macros expanded; names of the model stay as they are."""
+        """Return lines that were printed for the solver, in its type, with macros expanded; names of the model stay."""
         named, number = set[int](), 0
         for token in tokens("\n".join(lines)):
             if token.kind is TokenKind.NAME and token.text in _PHRASES:
@@ -131,7 +131,7 @@ class Amalgam:
         spelt_lines: list[str] = []
         for k, line in enumerate(lines):
             spelt_lines += map(self._prefixed, self._macros.expanded([line])) if k in named else [line]
-        return self._typed(spelt_lines)
+        return spelt_lines
 
     def _typed(self, lines: Sequence[str]) -> list[str]:
         """Return lines that compute in double in the type of the solver."""

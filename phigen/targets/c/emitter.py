@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 from phigen.lanes.in_lanes import LANES, Blocks, Lanes, Packs, Rows, Traces, in_lanes
@@ -26,7 +27,7 @@ from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.language import members
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.misra import compliant
-from phigen.targets.c.real import DOUBLE, FLOAT
+from phigen.targets.c.real import real_of, rendered
 from phigen.targets.c.step_text import Sizes, path_sizes, text_of
 from phigen.targets.c.tokens import without_word
 from phigen.targets.header import header_lines, plain, right_hand_side, sealed
@@ -74,7 +75,7 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     """Return the assembly of a solver, and the files of the runtime from which header and source start."""
     lanes = in_lanes(program)
     has = switches(program, lanes)
-    constants, real = policies(program, staged=has["STAGED"]), FLOAT if program.single else DOUBLE
+    constants, real = policies(program, staged=has["STAGED"]), real_of(program)
     step = program.step.swept
     if step is None:
         return Amalgam(program.name, has, constants | printed(program, lanes, has), real), "solver.h", "runtime.c"
@@ -105,7 +106,9 @@ def policies(program: Program, *, staged: bool = False) -> dict[str, str]:
     """
     sizes = ("DIFFERENCES", "DIRECTIONS")
     policy_by_name = policies_of(program) | {"gauss_policy": gauss_policy(single=program.single, staged=staged)}
-    texts = {f"{name}.h": C.text(policy, sizes) for name, policy in policy_by_name.items()}
+    real = real_of(program)
+    spelling = replace(C, rounded=lambda value: real.number(real.threshold(value))) if program.single else C
+    texts = {f"{name}.h": spelling.text(policy, sizes) for name, policy in policy_by_name.items()}
     return {file: text.replace("PHI_", f"{program.name}_") for file, text in texts.items()}
 
 
@@ -139,7 +142,7 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"] or has["STAGED"]):
         packed = partial(text_of(program).packed, program, step)
         texts["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes, packed, batched=has["STAGE_GROUPS"]))
-    declarations = render("c", "declarations.h", declared_values(program, lanes, has))
+    declarations = rendered(program, "declarations.h", declared_values(program, lanes, has))
     return {"declarations.h": declarations, "model.h": model(program, lanes, has, texts.values()), **texts}
 
 
@@ -349,9 +352,9 @@ def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others
     }
     values["middles"] = ", ".join(map(repr, program.midpoints))
     values["moments"] = ", ".join(map(repr, schedule.moments)) if schedule else ""
-    values["middles"] = render("c", "middles.c", values) if step.refresh and program.time else ""
+    values["middles"] = rendered(program, "middles.c", values) if step.refresh and program.time else ""
     values["bound"] = repr(MAX_NORMAL_VARIATE) if program.noise else ""
-    return render("c", "constants.c", values) + text
+    return rendered(program, "constants.c", values) + text
 
 
 def _of_adjoint(program: Program, adjoint: Adjoint) -> list[Kernel]:

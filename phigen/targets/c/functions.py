@@ -31,8 +31,8 @@ from phigen.symbolic.universal import ANOMALY
 from phigen.targets import special
 from phigen.targets.c.language import FUNCTIONS, printer
 from phigen.targets.c.layout import WIDTH
+from phigen.targets.c.real import rendered
 from phigen.targets.polynomials import estrin
-from phigen.targets.rendering import render
 from phigen.targets.special import entire_used
 
 #: The functions of the library that have a small-argument version here, under whose name flows call them.
@@ -91,10 +91,10 @@ def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool =
     names = special.used(program, unprinted)
     if device and names and SPECIAL[0] not in names:  # which the others call
         names = [SPECIAL[0], *names]
-    phis = [render("c", "phi_device.c" if device else "phi.c", _phi(program, f, device=device)) for f in names]
-    polynomial = [render("c", "polynomial.c", {"NAME": program.name})] if phis else []
+    phis = [rendered(program, "phi_device.c" if device else "phi.c", _phi(program, f, device=device)) for f in names]
+    polynomial = [rendered(program, "polynomial.c", {})] if phis else []
     anomaly = [_anomaly(program)] if special.calls_anomaly(program) else []
-    functions = [render("c", "small.c", _values(program, f)) for f in small]
+    functions = [_small(program, f) for f in small]
     elliptic = _elliptic(program, special.elliptic_used(program), near=False)
     elliptic += _remainders(program, special.remainders_used(program), near=False)
     return [*polynomial, *phis, *functions, *anomaly, *elliptic, *_exponentials(program)]
@@ -106,32 +106,34 @@ def _exponentials(program: Program) -> list[str]:
     if not rows:
         return []
     values = {"NAME": program.name, "entries": (2 * rows if adjoint else rows) ** 2, "adjoint": adjoint}
-    return [render("c", "matrix_exponential.c", {**values, **special.exponential_constants()})]
+    return [rendered(program, "matrix_exponential.c", {**values, **special.exponential_constants()})]
 
 
 def near(program: Program, names: Iterable[str]) -> list[str]:
     """Versions of these functions for loops over lanes, for small arguments only."""
     listed = list(names)
     others = [f for f in listed if f not in (*ELLIPTIC, *REMAINDERS, *QUOTIENTS)]
-    texts = [
-        _anomaly(program, near=True) if f == ANOMALY else render("c", "small.c", _values(program, f) | {"near": True})
-        for f in others
-    ]
+    texts = [_anomaly(program, near=True) if f == ANOMALY else _small(program, f, near=True) for f in others]
     texts += _elliptic(program, [f for f in ELLIPTIC if f in listed], near=True)
     return texts + _remainders(program, [f for f in (*REMAINDERS, *QUOTIENTS) if f in listed], near=True)
+
+
+def _small(program: Program, f: str, **values: object) -> str:
+    """Return a function with a polynomial for small arguments."""
+    return rendered(program, "small.c", _values(program, f) | values)
 
 
 def _remainders(program: Program, names: Sequence[str], *, near: bool) -> list[str]:
     """Return the functions of exponentials of small matrices."""
     doublings = LANE_DOUBLINGS if near else "halvings"
     values = {"NAME": program.name, "near": near, "doublings": doublings, **special.remainder_values(names)}
-    return [render("c", "remainders.c", values)] if names else []
+    return [rendered(program, "remainders.c", values)] if names else []
 
 
 def _elliptic(program: Program, names: Sequence[str], *, near: bool) -> list[str]:
     """Return the elliptic functions of free rigid bodies."""
     return special.elliptic_texts(
-        names, lambda template, values: render("c", f"{template}.c", {"NAME": program.name, "near": near, **values})
+        names, lambda template, values: rendered(program, f"{template}.c", {"near": near, **values})
     )
 
 
@@ -143,12 +145,12 @@ def _anomaly(program: Program, *, near: bool = False) -> str:
     lines, first = estrin(c2, "z", "a")
     (_, *others), second = estrin(c3, "z", "e")
     values = {"NAME": program.name, "near": near, "lines": [*lines, *others], "c2": first, "c3": second}
-    return render("c", "anomaly.c", values | special.anomaly_values(single=program.single))
+    return rendered(program, "anomaly.c", values | special.anomaly_values(single=program.single))
 
 
 def near_rows(program: Program, names: Iterable[str]) -> list[str]:
     """Return small-argument functions for loops over sites, with the fewest operations that give full precision."""
-    return [render("c", "row_near.c", _row_values(program, f)) for f in names]
+    return [rendered(program, "row_near.c", _row_values(program, f)) for f in names]
 
 
 def _row_values(program: Program, f: str) -> dict[str, object]:
@@ -183,7 +185,7 @@ def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
         before, last = rest[-2:]
         others = list(zip(rest[-3::-2], rest[-4::-2], strict=True))
         values = {"first": first, "before": before, "last": last, "others": others, "reach": repr(LANE_REACH)}
-        texts.append(render("c", "phi_lane.c", {"NAME": program.name, "function": f, **values}))
+        texts.append(rendered(program, "phi_lane.c", {"NAME": program.name, "function": f, **values}))
     return texts
 
 

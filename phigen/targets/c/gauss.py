@@ -11,7 +11,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.policies import POLICIES, GaussPolicy
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss
-from phigen.targets.rendering import render
+from phigen.targets.c.real import rendered
 
 #: In single precision, thresholds are powers of those of double precision. This one becomes 1e-9, the same fraction of
 #: a rounding error as 2e-18 in double precision. With the other rule, 1e5 steps of Hénon–Heiles have an energy error of
@@ -104,7 +104,7 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool)
         "reduced": False,
         **(_reduced(step, table, width) if staged and step.reduced else {}),
     }
-    return render("c", "gauss.c", values)
+    return rendered(program, "gauss.c", values)
 
 
 def _reduced(step: Gauss, table: Tableau, width: int) -> dict[str, object]:

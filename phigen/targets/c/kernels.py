@@ -18,6 +18,7 @@ from phigen.scheme.program import Program
 from phigen.targets.c.language import members
 from phigen.targets.c.layout import comment
 from phigen.targets.c.loops import statements
+from phigen.targets.c.real import real_of
 from phigen.targets.header import plain, sentence
 
 #: Most assignments in one function; compile time is quadratic in the length.
@@ -49,7 +50,7 @@ class Form:
 
     def number(self, program: Program, array: str) -> str:
         """The type of an entry of an array."""
-        return f"{program.name}_lanes" if self.lanes and array not in self.shared else "double"
+        return f"{program.name}_lanes" if self.lanes and array not in self.shared else real_of(program).name
 
 
 def function(
@@ -111,9 +112,12 @@ def function(
     head.append(f"    {form.number(program, 'work')} work[{size}];")
     if exported:
         arguments = arguments.replace(f", {kernel.outputs[0].name}, work", ", value, work")
-        head += [f"    double value[{len(kernel.roots)}];", *_default_parameters(program, kernel, form)]
+        head += [
+            f"    {real_of(program).name} value[{len(kernel.roots)}];",
+            *_default_parameters(program, kernel, form),
+        ]
     cleared = built.with_body(*(s for s in built.body if isinstance(s, ir.Clear)))
-    head += statements(cleared, program.name)
+    head += statements(cleared, program)
     head += [f"    {full_name}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
     head += _exponentials(program, kernel)
     if exported:
@@ -135,7 +139,7 @@ def _through_exponentials(program: Program, kernel: Kernel) -> str:
     plain_kernel = replace(outer, name=kernel.name, inputs={k: s for k, s in kernel.inputs.items() if k != EXPONENTS})
     form, count = Form(f"{program.name}_{kernel.name}"), len(inner.roots)
     lines = [*_comment(sentence(kernel.purpose)), _signature(program, plain_kernel, form) + "\n{"]
-    lines += [f"    double {EXPONENTS}[{count}];"]
+    lines += [f"    {real_of(program).name} {EXPONENTS}[{count}];"]
     lines += [f"    {program.name}_{inner.name}({', '.join([*inner.inputs, EXPONENTS])});"]
     place = 0
     for start, n in kernel.exponentials:
@@ -155,13 +159,13 @@ def declaration(program: Program, kernel: Kernel, *, name: str = "", returning: 
 
 def _signature(program: Program, kernel: Kernel, form: Form) -> str:
     # C99 has no conversion from double (*)[8] to const double (*)[8]: the inputs of lanes are not const.
-    number = f"{program.name}_lanes" if form.lanes else "double"
-    inputs, alone = (number, "restrict ") if form.lanes else ("const double", "")
-    kinds = {i: ("const double", "") if i in form.shared else (inputs, alone) for i in kernel.inputs}
+    real = real_of(program).name
+    inputs, alone = (f"{program.name}_lanes", "restrict ") if form.lanes else (f"const {real}", "")
+    kinds = {i: (f"const {real}", "") if i in form.shared else (inputs, alone) for i in kernel.inputs}
     arguments = [
         f"const {program.name}_params *params"
         if i == "params"
-        else f"double {i}"
+        else f"{real} {i}"
         if i in SCALARS
         else f"{kinds[i][0]} {i}[{kinds[i][1]}{max(1, len(symbols))}]"
         for i, symbols in kernel.inputs.items()
@@ -178,7 +182,7 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
         arguments.append(f"{form.number(program, 'work')} work[restrict {form.workspace}]")
     linkage = f"{program.name}_APART static " if form.workspace else "" if form.exported else f"{form.linkage} "
     linkage = f"{program.name}_IN_PLACE static inline " if form.alike else linkage
-    return f"{linkage}{'double' if form.returning else 'void'} {form.name}({', '.join(arguments)})"
+    return f"{linkage}{real if form.returning else 'void'} {form.name}({', '.join(arguments)})"
 
 
 def _body(program: Program, kernel: Kernel, form: Form, built: ir.Function) -> list[str]:
@@ -194,7 +198,7 @@ def _body(program: Program, kernel: Kernel, form: Form, built: ir.Function) -> l
         built = in_lanes(built, form.shared, form.alike, single=form.single)
     built = discard_unread(built)
     defaults = [] if ir.Discard("params") in built.body else _default_parameters(program, kernel, form)
-    return [*defaults, *statements(built, program.name, shared_line=SHARED_LINE)]
+    return [*defaults, *statements(built, program, shared_line=SHARED_LINE)]
 
 
 def _default_parameters(program: Program, kernel: Kernel, form: Form) -> list[str]:

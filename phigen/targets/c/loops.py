@@ -8,9 +8,11 @@ from itertools import groupby
 
 from phigen.ir import nodes as ir
 from phigen.scheme.kernel import Role
+from phigen.scheme.program import Program
 from phigen.symbolic.expression import Expression
 from phigen.targets.c.language import LANGUAGE, elementary_functions, reserved_variables
 from phigen.targets.c.layout import WIDTH, comment
+from phigen.targets.c.real import real_of
 from phigen.targets.spelling import Dialect, Spelling
 
 #: Functions and sizes of the runtime, whose names begin with that of the solver.
@@ -22,14 +24,8 @@ _RUNTIME = (
 #: Names of addresses of records.
 _POINTERS = frozenset({"row", "s", "e", "group", "pack", "bar", "params_bar"})
 
-#: Types of values that are no pointers.
-_TYPES = {
-    ir.Type.REAL: "double",
-    ir.Type.INDEX: "ptrdiff_t",
-    ir.Type.SIZE: "size_t",
-    ir.Type.FLAG: "int",
-    ir.Type.ARRAYS: "double *const *",
-}
+#: Types of integers.
+_INTEGERS = {ir.Type.INDEX: "ptrdiff_t", ir.Type.SIZE: "size_t", ir.Type.FLAG: "int"}
 
 #: Types of the variables of loops, by their kinds.
 _COUNTERS = {
@@ -46,63 +42,79 @@ _COUNTERS = {
 _SHORT_CASE, _CASE_WIDTH = 2, WIDTH - 24
 
 
-def function(printed: ir.Function, name: str, linkage: str = "static") -> str:
+@dataclass(frozen=True)
+class CTypes:
+    """The names of types in a solver, whose name is their prefix; numbers are ``real``."""
+
+    prefix: str
+    real: str
+
+    def number(self, *, lanes: bool) -> str:
+        """Return the type of a number, or of its values in SIMD lanes."""
+        return f"{self.prefix}_lanes" if lanes else self.real
+
+    def value(self, kind: ir.Type) -> str:
+        """Return the type of a value that is no address."""
+        return self.real if kind is ir.Type.REAL else _INTEGERS[kind]
+
+    def parameter(self, name: str, kind: ir.ParameterType, spell: Spelling) -> str:
+        """Return the declaration of a parameter."""
+        match kind:
+            case ir.RecordType(record, mutable):
+                return f"{'const ' * (not mutable)}{self.prefix}_{record} *{name}"
+            case ir.Pointer(constant, restricted, lanes):
+                return f"{'const ' * constant}{self.number(lanes=lanes)} *{'restrict ' * restricted}{name}"
+            case ir.Vector(length, rows):
+                row, sized = f"[{spell(rows)}]" if rows else "", spell(length) if length else ""
+                sized = " ".join(filter(None, ["restrict" * kind.restricted, sized]))
+                return f"{'const ' * kind.constant}{self.number(lanes=kind.lanes)} {name}{row}[{sized}]"
+            case ir.Tape(length):
+                return f"{self.real} (*{name})[{spell(length)}]"
+            case ir.Type.ARRAYS:
+                return f"{self.real} *const *{name}"
+        return f"{self.value(kind)} {name}"
+
+
+def function(printed: ir.Function, program: Program, linkage: str = "static") -> str:
     """Return a function of a solver as text, without its comment."""
-    spelling = _spelling(printed, name)
-    parameters = ", ".join(_parameter(p, printed.type_of(p), name, spelling) for p in printed.parameters)
-    returned = _TYPES[printed.returns] if printed.returns else "void"
-    head = f"{linkage} {returned} {name}_{printed.name}({parameters})"
-    return "\n".join([f"{head}\n{{", *_indented(_StatementPrinter(spelling, name, 0).lines(printed.body)), "}\n"])
+    printer = _StatementPrinter.of(printed, program)
+    parameters = ", ".join(printer.types.parameter(p, printed.type_of(p), printer.spell) for p in printed.parameters)
+    returned = printer.types.value(printed.returns) if printed.returns else "void"
+    head = f"{linkage} {returned} {program.name}_{printed.name}({parameters})"
+    return "\n".join([f"{head}\n{{", *_indented(printer.lines(printed.body)), "}\n"])
 
 
-def commented(printed: ir.Function, name: str, linkage: str = "static") -> str:
+def commented(printed: ir.Function, program: Program, linkage: str = "static") -> str:
     """Return a function of a solver as text, below its purpose."""
-    return "\n".join([*comment(f"/* {printed.doc}. */"), function(printed, name, linkage)])
+    return "\n".join([*comment(f"/* {printed.doc}. */"), function(printed, program, linkage)])
 
 
-def table(printed: ir.Table, name: str) -> str:
+def table(printed: ir.Table, program: Program) -> str:
     """Return the constants of a table of a solver as a line."""
     number = printed.length or ir.Constant(len(printed.values))
-    length = _spelling(ir.Function("", "", Role.OTHER, (), ()), name)(number)
-    return f"static const int {name}_{printed.name}[{length}] = {{ {', '.join(map(str, printed.values))} }};"
+    length = _spelling(ir.Function("", "", Role.OTHER, (), ()), program)(number)
+    return f"static const int {program.name}_{printed.name}[{length}] = {{ {', '.join(map(str, printed.values))} }};"
 
 
-def statements(printed: ir.Function, name: str, *, shared_line: int = 0) -> list[str]:
+def statements(printed: ir.Function, program: Program, *, shared_line: int = 0) -> list[str]:
     """Return the lines of the body of a function of a solver.
 
     Declarations of computed values share lines that are not longer than ``shared_line``.
     """
-    return [*_indented(_StatementPrinter(_spelling(printed, name), name, shared_line).lines(printed.body))]
+    return [*_indented(_StatementPrinter.of(printed, program, shared_line).lines(printed.body))]
 
 
-def _spelling(printed: ir.Function, name: str) -> Spelling:
+def _spelling(printed: ir.Function, program: Program) -> Spelling:
+    name, real = program.name, real_of(program)
+    language = replace(LANGUAGE, reserved=reserved_variables(name), functions=elementary_functions(name))
     dialect = Dialect(
-        replace(LANGUAGE, reserved=reserved_variables(name), functions=elementary_functions(name)),
-        operators={"and": "&&", "or": "||", "not": "!", "index": "ptrdiff_t", "size": "size_t", "real": "double"},
-        functions={function: f"{name}_{function}" for function in _RUNTIME},
+        real.language(language),
+        operators={"and": "&&", "or": "||", "not": "!", "index": "ptrdiff_t", "size": "size_t", "real": real.name},
+        functions={**real.names(), **{function: f"{name}_{function}" for function in _RUNTIME}},
         pointers=_POINTERS | {p for p in printed.parameters if p == "params"},
         links=frozenset({"s"}),
     )
     return Spelling(dialect, printed.parameters, printed.body)
-
-
-def _parameter(parameter: str, kind: ir.ParameterType, name: str, spell: Spelling) -> str:
-    match kind:
-        case ir.RecordType(record, mutable):
-            return f"{'const ' * (not mutable)}{name}_{record} *{parameter}"
-        case ir.Pointer(constant, restricted):
-            return f"{'const ' * constant}{_number(kind, name)} *{'restrict ' * restricted}{parameter}"
-        case ir.Vector(length, rows):
-            row, sized = f"[{spell(rows)}]" if rows else "", spell(length) if length else ""
-            sized = " ".join(filter(None, ["restrict" * kind.restricted, sized]))
-            return f"{'const ' * kind.constant}{_number(kind, name)} {parameter}{row}[{sized}]"
-        case ir.Tape(length):
-            return f"double (*{parameter})[{spell(length)}]"
-    return f"{_TYPES[kind]}{'' if _TYPES[kind].endswith('*') else ' '}{parameter}"
-
-
-def _number(kind: ir.Pointer | ir.Vector, name: str) -> str:
-    return f"{name}_lanes" if kind.lanes else "double"
 
 
 def _indented(lines: Iterable[str]) -> Iterator[str]:
@@ -111,11 +123,21 @@ def _indented(lines: Iterable[str]) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class _StatementPrinter:
-    """The statements of one function, in a spelling, of the solver with a name; see `statements`."""
+    """The statements of one function, in a spelling and with the types of a solver; see `statements`."""
 
     spell: Spelling
-    name: str
+    types: CTypes
     shared_line: int
+
+    @classmethod
+    def of(cls, printed: ir.Function, program: Program, shared_line: int = 0) -> _StatementPrinter:
+        """Return the printer of a function of a solver."""
+        return cls(_spelling(printed, program), CTypes(program.name, real_of(program).name), shared_line)
+
+    @property
+    def name(self) -> str:
+        """The name of the solver."""
+        return self.types.prefix
 
     def lines(self, body: Iterable[ir.Statement]) -> Iterator[str]:
         """Yield the lines of statements."""
@@ -148,7 +170,7 @@ class _StatementPrinter:
             if line and len(line) + len(item) + 2 > self.shared_line - 4:
                 yield f"{line};"
                 line = ""
-            line = f"{line}, {item}" if line else f"const double {item}"
+            line = f"{line}, {item}" if line else f"const {self.types.real} {item}"
         yield f"{line};"
 
     def _statement(self, s: ir.Statement) -> Iterator[str]:
@@ -201,17 +223,17 @@ class _StatementPrinter:
     def _declaration(self, s: ir.Declare) -> str:
         star, length = "", ""
         match s.type:
-            case ir.Pointer(constant, restricted):
-                kind = f"{'const ' * constant}{_number(s.type, self.name)}"
+            case ir.Pointer(constant, restricted, lanes):
+                kind = f"{'const ' * constant}{self.types.number(lanes=lanes)}"
                 star = "*restrict " if restricted else "*"
             case ir.Vector(size):
-                kind, length = _number(s.type, self.name), f"[{self.spell(size) if size else ''}]"
+                kind, length = self.types.number(lanes=s.type.lanes), f"[{self.spell(size) if size else ''}]"
             case ir.Type.ARRAYS:
-                kind, star, length = "double", "*const ", "[]"
+                kind, star, length = self.types.real, "*const ", "[]"
             case ir.RecordType(record, mutable, address):
                 kind, star = f"{'const ' * (not (s.mutable or mutable))}{self.name}_{record}", "*" * address
             case kind_of_number:
-                kind = f"{'const ' * (not s.mutable)}{_TYPES[kind_of_number]}"
+                kind = f"{'const ' * (not s.mutable)}{self.types.value(kind_of_number)}"
         items = (f"{star}{self.spell.name(symbol)}{length}{self._initial(value)}" for symbol, value in s.items)
         return f"{kind} {', '.join(items)};{f' /* {s.note} */' if s.note else ''}"
 

@@ -1,18 +1,21 @@
 """The types of real numbers in C: the spelling of types, literals, limits and library functions.
 
-The runtime and the printers are written for ``double``; `Real.spelt` is the pass that translates their text to
-another type. Only thresholds change in value: small numbers that are named by a ``#define`` and depend on the
-precision.
+Printers spell functions of the loop IR in the type of a program. The runtime and the templates are C that is written
+for ``double``; `Real.spelt` translates these files to another type. Only thresholds change in value: small numbers
+that are named by a ``#define`` and depend on the precision.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+from phigen.scheme.program import OVERLOADED, Program
 from phigen.targets.c.tokens import CToken, TokenKind, tokens
+from phigen.targets.language import Language
+from phigen.targets.rendering import render
 
 #: Ratio of the numbers of digits of float and double.
 DIGITS = 24 / 53
@@ -86,6 +89,33 @@ class Real:
     words: Mapping[str, str] = field(default_factory=dict)
     function_suffix: str = ""
 
+    def number(self, value: float) -> str:
+        """Return the literal of a number."""
+        return literal(value) if self.words else repr(value)
+
+    def threshold(self, value: float) -> float:
+        """Return the value of a named constant, which depends on the precision if it is small."""
+        return threshold(value) if self.words and 0.0 < value < THRESHOLD else value
+
+    def language(self, language: Language) -> Language:
+        """Return the description of C in this type, from that of C in double."""
+        if not self.words:
+            return language
+        functions = {f: self._function(text) for f, text in language.functions.items()}
+        constants = {name: self.spelt(text) for name, text in language.constants.items()}
+        return replace(language, functions=functions, constants=constants, whole=self.number, real=self.number)
+
+    def names(self) -> dict[str, str]:
+        """Return the names of library functions and limits that differ from those for double."""
+        functions = {f: self._function(f) for f in _FUNCTIONS}
+        return {**functions, **self.words, **{f"-{word}": f"-{text}" for word, text in self.words.items()}}
+
+    def _function(self, text: str) -> str:
+        """Return the name of a function, or a formula that calls functions, in this type."""
+        if text.isidentifier():
+            return f"{text}{self.function_suffix}" if text in _FUNCTIONS else text
+        return self.spelt(text)
+
     def spelt(self, text: str) -> str:
         """Return C that computes in this type, from C that computes in double."""
         return "".join(self._spelt(text)) if self.words else text
@@ -96,7 +126,7 @@ class Real:
             naming = (naming or token.text == "define") and "\n" not in token.text
             if token.kind is TokenKind.REAL and not token.text.endswith("f"):
                 value = float.fromhex(token.text) if token.text.startswith("0x") else float(token.text)
-                yield literal(threshold(value) if naming and 0.0 < value < THRESHOLD else value)
+                yield literal(self.threshold(value) if naming else value)
             elif token.kind is TokenKind.NAME and token.text in _FUNCTIONS and after.text == "(":
                 yield f"{token.text}{self.function_suffix}"
             else:
@@ -116,6 +146,19 @@ FLOAT = Real("float", _FLOAT, "f")
 #: Single precision in dialects of C whose library functions are overloaded.
 OVERLOADED_FLOAT = Real("float", _FLOAT)
 
+#: The types by their names in programs.
+_REALS = {"double": DOUBLE, "float": FLOAT, OVERLOADED: OVERLOADED_FLOAT}
+
+
+def real_of(program: Program) -> Real:
+    """Return the type of the real numbers of a program."""
+    return _REALS[program.extras.real]
+
+
+def rendered(program: Program, template: str, values: Mapping[str, object]) -> str:
+    """Return the text of a template of C, in the type of a program."""
+    return real_of(program).spelt(render("c", template, {"NAME": program.name, **values}))
+
 
 def threshold(value: float) -> float:
     """Return the threshold in single precision that has the same share of the digits as ``value`` in double."""
@@ -124,6 +167,8 @@ def threshold(value: float) -> float:
 
 def literal(value: float) -> str:
     """Return the shortest literal of the nearest float; values beyond the range of floats become its limits."""
+    if value < 0.0:
+        return f"-{literal(-value)}"
     if value:
         value = min(max(value, _LEAST), _MOST)
     nearest = struct.unpack("f", struct.pack("f", value))[0]

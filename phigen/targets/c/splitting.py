@@ -32,7 +32,7 @@ def sizes(step: Splitting) -> list[tuple[str, int, str]]:
 
 def printed(program: Program, step: Splitting) -> str:
     """Return the functions of the flows, and of one step."""
-    name, build, schedule = program.name, _functions(program, step), step.schedule
+    build, schedule = _functions(program, step), step.schedule
     texts = [function(program, replace(step.prepare, name="prepare_row"))]
     texts += [function(program, step.refresh, name="at_step" if program.noise else "at_time")] if step.refresh else []
     # With an element the function would be too long for compilers to inline it.
@@ -40,9 +40,9 @@ def printed(program: Program, step: Splitting) -> str:
     for k, flow in enumerate(program.attitude.turns if program.attitude else step.flows, 1):
         kernel, updated = _flow(flow, k)
         texts.append(function(program, kernel, versions=_VERSIONS, linkage=linkage))
-        texts.append(commented(build.flow(k, updated), name, "static inline"))
-    texts.append(commented(build.schedule(schedule), name, "static inline"))
-    texts += [commented(build.corrector(schedule), name)] if schedule.begin else []
+        texts.append(commented(build.flow(k, updated), program, "static inline"))
+    texts.append(commented(build.schedule(schedule), program, "static inline"))
+    texts += [commented(build.corrector(schedule), program)] if schedule.begin else []
     return "\n".join(texts)
 
 
@@ -62,8 +62,8 @@ def in_lanes(program: Program, step: Splitting, form: str, versions: Mapping[str
         kernel, updated = _flow(flow, k)
         kernel = replace(kernel, name=kernel.name + form)
         texts.append(function(program, kernel, lanes=True, alike=["coef"], versions=versions))
-        texts.append(commented(group_flow(k, form, updated), program.name, linkage))
-    return [*texts, commented(group_schedule(step.schedule, form), program.name, linkage)]
+        texts.append(commented(group_flow(k, form, updated), program, linkage))
+    return [*texts, commented(group_schedule(step.schedule, form), program, linkage)]
 
 
 def _tables(program: Program, step: Splitting, prefix: str, suffix: str) -> str:
@@ -71,14 +71,14 @@ def _tables(program: Program, step: Splitting, prefix: str, suffix: str) -> str:
     flows, length = step.schedule.flows_of_run, ir.fixed("FLOWS")
     parts = ir.Table(f"{prefix}part{suffix}", tuple(part + 1 for part, _ in flows), length)
     rows = ir.Table(f"{prefix}row{suffix}", tuple(row for _, row in flows), length)
-    lines = [table(one, program.name) for one in (parts, rows)]
+    lines = [table(one, program) for one in (parts, rows)]
     return "\n".join(["/* Flows of one step: the part of H, and the row of coefficients. */", *lines]) + "\n"
 
 
 def tangent(program: Program, step: Splitting) -> str:
     """Return the derivatives of the flows."""
     texts = [function(program, kernel, versions=_VERSIONS) for kernel in step.tangents]
-    applied = commented(_functions(program, step).tangent(len(step.flows)), program.name)
+    applied = commented(_functions(program, step).tangent(len(step.flows)), program)
     return "\n".join([*texts, _tables(program, step, "", "_of"), applied])
 
 
@@ -86,7 +86,7 @@ def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
     """Return the transposes of the flows."""
     kernels, build = _transposed(program, step, adjoint.steps)
     texts = [function(program, kernel, versions=_VERSIONS) for kernel in kernels]
-    return "\n".join([*texts, _tables(program, step, "flow_", ""), commented(build.back(), program.name)])
+    return "\n".join([*texts, _tables(program, step, "flow_", ""), commented(build.back(), program)])
 
 
 def adjoint_in_lanes(
@@ -105,8 +105,8 @@ def adjoint_in_lanes(
             far_kernel = replace(kernel, name=f"{kernel.name}_far")
             linkage = f"{program.name}_APART static"
             texts.append(function(program, far_kernel, lanes=True, versions=far, linkage=linkage))
-    texts += [] if build.recomputes else [commented(build.group_flows(), program.name)]
-    return [*texts, commented(build.group_back(), program.name)]
+    texts += [] if build.recomputes else [commented(build.group_flows(), program)]
+    return [*texts, commented(build.group_back(), program)]
 
 
 def reaches_far(kernel: Kernel) -> bool:

@@ -97,19 +97,19 @@ def _adjoint_path(program: Program, path: PathAdjoint) -> str:
     used, extended = ir.Table("back_used", tuple(path.used) or (0,)), adjoint_program(program, path)
     said = "The coefficients" if path.used else "None of the coefficients is one"
     comment = f"/* {said} that the slope of a path depends on. */"
-    return f"{comment}\n{table(used, program.name)}\n\n{_path(extended, path.recurrences, 'back')}"
+    return f"{comment}\n{table(used, program)}\n\n{_path(extended, path.recurrences, 'back')}"
 
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
     """Return the recurrences of a path, or of a tangent path."""
-    return "\n".join(commented(f, program.name) for f in path_functions.functions(program, path, kind))
+    return "\n".join(commented(f, program) for f in path_functions.functions(program, path, kind))
 
 
 def _path_in_lanes(program: Program, step: Path, slopes: PathSlopes) -> str:
     """Return the recurrences of a path and its derivatives in SIMD lanes."""
     used = step.back.used if step.back else ()
     listed = path_functions.lane_functions(program, step.recurrences, slopes, used)
-    return "\n".join(commented(f, program.name) for f in listed)
+    return "\n".join(commented(f, program) for f in listed)
 
 
 def path_sizes(slopes: PathSlopes, slope_terms: int) -> Sizes:

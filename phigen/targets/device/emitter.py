@@ -11,18 +11,17 @@ from functools import partial
 from typing import Any
 
 from phigen.scheme.policies import PredictorPolicy
-from phigen.scheme.program import Program
+from phigen.scheme.program import OVERLOADED, Program
 from phigen.targets.c import emitter as c
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.layout import fitted
-from phigen.targets.c.real import DOUBLE, OVERLOADED_FLOAT
+from phigen.targets.c.real import real_of, rendered
 from phigen.targets.c.step_text import text_of
 from phigen.targets.device import lattice
 from phigen.targets.device.dialect import qualified
 from phigen.targets.device.registers import spilling
 from phigen.targets.header import header_lines, sealed
-from phigen.targets.rendering import render
 
 #: The end of the name of a generated file.
 SUFFIX = "_device.h"
@@ -49,7 +48,8 @@ def for_devices(program: Program) -> Program:
     if swept := program.step.swept:
         left_out["rates"] = replace(swept.rates, slopes=()) if swept.rates else None
     step = replace(program.step, **{part: none for part, none in left_out.items() if part in parts})
-    extras = replace(program.extras, tangent=False, adjoint=False, modified_hamiltonian=0)
+    real = OVERLOADED if program.single else program.extras.real
+    extras = replace(program.extras, tangent=False, adjoint=False, modified_hamiltonian=0, real=real)
     return replace(program, step=step, extras=extras, modified=None, attitude=None, lanes=False, profile="small")
 
 
@@ -92,9 +92,9 @@ def text_of_device(program: Program) -> str:
         "common": common,
         "pointer": f"(*common)[{program.name}_COEFFICIENTS]" if staged else "*common",
     }
-    language = render("c", "device_language.h", values)
+    language = rendered(program, "device_language.h", values)
     has = switches(program, None) | {"DEVICE": True, "KICKED": False, "COMMON": common}
-    real = OVERLOADED_FLOAT if program.single else DOUBLE
+    real = real_of(program)
     spelt = partial(qualified, name=program.name, common=common)
     if program.step.swept:
         kernels = {"device_lattice.h": lattice.body(program, program.step.swept, language)}
@@ -104,7 +104,7 @@ def text_of_device(program: Program) -> str:
     stages = f"[{program.name}_STAGES]" if staged else ""
     coefficients = f"double coef{stages}[{program.name}_COEFFICIENTS];"
     declared = c.declared_values(program, None, has) | {"common": common, "coefficients": coefficients}
-    declarations = render("c", "device_declarations.h", declared)
+    declarations = rendered(program, "device_declarations.h", declared)
     texts |= {"device_declarations.h": declarations, "model.h": c.model(program, None, has, texts.values())}
     amalgam = Amalgam(program.name, has, c.policies(program) | texts, real)
     body = c.unrestricted(program, amalgam.text("device.c", spelt))

@@ -14,8 +14,8 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Gather, Sweeps
 from phigen.targets.c import functions
 from phigen.targets.c.loops import statements
+from phigen.targets.c.real import rendered
 from phigen.targets.header import plain, sentence
-from phigen.targets.rendering import render
 
 #: The arrays of kernels: their types, and their contents.
 _ARRAYS = {
@@ -66,7 +66,7 @@ def body(program: Program, step: Sweeps, language: str) -> str:
         "functions": functions.called(program, device=True),
         "kernels": [*_kernels(loops)],
     }
-    return render("c", "device_lattice.h", values)
+    return rendered(program, "device_lattice.h", values)
 
 
 def _argument(name: str, prefix: str) -> str:
@@ -80,7 +80,7 @@ def _kernels(loops: LatticeLoops) -> Iterator[tuple[str, str, list[str]]]:
         if not any(isinstance(s, ir.Store) for s in walk.statements(built.body)):
             continue
         lowered = work_items(simultaneous(temporaries(built)), loops)
-        yield plain(sentence(built.doc)), built.name, statements(lowered, loops.program.name)
+        yield plain(sentence(built.doc)), built.name, statements(lowered, loops.program)
 
 
 def _functions(loops: LatticeLoops) -> Iterator[ir.Function]:

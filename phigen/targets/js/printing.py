@@ -19,7 +19,7 @@ LANGUAGE = Language(
     reserved=JAVASCRIPT_RESERVED,
     functions={name: name for name in FUNCTIONS} | written_in("js"),
     constants={"pi": "Math.PI", "E": "Math.E"},
-    point="",
+    whole=str,
 )
 
 

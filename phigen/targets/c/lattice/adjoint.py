@@ -61,7 +61,7 @@ from phigen.targets.c.lattice.loops import RowLoops, code
 from phigen.targets.c.lattice.loops import printed as loop_text
 from phigen.targets.c.lattice.sweep_functions import calls_of, driver_text, drivers
 from phigen.targets.c.loops import commented
-from phigen.targets.rendering import render
+from phigen.targets.c.real import rendered
 
 
 @dataclass(frozen=True)
@@ -330,7 +330,7 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
         "bars": program.dimension + len(step.sites.parameters) + len(step.sites.at_bonds),
         "numbers": max(1, sum(p.at == "all" for p in program.parameters)),
     }
-    return render("c", "lattice_adjoint.c", values)
+    return rendered(program, "lattice_adjoint.c", values)
 
 
 def _read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
@@ -350,4 +350,4 @@ def _added(program: Program, step: Sweeps, layout: Layout) -> str:
     """Return the functions that add the derivatives by parameters to those of the caller."""
     bars = {p: layout.bar(p) for p in (*step.sites.parameters, *step.sites.at_bonds)}
     added = sums_of_derivatives(program.parameters, members(program), bars)
-    return "\n".join(commented(one, program.name) for one in added)
+    return "\n".join(commented(one, program) for one in added)

@@ -43,9 +43,7 @@ def printed(program: Program, loop: ir.Function, purposes: Iterable[str] = (), *
     sentences = [plain(sentence(purpose)) for purpose in _together(purposes or (loop.doc,))]
     lines = [line for text in sentences for line in comment(text, "   ")]
     lines[0] = f"/* {lines[0].strip()}"
-    return "\n".join(
-        [*lines[:-1], f"{lines[-1]} */", function(loop, program.name, "static inline" if inline else "static")]
-    )
+    return "\n".join([*lines[:-1], f"{lines[-1]} */", function(loop, program, "static inline" if inline else "static")])
 
 
 def _together(purposes: Iterable[str]) -> Iterator[str]:

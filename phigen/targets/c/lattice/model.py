@@ -22,8 +22,8 @@ from phigen.targets.c.lattice.layout import (
 )
 from phigen.targets.c.lattice.loops import share
 from phigen.targets.c.loops import commented
+from phigen.targets.c.real import rendered
 from phigen.targets.header import plain
-from phigen.targets.rendering import render
 
 
 def declarations(program: Program, step: Sweeps) -> str:
@@ -67,7 +67,7 @@ def declarations(program: Program, step: Sweeps) -> str:
         "sizes": sizes,
         "bars": _bars(program, member) if step.adjoint else [],
     }
-    return render("c", "lattice.h", values)
+    return rendered(program, "lattice.h", values)
 
 
 def _differences(program: Program) -> int:
@@ -151,12 +151,12 @@ def model(program: Program, step: Sweeps) -> str:
         "late": has["LATE"],
     }
     timed = step.refresh or (program.time and step.equation)
-    prepare = render("c", "middles.c", values) if timed else ""
+    prepare = rendered(program, "middles.c", values) if timed else ""
     prepare += function(program, step.prepare)
     prepare += "\n" + function(program, step.refresh) if step.refresh else ""
     allowed = are_allowed(program.parameters, members(program), graph=layout.graph)
-    texts = [*(render("c", f"{part}.c", values) for part in ("lattice", "lattice_flows"))]
-    return "".join([*texts, commented(allowed, program.name), "\n", prepare])
+    texts = [*(rendered(program, f"{part}.c", values) for part in ("lattice", "lattice_flows"))]
+    return "".join([*texts, commented(allowed, program), "\n", prepare])
 
 
 def _constants(

@@ -74,7 +74,7 @@ def parameters(program: Program, step: Sweeps) -> str:
     """Print the functions that copy parameters at sites and bonds to the arrays that loops read."""
     arrays = layout_of(program, step).arrays
     listed = copies(program.parameters, members(program), arrays, step.sites.at_bonds)
-    return "".join(commented(copy, program.name) + "\n" for copy in listed)
+    return "".join(commented(copy, program) + "\n" for copy in listed)
 
 
 def drivers(loops: RowLoops) -> RowDrivers:
@@ -85,7 +85,7 @@ def drivers(loops: RowLoops) -> RowDrivers:
 
 def driver_text(program: Program, driver: ir.Function) -> str:
     """Return the text of a driver, below its purpose."""
-    return f"/* {driver.doc}. */\n{function(driver, program.name)}"
+    return f"/* {driver.doc}. */\n{function(driver, program)}"
 
 
 @dataclass(frozen=True)
