@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
+    from phigen.study.averages import averages
     from phigen.sweeping.api import sweep
 
 _HOMES = {
@@ -38,6 +39,7 @@ _HOMES = {
     "compile": "phigen.api",
     "formulas": "phigen.api",
     "sweep": "phigen.sweeping.api",
+    "averages": "phigen.study.averages",
     "System": "phigen.geometry.system",
     "LatticeSolver": "phigen.runtime.lattice",
     "LatticeSystem": "phigen.lattice.lattice_system",
@@ -75,6 +77,7 @@ __all__ = [
     "ToolchainError",
     "Trajectory",
     "__version__",
+    "averages",
     "compile",
     "formulas",
     "load",

@@ -255,7 +255,8 @@ def _write_store(path: Path, trajectory: LatticeTrajectory) -> None:
     expect_store(path)
     data = trajectory.to_xarray()
     part = path.with_name(path.name + ".part")
-    root = imported("zarr").open_group(str(part), mode="w", zarr_format=2)
+    zarr = imported("zarr")
+    root = zarr.open_group(str(part), mode="w", zarr_format=2)
     for name in data.variables:
         values, attributes = data[name].to_numpy(), {"_ARRAY_DIMENSIONS": list(data[name].dims)}
         if values.dtype.kind in "fiu":
@@ -265,6 +266,7 @@ def _write_store(path: Path, trajectory: LatticeTrajectory) -> None:
     root.attrs.update({str(name): value for name, value in data.attrs.items()})
     if trajectory.origin:
         root.attrs["origin"] = trajectory.origin
+    zarr.consolidate_metadata(str(part))  # without this xarray warns
     if path.exists():
         shutil.rmtree(path)
     part.rename(path)

@@ -58,11 +58,13 @@ class DynamicSpectrum:
 
         Raises `MissingPackageError` without zarr.
         """
-        root = imported("zarr").open_group(str(path), mode="w", zarr_format=2)
+        zarr = imported("zarr")
+        root = zarr.open_group(str(path), mode="w", zarr_format=2)
         for name, (dimensions, values) in self.variables("S").items():
             about = {"_ARRAY_DIMENSIONS": list(dimensions)}
             root.create_array(name, data=values, fill_value=None, attributes=about)  # 0 is a value like others
         root.attrs["of"] = list(self.of)
+        zarr.consolidate_metadata(str(path))
 
     def plot(self, title: str = "") -> Figure:
         """A picture of S over q and ω ≥ 0, on a logarithmic scale; for grids of two or three axes along the first,

@@ -176,7 +176,8 @@ class Declarations:
     def numbers(self) -> AllowedNames:
         """No declared name at all: for defaults and initial values."""
         declared = (*self.coordinates, *self.parameters, *self.definitions, *filter(None, [self.time]))
-        return AllowedNames({}, {n: (f"expected a number; {n!r} is not constant", "") for n in declared})
+        hint = "formulas of values may contain indices and sizes, such as i and N_i" if self.lattice else ""
+        return AllowedNames({}, {n: (f"expected a number; {n!r} is not constant", hint) for n in declared})
 
     def inside(self, within: tuple[Any, ...], coordinates: tuple[str, ...], message: str) -> Declarations:
         """Declarations for a structure with coordinates of its own; ``message`` begins the refusal of other names."""

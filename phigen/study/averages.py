@@ -14,6 +14,9 @@ from typing import Any
 import numpy as np
 
 from phigen.runtime.interface import Floats
+from phigen.runtime.lattice import LatticeTrajectory
+from phigen.runtime.lattice_series import LatticeSeries
+from phigen.runtime.trajectory import Trajectory
 from phigen.spec.model import Run
 
 #: Default number of blocks for the standard error. With 20 blocks, the standard error itself has a
@@ -142,6 +145,21 @@ class Averages:
         columns = (state["mean"], error, variance, state["least"], state["largest"], time)
         rows = zip(*(column.tolist() for column in columns), resolved.tolist(), strict=True)
         return [Average(*row) for row in rows]
+
+
+def averages(
+    trajectory: Trajectory | LatticeTrajectory | LatticeSeries, *, after: float | None = None, blocks: int | None = None
+) -> dict[str, Average]:
+    """Return the averages over time of the observables of a trajectory, or of the columns of a series, by name.
+
+    They are those that ``phigen run`` prints and sweeps store: over the rows from the time ``after`` on, with standard
+    errors from at least ``blocks`` blocks. Fields of lattices, with a value at each site, are left out.
+    """
+    listed = trajectory.columns if isinstance(trajectory, LatticeSeries) else trajectory.observables
+    columns = {name: values for name, values in listed.items() if np.ndim(values) == 1}
+    running = Averages(len(columns), after=after, backwards=trajectory.h < 0, blocks=blocks)
+    running.see(trajectory.t, np.reshape([*columns.values()], (len(columns), -1)).T)
+    return dict(zip(columns, running.results(), strict=True))
 
 
 def averages_of(run: Run, width: int) -> Averages:

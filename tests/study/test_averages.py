@@ -112,3 +112,27 @@ def test_an_observable_slower_than_the_run_is_not_resolved(count):
 def test_a_conserved_observable_needs_no_blocks():
     (average,) = averages(3 + 1e-9 * np.cos(np.linspace(0, 1, 100))).results()
     assert average.resolved
+
+
+def test_averages_of_a_trajectory_and_of_a_series_are_those_of_their_rows():
+    text = """phigen: 1
+name: chain
+lattice: {axes: [i]}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + (q[i+1] - q)**2/2
+observables: {heat: {mean: p**2}, local: q}
+order: 2
+runs: {r: {initial: {q: sin(i), p: 0}, sizes: [6], step: 0.1, steps: 90, stride: 2, record: [heat, energy]}}
+"""
+    solver = phigen.compile(phigen.spec.loads(text), target="numpy")
+    series = solver.run()
+    start = np.stack([np.sin(np.arange(6.0)), np.zeros(6)])
+    trajectory = solver.integrate(start, 0.1, 90, stride=2)
+    of_series, of_trajectory = (phigen.averages(one, after=2.0, blocks=4) for one in (series, trajectory))
+    assert list(of_trajectory) == ["heat"]
+    heat = trajectory.observables["heat"][trajectory.t >= 2 - 1e-12]
+    assert of_trajectory["heat"].mean == pytest.approx(heat.mean(), rel=1e-12)
+    assert of_series["heat"].mean == pytest.approx(heat.mean(), rel=1e-12)
+    assert of_series["heat"].error == pytest.approx(of_trajectory["heat"].error, rel=1e-9)
+    assert of_series["energy"].variance < 1e-3

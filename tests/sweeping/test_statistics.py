@@ -54,9 +54,7 @@ def test_statistics_are_those_of_single_runs(frames, after):
 def test_statistics_are_over_the_stored_rows_of_a_run():
     text = DRIVEN.replace("start: 0.5", "start: 0.5, stride: 7, average: {after: 2.5, blocks: 2}")
     data, solver = phigen.sweep(phigen.spec.loads(text), workers=1), phigen.compile(phigen.spec.loads(text))
-    trajectory, averages = solver.run("swing", A=0.4), Averages(1, after=2.5, blocks=2)
-    averages.see(trajectory.t, trajectory.observables["kinetic"][:, None])
-    (average,) = averages.results()
+    average = phigen.averages(solver.run("swing", A=0.4), after=2.5, blocks=2)["kinetic"]
     member = data.sel(A=0.4, q=0.9)
     assert float(member["mean(kinetic)"]) == pytest.approx(average.mean, rel=1e-11)
     assert float(member["error(kinetic)"]) == pytest.approx(average.error, rel=1e-9)
