@@ -34,6 +34,18 @@ def test_conda_recipe_has_the_dependencies_of_the_package():
     assert set(recipe()["requirements"]["run"]) == needs | {"python " + project["project"]["requires-python"]}
 
 
+def test_conda_recipe_agrees_with_the_package():
+    project, about = tomllib.loads(text("pyproject.toml")), recipe()
+    (command,) = project["project"]["scripts"].items()
+    assert about["build"]["entry_points"] == [" = ".join(command)]
+    assert about["about"]["license"] == project["project"]["license"]
+    host = [d.replace(" ", "") for d in about["requirements"]["host"]]
+    assert set(project["build-system"]["requires"]) <= set(host)
+    assert (ROOT / "packaging/conda" / about["source"]["path"] / about["about"]["license_file"]).samefile(
+        ROOT / "LICENSE"
+    )
+
+
 def test_paper_cites_what_its_bibliography_has():
     cited = set(re.findall(r"@(\w+)", text("paper.md").split("---", 2)[2]))
     assert cited == set(re.findall(r"^@\w+\{(\w+),", text("paper.bib"), re.MULTILINE))

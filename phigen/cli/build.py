@@ -277,8 +277,8 @@ def _expect_certificates(planned: Sequence[tuple[Compilation, list[Change]]], op
 
 
 def _report(console: Console, folder: Path, compilation: Compilation, changes: Sequence[Change]) -> None:
-    written = [c.path.name for c in changes if c.state in ("missing", "different")]
-    removed = [c.path.name for c in changes if c.state == "stale"]
+    written = [_within(folder, c.path) for c in changes if c.state in ("missing", "different")]
+    removed = [_within(folder, c.path) for c in changes if c.state == "stale"]
     said = [f"wrote {', '.join(written)}"] if written else []
     said += [f"removed {', '.join(removed)}, which the spec no longer gives"] if removed else []
     program = compilation.program
@@ -287,6 +287,11 @@ def _report(console: Console, folder: Path, compilation: Compilation, changes: S
     library = folder / _library(compilation.spec.name)
     if written and library.exists():
         console.note(f"{library} is older than its sources; --compile builds it again")
+
+
+def _within(folder: Path, path: Path) -> str:
+    """Return a path relative to the folder of a system, if it is in that folder."""
+    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
 
 
 def _compile_library(console: Console, folder: Path, name: str) -> None:

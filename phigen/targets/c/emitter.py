@@ -38,6 +38,9 @@ from phigen.targets.rendering import render
 #: that call library functions, and for paths, whose derivatives a single evaluation does not need.
 PASSES, PASSES_OF_CALLS = 2, 1
 
+#: Iterations of a stage of an implicit step: with the predictor and, if they fail, without it.
+ATTEMPTS = 2
+
 #: Number of lines above which a file gets a table of contents.
 FEW_SCREENS = 240
 
@@ -169,6 +172,9 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
         predictor = PredictorPolicy()
         sizes.append(("DIFFERENCES", predictor.differences, "for the predictor; more would amplify rounding"))
     sizes += text_of(program).declared(step, lanes)
+    if program.profile == "certified" and step.kind.implicit and step.inner_solve:
+        most = ATTEMPTS * step.inner_solve.max_iterations * len(program.fractions)
+        sizes.append(("MOST_EVALUATIONS", most, "largest number of evaluations of the kernel in a step"))
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
         sizes.append(("REMEMBERED", memory["REMEMBERED"], "past solutions that the recurrence is fitted to"))
