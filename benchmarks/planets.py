@@ -31,6 +31,8 @@ Bodies = tuple[NDArray[np.float64], NDArray[np.float64]]
 PHIGEN = (
     ("jacobi", "wisdom-holman-17", 2, 5.0),
     ("jacobi", "wisdom-holman-17", 2, 2.5),
+    ("jacobi", "wisdom-holman-modified-17", 4, 5.0),
+    ("jacobi", "wisdom-holman-modified-17", 4, 3.65),
     ("jacobi", "aba-10-6-4", 4, 10.0),
     ("jacobi", "aba-10-6-4", 4, 20.0),
     ("democratic_heliocentric", "wisdom-holman-17", 2, 5.0),

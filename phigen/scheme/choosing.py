@@ -22,7 +22,7 @@ from phigen.scheme.near_integrable import Corrected, NearIntegrable
 from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.order import Order
 from phigen.splitting.flow import Flow
-from phigen.splitting.kicks import Kick, kicks
+from phigen.splitting.kicks import Kick, kicks, modified_kick
 from phigen.splitting.parts import SplitHamiltonian
 from phigen.splitting.statements import bracket
 from phigen.symbolic.expression import gradient, symbols_of
@@ -79,7 +79,8 @@ def plan(system: System, splitting: SplitHamiltonian, requested: int, compositio
         choice = planned(system, splitting, requested, composition, lambda: ())
         return with_carrier(choice, system.time) if system.time else choice
     if not system.time:
-        return planned(system, splitting, requested, composition, lambda: kicks(system, splitting))
+        choice = planned(system, splitting, requested, composition, lambda: kicks(system, splitting))
+        return _with_modified_kick(system, choice)
     choice = planned(system, splitting, requested, composition, lambda: _kicks_in_time(system, splitting))
     return with_carrier(choice, system.time)
 
@@ -164,6 +165,20 @@ def _near_integrable(splitting: SplitHamiltonian, order: Order, method: NearInte
         return ScheduledMethod(order, method, SplitHamiltonian((small, large), small=0), why)
     why = f"H_2 is small, of size ε: errors {method.errors}"
     return ScheduledMethod(order, method, SplitHamiltonian((large, small), small=1), why)
+
+
+def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMethod:
+    """Return the choice with the flow of B + κ{B, {B, A}} if the method takes it. Raises `SpecError` without one."""
+    method = choice.method
+    if not isinstance(method, Corrected) or not method.multiple:
+        return choice
+    small, large = choice.splitting.flows
+    modified = modified_kick(system, small, large)
+    if modified is None:
+        message = f"scheme splitting: composition {method.name} needs B and {{B, {{B, A}}}} in coordinates that commute"
+        hint = "coordinates_from: jacobi has such a B, and composition: wisdom-holman-17 takes any"
+        raise SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
+    return replace(choice, splitting=SplitHamiltonian((modified, large), kick=0, small=0))
 
 
 def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) -> SpecError:

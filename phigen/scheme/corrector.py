@@ -6,6 +6,10 @@ A + ε(f(z) − z g(z)) B. With z g(z) = f(z) − 1 up to z^{2k} the error in ε
 remains. C is a product of flows of A, B, A, B, A over the times c_i, −b_i, −2c_i, b_i, c_i, which gives
 g(z) = Σ 2 b_i sinh(c_i z): for chosen c_i a linear system for b_1, …, b_k. A product of exact flows is a Poisson map.
 
+The order of the flows of B adds ε²h³ to the errors of C. A *balanced* C has each pair with half of b_i, then these
+pairs in the reverse order with −c_i and −b_i: the flows of B, at their times along A, are the same in reverse, and the
+logarithm of C is odd in ε. This is for steps without an error of ε²h², with B − h²{B, {B, A}}/24 in place of B.
+
 J. Wisdom, M. Holman, J. Touma, Symplectic correctors, Fields Institute Communications 10 (1996); J. Wisdom, Symplectic
 correctors for canonical heliocentric n-body maps, Astronomical Journal 131 (2006).
 """
@@ -25,13 +29,16 @@ B, A = 0, 1
 SPACING = Fraction("0.418330013267037773994000")
 
 
-def corrector(order: int) -> tuple[Fraction, ...]:
+def corrector(order: int, *, balanced: bool = False) -> tuple[Fraction, ...]:
     """Return the times of flows of A, B, A, …, A at the end of a run: minus half a flow of A, then C.
 
-    Those at the start of the run have the other sign and the reverse order. Order 1 has no C.
+    Those at the start of the run have the other sign and the reverse order. Order 1 has no C. A ``balanced`` C has
+    twice the flows, and no error of ε²h³.
     """
-    times = [-Fraction(1, 2)]
-    for c, b in _pairs((order - 1) // 2):
+    times, pairs = [-Fraction(1, 2)], _pairs((order - 1) // 2)
+    if balanced:
+        pairs = (*((c, b / 2) for c, b in pairs), *((-c, -b / 2) for c, b in reversed(pairs)))
+    for c, b in pairs:
         times = [*times[:-1], times[-1] + c, -b, -2 * c, b, c]
     return tuple(times)
 

@@ -13,12 +13,15 @@ J. Laskar, P. Robutel, High order symplectic integrators for perturbed Hamiltoni
 Dynamical Astronomy 80 (2001): Gauss's quadrature, (2s, 2). R. I. McLachlan, Composition methods in the presence of
 small parameters, BIT 35 (1995): (8, 4). S. Blanes, F. Casas, A. Farrés, J. Laskar, J. Makazaga, A. Murua, New
 families of symplectic splitting methods for numerical integration in dynamical astronomy, Applied Numerical
-Mathematics 68 (2013): (8, 6, 4) and (10, 6, 4).
+Mathematics 68 (2013): (8, 6, 4) and (10, 6, 4). J. Wisdom, M. Holman, J. Touma, Symplectic correctors, Fields Institute
+Communications 10 (1996), and H. Rein, D. Tamayo, G. Brown, High-order symplectic integrators for planetary dynamics and
+their implementation in REBOUND, Monthly Notices of the Royal Astronomical Society 489 (2019): a kernel that is modified
+by {B, {B, A}}.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 
@@ -79,13 +82,20 @@ class NearIntegrable(Alternation):
 
 @dataclass(frozen=True)
 class Corrected(NearIntegrable):
-    """Steps of one flow of B and one of A, between a `corrector`, given by its times, and its inverse."""
+    """Steps of one flow of B and one of A, between a `corrector`, given by its times, and its inverse.
+
+    In a step B has ``multiple`` h² {B, {B, A}} beside it; in the corrector it has not.
+    """
 
     corrector: tuple[Fraction, ...] = ()
+    multiple: Fraction = Fraction(0)
 
     def schedule(self) -> Schedule:
         """Return the flows of a step, where part 0 is B, and those of the corrector."""
-        return schedule(self.corrector)
+        flows = schedule(self.corrector)
+        if not self.multiple:
+            return flows
+        return replace(flows, multiples=(float(self.multiple), *[0.0] * (len(flows.times) - 1)))
 
 
 def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[Fraction]) -> NearIntegrable:
@@ -127,6 +137,19 @@ def _weight(nodes: list[Fraction], i: int) -> Fraction:
     return sum((x / (k + 1) for k, x in enumerate(p)), Fraction(0))
 
 
+def _modified(order: int) -> Corrected:
+    """Return the method with a modified flow of B and the corrector of an order: without errors of ε² h²."""
+    plain = _wisdom_holman(order)
+    return replace(
+        plain,
+        name=f"wisdom-holman-modified-{order}",
+        order=4,
+        generalised=(order + 1, 4),
+        corrector=corrector(order, balanced=True),
+        multiple=Fraction(-1, 24),
+    )
+
+
 def _wisdom_holman(order: int) -> Corrected:
     """Return the method with the corrector of an order; 1 is that without a corrector."""
     name = "wisdom-holman" if order == 1 else f"wisdom-holman-{order}"
@@ -144,6 +167,7 @@ METHODS = (
     _listed("aba-10-6-4", (10, 6, 4), 8, _10_6_4),
     _listed("aba-8-6-4", (8, 6, 4), 7, _8_6_4),
     _listed("aba-8-4", (8, 4), 5, _8_4),
+    *(_modified(order) for order in (7, 11, 17)),
 )
 NAMES = tuple(method.name for method in METHODS)
 

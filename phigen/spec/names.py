@@ -127,7 +127,10 @@ STATISTICS = ("mean", "std", "error")
 RECONSTRUCTIONS = ("quaternion", "matrix")
 
 #: Compositions of the flows of the parts of a splitting: for two parts, and for any number.
-CORRECTED = tuple(f"wisdom-holman{order}" for order in ("", "-3", "-5", "-7", "-11", "-17"))
+CORRECTED = (
+    *(f"wisdom-holman{order}" for order in ("", "-3", "-5", "-7", "-11", "-17")),
+    *(f"wisdom-holman-modified-{order}" for order in (7, 11, 17)),
+)
 NEAR_INTEGRABLE = ("saba-4-2", "saba-6-2", "saba-8-2", "saba-10-2", *CORRECTED, "aba-8-4", "aba-8-6-4", "aba-10-6-4")
 FLOW_COMPOSITIONS = ("blanes-moan", "blanes-moan-rkn", "nystrom", "force-gradient", *NEAR_INTEGRABLE)
 COMPOSITIONS = (

@@ -15,12 +15,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from phigen.geometry.system import System
+from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.splitting.flow import Flow, NoFlowError, Term, flow_of
 from phigen.splitting.parts import SplitHamiltonian
-from phigen.splitting.ring import KICK, Ring, ring_of
+from phigen.splitting.ring import KICK, TIME, Ring, ring_of
+from phigen.splitting.statements import bracket
 from phigen.splitting.terms import hamiltonian_terms
-from phigen.symbolic.expression import symbol
+from phigen.symbolic.expression import gradient, symbol, symbols_of
 from phigen.symbolic.tower import Poly
 
 #: Largest {V, {V, T}}, in monomials, for a modified kick and for the question whether it commutes with V; with roots,
@@ -52,6 +53,21 @@ def kicks(system: System, splitting: SplitHamiltonian) -> tuple[Kick, ...]:
         if proved or (small and ring.commute(v, gradient)):
             kick_parts.append(Kick(part, _modified(ring, splitting.flows[part], v, gradient) if small else None))
     return tuple(kick_parts)
+
+
+def modified_kick(system: System, kick: Flow, other: Flow) -> Flow | None:
+    """Return the flow of V + κ{V, {V, T}} if both are functions of coordinates that commute, or None.
+
+    V is the Hamiltonian of ``kick``, T that of ``other``. Unlike `kicks`, this does not expand the bracket, which for
+    nine bodies has more monomials than fit.
+    """
+    v = kick.hamiltonian
+    both = v + symbol(KICK) * bracket(system, v, bracket(system, v, other.hamiltonian))
+    places = [i for i, c in enumerate(system.coordinates) if c in symbols_of(both)]
+    if kick.force or not all(system.poisson[i][j].is_zero for i in places for j in places):
+        return None
+    slope = gradient(symbol(TIME) * both, system.coordinates)
+    return Flow(both, tuple(hamiltonian_vector_field(system.poisson, slope)), kick.manner)
 
 
 def _graded(ring: Ring, v: Poly, t: Poly) -> bool:

@@ -260,11 +260,10 @@ def _observed(source: random.Random, drawn: Ordinary) -> Ordinary:
 
 
 def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """The system, or with a rotation, or with the same pairs a linear one, or a perturbed Kepler motion."""
+    """The system, or with a rotation or body, or with the same pairs a linear one, or a perturbed Kepler motion."""
     acted_upon = drawn.timed or drawn.forced or drawn.noise or drawn.monitor is not None
-    if drawn.structure.body and not acted_upon and drawn.options.get("scheme") == "splitting" and source.random() < 0.5:
-        square = linear(source, drawn.structure.coordinates) ** 2  # a rotation about a vector
-        return replace(drawn, terms=(*drawn.terms, small(source) * square / 4))
+    if drawn.structure.body and not acted_upon and drawn.options.get("scheme") == "splitting":
+        return _with_rotations(source, drawn)
     if drawn.structure.kind != "canonical" or acted_upon:
         return drawn
     series_only = ("gauge", "birealisation", "solver", "composition")
@@ -284,11 +283,24 @@ def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:
     motion = [sum(v**2 for v in p[:size]) / (2 * mass), -pull / sympy.sqrt(sum(v**2 for v in q[:size]))]
     beside = [v**2 / 300 for v in p[size:]]
     terms = [*motion, *beside, small(source) * monomial(source, q, 3) / 300]
-    names = {2: ["saba-8-2", "wisdom-holman"], 4: ["aba-8-4", "aba-8-6-4", "aba-10-6-4"]}
+    names = {2: ["saba-8-2", "wisdom-holman"], 4: ["aba-8-6-4", "aba-10-6-4", "wisdom-holman-modified-7"]}
     if not beside and options["order"] in names and source.random() < 0.7:
         name = source.choice(names[options["order"]])
-        options["composition"] = name + "-5" * name.startswith("wisdom")
+        options["composition"] = name + ("-5" if name == "wisdom-holman" else "")
     return replace(drawn, terms=tuple(terms), options=options)
+
+
+def _with_rotations(source: random.Random, drawn: Ordinary) -> Ordinary:
+    """The system with a rotation about a vector, or a free rigid body with three moments, or the system."""
+    x, way = drawn.structure.coordinates, source.choice(["vector", "body", "body", ""])
+    if way == "vector":
+        return replace(drawn, terms=(*drawn.terms, small(source) * linear(source, x) ** 2 / 4))
+    if way != "body":
+        return drawn
+    terms = [abs(small(source)) * v**2 for v in x]
+    beside = [small(source) * source.choice(x)] if source.random() < 0.5 else []
+    options = {k: v for k, v in drawn.options.items() if k != "composition"}
+    return replace(drawn, terms=(*terms, *beside), options=options)
 
 
 def _bodies(source: random.Random, drawn: Ordinary, options: dict[str, Any]) -> Ordinary:

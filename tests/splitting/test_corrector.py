@@ -30,7 +30,7 @@ BY_NAME = {m.name: m for m in METHODS if isinstance(m, Corrected)}
 
 @cache
 def compilation(name, text=SMALL, **options):
-    return compile_text(text + f"composition: {name}\n", 2, **options)
+    return compile_text(text + f"composition: {name}\n", BY_NAME[name].order, **options)
 
 
 def test_all_names_are_offered():
@@ -69,10 +69,20 @@ def test_the_error_in_the_second_power_of_epsilon_is_left():
     assert errors[0] / errors[1] == pytest.approx(100, rel=0.2)
 
 
+def test_the_modified_flow_removes_the_error_of_the_second_power_of_the_step():
+    """The corrector is balanced: otherwise an error of ε² h³ would be left."""
+    made = solver(compilation("wisdom-holman-modified-17"), "c")
+    errors = [np.ptp(made.integrate(START, h, round(48 / h), stride=1).energy) for h in (0.2, 0.1)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.3)
+
+
 @pytest.mark.parametrize("target", ["c", "numpy"])
-@pytest.mark.parametrize("text", [SMALL, TOP], ids=["canonical", "top"])
-def test_a_corrected_step_is_a_poisson_map_with_an_exact_tangent(text, target):
-    made = solver(compilation("wisdom-holman-7", text, tangent=True), target)
+@pytest.mark.parametrize(
+    ("text", "name"), [(SMALL, "wisdom-holman-7"), (TOP, "wisdom-holman-7"), (SMALL, "wisdom-holman-modified-7")],
+    ids=["canonical", "top", "modified"],
+)  # fmt: skip
+def test_a_corrected_step_is_a_poisson_map_with_an_exact_tangent(text, name, target):
+    made = solver(compilation(name, text, tangent=True), target)
     x, h, d, eps = np.array([0.9, 0.2, 0.3, 1.1][: 4 if text is SMALL else 3]), 0.4, 1e-5, 0.3
     end, tangent = made.step_tangent(x, h, eps=eps)
 
@@ -98,10 +108,10 @@ def test_states_do_not_depend_on_the_outputs(profile):
 
 @pytest.mark.thin(1)
 @pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("stride", [1, 4, 9, None])
-def test_gradients_of_runs_are_differences(target, stride):
+@pytest.mark.parametrize(("stride", "kernel"), [(1, ""), (4, ""), (9, ""), (None, ""), (4, "modified-")])
+def test_gradients_of_runs_are_differences(target, stride, kernel):
     """Along states and parameters, with rows at which runs end and begin anew; the last run is shorter."""
-    made = solver(compilation("wisdom-holman-7", adjoint=True), target)
+    made = solver(compilation(f"wisdom-holman-{kernel}7", adjoint=True), target)
     x, h, steps, d, eps = np.array(START) + 0.1, 0.3, 9, 1e-4, 0.02
     source = np.random.default_rng(1)
     rows = 1 if stride is None else len(made.integrate(x, h, steps, stride).x)
@@ -131,9 +141,10 @@ def test_gradients_of_members_are_those_of_single_runs():
     np.testing.assert_allclose(together, alone, rtol=0, atol=1e-12)
 
 
-def test_targets_agree():
-    c, numpy = (solver(compilation("wisdom-holman-17"), target).integrate(START, 0.3, 40).x[-1] for target in TARGETS)
-    js = javascript(compilation("wisdom-holman-17"), f"x0: {START}", "s.integrate(0.3, 39).step(0.3)", "[...s.x]")
+@pytest.mark.parametrize("name", ["wisdom-holman-17", "wisdom-holman-modified-17"])
+def test_targets_agree(name):
+    c, numpy = (solver(compilation(name), target).integrate(START, 0.3, 40).x[-1] for target in TARGETS)
+    js = javascript(compilation(name), f"x0: {START}", "s.integrate(0.3, 39).step(0.3)", "[...s.x]")
     np.testing.assert_allclose([numpy, js], [c, c], rtol=0, atol=1e-12)
 
 
@@ -194,6 +205,12 @@ REFUSED = {
     "noise": (SMALL + "noise: {w: {hamiltonian: x, amplitude: 0.1}}\n", "noise"),
     "nothing small": (SMALL.replace("0.001, small: true", "0.5"), "none is known to be small"),
 }
+
+
+def test_a_modified_flow_that_is_no_shift_is_refused():
+    with pytest.raises(SpecError, match="coordinates that commute") as refused:
+        compilation("wisdom-holman-modified-7", TOP)
+    assert refused.value.diagnostics[0].location is not None
 
 
 @pytest.mark.parametrize("case", REFUSED)
