@@ -50,7 +50,7 @@ def elements(motion: EulerMotion, group: Group, t: Expression) -> list[list[Expr
     x, changes = addition.x, addition.changes()
     signed = [-w for w in weights] if group.spatial else weights
     s, c, _ = functions_of(addition.kappa, addition.p, addition.r)
-    axes = _Axes(addition.sorted(x), addition.sorted(signed), dot(x, x), call("inv0", dot(x, x)))
+    axes = _SortedAxes(addition.sorted(x), addition.sorted(signed), dot(x, x), call("inv0", dot(x, x)))
     z = addition.p * addition.kappa**2
     stretched = (4 * addition.kappa * power(1 + z, -1)) ** 2
     d = sqrt(c**2 + addition.r * s**2)
@@ -80,7 +80,7 @@ def _matrix(group: Group, q: Vector) -> list[Expression]:
 
 
 @dataclass(frozen=True)
-class _Axes:
+class _SortedAxes:
     """x_i and w_i in the order l, m, h, with L² and 1/L²."""
 
     x: Vector
@@ -160,7 +160,7 @@ def _angle(order: Sequence[int]) -> Iterator[tuple[str, Expression]]:
     c, d = (sqrt(1 - (high - e) * s**2) for e in (low, middle))
     sigma = [dict(zip(order, (c, d, ONE), strict=True))[i] for i in range(3)]
     end = moved(x, factors, sigma, s, 1 - high * s**2)
-    axes = _Axes([x[i] for i in order], [w[i] for i in order], dot(x, x), power(dot(x, x), -1))
+    axes = _SortedAxes([x[i] for i in order], [w[i] for i in order], dot(x, x), power(dot(x, x), -1))
     across, along = axes.point(high - middle, (1 + c) / 2, s**2, s, c, d)
     slopes = [c * d * e for e in derivatives([across, along], name)]
     turning = (across * slopes[1] - along * slopes[0]) * power(across**2 + axes.square * along**2, -1)

@@ -34,8 +34,14 @@ GAUSS_ORDERS = (4, 8, 12, 16)
 AUTO = "auto scheme"
 
 #: Candidate methods for near-integrable systems, with their orders: the best for each set of error terms in ε and h,
-#: and the method with a corrector, whose steps are the cheapest.
-NEAR_INTEGRABLE = (("saba-8-2", 2), ("wisdom-holman-17", 2), ("aba-8-4", 4), ("aba-10-6-4", 4))
+#: and the methods with a corrector, whose steps are the cheapest.
+NEAR_INTEGRABLE = (
+    ("saba-8-2", 2),
+    ("wisdom-holman-17", 2),
+    ("wisdom-holman-modified-17", 4),
+    ("aba-8-4", 4),
+    ("aba-10-6-4", 4),
+)
 
 #: Kinds that need formulas of the user, and kinds with options.
 FORMULAS = ("custom", "group-map", "spray")

@@ -237,7 +237,9 @@ def test_a_wrong_rate_of_the_attitude_is_refuted(monkeypatch):
     ((_, residual),) = free_bodies._angle((0, 2, 1))
     values = {s: 0.3 + 0.17 * k for k, s in enumerate(sorted(symbols_of(residual), key=str))}
     assert abs(evaluate([residual], values)[0]) < 1e-13
-    monkeypatch.setattr(free_bodies._Axes, "linear", property(lambda axes: (axes.weights[0], axes.betas[2] * axes.n)))
+    monkeypatch.setattr(
+        free_bodies._SortedAxes, "linear", property(lambda axes: (axes.weights[0], axes.betas[2] * axes.n))
+    )
     ((_, residual),) = free_bodies._angle((0, 2, 1))
     assert abs(evaluate([residual], values)[0]) > 1e-2
 
