@@ -521,6 +521,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         until: float | None = None,
         stride: int | None = None,
         every: float | None = None,
+        at: Sequence[float] | None = None,
         retry: int = 0,
         seed: int | None = None,
         output: str | Path | None = None,
@@ -534,24 +535,24 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         A run whose ``record`` has no ``state`` returns the result of `series`. The initial state, the bonds, and
         parameters at sites and bonds are computed from the formulas, files and random numbers of the run, at its
         ``sizes`` or at those passed. The other arguments replace the settings of the spec: the ``step``, the number of
-        ``steps`` or the time ``until`` where it ends, the ``stride`` or the time ``every`` between rows, ``seed`` that
-        of the noise; ``x0`` (coordinates, *sizes) is the initial state, ``retry`` as for `integrate`. A run with
-        ``stop`` ends where that expression first passes through 0; ``crossings`` of the result are those of the
-        ``section``. Raises `ValueError` if there is no run of that name, and `SpecError` for an initial state that does
-        not fit the sizes.
+        ``steps`` or the time ``until`` where it ends, the ``stride`` or the time ``every`` between rows, or the times
+        ``at`` which they are, ``seed`` that of the noise; ``x0`` (coordinates, *sizes) is the initial state, ``retry``
+        as for `integrate`. A run with ``stop`` ends where that expression first passes through 0; ``crossings`` of the
+        result are those of the ``section``. Raises `ValueError` if there is no run of that name, and `SpecError` for an
+        initial state that does not fit the sizes.
         """
         from phigen.lattice.states import start_of
 
         base = runs.run_named(self.spec, name)
         assert self.spec is not None
-        settings = runs.Settings(step, steps, until, stride, every, sizes)
+        settings = runs.Settings(step, steps, until, stride, every, sizes, at)
         chosen = runs.changed(self.spec, base, settings)
         start = start_of(self.spec, chosen)
         t0 = float(chosen.start) if self.interface.time else None
         drawn = {"seed": chosen.seed if seed is None and self.interface.noise else seed}
         values = start.arguments | arguments.together(parameters, more)
-        at = self._beginning(start.state if x0 is None else x0, "x0", float(chosen.step), values, {}, t0, drawn)
-        plan = self._plan_of(chosen, at, arguments.count(retry, "retry", 0))
+        begun = self._beginning(start.state if x0 is None else x0, "x0", float(chosen.step), values, {}, t0, drawn)
+        plan = self._plan_of(chosen, begun, arguments.count(retry, "retry", 0))
         of = chosen.record if chosen.records_numbers else ()
         return self.carried_out(plan, of, output=output, checkpoints=checkpoints, progress=progress)
 

@@ -32,6 +32,7 @@ class Settings:
     stride: int | None = None
     every: float | None = None
     sizes: Sequence[int] | None = None
+    at: Sequence[float] | None = None
 
 
 def run_named(spec: Spec | None, name: str | None) -> Run:
@@ -54,8 +55,9 @@ def changed(spec: Spec, run: Run, settings: Settings) -> Run:
     """Return the run with the settings of the caller. Raises `ValueError` and `TypeError` for invalid settings."""
     if settings.steps is not None and settings.until is not None:
         raise TypeError("a run takes either steps or until, not both")
-    if settings.stride is not None and settings.every is not None:
-        raise TypeError("a run takes either stride or every, not both")
+    rows = [n for n in ("stride", "every", "at") if getattr(settings, n) is not None]
+    if len(rows) > 1:
+        raise TypeError(f"a run takes either {rows[0]} or {rows[1]}, not both")
     if settings.steps is not None:
         steps = arguments.count(settings.steps, "steps", 1, limits.STEPS)
         run = replace(run, steps=steps, stride=min(run.stride, steps), duration=None, until=None)
@@ -73,7 +75,25 @@ def changed(spec: Spec, run: Run, settings: Settings) -> Run:
         if every <= 0:
             raise ValueError(f"every must be positive, not {settings.every!r}")
         run = replace(run, every=every, at=())
+    if settings.at is not None:
+        known_end = run.stop is None and (run.until is not None or spec.monitor is None)
+        run = replace(run, every=None, at=_times(run, settings.at, known_end=known_end))
     return _resized(spec, run, settings.sizes)
+
+
+def _times(run: Run, times: Sequence[float], *, known_end: bool) -> tuple[Fraction, ...]:
+    """Return times of rows in the order of the run. Raises `ValueError` for one that is not after the start."""
+    forwards = run.step > 0
+    ordered = sorted((_number(t, "at") for t in times), reverse=not forwards)
+    if not ordered:
+        raise ValueError("at has no times")
+    if (ordered[0] < run.start) if forwards else (ordered[0] > run.start):
+        raise ValueError(f"at: {float(ordered[0])!r} is before the start, {float(run.start)!r}")
+    if known_end:
+        end = run.until if run.until is not None else run.start + run.step * run.steps
+        if abs(ordered[-1] - run.start) > abs(end - run.start) * (1 + Fraction(EQUAL)):
+            raise ValueError(f"at: {float(ordered[-1])!r} is after the end, {float(end)!r}")
+    return tuple(dict.fromkeys(ordered))
 
 
 def _resized(spec: Spec, run: Run, sizes: Sequence[int] | None) -> Run:

@@ -155,6 +155,7 @@ class Solver(Named[Backend, Interface]):
         until: float | None = None,
         stride: int | None = None,
         every: float | None = None,
+        at: Sequence[float] | None = None,
         seed: int | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, float] | None = None,
@@ -163,15 +164,20 @@ class Solver(Named[Backend, Interface]):
         """Integrate a run of the spec, the first by default, and return what `integrate` returns.
 
         Arguments replace the settings of the spec: the initial state ``x0`` (DIM,), the ``step``, the number of
-        ``steps`` or the time ``until`` the end, the ``stride`` or the time ``every`` between rows, the ``seed`` of the
-        noise, and parameters. A run with ``stop`` ends at the first zero of that expression. Raises `ValueError` if
+        ``steps`` or the time ``until`` the end, the ``stride`` or the time ``every`` between rows, or the times ``at``
+        which they are, the ``seed`` of the noise, parameters, and coordinates by name, which replace initial values. A
+        run with ``stop`` ends at the first zero of that expression. Raises `ValueError` if
         there is no run of that name; `runs` lists the names.
         """
-        spec, settings = self.spec, runs.Settings(step, steps, until, stride, every)
+        spec, settings = self.spec, runs.Settings(step, steps, until, stride, every, at=at)
         base = runs.run_named(spec, name)
         assert spec is not None
         chosen = runs.changed(spec, base, settings)
-        start = [float(value) for value in chosen.initial] if x0 is None else x0
+        initial = {c: more.pop(c) for c in self.interface.coordinates if c in more}
+        if x0 is not None and initial:
+            raise TypeError(f"a run takes either x0 or initial values such as {next(iter(initial))}, not both")
+        given = zip(self.interface.coordinates, chosen.initial, strict=True)
+        start = [initial.get(c, float(value)) for c, value in given] if x0 is None else x0
         values: dict[str, float] = {n: float(v) for n, v in chosen.parameters.items()}
         values |= arguments.together(parameters, more)
         t0 = float(chosen.start) if self.interface.time else None

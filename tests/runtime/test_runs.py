@@ -94,6 +94,10 @@ def test_arguments_take_the_place_of_settings():
     assert solver.run("until", every=0.5).t[1:3] == pytest.approx([1.0, 1.5])
     assert solver.run("strided", until=1.73).t[-1] == pytest.approx(1.73)
     assert solver.run("timed", stride=5).t[1] == pytest.approx(1.0)
+    np.testing.assert_array_equal(solver.run(q=0.3, p=0.2, step=0.05, steps=40, stride=9, omega=1.5).x, by_hand.x)
+    rows = solver.run("strided", at=[1.7, 0.9])
+    assert rows.t[:-1] == pytest.approx([0.5, 0.9, 1.7])
+    np.testing.assert_allclose(rows.x[1:3], solver.run("strided", stride=1).at([0.9, 1.7]), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -103,6 +107,10 @@ def test_arguments_take_the_place_of_settings():
         ({"steps": 3, "until": 3.0}, "either steps or until"),
         ({"stride": 3, "every": 3.0}, "either stride or every"),
         ({"until": -1.0}, "never reached"),
+        ({"every": 1.0, "at": [1.0]}, "either every or at"),
+        ({"at": [0.25]}, "before the start"),
+        ({"at": [1e3]}, "after the end"),
+        ({"x0": [0.3, 0.2], "q": 0.1}, "either x0 or initial values"),
         ({"every": 0.0}, "every must be positive"),
         ({"every": float("nan")}, "every must be a finite number"),
         ({"steps": 0}, "steps must be at least 1"),
@@ -129,6 +137,9 @@ def test_lattice_runs_at_its_sizes_and_at_others(target):
     start = start_of(spec, spec.runs["wave"])
     by_hand = solver.integrate(start.state, 0.05, 20, 6, parameters=start.arguments)
     np.testing.assert_array_equal(solver.run("wave").x, by_hand.x)
+    rows = solver.run("wave", at=[0.1, 0.73])
+    assert rows.t == pytest.approx([0, 0.1, 0.73, 1.0])
+    np.testing.assert_allclose(rows.x[1:3], by_hand.at([0.1, 0.73]), rtol=0, atol=1e-12)
     other = solver.run(sizes=[16], steps=3, k=0.5)
     assert other.x.shape == (2, 2, 16)
     assert other.parameters["k"] == 0.5
