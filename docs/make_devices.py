@@ -24,29 +24,44 @@ BEGIN, END = "<!-- registers -->\n", "<!-- end of registers -->\n"
 KERNELS = (
     ("rigid_body", 2), ("rigid_body", 4), ("rigid_body", 6), ("rigid_body", 8), ("lotka_volterra", 4),
     ("henon_heiles", 4), ("kepler", 4), ("kepler", 6), ("toda3", 4), ("toda3", 6), ("lagrange_top", 2),
-    ("kepler_eccentric", None), ("pendulum_euler", None), ("satellite", None), ("nambu_pendulum", None),
+    ("kepler_eccentric", None), ("pendulum_euler", None), ("earth_moon", 4),
+    ("so4_manakov", 4), ("satellite", None), ("nambu_pendulum", None),
     ("kowalevski_gauss", None), ("satellite_wheels", None), ("spin_chain5", None),
 )  # fmt: skip
 
 
+def kernels_of(text: str, name: str) -> list[nvrtc.Kernel]:
+    """Return the kernels of ensembles for all architectures."""
+    kernels = []
+    with tempfile.TemporaryDirectory() as folder:
+        for architecture in nvrtc.ARCHITECTURES:
+            compiled = nvrtc.assembled(nvrtc.ptx(text, architecture), architecture, Path(folder))
+            kernels.append(compiled[f"{name}_ensemble_kernel"])
+    return kernels
+
+
+def columns(kernels: list[nvrtc.Kernel]) -> list[str]:
+    """Return the registers, stacks and spills."""
+    return [" / ".join(str(getattr(k, part)) for k in kernels) for part in ("registers", "stack", "spilled")]
+
+
 def rows() -> Iterator[str]:
     """Yield the rows of the table."""
-    resources = "registers | stack, bytes | spills, bytes | shared, bytes a thread"
-    yield f"| system | order | step | coordinates | {resources} | compilation, s |"
-    yield "|---|---|---|---|---|---|---|---|---|"
+    resources = "registers | stack, bytes | spills, bytes"
+    common = "registers, common | stack, common | spills, common"
+    yield f"| system | order | step | coordinates | {resources} | {common} | compilation, s |"
+    yield "|---|---|---|---|---|---|---|---|---|---|---|"
     for name, order in KERNELS:
         program = compilation_of(name, order=order, profile="small").program
         (text,) = emit(program, "device", "phigen build").values()
-        kernels, begin = [], time.perf_counter()
-        with tempfile.TemporaryDirectory() as folder:
-            for architecture in nvrtc.ARCHITECTURES:
-                compiled = nvrtc.assembled(nvrtc.ptx(text, architecture), architecture, Path(folder))
-                kernels.append(compiled[f"{name}_ensemble_kernel"])
-        seconds = (time.perf_counter() - begin) / len(kernels)
-        group = int(text.split(f"#define {name}_GROUP ")[1].split()[0])
-        pairs = [[getattr(k, part) for k in kernels] for part in ("registers", "stack", "spilled")]
-        columns = [*(" / ".join(map(str, pair)) for pair in pairs), str(kernels[0].shared // group), f"{seconds:.1f}"]
-        yield f"| {name} | {program.order} | {program.step.kind.name} | {program.dimension} | {' | '.join(columns)} |"
+        begin = time.perf_counter()
+        own = kernels_of(text, name)
+        seconds = (time.perf_counter() - begin) / len(own)
+        shared = ["", "", ""]
+        if f"{name}_COMMON" in text:
+            shared = columns(kernels_of(f"#define {name}_COMMON\n{text}", name))
+        values = [*columns(own), *shared, f"{seconds:.1f}"]
+        yield f"| {name} | {program.order} | {program.step.kind.name} | {program.dimension} | {' | '.join(values)} |"
 
 
 if __name__ == "__main__":

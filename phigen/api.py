@@ -181,18 +181,7 @@ def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any
     interface = interface_of(program)
     chosen = chosen_target(target, _warn)
     files = files_of(program, chosen, f"phigen build {program.name}.yaml")
-    backend = backend_of(files, interface, chosen, device)
-    if chosen in registry.DEVICES:
-        _warn_of_spills(program, backend)
-    return backend, interface
-
-
-def _warn_of_spills(program: Program, backend: Any) -> None:
-    """Warn of steps that are slow on graphics cards."""
-    from phigen.targets.device.registers import spilling
-
-    if backend.device.is_card and (message := spilling(program)):
-        _warn(message)
+    return backend_of(files, interface, chosen, device), interface
 
 
 def files_of(program: Program, target: str, command: str) -> dict[str, str]:

@@ -29,6 +29,7 @@ class CUDADevice:
         facts = cupy.cuda.runtime.getDeviceProperties(index)
         self.name, self.units = facts["name"].decode(), facts["multiProcessorCount"]
         self.memory = self.largest = facts["totalGlobalMem"]
+        self.shared = facts["sharedMemPerBlock"]
 
     def __repr__(self) -> str:
         return f"<CUDA device: {self.name}, {self.memory >> 20} MiB>"
@@ -46,7 +47,11 @@ class CUDADevice:
 
     def kernel(self, program: Any, name: str) -> Any:
         """See `phigen.runtime.devices.device.Device`."""
-        return program.get_function(name)
+        return self._tried(lambda: program.get_function(name))
+
+    def local_bytes(self, kernel: Any) -> int:
+        """See `phigen.runtime.devices.device.Device`."""
+        return self._tried(lambda: int(kernel.local_size_bytes))
 
     def empty(self, size: int) -> Any:
         """See `phigen.runtime.devices.device.Device`."""
@@ -68,7 +73,7 @@ class CUDADevice:
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
         """See `phigen.runtime.devices.device.Device`."""
-        group = kernel.max_threads_per_block  # as in the launch bounds of kernels
+        group = self._tried(lambda: kernel.max_threads_per_block)  # at most the launch bounds of the kernel
         passed = tuple(np.uint64(0) if argument is None else argument for argument in arguments)  # a null pointer
         self._tried(lambda: kernel((-(-items // group),), (group,), passed))
 

@@ -27,6 +27,7 @@ class Device(Protocol):
     name: str
     memory: int  # bytes of device memory
     largest: int  # bytes of the largest possible array
+    shared: int  # bytes of shared memory of a work group
     units: int  # compute units, each of which runs many work items
     double: bool  # whether double precision is supported
     is_card: bool  # whether it is no processor: values beyond its registers lie in slow memory
@@ -44,6 +45,10 @@ class Device(Protocol):
 
     def empty(self, size: int) -> Any:
         """Return a new buffer of the given number of bytes."""
+        ...
+
+    def local_bytes(self, kernel: Any) -> int:
+        """Return the bytes of memory of the device that a work item of a kernel uses, as registers are too few."""
         ...
 
     def constants(self, array: Any) -> Any:

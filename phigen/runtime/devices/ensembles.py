@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, cast
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phigen import registry
-from phigen.errors import DeviceError
+from phigen.errors import DeviceError, PhigenWarning
 from phigen.runtime.backend import Backend
 from phigen.runtime.devices.device import Device, OutOfMemoryError
 from phigen.runtime.devices.launching import Kernels
@@ -31,6 +32,10 @@ _STEPS_PER_UNIT = 1 << 24
 
 #: Smallest number of members in a launch for each compute unit: enough to hide the latency of memory.
 _MEMBERS_PER_UNIT = 2048
+
+#: Bytes of local memory of a member that stay in the cache of a card: 128 kB for the 256 members, with 255 registers
+#: each, that run at once on a multiprocessor.
+_LOCAL_BYTES = 512
 
 
 class DeviceSolver:
@@ -171,9 +176,27 @@ class DeviceSolver:
     def _kernels(self, *, common: bool) -> Kernels:
         """Return the kernels for members with ``common`` coefficients, or with coefficients of their own."""
         if common not in self._compiled:
-            defined = {**self.defined, **({f"{self.interface.name}_COMMON": 1} if common else {})}
+            defined = {**self._group(), **self.defined, **({f"{self.interface.name}_COMMON": 1} if common else {})}
             self._compiled[common] = Kernels(self.device, self._header, self.interface.name, defined)
+            self._warn_of_local_memory(self._compiled[common]["ensemble"])
         return self._compiled[common]
+
+    def _group(self) -> dict[str, int]:
+        """Return the definition of a smaller group, if predictors need more shared memory than the device has."""
+        name, header = self.interface.name, self._header
+        if f"{name}_LENT = " not in header:
+            return {}
+        sizes = re.findall(rf"{name}_(?:STAGES =|DIFFERENCES =|DIM) (\d+)", header)
+        fitting = self.device.shared // (np.dtype(self._real).itemsize * math.prod(map(int, sizes)))
+        (usual,) = map(int, re.findall(rf"#define {name}_GROUP (\d+)", header))
+        return {f"{name}_GROUP": 1 << max(0, fitting.bit_length() - 1)} if fitting < usual else {}
+
+    def _warn_of_local_memory(self, kernel: Any) -> None:
+        """Warn of steps that are slow because the registers of a card are too few for their values."""
+        if self.device.is_card and (size := self.device.local_bytes(kernel)) > _LOCAL_BYTES:
+            about = f"{self.interface.name}: besides registers, each member uses {size} bytes of {self.device.name}"
+            hint = "members with the same parameters and step need less, as do a lower order and scheme: splitting"
+            warnings.warn(f"{about}, which is slow; {hint}", PhigenWarning, stacklevel=2)
 
     def _has_common_coefficients(self, members: Members) -> bool:
         """Whether all members have the same parameters, step and gauge, and their kernel can share coefficients."""

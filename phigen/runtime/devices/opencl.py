@@ -32,6 +32,7 @@ class OpenCLDevice:
         self._queue = cl.CommandQueue(self._context)
         self.name, self.units = f"{device.name.strip()}, {device.platform.name.strip()}", device.max_compute_units
         self.memory, self.largest = device.global_mem_size, device.max_mem_alloc_size
+        self.shared = device.local_mem_size
         self.double = bool(device.double_fp_config)
         self.is_card = not device.type & cl.device_type.CPU
 
@@ -55,6 +56,10 @@ class OpenCLDevice:
     def empty(self, size: int) -> Any:
         """See `phigen.runtime.devices.device.Device`."""
         return self._tried(lambda: self._cl.Buffer(self._context, self._cl.mem_flags.READ_WRITE, max(1, size)))
+
+    def local_bytes(self, kernel: Any) -> int:
+        """See `phigen.runtime.devices.device.Device`; 0 where a driver does not know."""
+        return int(kernel.get_work_group_info(self._cl.kernel_work_group_info.PRIVATE_MEM_SIZE, self._device))
 
     def constants(self, array: Any) -> Any:
         """See `phigen.runtime.devices.device.Device`; a buffer in the address space of constants."""
