@@ -78,9 +78,8 @@ def test_the_modified_flow_removes_the_error_of_the_second_power_of_the_step():
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize(
-    ("text", "name"), [(SMALL, "wisdom-holman-7"), (TOP, "wisdom-holman-7"), (SMALL, "wisdom-holman-modified-7")],
-    ids=["canonical", "top", "modified"],
-)  # fmt: skip
+    ("text", "name"), [(SMALL, "wisdom-holman-modified-7"), (TOP, "wisdom-holman-7")], ids=["canonical", "top"]
+)
 def test_a_corrected_step_is_a_poisson_map_with_an_exact_tangent(text, name, target):
     made = solver(compilation(name, text, tangent=True), target)
     x, h, d, eps = np.array([0.9, 0.2, 0.3, 1.1][: 4 if text is SMALL else 3]), 0.4, 1e-5, 0.3
@@ -108,7 +107,7 @@ def test_states_do_not_depend_on_the_outputs(profile):
 
 @pytest.mark.thin(1)
 @pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize(("stride", "kernel"), [(1, ""), (4, ""), (9, ""), (None, ""), (4, "modified-")])
+@pytest.mark.parametrize(("stride", "kernel"), [(1, ""), (4, ""), (9, "modified-"), (None, "")])
 def test_gradients_of_runs_are_differences(target, stride, kernel):
     """Along states and parameters, with rows at which runs end and begin anew; the last run is shorter."""
     made = solver(compilation(f"wisdom-holman-{kernel}7", adjoint=True), target)
@@ -141,8 +140,8 @@ def test_gradients_of_members_are_those_of_single_runs():
     np.testing.assert_allclose(together, alone, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["wisdom-holman-17", "wisdom-holman-modified-17"])
-def test_targets_agree(name):
+def test_targets_agree():
+    name = "wisdom-holman-modified-17"
     c, numpy = (solver(compilation(name), target).integrate(START, 0.3, 40).x[-1] for target in TARGETS)
     js = javascript(compilation(name), f"x0: {START}", "s.integrate(0.3, 39).step(0.3)", "[...s.x]")
     np.testing.assert_allclose([numpy, js], [c, c], rtol=0, atol=1e-12)
