@@ -160,7 +160,7 @@ LEVEL = Choice(
         "AND_NO_LEVEL": (", NULL", ""),
         "COUNT_TIME(s)": ("", "s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;"),
         "TIME_OF(s)": ("phi_solver_time(s)", "s->t"),
-        "RATE_OF_TIME(s)": ("phi_monitor(&s.params, s.x)", "1.0"),
+        "IN_TAU(time, s)": ("time / (double)phi_monitor(&s.params, s.x)", "time"),
         "TAKE_RATE_OF_TIME(s)": ("if (!phi_time_passes(&s.params, s.x)) return PHI_BAD_ARGUMENT;", ""),
         "PASS(s, elapsed)": ("phi_pass(s, elapsed);", ""),
         "TAKE_LEVEL(s, from)": ("if (!phi_take_level(s, from, carry)) return PHI_BAD_ARGUMENT;", ""),

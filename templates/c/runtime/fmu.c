@@ -138,7 +138,7 @@ static phi_status phi_fmu_part(phi_fmu_state *f, double target)
         const double missing = target - phi_fmu_time(f, &f->now);
         if (fabs(missing) <= phi_fmu_tolerance(f, target)) return PHI_OK;
         if (!phi_fmu_divisible) return PHI_BAD_ARGUMENT;
-        part = fmin(fmax(part + missing / (double)PHI_RATE_OF_TIME(f->now), 0.0), f->step);
+        part = fmin(fmax(part + PHI_IN_TAU(missing, f->now), 0.0), f->step);
         f->now = f->grid;
         const phi_status status = phi_step(&f->now, (phi_real)part);
         if (status != PHI_OK) return status;
