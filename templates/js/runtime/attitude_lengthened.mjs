@@ -1,6 +1,6 @@
 /**
- * Divide a quaternion, given minus 1, by its length. The sign is such that the real part is not negative: otherwise
- * corrections of lengths would act in reverse.
+ * Divide a quaternion, given minus 1, by its length. The sign is such that the real part is not negative:
+ * otherwise corrections of lengths would act in reverse.
  */
 export function shorten(q) {
   if (q[0] < -1) {

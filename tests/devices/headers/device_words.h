@@ -16,5 +16,5 @@ struct index_3d {
     unsigned x, y, z;
 };
 extern __device__ const index_3d threadIdx, blockIdx, blockDim;
-__device__ double fabs(double), sqrt(double), tan(double), tanh(double);
+__device__ double fabs(double), floor(double), sqrt(double), tan(double), tanh(double);
 __device__ bool isfinite(double);
