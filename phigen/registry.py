@@ -95,11 +95,11 @@ def find(name: str) -> Target:
     if name in DEVICES:
         return DEVICES[name]
     if name not in TARGETS:
-        listed = {word: t.name for t in _LISTED for word in (t.name, t.title.lower())}
+        listed = {word: t.name for t in (*_LISTED, *DEVICES.values()) for word in (t.name, t.title.lower())}
         from difflib import get_close_matches
 
         near = get_close_matches(name.lower(), listed, 1)
-        hint = f"did you mean {listed[near[0]]!r}?" if near else f"there are {', '.join(TARGETS)}"
+        hint = f"did you mean {listed[near[0]]!r}?" if near else f"there are {', '.join((*TARGETS, *DEVICES))}"
         raise ValueError(f"unknown target {name!r}; {hint}")
     return TARGETS[name]
 

@@ -10,10 +10,10 @@ from phigen.compiler import emit
 pytestmark = pytest.mark.skipif(not nvrtc.is_installed(), reason="the wheels of NVRTC and ptxas are not installed")
 
 
-def resources_of(name, architecture, folder, order=None):
+def resources_of(name, architecture, folder, order=None, *options):
     """The resources of the kernel of ensembles."""
     (text,) = emit(compilation_of(name, order=order, profile="small").program, "device", COMMAND).values()
-    compiled = nvrtc.assembled(nvrtc.ptx(text, architecture), architecture, folder)
+    compiled = nvrtc.assembled(nvrtc.ptx(text, architecture, *options), architecture, folder)
     return compiled[f"{name}_ensemble_kernel"]
 
 
@@ -40,3 +40,6 @@ SMALL = ("rigid_body", "kepler", "henon_heiles", "toda3", "lotka_volterra")
 def test_small_systems_stay_in_registers(name, architecture, tmp_path):
     used = resources_of(name, architecture, tmp_path, order=4)
     assert (used.spilled, used.stack) == (0, 0)
+    common = resources_of(name, architecture, tmp_path, 4, f"-D{name}_COMMON")
+    assert (common.spilled, common.stack) == (0, 0)
+    assert common.registers < used.registers
