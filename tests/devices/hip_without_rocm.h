@@ -17,6 +17,7 @@ extern "C" __device__ float __int_as_float(int);
 extern "C" __device__ double __longlong_as_double(long long);
 #define isfinite(x) __builtin_isfinite(x)
 #define fabs(x) __builtin_fabs(x)
+#define floor(x) __builtin_floor(x)
 #define sqrt(x) __builtin_sqrt(x)
 #define floor(x) __builtin_floor(x)
 #define fmax(x, y) __builtin_fmax(x, y)
