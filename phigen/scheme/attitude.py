@@ -68,7 +68,8 @@ def gauss_attitude(
             system, "reconstruct: steps to truncation have no group element", f"structure: exact, or {series}"
         )
     if group.matrices:
-        raise refused(system, "reconstruct: Gauss steps have a quaternion, no matrix", f"quaternion, or {series}")
+        hint = f"{series}; on so(3) and se(3) also quaternion"
+        raise refused(system, "reconstruct: Gauss steps have a quaternion, no matrix", hint)
     if system.forces and any(not z.is_zero for z in system.forces.covector):
         message = "reconstruct: with covector forces the group element of a Gauss step is not that of the body"
         raise refused(system, message, series)
