@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 0a57f93cbad3a597812cd85d5a335d9df39ec149022913917c73c05b34261ed8
+ * body-sha256: 0d5bb6baf8eaef56116caa0546e0923bd6086f8e1ee5d5695c6555939fbccdd2
  */
 #include "food_web.h"
 #include <limits.h>
@@ -480,13 +480,11 @@ static int food_web_try(food_web_solver *s, size_t steps)
     return 0;
 }
 
-/* Values are checked after several steps; if they are not finite, these steps are repeated one by one. */
-food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
+/* Make steps from s->before, equal to s->x, without the last flow of the last step. Values are checked after
+   several steps; if they are not finite, these steps are repeated one by one. */
+static food_web_status food_web_march(food_web_solver *s, size_t steps)
 {
-    food_web_status status = food_web_set_step(s, h);
-    if (status != food_web_OK || steps == 0) return status;
-    if (s->open) food_web_copy(s->x, s->before, s); /* merged with the next flow */
-    else food_web_copy(s->before, s->x, s);
+    food_web_status status = food_web_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = food_web_STRETCH; s->steps < end && status == food_web_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -500,6 +498,16 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
             status = food_web_NOT_FINITE;
         }
     }
+    return status;
+}
+
+food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
+{
+    food_web_status status = food_web_set_step(s, h);
+    if (status != food_web_OK || steps == 0) return status;
+    if (s->open) food_web_copy(s->x, s->before, s); /* merged with the next flow */
+    else food_web_copy(s->before, s->x, s);
+    status = food_web_march(s, steps);
     if (s->open && !food_web_try(s, 0)) { /* the last flow of the last step; s->before stays before it */
         status = food_web_NOT_FINITE;
         s->open = 0;

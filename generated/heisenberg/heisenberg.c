@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: c9a10f11905b7abf3a31d4c00cf1e31a3db36b7dd2a69fdc091e7295166f454d
+ * body-sha256: 258fdbc142087cc3f3c79f672d47ada2bbd8c55945f2e9403ac2711a77396f09
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -811,14 +811,11 @@ static int heisenberg_close(heisenberg_solver *s)
     return done;
 }
 
-/* Small-argument functions return NaN out of range. Values are checked after several steps; if they are not
-   finite, these steps are repeated one by one, and a failing step once more with full-range functions. */
-heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
+/* Make steps from s->before, equal to s->x, without the last flow of the last step. Values are checked after
+   several steps; if they are not finite, these steps are repeated one by one. */
+static heisenberg_status heisenberg_march(heisenberg_solver *s, size_t steps)
 {
-    heisenberg_status status = heisenberg_set_step(s, h);
-    if (status != heisenberg_OK || steps == 0) return status;
-    if (s->open) heisenberg_copy(s->x, s->before, s); /* merged with the next flow */
-    else heisenberg_copy(s->before, s->x, s);
+    heisenberg_status status = heisenberg_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_STRETCH; s->steps < end && status == heisenberg_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -830,13 +827,23 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
             s->far -= s->far > 0 ? now : 0;
         } else if (now > 1) {
             stretch = 1;
-        } else if (s->far == 0) {
+        } else if (s->far == 0) { /* small-argument functions return NaN out of range */
             s->far = heisenberg_FAR_STEPS;
             stretch = heisenberg_STRETCH;
         } else {
             status = heisenberg_NOT_FINITE;
         }
     }
+    return status;
+}
+
+heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
+{
+    heisenberg_status status = heisenberg_set_step(s, h);
+    if (status != heisenberg_OK || steps == 0) return status;
+    if (s->open) heisenberg_copy(s->x, s->before, s); /* merged with the next flow */
+    else heisenberg_copy(s->before, s->x, s);
+    status = heisenberg_march(s, steps);
     if (s->open && !heisenberg_close(s)) { /* the last flow of the last step; s->before stays before it */
         status = heisenberg_NOT_FINITE;
         s->open = 0;

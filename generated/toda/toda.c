@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: da43b5558b9e6fc67ea131b00d26222a9ddf3af68cf2e927e62372bb94af3e18
+ * body-sha256: 5b8d695c7db81af16069948ec2eefc42ff6c77db4481c7f5876fdd08cd2191ab
  */
 #include "toda.h"
 #include <math.h>
@@ -366,13 +366,11 @@ static int toda_try(toda_solver *s, size_t steps)
     return 0;
 }
 
-/* Values are checked after several steps; if they are not finite, these steps are repeated one by one. */
-toda_status toda_integrate(toda_solver *s, double h, size_t steps)
+/* Make steps from s->before, equal to s->x, without the last flow of the last step. Values are checked after
+   several steps; if they are not finite, these steps are repeated one by one. */
+static toda_status toda_march(toda_solver *s, size_t steps)
 {
-    toda_status status = toda_set_step(s, h);
-    if (status != toda_OK || steps == 0) return status;
-    if (s->open) toda_copy(s->x, s->before, s); /* merged with the next flow */
-    else toda_copy(s->before, s->x, s);
+    toda_status status = toda_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = toda_STRETCH; s->steps < end && status == toda_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -386,6 +384,16 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
             status = toda_NOT_FINITE;
         }
     }
+    return status;
+}
+
+toda_status toda_integrate(toda_solver *s, double h, size_t steps)
+{
+    toda_status status = toda_set_step(s, h);
+    if (status != toda_OK || steps == 0) return status;
+    if (s->open) toda_copy(s->x, s->before, s); /* merged with the next flow */
+    else toda_copy(s->before, s->x, s);
+    status = toda_march(s, steps);
     if (s->open && !toda_try(s, 0)) { /* the last flow of the last step; s->before stays before it */
         status = toda_NOT_FINITE;
         s->open = 0;

@@ -89,14 +89,15 @@ ORDERS = Choice(
 )
 
 VALUES = Choice(
-    "The value of the unknown of a stage in the step that was made last.",
+    "The value of the unknown of a stage in the step that was made last, and the arguments of its predictor.",
     ("RECURRENCES", "GUESSED"),
     {
         "LAST_VALUE": (
             "PHI_OF(s->history, stage).past[PHI_OF(s->history, stage).count - 1]",
             "PHI_OF(s->history, stage).difference[0]",
             "at->x",
-        )
+        ),
+        "AND_ITERATION": (", iteration", "", ""),
     },
 )
 

@@ -59,6 +59,16 @@ static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
     phi_read_attitude(s);
 }
 
+/* Compute the rotation rate of the gauge anew, after a change of the state or the parameters. */
+static void phi_renew_rate(phi_solver *s)
+{
+#if PHI_MATRICES
+    phi_begin_attitude(s, s->attitude);
+#else
+    phi_take_rate(s);
+#endif
+}
+
 /* Initialise the attitude with the identity. */
 static void phi_begin_unturned(phi_solver *s)
 {

@@ -140,29 +140,11 @@ static int phi_close(phi_solver *s)
     return done;
 }
 
-#if PHI_NEAR
-/* Small-argument functions return NaN out of range. Values are checked after several steps; if they are not finite,
-   these steps are repeated one by one, and a failing step once more with full-range functions. */
-#else
-/* Values are checked after several steps; if they are not finite, these steps are repeated one by one. */
-#endif
-#if PHI_ADJOINT
-/* Make steps from s->before, equal to s->x, without the last flow of the last step. */
+/* Make steps from s->before, equal to s->x, without the last flow of the last step. Values are checked after several
+   steps; if they are not finite, these steps are repeated one by one. */
 static phi_status phi_march(phi_solver *s, size_t steps)
 {
     phi_status status = PHI_OK;
-#else
-phi_status phi_integrate(phi_solver *s, double h, size_t steps)
-{
-    phi_status status = phi_set_step(s, h);
-    if (status != PHI_OK || steps == 0) return status;
-#if PHI_NOISE
-    phi_copy(s->before, s->x, s);
-#else
-    if (s->open) phi_copy(s->x, s->before, s); /* merged with the next flow */
-    else phi_copy(s->before, s->x, s);
-#endif
-#endif
     const size_t end = s->steps + steps;
     for (size_t stretch = PHI_STRETCH; s->steps < end && status == PHI_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -184,7 +166,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         } else if (now > 1) {
             stretch = 1;
 #if PHI_NEAR
-        } else if (s->far == 0) {
+        } else if (s->far == 0) { /* small-argument functions return NaN out of range */
             s->far = PHI_FAR_STEPS;
             stretch = PHI_STRETCH;
 #endif
@@ -192,7 +174,6 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
             status = PHI_NOT_FINITE;
         }
     }
-#if PHI_ADJOINT
     return status;
 }
 
@@ -207,7 +188,6 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     else phi_copy(s->before, s->x, s);
 #endif
     status = phi_march(s, steps);
-#endif
 #if !PHI_NOISE
     if (s->open && !PHI_TRY_FLOWS) { /* the last flow of the last step; s->before stays before it */
         status = PHI_NOT_FINITE;

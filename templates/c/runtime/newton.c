@@ -69,11 +69,7 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 #endif
         if (!phi_advance(s, increment, small)) return PHI_NOT_FINITE;
         PHI_PASS(s, elapsed[0])
-#if PHI_RECURRENCES
-        phi_remember(&PHI_OF(s->history, stage), y, iteration);
-#elif PHI_GUESSED
-        phi_remember(&PHI_OF(s->history, stage), y);
-#endif
+        phi_remember(&PHI_OF(s->history, stage), y PHI_AND_ITERATION);
 #if PHI_ATTITUDE
         phi_turn_by(s, factor PHI_AND_ASIDE(s->aside));
 #endif

@@ -4,6 +4,7 @@
 
 #include "algebra.c"
 #include "model.h"
+#include "start_policy.h"
 #include "attitude.c"
 #include "level.c"
 
@@ -26,11 +27,7 @@ phi_status phi_set_parameters(phi_solver *s, const phi_params *params)
 #if PHI_GAUSS
     changed.history.kicked = 1;
 #endif
-#if PHI_RATE_OF_GAUGE && PHI_MATRICES
-    phi_begin_attitude(&changed, changed.attitude);
-#elif PHI_RATE_OF_GAUGE
-    phi_take_rate(&changed);
-#endif
+    phi_renew_rate(&changed);
     *s = changed;
     return PHI_OK;
 }

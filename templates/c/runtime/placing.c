@@ -36,11 +36,7 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
     PHI_EACH_STAGE
         for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif
-#if PHI_RATE_OF_GAUGE && PHI_MATRICES
-    phi_begin_attitude(s, s->attitude);
-#elif PHI_RATE_OF_GAUGE
-    phi_take_rate(s);
-#endif
+    phi_renew_rate(s);
     return PHI_OK;
 }
 
@@ -65,11 +61,7 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
     PHI_EACH_STAGE
         for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif
-#if PHI_RATE_OF_GAUGE && PHI_MATRICES
-    phi_begin_attitude(s, s->attitude);
-#elif PHI_RATE_OF_GAUGE
-    phi_take_rate(s);
-#endif
+    phi_renew_rate(s);
     return PHI_OK;
 }
 #endif
