@@ -139,7 +139,8 @@ def _system_of(source: str | PathLike[str] | Spec | System | LatticeSystem) -> S
 
 def _refused(system: System) -> Iterator[tuple[str, str, str]]:
     if system.time:
-        yield "time", "H does not depend on the time", "remove time"
+        message = "the system depends on the time, but H is a function of x without the time"
+        yield "time", message, "remove time, or phigen.jax.propagator"
     if system.forces:
         yield "forces", "forces are not offered", "remove forces, or phigen.jax.propagator"
     if system.noise:

@@ -8,15 +8,36 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import jax
 import numpy as np
 from jax import numpy as jnp
+from jax.extend.core import Primitive
+from jax.interpreters import batching, mlir
 
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.propagation import Propagation
 from phigen.runtime.solver import Solver
+
+#: Message of the refusal of forward mode.
+NO_FORWARD_MODE = (
+    "lattices have no derivatives in forward mode (jax.jvp, jax.jacfwd, forward=True); "
+    "use jax.grad, jax.vjp or jax.jacrev"
+)
+
+# Identity that is refused where it is compiled or evaluated.
+_refused_forward = Primitive("lattices_have_no_forward_mode")
+_refused_forward.def_abstract_eval(lambda value: value)
+
+
+@_refused_forward.def_impl  # type: ignore[untyped-decorator]
+def _refuse_forward(*_: Any) -> NoReturn:
+    raise TypeError(NO_FORWARD_MODE)
+
+
+mlir.register_lowering(_refused_forward, _refuse_forward)
+batching.primitive_batchers[_refused_forward] = lambda values, axes: (_refused_forward.bind(*values), axes[0])
 
 
 def propagator(
@@ -42,6 +63,8 @@ def propagator(
     ``bonds=``, apply to all runs.
     """
     runs = Propagation(solver, h, steps, stride, t0, shared)
+    if forward and runs.axes > 1:
+        raise TypeError(NO_FORWARD_MODE)
     shaped = partial(jax.pure_callback, vmap_method="broadcast_all")
 
     def called(x0: Any, parameters: Any) -> Any:
@@ -61,10 +84,10 @@ def propagator(
 
     def moved(at: Any, directions: Any) -> Any:
         batch, (x0, parameters), (along, changes) = _Axes(runs, *at), at, directions
-        if runs.axes > 1:
-            # `jacobian` raises the refusal for lattices.
-            return shaped(runs.jacobian, jax.ShapeDtypeStruct(runs.shape(x0.shape), x0.dtype), *at)
         states = runs.shape(x0.shape)
+        if runs.axes > 1:
+            # Also traced for reverse mode, which never evaluates it.
+            return _refused_forward.bind(jax.lax.full(states, 0, x0.dtype))
 
         def jacobian(x: Any, p: Any) -> Any:
             slopes = runs.jacobian(x, batch.aligned(p))
@@ -80,6 +103,7 @@ def propagator(
         return result
 
     def derived(at: Any, directions: Any) -> Any:
+        runs.expect_pullback()
         at = _derived_once(at)
         if forward:
             return moved(at, directions)

@@ -55,6 +55,11 @@ class Backend(Protocol):
         """
         ...
 
+    @property
+    def has_pullback(self) -> bool:
+        """Whether the generated code has the extra ``adjoint``."""
+        ...
+
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """Return the stored states (rows, members, DIM), and the pullback of their cotangents ``bars`` to the start.
 

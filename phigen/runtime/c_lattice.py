@@ -393,6 +393,11 @@ class CLattice:
         """Return a session at x0 (coordinates, *sizes), at the time t0."""
         return CLatticeSession(self._c, self.interface, x0, parameters, t0, draws)
 
+    @property
+    def has_pullback(self) -> bool:
+        """See `phigen.runtime.lattice.LatticeBackend`."""
+        return hasattr(self._c, "pullback")
+
     def pullback(
         self,
         x0: Floats,
@@ -404,7 +409,7 @@ class CLattice:
         t0: float = 0.0,
     ) -> tuple[Floats, Floats, dict[str, Floats]]:
         """See `phigen.runtime.lattice.LatticeBackend`."""
-        if not hasattr(self._c, "pullback"):
+        if not self.has_pullback:
             raise MissingExtraError("pullback")
         zero = dict.fromkeys(self.interface.parameters, 0.0)
         struct, arrays = _packed(self.interface, zero, x0.shape[1:], len(parameters.get("bonds", ())))

@@ -239,9 +239,14 @@ class CSolver:
             times_or_gauges = [None if gauge is None else np.array(np.broadcast_to(gauge, (count, gauge.shape[-1])))]
         return self._own(packed), times_or_gauges, self._own(np.full(count, members.h))
 
+    @property
+    def has_pullback(self) -> bool:
+        """See `phigen.runtime.backend.Backend`."""
+        return hasattr(self._c, "pullback")
+
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """See `phigen.runtime.backend.Backend`."""
-        if not hasattr(self._c, "pullback"):
+        if not self.has_pullback:
             raise MissingExtraError("pullback")
         count, together = len(members), self._can_batch_pullback(members)
         of_step = int(self._c.trail_size_each() if together else self._c.trail_size())

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.runtime import arguments
-from phigen.runtime.interface import BackendError, Floats, MissingExtraError, row_steps
+from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, row_steps
 
 if TYPE_CHECKING:
     from phigen.runtime.solver import Solver
@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 #: Largest number of values on the tape of one segment of a run (32 MiB in double precision). Longer runs are divided
 #: into segments, and all but the last are computed twice.
 MAX_TAPE_VALUES = 1 << 22
+
+
+def without_pullback(interface: Interface) -> TypeError:
+    """Return the error for a solver that was compiled without ``adjoint``."""
+    hint = "compile it with adjoint=True, or say adjoint: true in the spec"
+    return TypeError(f"{interface.name} was compiled without pullback; {hint}")
 
 
 class Pullback(NamedTuple):
@@ -101,8 +107,7 @@ def pullback(
     try:
         states, x0_bar, parameter_bars = solver.backend.pullback(members, bars, threads)
     except MissingExtraError:
-        hint = "compile it with adjoint=True, or say adjoint: true in the spec"
-        raise TypeError(f"{interface.name} was compiled without pullback; {hint}") from None
+        raise without_pullback(interface) from None
     except BackendError as error:
         size, values, _ = members.numbers(error.members[0] if error.members else 0)
         if start.ndim == 1:

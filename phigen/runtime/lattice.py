@@ -7,7 +7,7 @@ import zipfile
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -157,6 +157,11 @@ class LatticeBackend(Protocol):
 
     def threads(self, sites: int) -> int:
         """Return the number of threads that share the work on a lattice of ``sites`` sites."""
+        ...
+
+    @property
+    def has_pullback(self) -> bool:
+        """Whether the generated code has the extra ``adjoint``."""
         ...
 
     def pullback(
@@ -817,6 +822,11 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         values = arguments.together(parameters, more)
         return lattice_gradients.pullback(self, x0, h, steps, cotangent, stride, times, values)
 
+    def jacobian(self, *_: Any, **__: Any) -> NoReturn:
+        """Raise `TypeError`: lattices have `pullback` and `tangents`, but no full Jacobian."""
+        hint = "use pullback for the gradient of a number, and tangents or step_tangent for directions"
+        raise TypeError(f"{self.interface.name} is a lattice, and lattices have no full Jacobian; {hint}")
+
     def session(
         self,
         x0: ArrayLike,
@@ -1031,10 +1041,15 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return LatticeTrajectory(t, x, energy, steps, at.h, at.values, self.coordinates, axes, self, observed)
 
 
+def missing_bonds() -> TypeError:
+    """Return the error for a graph without bonds."""
+    return TypeError("a lattice that is a graph needs its bonds=, an array (bonds, 2) of the numbers of sites")
+
+
 def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
     """Return bonds as an array (bonds, 2). Raises `TypeError` and `ValueError`."""
     if bonds is None:
-        raise TypeError("a lattice that is a graph needs its bonds=, an array (bonds, 2) of the numbers of sites")
+        raise missing_bonds()
     array = np.asarray(bonds)
     pairs = array.reshape(-1, 2) if array.size == 0 else array
     if pairs.ndim != 2 or pairs.shape[1] != 2:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from phigen.memory import filled
 from phigen.runtime import arguments
-from phigen.runtime.gradients import Pullback, cotangents
+from phigen.runtime.gradients import Pullback, cotangents, without_pullback
 from phigen.runtime.interface import BackendError, Floats, MissingExtraError, row_steps
 from phigen.runtime.lattice_ensemble import has_members, states
 
@@ -57,8 +57,7 @@ def pullback(
                 x, each[m], steps, width, bars[:, m], values, float(times[m])
             )
         except MissingExtraError:
-            hint = "compile it with adjoint=True, or say adjoint: true in the spec"
-            raise TypeError(f"{solver.interface.name} was compiled without pullback; {hint}") from None
+            raise without_pullback(solver.interface) from None
         except BackendError as error:
             named = BackendError(error.status, error.step, error.states, () if single else (m,))
             raise solver.failure(named, each[m], None, values) from error

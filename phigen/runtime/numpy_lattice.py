@@ -215,6 +215,11 @@ class NumpyLattice:
         """Return a session at x0 (coordinates, *sizes), at the time t0."""
         return NumpyLatticeSession(self._module, x0, parameters, t0, draws, timed=bool(self.interface.time))
 
+    @property
+    def has_pullback(self) -> bool:
+        """See `phigen.runtime.lattice.LatticeBackend`."""
+        return hasattr(self._module, "pullback")
+
     def pullback(
         self,
         x0: Floats,
@@ -226,7 +231,7 @@ class NumpyLattice:
         t0: float = 0.0,
     ) -> tuple[Floats, Floats, dict[str, Floats]]:
         """See `phigen.runtime.lattice.LatticeBackend`."""
-        if not hasattr(self._module, "pullback"):
+        if not self.has_pullback:
             raise MissingExtraError("pullback")
         stored_states = min(steps, 2 * math.isqrt(steps)) + 2 * len(bars)
         expect_room("the stored states of the reverse pass", stored_states * x0.nbytes)

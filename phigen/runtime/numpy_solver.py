@@ -393,9 +393,14 @@ class NumpySolver:
         self._expect_admissible(members.x0, members.parameters)
         return ensemble(self.module, members, self._gauges(members.x0, members.parameters), turned)
 
+    @property
+    def has_pullback(self) -> bool:
+        """See `phigen.runtime.backend.Backend`."""
+        return hasattr(self.module, "pullback")
+
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """See `phigen.runtime.backend.Backend`."""
-        if not hasattr(self.module, "pullback"):
+        if not self.has_pullback:
             raise MissingExtraError("pullback")
         x0, parameters = members.x0, members.parameters
         self._expect_admissible(x0, parameters)

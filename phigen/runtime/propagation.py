@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.runtime import arguments
-from phigen.runtime.interface import Floats, row_steps
-from phigen.runtime.lattice import LatticeSolver
+from phigen.runtime.gradients import without_pullback
+from phigen.runtime.interface import Floats, LatticeInterface, row_steps
+from phigen.runtime.lattice import LatticeSolver, checked_bonds, missing_bonds
 from phigen.runtime.solver import Solver
 
 Values = Mapping[str, ArrayLike]
@@ -42,13 +43,26 @@ class Propagation:
     def __post_init__(self) -> None:
         if not isinstance(self.solver, Solver | LatticeSolver):
             raise TypeError(f"a propagator needs a compiled solver, not {self.solver!r}")
+        arguments.start_time(self.t0, self.solver.interface, {})
         if isinstance(self.solver, Solver):
-            arguments.start_time(self.t0, self.solver.interface, {})
             self.solver.values(self.shared, {})  # type: ignore[arg-type]
+        else:
+            self._expect_shared(self.solver.interface)
         arguments.step_size(self.h)
         arguments.count(self.steps, "steps", 0)
         if self.stride is not None:
             arguments.count(self.stride, "stride", 1)
+
+    def _expect_shared(self, lattice: LatticeInterface) -> None:
+        """Raise `TypeError` for a graph without bonds, and for shared arguments with unknown names."""
+        if lattice.graph and self.shared.get("bonds") is None:
+            raise missing_bonds()
+        arguments.expect_known([n for n in self.shared if n != "bonds" or not lattice.graph], lattice.parameters)
+
+    def expect_pullback(self) -> None:
+        """Raise `TypeError` if the solver was compiled without ``adjoint``."""
+        if not self.solver.backend.has_pullback:
+            raise without_pullback(self.solver.interface)
 
     @property
     def rows(self) -> int:
@@ -75,6 +89,9 @@ class Propagation:
         """Raise `ValueError` for shapes of arguments that do not fit, `TypeError` for unknown names of parameters."""
         arguments.expect_known(parameters, self.solver.interface.parameters)
         if isinstance(self.solver, LatticeSolver):
+            state = self.solver.state(np.zeros(start[-self.axes :]), "x0")
+            if self.solver.interface.graph:
+                checked_bonds(self.shared["bonds"], state.shape[1])
             return
         if start[-1:] != (self.solver.interface.dimension,):
             raise ValueError(f"x0 must have shape (…, {self.solver.interface.dimension}), not {start}")
@@ -89,7 +106,7 @@ class Propagation:
     def run(self, x0: ArrayLike, parameters: Values) -> Floats:
         """Return the final states, or all rows with a stride."""
         start, members, values = self._members(x0, parameters)
-        states = self.solver.ensemble(members, self.h, self.steps, self.stride, **self._from, parameters=values)
+        states = self.solver.ensemble(members, self.h, self.steps, self.stride, t0=self.t0, parameters=values)
         if self.stride is not None:
             states = np.moveaxis(states, 0, 1)
         return states.reshape(self.shape(start))
@@ -102,7 +119,7 @@ class Propagation:
         if self.stride is not None:
             bars = np.moveaxis(bars, 1, 0)
         h, steps, stride = self.h, self.steps, self.stride
-        pulled_back = self.solver.pullback(members, h, steps, bars, stride, **self._from, parameters=values)
+        pulled_back = self.solver.pullback(members, h, steps, bars, stride, t0=self.t0, parameters=values)
         of_parameters = {}
         for name, value in parameters.items():
             bar = pulled_back.parameters_bar[name]
@@ -112,10 +129,8 @@ class Propagation:
     def jacobian(self, x0: ArrayLike, parameters: Values) -> tuple[Floats, dict[str, Floats]]:
         """Return the derivatives of the result by x0, with a further axis (DIM,), and by each parameter, in its shape.
 
-        Takes one reverse pass for each component of a member's result. Raises `TypeError` for lattices.
+        Takes one reverse pass for each component of a member's result. Not for lattices.
         """
-        if self.axes > 1:
-            raise TypeError("lattices have no full Jacobians; use reverse mode, forward=False")
         start, members, values = self._members(x0, parameters)
         shape = self.shape((len(members), start[-1]))
         by_x0, by = np.empty((*shape, start[-1])), {name: np.empty(shape) for name in parameters}
@@ -144,11 +159,6 @@ class Propagation:
         if parameter in self.solver.interface.at_sites:
             return state[1 - self.axes :]
         return (len(np.asarray(self.shared["bonds"])),)
-
-    @property
-    def _from(self) -> dict[str, Any]:
-        """The argument ``t0`` of the solver, if it has one."""
-        return {} if isinstance(self.solver, LatticeSolver) and not self.solver.interface.time else {"t0": self.t0}
 
 
 def _summed(values: Floats, shape: tuple[int, ...]) -> Floats:

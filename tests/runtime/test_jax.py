@@ -154,6 +154,39 @@ def test_arguments_of_no_run_are_told_by_the_call_itself(solver):
         propagator("rigid_body")
 
 
+def test_derivatives_of_a_solver_without_pullback_are_refused_while_traced():
+    x, run = X[0], propagator(phigen.compile(phigen.spec.loads(SYSTEM), target="numpy"))
+    assert run(x).shape == (3,)
+    for derived in (jax.grad(cubes(run)), jax.jit(jax.grad(cubes(run))), jax.jacfwd(cubes(run))):
+        with pytest.raises(TypeError, match="compiled without pullback; compile it with adjoint=True"):
+            derived(x, 2.2)
+
+
+def test_forward_mode_of_lattices_is_refused_without_a_run():
+    lattice = phigen.compile("xxz_disorder", target="numpy", adjoint=True)
+    run, x = propagator(lattice), np.ones((3, 4))
+    loss = lambda x: jnp.sum(run(x, {"B": 1.0}))  # noqa: E731
+    for derived in (jax.jacfwd(loss), jax.jit(jax.jacfwd(loss))):
+        with pytest.raises(TypeError, match="lattices have no derivatives in forward mode"):
+            derived(x)
+    with pytest.raises(TypeError, match="lattices have no derivatives in forward mode"):
+        propagator(lattice, forward=True)
+    with pytest.raises(TypeError, match="xxz_disorder is a lattice, and lattices have no full Jacobian; use pullback"):
+        lattice.jacobian(x, H)
+    with pytest.raises(TypeError, match="unknown parameter 'bonds'"):
+        propagator(lattice, bonds=[[0, 1]])
+    with pytest.raises(ValueError, match="x0 must have shape"):
+        run(x[:2])
+
+
+def test_a_propagator_of_a_graph_needs_bonds():
+    graph = phigen.compile("food_web", target="numpy")
+    with pytest.raises(TypeError, match="needs its bonds="):
+        propagator(graph)
+    with pytest.raises(ValueError, match="bond 0 runs from 0 to 7"):
+        propagator(graph, bonds=[[0, 7]])(np.ones((1, 3)))
+
+
 def test_members_may_be_none_and_states_lists(solver):
     made = propagator(solver)
     assert np.array_equal(made([1, 0.5, 0.3]), made(X[0] * 0 + np.array([1, 0.5, 0.3])))

@@ -176,7 +176,7 @@ def test_step_that_fails_is_not_a_number():
 
 REFUSED = {
     "bracket": ("poisson: {brackets: {x1: {x2: x1*x2 + x3**2}}}", "", "no exact Poisson map", "to truncation"),
-    "time": (BODY, "time: t", "does not depend on the time", "remove time"),
+    "time": (BODY, "time: t", "depends on the time, but H is a function of x without", "remove time"),
     "forces": (BODY, "forces: {covector: {x1: -x1}}", "forces are not offered", "remove"),
     "noise": (BODY, "noise: {w: {hamiltonian: x1}}", "noise is not offered", "remove"),
 }

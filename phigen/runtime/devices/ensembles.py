@@ -253,6 +253,11 @@ class DeviceSolver:
         """See `phigen.runtime.backend.Backend`."""
         return self._host.restored(saved, parameters)
 
+    @property
+    def has_pullback(self) -> bool:
+        """See `phigen.runtime.backend.Backend`."""
+        return self._host.has_pullback
+
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """See `phigen.runtime.backend.Backend`; on the host."""
         return self._host.pullback(members, bars, threads)
