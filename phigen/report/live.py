@@ -30,7 +30,7 @@ FEW, COORDINATES = 4, 15
 STEP, SPEED, PARAMETER = 16, 20, 8
 
 HELP = """Drag a picture of space, or use the arrow keys, to turn both; + and − zoom; 0 resets. Between steps the curves
-are interpolated. The panel begins with the order and the step for which the advantage of phigen at equal work is seen
+are interpolated. The panel begins with the {} for which the advantage of phigen at equal work is seen
 best, if it has one within ten seconds; the step is at most half of that with which phigen fails. With smaller steps
 both come closer to the exact solution, and over short times RK4 is often closer."""
 
@@ -186,7 +186,7 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
         choice=len(shown) > 1,
         groups=list(enumerate(", ".join(g) for g in shown)),
         folds=[(title, unfolded, map(slid, listed)) for title, unfolded, listed in _folds(system, start, parameters)],
-        help=HELP,
+        help=HELP.format("order and the step" if len(live.solvers) > 1 else "step"),
         data=page.data("live-data", settings),
     )
 

@@ -176,8 +176,8 @@ class Solver(Named[Backend, Interface]):
         initial = {c: more.pop(c) for c in self.interface.coordinates if c in more}
         if x0 is not None and initial:
             raise TypeError(f"a run takes either x0 or initial values such as {next(iter(initial))}, not both")
-        given = zip(self.interface.coordinates, chosen.initial, strict=True)
-        start = [initial.get(c, float(value)) for c, value in given] if x0 is None else x0
+        of_run = zip(self.interface.coordinates, chosen.initial, strict=True)
+        start = [initial.get(c, float(value)) for c, value in of_run] if x0 is None else x0
         values: dict[str, float] = {n: float(v) for n, v in chosen.parameters.items()}
         values |= arguments.together(parameters, more)
         t0 = float(chosen.start) if self.interface.time else None

@@ -36,6 +36,8 @@ if (document.getElementById("live-panel")) {
 
   const superscript = (n) => String(n).replace("-", "⁻").replace(/\d/g, (d) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[d]);
 
+  const counted = (steps) => (steps === 1 ? "1 step" : `${steps} steps`);
+
   // 16 × 12, 16³
   const sized = (sizes) => sizes.length > 1 && new Set(sizes).size === 1 ? `${sizes[0]}${superscript(sizes.length)}` : sizes.join(" × ");
 
@@ -66,20 +68,26 @@ if (document.getElementById("live-panel")) {
   function linkHere() {
     at("link").href = link();
     if (!changed) return;
+    at("unused").hidden = true;
     try {
       history.replaceState(null, "", link());
     } catch { /* pages without an origin of their own may not */ }
   }
 
-  // The settings of an address; whatever is no number, or not allowed, is as usual.
+  // The settings of an address, with the parts of it that are not used.
   function linked() {
     const found = copy(standard), parts = new URLSearchParams(location.hash.replace(/^#live&?/, ""));
+    const unknown = new Set(parts.keys()), refused = [];
+    const text = (key, allowed, take) => {
+      if (!unknown.delete(key)) return;
+      const value = parts.get(key);
+      if (allowed(value)) take(value); else refused.push(`${key}=${value}`);
+    };
     const number = (key, allowed, take) => {
-      const value = parts.has(key) ? Number(parts.get(key)) : NaN;
-      if (Number.isFinite(value) && allowed(value)) take(value);
+      text(key, (v) => v.trim() !== "" && Number.isFinite(Number(v)) && allowed(Number(v)), (v) => take(Number(v)));
     };
     const positive = (v) => v > 0;
-    if (["step", "work"].includes(parts.get("compare"))) found.compare = parts.get("compare");
+    text("compare", (v) => ["step", "work"].includes(v), (v) => { found.compare = v; });
     number("h", (v) => v !== 0, (v) => { found.h = v; });
     number("speed", (v) => v > 0 && v <= 1e4, (v) => { found.speed = v; });
     number("order", (v) => data.orders.includes(v), (v) => { found.order = v; });
@@ -92,8 +100,10 @@ if (document.getElementById("live-panel")) {
     // A link shows what its sender saw, whatever this browser would measure.
     number("rk4", (v) => v >= 1 && v <= MOST_PARTS && Number.isInteger(v), (v) => { start.remember(found, v); });
     found.start.forEach((_, i) => number(`x.${data.coordinates[i]}`, () => true, (v) => { found.start[i] = v; }));
-    return found;
+    return { found, refused: [...refused, ...[...unknown].map((key) => `${key}=${parts.get(key)}`)] };
   }
+
+  const clipped = (text) => (text.length > 200 ? `${text.slice(0, 200)}…` : text);
 
   // -- the motion
 
@@ -156,7 +166,7 @@ if (document.getElementById("live-panel")) {
     [...(at(`${sides[k]}-observed`)?.children ?? [])].forEach((row, i) => {
       row.lastElementChild.textContent = i in observed ? String(shortened(observed[i])).replace("-", "−") : "–";
     });
-    const told = runner?.failed ? `Failed after ${runner.steps} steps.` : "";
+    const told = runner?.failed ? `Failed after ${counted(runner.steps)}: ${runner.failed}.` : "";
     if (at(`${sides[k]}-told`).textContent !== told) at(`${sides[k]}-told`).textContent = told;
   }
 
@@ -185,7 +195,7 @@ if (document.getElementById("live-panel")) {
       }
       const steps = Math.max(race.ours.steps, race.theirs.steps, 20);
       [pen.textAlign, pen.textBaseline] = ["right", "top"];
-      pen.fillText(`${steps} steps`, x0 + width, canvas.clientHeight - 16);
+      pen.fillText(counted(steps), x0 + width, canvas.clientHeight - 16);
       sides.forEach((side, k) => {
         const { values, steps: until } = race[side].histories[g];
         pen.strokeStyle = colour(k);
@@ -204,7 +214,7 @@ if (document.getElementById("live-panel")) {
     sides.forEach((_, k) => drawScores(k));
     if (at("errors")) drawErrors();
     at("order").textContent = `order ${settings.order}`;
-    at("steps").textContent = race ? `${race.ours.steps} steps` : "";
+    at("steps").textContent = race ? counted(race.ours.steps) : "";
   }
 
   // For screen readers, and for whoever examines the page: where both are when they rest.
@@ -224,8 +234,8 @@ if (document.getElementById("live-panel")) {
     waiting = 1;
     if (race?.ours.steps) {
       const told = (runner) => race.groups.map(({ name }, i) => `${name} ${readable(runner.histories[i].last)}`).join(", ");
-      at("told").textContent = `After ${race.ours.steps} steps: phigen, ${told(race.ours)}; RK4, ${told(race.theirs)}.`;
-      if (!race.groups.length) at("told").textContent = `After ${race.ours.steps} steps.`;
+      at("told").textContent = `After ${counted(race.ours.steps)}: phigen, ${told(race.ours)}; RK4, ${told(race.theirs)}.`;
+      if (!race.groups.length) at("told").textContent = `After ${counted(race.ours.steps)}.`;
       else at("told").textContent += ` ${whereRk4IsCloser(race)}`.trimEnd();
     }
     draw();
@@ -294,9 +304,12 @@ if (document.getElementById("live-panel")) {
   });
   function follow() {
     if (!location.hash.startsWith("#live&") || location.hash === link()) return;
-    settings = linked();
+    const { found, refused } = linked();
+    settings = found;
     if (at("group")) at("group").value = settings.group;
     restart();
+    at("unused").hidden = !refused.length;
+    at("unused").textContent = `Not used from the address, as unknown or not allowed: ${clipped(refused.join(", "))}`;
   }
   addEventListener("hashchange", follow);
   still.addEventListener("change", rest);

@@ -147,6 +147,29 @@ def test_link_of_the_panel_holds_its_settings(browser, made):
     assert told(browser, "settings") == chosen
 
 
+def test_what_is_not_used_of_a_link_is_told_as_text(browser, made):
+    wrong = ("order=3", "h=", "p.I1=-1", "speed=fast", "x.y=1", "%3Cimg src=x onerror=broken=1%3E=1", "rk4=0")
+    settled(browser, made, "#live&x.x1=0.25&" + "&".join(wrong))
+    unused = browser.value("document.getElementById('live-unused').textContent")
+    assert set(unused.partition(": ")[2].split(", ")) == {w.replace("%3C", "<").replace("%3E", ">") for w in wrong}
+    assert browser.value("document.querySelector('#live-unused').children.length") == 0
+    assert told(browser, "settings")["start"][0] == 0.25
+    assert told(browser, "settings")["params"]["I1"] == 1
+    settled(browser, made, SET)
+    assert browser.value("document.getElementById('live-unused').hidden")
+
+
+def test_a_failing_step_is_told_with_its_status(browser, made):
+    settled(browser, made, "#live&h=1e9&order=2&compare=step")
+    assert browser.value("document.getElementById('live-ours-told').textContent") == ""
+    click(browser, "step")
+    message = browser.value("document.getElementById('live-ours-told').textContent")
+    assert message in ("Failed after 0 steps: NO_CONVERGENCE.", "Failed after 0 steps: NOT_FINITE.")
+    settled(browser, made, SET)
+    click(browser, "step")
+    assert browser.value("document.getElementById('live-steps').textContent") == "1 step"
+
+
 def test_equal_work_gives_rk4_as_many_steps_as_the_link_says(browser, made):
     settled(browser, made, SET.replace("compare=step", "rk4=3"))
     click(browser, "step", 5)
