@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0be3f9f0148e5f94abce629050ee42b9e84919dded00f4e0a5f6d8a65c634d34
+ * body-sha256: 546cd0199e06534da7eb26d7383ad69d7679efe4747816e8f1b459d163794b51
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -17,7 +17,7 @@ extern "C" {
 #define point_vortices_SPEC_SHA256 "804a59fbd6a75ce4716246b77b3269259aad5901c7b5e0f87e175f5913fb28ec"
 
 typedef struct {
-    const double *G; /* at sites: circulation */
+    const double *G; /* at sites: circulation; required, because its default is an array */
 } point_vortices_params;
 
 extern const point_vortices_params point_vortices_default_params;

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 20931a7545b91a680f0ea4c1b1e3391f6e3f77c7513af8f5cbf565682bce1e19
+# body-sha256: 5f629c384f661ff3c7dce459e94135e1b19b31f44976239ac919348a38643834
 import numpy as np
 
 VERSION = "0.1.0"
@@ -18,8 +18,9 @@ ORDER = 4
 AXES = ("i",)
 COORDINATES = ("x", "y",)
 CASIMIRS = ()
+# None: the default in the spec is an array, for which this module has no sizes. Such a parameter must be given.
 DEFAULT_PARAMETERS = {
-    "G": 1.0,
+    "G": None,
 }
 
 # Parameters that may be arrays with a value at each site, and those that must be positive.
@@ -78,6 +79,8 @@ class _Sites:
             raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
         self.parameters = {}
         for name, value in {**DEFAULT_PARAMETERS, **parameters}.items():
+            if value is None:
+                raise TypeError(f"the parameter {name} must be given: its default in the spec is an array")
             value, shape = np.array(value, dtype=float), self.shape_of(name)
             if value.shape not in ((), shape):
                 raise ValueError(f"the parameter {name} has shape {value.shape}")

@@ -50,6 +50,7 @@ FEATURES = (
     Feature("TIMED", lambda p: p.time),
     Feature("NOISE", lambda p: p.noise),
     Feature("NONNEGATIVE", lambda p: any(q.nonnegative for q in p.parameters)),
+    Feature("ARRAYS", lambda p: any(q.values is not None for q in p.parameters)),
     Feature("OBSERVED", lambda p: p.observed),
     Feature("OBSERVED_FIELDS", lambda p: p.observables.fields),
     Feature("RENEWED", lambda p: p.step.refresh),

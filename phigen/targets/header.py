@@ -63,10 +63,13 @@ def right_hand_side(program: Program) -> str:
     return f"pi(x) (grad H{at} + zeta{at}) + f{at}" if program.forced else f"pi(x) grad H{at}"
 
 
-def facts(program: Program, listed: Callable[[Sequence[object]], str], key: Callable[[str], str]) -> dict[str, object]:
+def facts(
+    program: Program, listed: Callable[[Sequence[object]], str], key: Callable[[str], str], nothing: str
+) -> dict[str, object]:
     """Return the constants of a module that describe its system, for templates.
 
-    ``listed`` prints a sequence, ``key`` the name of a parameter.
+    ``listed`` prints a sequence, ``key`` the name of a parameter. ``nothing`` takes the place of defaults that are
+    arrays: a module is for all sizes.
     """
     noise, nonnegative = program.noise, [p.name for p in program.parameters if p.nonnegative]
     return {
@@ -79,7 +82,10 @@ def facts(program: Program, listed: Callable[[Sequence[object]], str], key: Call
         "casimirs": listed(program.casimirs),
         "observed": listed(program.observed) if program.observed else "",
         "observed_fields": listed(program.observables.fields) if program.observables.fields else "",
-        "defaults": [f"{key(p.name)}: {float(p.value)!r}" for p in program.parameters],
+        "defaults": [
+            f"{key(p.name)}: {nothing if p.values is not None else repr(float(p.value))}" for p in program.parameters
+        ],
+        "arrays": any(p.values is not None for p in program.parameters),
         "positive": listed([p.name for p in program.parameters if p.positive]),
         "nonnegative": listed(nonnegative) if nonnegative else "",
         "right_hand_side": right_hand_side(program),

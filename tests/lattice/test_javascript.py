@@ -274,10 +274,11 @@ def test_tangent_vectors_are_those_of_numpy_to_roundoff(case: str, carried: dict
 REFUSED = {
     "sizes": ("volterra", {"sizes": [5]}, "i of 2 or more, a multiple of 2"),
     "small": ("heisenberg", {"sizes": [1, 2, 2]}, "i of 2 or more"),
-    "dimension": ("heisenberg", {"sizes": [4]}, "sizes [4]"),
+    "dimension": ("heisenberg", {"sizes": [4]}, "sizes are [4]"),
     "state": ("toda", {"x0": [1, 2, 3]}, "x0 must be 128 finite numbers"),
     "not finite": ("toda", {"sizes": [2], "x0": ["NaN", 1, 1, 1]}, "x0 must be 4 finite numbers"),
     "unknown": ("dnls", {"params": {"gamma": 1}}, "there is no parameter gamma"),
+    "array": ("xxz_disorder", {"params": {}}, "the parameter B must be given: its default is an array"),
     "positive": ("kdv", {"params": {"d": 0}}, "the parameter d is 0"),
     "one site": ("food_web", {"params": {"k": [1, 1, 1, 0, 1, 1, 1, 1, 1, 1]}}, "the parameter k is"),
     "bonds": ("food_web", {"bonds": [0, 10]}, "bonds are pairs of different sites"),
@@ -297,3 +298,13 @@ def refusals(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
 def test_what_is_not_allowed_is_told(what: str, refusals: dict[str, dict[str, Any]]) -> None:
     assert refusals[what]["status"] == "BAD_ARGUMENT"
     assert REFUSED[what][2] in refusals[what]["message"]
+
+
+def test_modules_of_numpy_have_no_default_for_an_array() -> None:
+    start, h = begun("xxz_disorder")
+    (text,) = emit(compiled("xxz_disorder").program, "numpy", "phigen").values()
+    module: dict[str, Any] = {}
+    exec(text, module)
+    with pytest.raises(TypeError, match="the parameter B must be given"):
+        module["integrate"](start.state, h, 1)
+    module["integrate"](start.state, h, 1, **start.parameters)

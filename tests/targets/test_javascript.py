@@ -11,6 +11,7 @@ from shutil import copy
 import numpy as np
 import pytest
 from node import answers as answers_of
+from node import asked
 from support import (
     BODY,
     COMMAND,
@@ -348,6 +349,7 @@ def test_a_failing_step_is_an_exception_and_keeps_the_state(name, h, failures):
         ({"x0": [1, 2]}, "x0 must be 3 finite numbers"),
         ({}, "x0 must be 3 finite numbers"),
         ({"x0": [1, 2, "a"]}, "x0 must be 3 finite numbers"),
+        ({"x0": [1, 2, 3], "parameters": {"I1": 1}}, "there is no option parameters"),
         ({"x0": [1, 2, 3], "params": {"J": 1}}, "there is no parameter J"),
         ({"x0": [1, 2, 3], "params": {"toString": 1}}, "there is no parameter toString"),
         ({"x0": [1, 2, 3], "params": {"I1": "2"}}, "the parameter I1 is 2"),
@@ -360,6 +362,20 @@ def test_bad_arguments_are_told(options, said, tmp_path):
     assert found["isStepError"]
     assert found["made"]["status"] == "BAD_ARGUMENT"
     assert said in found["made"]["message"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("{params: {I1: [1, 2, 3]}}", "I1 must be one number, or 2"),
+        ("{parameters: {I1: 1}}", "there is no option parameters"),
+    ],
+)
+def test_bad_arguments_of_ensembles_are_told(options, said, tmp_path):
+    (text,) = emit(compiled("rigid_body").program, "js", "phigen").values()
+    (tmp_path / "rigid_body.mjs").write_text(text, encoding="utf-8")
+    call = f"module.Solver.ensemble([[1, 1, 1], [1, 2, 1]], 0.1, 1, {options})"
+    assert said in asked(tmp_path / "rigid_body.mjs", f"try {{ {call} }} catch (error) {{ return error.message }}")
 
 
 @pytest.mark.parametrize(("h", "steps"), [("NaN", 1), (0.1, -1), (0.1, 1.5)])

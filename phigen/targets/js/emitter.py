@@ -88,7 +88,7 @@ def _model(program: Program) -> str:
 def _system(program: Program) -> Mapping[str, object]:
     return {
         "contents": [f" * {part}".rstrip() for line in _contents(program) for part in textwrap.wrap(line, 100) or [""]],
-        **facts(program, json.dumps, key),
+        **facts(program, json.dumps, key, "null"),
         "properties": properties(program.parameters),
         "gauge": json.dumps(program.held) if program.held else "",
         "monitored": program.monitor is not None,

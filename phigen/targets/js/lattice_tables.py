@@ -42,7 +42,7 @@ def _facts(program: Program, step: Sweeps) -> dict[str, object]:
     """Return the values of the template of public constants."""
     return {
         "contents": [f" * {line}".rstrip() for line in _contents(program, step)],
-        **facts(program, json.dumps, key),
+        **facts(program, json.dumps, key, "null"),
         **lattice_values.tables(program, step, json.dumps),
         "kinds": json.dumps(step.casimir_kinds),
         "reductions": json.dumps([[r.kind, r.over] for r in program.observables.reductions]),

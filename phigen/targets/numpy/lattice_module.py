@@ -28,7 +28,7 @@ _SERIES = ("lattice_series", "lattice_predictors", "lattice_newton")
 def body(program: Program, step: Sweeps, prepare: str) -> str:
     """Return the text of the module; ``prepare`` are the functions that compute coefficients."""
     values: dict[str, object] = {
-        **facts(program, listed, quoted),
+        **facts(program, listed, quoted, "None"),
         **lattice_values.tables(program, step, listed),
         **{name: PYTHON.text(policy) for name, policy in POLICIES.items()},
         "schedule": repr(tuple(step.schedule.flows)),

@@ -26,7 +26,7 @@ _OF_TAU = """
 
 def values_of(program: Program) -> dict[str, object]:
     """Return all shared values of a program."""
-    said = {"title": plain(program.about.title) or program.name, **facts(program, listed, quoted)}
+    said = {"title": plain(program.about.title) or program.name, **facts(program, listed, quoted, "None")}
     policies = {name: PYTHON.text(policy) for name, policy in policies_of(program).items()}
     return {**said, **policies, **_of_fixed(program), **_of_time(program), **_of_noise(program), **_of_step(program)}
 

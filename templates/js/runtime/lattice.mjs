@@ -1,5 +1,5 @@
 import { PROBE_STEP } from "./start_policy.mjs";
-import { StepError, finite } from "./errors.mjs";
+import { StepError, expectOptions, finite } from "./errors.mjs";
 import { march } from "./march.mjs";
 import { CASIMIRS, CASIMIR_KINDS, COORDINATES, DEFAULT_PARAMETERS, DIM, NAME, ORDER } from "./model.mjs";
 import { AXES, COEFFICIENTS, SPEC_SHA256, TIMES, VERSION } from "./model.mjs";
@@ -94,7 +94,8 @@ export class Solver {
    * @param {ArrayLike<number>} options.bonds the ends of all bonds, counted from 0: a, b of the first, …
    * #endif
    */
-  constructor(options) {
+  constructor(options = {}) {
+    expectOptions(options);
     const { x0 } = options;
     const sizes = options.sizes ?? (AXES.length === 1 && x0 ? [x0.length / DIM] : []);
     this.sites = new Sites(sizes, options);

@@ -1,11 +1,12 @@
-import { StepError } from "./errors.mjs";
+import { StepError, expectOptions } from "./errors.mjs";
 import { Solver } from "./solver.mjs";
 
 /** Members of Solver: runs of many states. */
 export class Ensemble {
   /**
    * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
-   * good value. h and the values of options may be arrays, with a number for each state.
+   * good value. h and the values of options may be arrays, with a number for each state; throws StepError if
+   * they have another length.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
@@ -14,16 +15,22 @@ export class Ensemble {
    * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
-    const ends = Array.from(members, (x0, m) => {
-      const own = (value) => (typeof value === "object" && value !== null ? value[m] : value);
-      const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(value)]);
-      const chosen = { ...options, params: Object.fromEntries(given), t0: own(options.t0), x0 };
+    const starts = Array.from(members);
+    expectOptions(options);
+    const ends = starts.map((x0, m) => {
+      const own = (what, value) => {
+        if (typeof value !== "object" || value === null) return value;
+        if (value.length === starts.length) return value[m];
+        throw new StepError("BAD_ARGUMENT", 0, `${what} must be one number, or ${starts.length}`);
+      };
+      const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(name, value)]);
+      const chosen = { ...options, params: Object.fromEntries(given), t0: own("t0", options.t0), x0 };
       chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(own(h), count);
+        solver.integrate(own("h", h), count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;

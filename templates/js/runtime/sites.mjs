@@ -29,7 +29,7 @@ export class Sites {
     const fits = (n, axis) => Number.isInteger(n) && n >= LEAST[axis] && n % PERIODS[axis] === 0;
     if (sizes.length !== AXES.length || !sizes.every(fits)) {
       const asked = AXES.map((axis, k) => `${axis} of ${LEAST[k]} or more, a multiple of ${PERIODS[k]}`);
-      throw new StepError("BAD_ARGUMENT", 0, `sizes [${sizes}]: needed is ${asked.join("; ")}`);
+      throw new StepError("BAD_ARGUMENT", 0, `sizes are [${sizes}]: needed is ${asked.join("; ")}`);
     }
     this.sizes = Object.freeze([...sizes]);
     this.count = sizes.reduce((product, n) => product * n, 1);
@@ -107,6 +107,12 @@ export class Sites {
       let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: one number
       // #if GRAPH
       if (AT_BONDS.includes(name)) length = this.bondCount;
+      // #endif
+      // #if ARRAYS
+      if (value === null) {
+        const missing = `the parameter ${name} must be given: its default is an array`;
+        throw new StepError("BAD_ARGUMENT", 0, missing);
+      }
       // #endif
       const listed = typeof value === "object" && length !== undefined;
       const values = listed ? finite(value, length, name) : [value];

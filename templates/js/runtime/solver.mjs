@@ -1,4 +1,4 @@
-import { StepError, finite } from "./errors.mjs";
+import { StepError, expectOptions, finite } from "./errors.mjs";
 import { march } from "./march.mjs";
 import { makeStage } from "./newton.mjs";
 import { emptyTables } from "./tables_stages.mjs";
@@ -71,7 +71,8 @@ export class Solver {
    * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
    * #state options
    */
-  constructor(options) {
+  constructor(options = {}) {
+    expectOptions(options);
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
     takeTime(this, options);
@@ -174,7 +175,8 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const twin = new Solver({ ...this, x0: this.x });
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where a system has none
+    const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
     // #state copied

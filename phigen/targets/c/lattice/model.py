@@ -128,8 +128,11 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
     said = plain(parameter.description) or f"default {float(parameter.value)!r}"
     said = said if member == parameter.name else f"{parameter.name}: {said}"
     if parameter.at != "all":
-        default = "" if parameter.values else "; NULL for the default at all of them"
-        return f"const double *{member};", f"at {parameter.at}: {said}{default}"
+        if parameter.values is not None:
+            said = plain(parameter.description) or ("" if member == parameter.name else parameter.name)
+            said = "; ".join(filter(None, [said, "required, because its default is an array"]))
+            return f"const double *{member};", f"at {parameter.at}: {said}"
+        return f"const double *{member};", f"at {parameter.at}: {said}; NULL for the default at all of them"
     return f"double {member};", said
 
 
