@@ -111,15 +111,29 @@ def _anomaly(t: Any, r: Any, eta: Any, beta: Any, mu: Any, _spin: Any) -> Any:
     return mpmath.findroot(residual, (high / 10**9, high), solver="anderson")
 
 
-def _amplitude(t: Any, p: Any, q: Any) -> Any:
+def _amplitude(t: Any, p: Any, r: Any) -> Any:
     """tan(φ/4)/√P for the amplitude φ of √P t, from Jacobi's functions."""
-    sn, cn = (mpmath.ellipfun(name, mpmath.sqrt(p) * t, m=q / p) for name in ("sn", "cn"))
+    sn, cn = (mpmath.ellipfun(name, mpmath.sqrt(p) * t, m=1 - r / p) for name in ("sn", "cn"))
     return mpmath.tan(mpmath.atan2(sn, cn) / 4) / mpmath.sqrt(p)
 
 
-def _amplitude_integral(kind: str, t: Any, p: Any, q: Any) -> Any:
+def _amplitude_integral(kind: str, t: Any, p: Any, r: Any) -> Any:
     """The integral of S² from 0 to t, with ``kind`` sn, or of S²/D², with ``kind`` sd."""
-    return mpmath.quad(lambda u: mpmath.ellipfun(kind, mpmath.sqrt(p) * u, m=q / p) ** 2 / p, mpmath.linspace(0, t, 9))
+
+    def integrand(u: Any) -> Any:
+        return mpmath.ellipfun(kind, mpmath.sqrt(p) * u, m=1 - r / p) ** 2 / p
+
+    return mpmath.quad(integrand, mpmath.linspace(0, t, 9))
+
+
+def _third(t: Any, p: Any, r: Any, n: Any) -> Any:
+    """The integral of S²/(1 − nS²) from 0 to t."""
+
+    def integrand(u: Any) -> Any:
+        square = mpmath.ellipfun("sn", mpmath.sqrt(p) * u, m=1 - r / p) ** 2 / p
+        return square / (1 - n * square)
+
+    return mpmath.quad(integrand, mpmath.linspace(0, t, 9))
 
 
 def _companion(coefficients: Any) -> Any:
@@ -169,6 +183,7 @@ _RULES: dict[str, Callable[..., Any]] = {
     "anomaly": _anomaly,
     "amplitude": _amplitude,
     "amplitude1": partial(_amplitude_integral, "sn"),
+    "amplitude3": _third,
     "amplitude2": partial(_amplitude_integral, "sd"),
     **{f"exprem{k}": partial(_remainder, k) for k in range(4)},
     **{f"expquo{k}": partial(_quotient, k) for k in range(4)},

@@ -29,7 +29,7 @@ from phigen.runtime.origin import origin_of
 from phigen.runtime.sections import function_of
 from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
-from phigen.runtime.tables import Table, opened
+from phigen.runtime.tables import TableFile, opened
 from phigen.runtime.trajectory import Trajectory
 from phigen.study.averages import averages_of
 from phigen.study.lyapunov import FrameGrowth, Spectrum
@@ -104,7 +104,7 @@ class Recorder:
         self.session: Session
         self.number = 0.0  # of the last row, in steps from where these begin
         self._whole: int | None = None  # steps, where the session has made a part of one at the end
-        self._tables: dict[str, Table] = {}
+        self._tables: dict[str, TableFile] = {}
         self._saved = time.monotonic()
 
     @property

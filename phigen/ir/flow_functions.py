@@ -221,17 +221,14 @@ class Transposed:
 class FlowTransposes:
     """The functions that pull cotangents back through the flows of a splitting, of ``dimension`` coordinates.
 
-    A row has ``row`` coefficients.
+    A row has ``row`` coefficients. ``recomputes`` says whether the transposes also compute the states before the flows,
+    so that no tape is needed.
     """
 
     flows: Sequence[Transposed]
     dimension: int
     row: int
-
-    @property
-    def recomputes(self) -> bool:
-        """Whether the transposes recompute the states before flows, which need no tape."""
-        return any(flow.before for flow in self.flows)
+    recomputes: bool
 
     def _switch(self, case: Callable[[int, Transposed], Iterator[ir.Statement]]) -> ir.Switch:
         """Return the switch over the parts of H."""

@@ -36,7 +36,7 @@ class Column:
     flat: bool = False
 
 
-class Table(Protocol):
+class TableFile(Protocol):
     """A table that is being written."""
 
     def append(self, rows: Floats) -> None:
@@ -60,12 +60,12 @@ class Table(Protocol):
         ...
 
 
-def opened(path: str | Path, columns: Sequence[Column], size: int | None = None) -> Table:
-    """Return a new table, or one that is resumed after the first ``size`` bytes, a result of `Table.flush`.
+def opened(path: str | Path, columns: Sequence[Column], size: int | None = None) -> TableFile:
+    """Return a new table, or one that is resumed after the first ``size`` bytes, a result of `TableFile.flush`.
 
     Raises `ValueError` for suffixes that are not in `SUFFIXES` and for files shorter than ``size``, and `OSError`.
     """
-    kinds: dict[str, Callable[[Path, Sequence[Column], int | None], Table]] = {".csv": CsvTable, ".npz": NpzTable}
+    kinds: dict[str, Callable[[Path, Sequence[Column], int | None], TableFile]] = {".csv": CsvTable, ".npz": NpzTable}
     suffix = Path(path).suffix.lower()
     if suffix not in kinds:
         raise ValueError(f"cannot write {str(path)!r}: the suffix must be {' or '.join(SUFFIXES)}")
@@ -89,25 +89,25 @@ class CsvTable:
             self._file.write((",".join(name for c in columns for name in c.names) + "\n").encode())
 
     def append(self, rows: Floats) -> None:
-        """See `Table`."""
+        """See `TableFile`."""
         with naming(self._path):
             self._file.write("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()).encode())
 
     def flush(self) -> int:
-        """See `Table`."""
+        """See `TableFile`."""
         with naming(self._path):
             return _flushed(self._file)
 
     def close(self, scalars: Mapping[str, Any]) -> None:
-        """See `Table`; scalars are not written."""
+        """See `TableFile`; scalars are not written."""
         with naming(self._path):
             self._file.close()
 
     def clean(self) -> None:
-        """See `Table`; there are no further files."""
+        """See `TableFile`; there are no further files."""
 
     def discard(self) -> None:
-        """See `Table`."""
+        """See `TableFile`."""
         _discarded(self._file, self._path)
 
 
@@ -119,17 +119,17 @@ class NpzTable:
         self._file = _opened(self._part, size)
 
     def append(self, rows: Floats) -> None:
-        """See `Table`."""
+        """See `TableFile`."""
         with naming(self._part):
             self._file.write(np.ascontiguousarray(rows, dtype="<f8").tobytes())
 
     def flush(self) -> int:
-        """See `Table`."""
+        """See `TableFile`."""
         with naming(self._part):
             return _flushed(self._file)
 
     def close(self, scalars: Mapping[str, Any]) -> None:
-        """See `Table`."""
+        """See `TableFile`."""
         with naming(self._part):
             self._file.close()
         width = sum(len(c.names) for c in self._columns)
@@ -147,11 +147,11 @@ class NpzTable:
                     np.lib.format.write_array(member, np.asarray(value), allow_pickle=False)
 
     def clean(self) -> None:
-        """See `Table`."""
+        """See `TableFile`."""
         self._part.unlink(missing_ok=True)
 
     def discard(self) -> None:
-        """See `Table`."""
+        """See `TableFile`."""
         _discarded(self._file, self._part)
 
     def _store(self, archive: zipfile.ZipFile, column: Column, rows: Floats, first: int) -> None:

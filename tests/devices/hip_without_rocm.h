@@ -19,7 +19,6 @@ extern "C" __device__ double __longlong_as_double(long long);
 #define fabs(x) __builtin_fabs(x)
 #define floor(x) __builtin_floor(x)
 #define sqrt(x) __builtin_sqrt(x)
-#define floor(x) __builtin_floor(x)
 #define fmax(x, y) __builtin_fmax(x, y)
 #define fmin(x, y) __builtin_fmin(x, y)
 #define copysign(x, y) __builtin_copysign(x, y)

@@ -411,7 +411,7 @@ def test_what_cannot_be_pulled_back_is_told(target):
     for bar, why in ((x + 1j, "real"), (["1", "2", "3"], "array of numbers"), ([[1, 2], 3, 4], "array of numbers")):
         with pytest.raises(TypeError, match=f"cotangent must be.*{why}"):
             made.pullback(x, H, 2, bar)
-    with pytest.raises(TypeError, match="'I2' must be a number"):
+    with pytest.raises(TypeError, match="'I2' must be one number"):
         made.jacobian(x, H, 2, I2=[1.0])
     with pytest.raises(ValueError, match=r"'I2' must have shape \(1,\)"):
         made.pullback([x], H, 2, [x], I2=[1, 2])

@@ -56,7 +56,7 @@ def test_values_that_a_flow_does_not_update_are_left_out():
 
 def test_cotangents_are_added_where_a_flow_has_read():
     flow = Transposed(state=[1], row=[0], before=[], reads=[(0, 1)], far=True, far_back=False)
-    transposes = FlowTransposes([flow, flow], 2, 3)
+    transposes = FlowTransposes([flow, flow], 2, 3, recomputes=False)
     assert "      bar[1] += back[0]\n      coef_bar[0] += slopes[0]" in text(transposes.back())
     stored = commented(transposes.group_flows(), PROGRAM)
     assert f"{NAME}_lanes tape[{NAME}_BACK_PACKS][2])" in stored
@@ -66,6 +66,6 @@ def test_cotangents_are_added_where_a_flow_has_read():
 
 def test_an_inverse_flow_needs_no_tape():
     flow = Transposed(state=[], row=[], before=[1], reads=[], far=False, far_back=False)
-    back = text(FlowTransposes([flow], 2, 1).group_back())
+    back = text(FlowTransposes([flow], 2, 1, recomputes=True).group_back())
     assert back.startswith("follow_back_lanes(part, row, group, bar)")
     assert "copy before[0] to x[1]" in back

@@ -164,7 +164,9 @@ def increments(name: str, h: float, steps: int, draws: dict[str, int]) -> np.nda
     """The increments of all sites in the order of the sources of the expansion (steps, draws)."""
     module, (x, _) = solver(name).backend._module, given(name)  # type: ignore[attr-defined]
     sites = type(
-        "Sites", (), {"given": None, "sizes": x.shape[1:], "h": h, "seed": draws["seed"], "member": draws["member"]}
+        "Sites",
+        (),
+        {"increments": None, "sizes": x.shape[1:], "h": h, "seed": draws["seed"], "member": draws["member"]},
     )()
     rows = []
     for step in range(steps):
@@ -190,7 +192,7 @@ def test_noisy_steps_are_those_of_the_expansion_with_the_same_increments(name: s
 
 def test_increments_are_independent_and_of_variance_h() -> None:
     module = solver("free").backend._module  # type: ignore[attr-defined]
-    sites = type("Sites", (), {"given": None, "sizes": (20_000,), "h": 0.3, "seed": 1, "member": 0, "step": 5})()
+    sites = type("Sites", (), {"increments": None, "sizes": (20_000,), "h": 0.3, "seed": 1, "member": 0, "step": 5})()
     first, second = (module._draw(sites, part) for part in (0, 1))
     sites.step = 6
     drawn = np.array([*first, *second, *module._draw(sites, 0), *np.roll(first, 1, axis=1)])

@@ -12,7 +12,7 @@ from phigen import resources, spec
 from phigen.geometry.system import system_from_spec
 from phigen.notation import mathml, named_parts
 from phigen.realisations.catalogue import realise
-from phigen.symbolic.elliptic import ELLIPTIC
+from phigen.symbolic.elliptic import ELLIPTIC, THIRD
 from phigen.symbolic.expression import (
     EULER,
     PI,
@@ -55,7 +55,7 @@ def joined_value(pieces, values=VALUES, functions=None):
 
 
 #: Functions that other tests read, and those of flows, which have no formula but their name.
-OTHERS = {"phi0", "phi1", "phi2", "acosh", "anomaly", *ELLIPTIC, *REMAINDERS, *QUOTIENTS}
+OTHERS = {"phi0", "phi1", "phi2", "acosh", "anomaly", *ELLIPTIC, THIRD, *REMAINDERS, *QUOTIENTS}
 
 
 @pytest.mark.parametrize("function", [f for f in FUNCTIONS if f not in OTHERS])

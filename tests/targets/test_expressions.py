@@ -37,6 +37,7 @@ ARGUMENTS |= {
 ARGUMENTS |= {"atan2": (-x, y - z), "power": (z, y - 3 * x), "tanhalf": (call("sin", y), call("versin", y))}
 ARGUMENTS |= {"choose": (x - y, x * z, y - z), "anomaly": (x + y, z, x - y, y / 2 - x, y, x)}
 ARGUMENTS |= dict.fromkeys(("amplitude", "amplitude1", "amplitude2"), (z / 4, x + y, x))
+ARGUMENTS |= {"amplitude3": (z / 4, x + y, x, -y)}  # 1 − nS² ≥ 1
 ARGUMENTS |= {f"{name}{k}": (z / 4, x, -y, x - y, x) for name in ("exprem", "expquo") for k in range(4)}
 
 #: Arguments of φ and its derivatives: near 0, farther, and beyond 16, of either sign.

@@ -126,7 +126,8 @@ def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tu
         state, row, before = (*reached, [])[:3]
         far, far_back = reaches_far(flow), reaches_far(kernels[-1])
         flows.append(Transposed(state, row, before, _read(kernels[-1]), far, far_back))
-    return kernels, FlowTransposes(flows, program.dimension, max(1, step.row))
+    recomputes = any(len(kernel.outputs) > 2 for kernel in kernels)
+    return kernels, FlowTransposes(flows, program.dimension, max(1, step.row), recomputes=recomputes)
 
 
 def _read(kernel: Kernel) -> list[tuple[int, int]]:
