@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 57ee46a92c3cf83d29a073a74bf9f6cc2655abdb7e3ace6431f441f653a84efb
+ * body-sha256: 5cb1992ebd92b089e838ce9cb6e1304acfb3ad267141681a0ee6b17051b47bd9
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -517,17 +517,6 @@ export class StepError extends Error {
   }
 }
 
-/** All that solvers take; some take a part of it. */
-const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
-
-/** Throw StepError for options that no solver has, such as misspelled ones. */
-function expectOptions(options) {
-  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
-  if (!unknown.length) return;
-  const known = OPTIONS.join(", ");
-  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
-}
-
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
@@ -558,9 +547,9 @@ const number = new Float64Array(1);
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
  * where required, and give finite coefficients for a negligibly small step.
  */
-function admitted(given) {
-  const params = { ...DEFAULT_PARAMETERS, ...given };
-  const unknown = Object.keys(given).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
+function admitted(overrides) {
+  const params = { ...DEFAULT_PARAMETERS, ...overrides };
+  const unknown = Object.keys(overrides).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
   if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
   for (const [name, value] of Object.entries(params)) {
     const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
@@ -618,8 +607,7 @@ export class Solver {
    * @param {ArrayLike<number>} [options.gauge] multiples of one's own: the step is an exact Poisson map
    *   for each
    */
-  constructor(options = {}) {
-    expectOptions(options);
+  constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
     takeGauge(this, options);
@@ -677,8 +665,7 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where a system has none
-    const twin = new Solver({ x0, params, gauge, seed, member, step0 });
+    const twin = new Solver({ ...this, x0: this.x });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
     twin.carry.set(this.carry);
@@ -739,8 +726,7 @@ export class Solver {
 
   /**
    * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
-   * good value. h and the values of options may be arrays, with a number for each state; throws StepError if
-   * they have another length.
+   * good value. h and the values of options may be arrays, with a number for each state.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
@@ -749,22 +735,16 @@ export class Solver {
    * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
-    const starts = Array.from(members);
-    expectOptions(options);
-    const ends = starts.map((x0, m) => {
-      const own = (what, value) => {
-        if (typeof value !== "object" || value === null) return value;
-        if (value.length === starts.length) return value[m];
-        throw new StepError("BAD_ARGUMENT", 0, `${what} must be one number, or ${starts.length}`);
-      };
-      const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(name, value)]);
-      const chosen = { ...options, params: Object.fromEntries(given), t0: own("t0", options.t0), x0 };
+    const ends = Array.from(members, (x0, m) => {
+      const memberValue = (value) => (typeof value === "object" && value !== null ? value[m] : value);
+      const params = Object.entries(options.params ?? {}).map(([name, value]) => [name, memberValue(value)]);
+      const chosen = { ...options, params: Object.fromEntries(params), t0: memberValue(options.t0), x0 };
       chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(own("h", h), count);
+        solver.integrate(memberValue(h), count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;
@@ -1016,17 +996,17 @@ const value = new Float64Array(1);
  */
 function plausible(solver, stage, increment) {
   const { params, x } = solver;
-  let moved = 0;
+  let distance = 0;
   let size = 0;
   for (let i = 0; i < DIM; i++) {
-    moved += Math.abs(increment[i]);
+    distance += Math.abs(increment[i]);
     size += Math.abs(x[i]);
   }
-  if (moved <= PLAUSIBLE * size) return true;
+  if (distance <= PLAUSIBLE * size) return true;
   vectorFieldAt(params, solver.t, x, speed);
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * speed[i]);
   size += sizeOfNoise(solver);
-  if (moved <= PLAUSIBLE * size) return true;
+  if (distance <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
     energyAt(params, solver.t, point, value);

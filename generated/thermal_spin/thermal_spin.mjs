@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 66ad441f5b59d26d0bdfc87faec63f9dffab1c04d7a512431be37433280a7d1b
+ * body-sha256: 61a69dc10f7fbc8a280270908e3e678d31b53e6f06d09312fa34a2d0bbc1337d
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -314,17 +314,6 @@ export class StepError extends Error {
   }
 }
 
-/** All that solvers take; some take a part of it. */
-const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
-
-/** Throw StepError for options that no solver has, such as misspelled ones. */
-function expectOptions(options) {
-  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
-  if (!unknown.length) return;
-  const known = OPTIONS.join(", ");
-  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
-}
-
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
@@ -355,9 +344,9 @@ const number = new Float64Array(1);
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
  * where required, and give finite coefficients for a negligibly small step.
  */
-function admitted(given) {
-  const params = { ...DEFAULT_PARAMETERS, ...given };
-  const unknown = Object.keys(given).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
+function admitted(overrides) {
+  const params = { ...DEFAULT_PARAMETERS, ...overrides };
+  const unknown = Object.keys(overrides).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
   if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
   for (const [name, value] of Object.entries(params)) {
     const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
@@ -420,8 +409,7 @@ export class Solver {
    * @param {number} [options.member] member of an ensemble, 32 bits, 0 by default
    * @param {number} [options.step0] number of steps made before x0, 0 by default
    */
-  constructor(options = {}) {
-    expectOptions(options);
+  constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
     takeDraws(this, options);
@@ -482,8 +470,7 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where a system has none
-    const twin = new Solver({ x0, params, gauge, seed, member, step0 });
+    const twin = new Solver({ ...this, x0: this.x });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
     twin.carry.set(this.carry);
@@ -545,8 +532,7 @@ export class Solver {
 
   /**
    * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
-   * good value. h and the values of options may be arrays, with a number for each state; throws StepError if
-   * they have another length.
+   * good value. h and the values of options may be arrays, with a number for each state.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
@@ -555,22 +541,16 @@ export class Solver {
    * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
-    const starts = Array.from(members);
-    expectOptions(options);
-    const ends = starts.map((x0, m) => {
-      const own = (what, value) => {
-        if (typeof value !== "object" || value === null) return value;
-        if (value.length === starts.length) return value[m];
-        throw new StepError("BAD_ARGUMENT", 0, `${what} must be one number, or ${starts.length}`);
-      };
-      const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(name, value)]);
-      const chosen = { ...options, params: Object.fromEntries(given), t0: own("t0", options.t0), x0 };
+    const ends = Array.from(members, (x0, m) => {
+      const memberValue = (value) => (typeof value === "object" && value !== null ? value[m] : value);
+      const params = Object.entries(options.params ?? {}).map(([name, value]) => [name, memberValue(value)]);
+      const chosen = { ...options, params: Object.fromEntries(params), t0: memberValue(options.t0), x0 };
       chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(own("h", h), count);
+        solver.integrate(memberValue(h), count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;
@@ -797,11 +777,11 @@ function normals(seed, member, step, values) {
  *
  * @returns {boolean} false if one is not finite, or some are missing
  */
-function draw(solver, given) {
+function draw(solver, increments) {
   const { dw, seed, member, step0, steps, h } = solver;
-  if (given) {
-    if (given.length !== DRAWS) return false;
-    dw.set(given);
+  if (increments) {
+    if (increments.length !== DRAWS) return false;
+    dw.set(increments);
   } else {
     normals(seed, member, BigInt(step0) + BigInt(steps), dw);
     const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS); // so that a step of -h inverts one of h
@@ -811,8 +791,9 @@ function draw(solver, given) {
 }
 
 /** Read the increments of the next step. Throws StepError if given ones are not admissible. */
-function drawStep(solver, given) {
-  if (!draw(solver, given)) throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${given}`);
+function drawStep(solver, increments) {
+  if (draw(solver, increments)) return;
+  throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${increments}`);
 }
 
 /** The vector fields of the sources of noise at x and the time t. */
@@ -942,17 +923,17 @@ const value = new Float64Array(1);
  */
 function plausible(solver, stage, increment) {
   const { params, x } = solver;
-  let moved = 0;
+  let distance = 0;
   let size = 0;
   for (let i = 0; i < DIM; i++) {
-    moved += Math.abs(increment[i]);
+    distance += Math.abs(increment[i]);
     size += Math.abs(x[i]);
   }
-  if (moved <= PLAUSIBLE * size) return true;
+  if (distance <= PLAUSIBLE * size) return true;
   vectorFieldAt(params, solver.t, x, speed);
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * speed[i]);
   size += sizeOfNoise(solver);
-  if (moved <= PLAUSIBLE * size) return true;
+  if (distance <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
     energyAt(params, solver.t, point, value);

@@ -435,7 +435,7 @@ def test_modules_that_meet_declare_no_name_twice():
         for path in RUNTIME
     }
     lattices = [["errors", "lattice", "sites", *step] for step in (["flows"], ["sweeps", "krylov"])]
-    others = ["tangent", "errors", "solver", "gauge", "guess", "algebra", "linear", "saving", "autonomous"]
+    others = ["tangent", "errors", "solver", "gauge", "predictor_checks", "algebra", "linear", "saving", "autonomous"]
     steps = [[s, f"tangent_{s}", *others] for s in ("newton", "path", "explicit", "splitting")]
     turned = [[*met, "attitude", f"attitude_{kind}"] for met in steps for kind in ("matrices", "quaternions")]
     for met in [*lattices, *turned]:

@@ -44,13 +44,13 @@ export function currentElement(solver) {
 
 /** The group element of an attitude and a position of the public interface. */
 export function elementOf(steps, attitude, position) {
-  const given = [...(attitude ?? identityElement().subarray(0, ATTITUDE))];
-  addPosition(given, position);
-  if (given.length !== ELEMENT || !given.every(Number.isFinite)) {
+  const elements = [...(attitude ?? identityElement().subarray(0, ATTITUDE))];
+  addPosition(elements, position);
+  if (elements.length !== ELEMENT || !elements.every(Number.isFinite)) {
     throw new StepError("BAD_ARGUMENT", steps, `${ELEMENT} finite numbers make an attitude`);
   }
-  const element = Float64Array.from(given);
-  const largest = Math.max(...given.slice(0, ATTITUDE).map(Math.abs));
+  const element = Float64Array.from(elements);
+  const largest = Math.max(...elements.slice(0, ATTITUDE).map(Math.abs));
   if (!(largest > 0)) throw new StepError("BAD_ARGUMENT", steps, "the attitude is 0");
   makeUnit(element, largest);
   return element;

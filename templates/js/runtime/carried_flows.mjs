@@ -1,6 +1,6 @@
 import { COEFFICIENTS, NEGATIVE, TANGENTS, part1Slope, part2Slope } from "./model.mjs";
 import { totalOf } from "./site_level.mjs";
-import { prepareRow } from "./rows_late.mjs";
+import { prepareRow } from "./rows_delayed.mjs";
 
 /** Carry the tangent vectors along by a flow over a time that depends on the state: time = tau / rate. */
 export function carryVectors({ params, sites, x, vectors }, part, time, rate) {

@@ -3,7 +3,7 @@ import { MOST_RISING, NEARLY_ROUNDING, ROUNDING, SOLVED, STALLED } from "./gauss
 import { DIM, MAX_SWEEPS, MIXING, PLACES, PLAIN, POINT, PREDICTION, UNKNOWNS, WEIGHTS } from "./model.mjs";
 import { stageChange, stageField } from "./model.mjs";
 import { turnStage } from "./attitude_stages.mjs";
-import { keepMove } from "./gauss_framed.mjs";
+import { storeIncrement } from "./gauss_framed.mjs";
 import { pass } from "./passing.mjs";
 import { timeOfStep } from "./level_gauss.mjs";
 
@@ -24,7 +24,7 @@ export class History {
   sweeps = 2;
   rate = 0.5;
   /** Increments of the stages of the last step, in the frame of its end, and its size. */
-  moves = stages();
+  increments = stages();
   h = NaN;
 
   /** Clear the predictor. */
@@ -33,14 +33,14 @@ export class History {
   }
 
   /** Clear the predictor, after the state has been changed. */
-  move() {
+  increment() {
     this.clear();
   }
 
   /** An independent copy. */
   copy() {
     const twin = Object.assign(new History(), this);
-    twin.moves = this.moves.map((move) => Float64Array.from(move));
+    twin.increments = this.increments.map((increment) => Float64Array.from(increment));
     return twin;
   }
 }
@@ -82,12 +82,12 @@ export function startOf({ x, t }) {
 }
 
 /** The unknowns of all stages: weighted sums of the stage increments. */
-export function mixed(matrix, moves, z) {
+export function mixed(matrix, increments, z) {
   for (let i = 0; i < NODES; i++) {
     z[i].fill(0);
     for (let j = 0; j < NODES; j++) {
       const factor = matrix[i][j];
-      for (let k = 0; k < UNKNOWNS; k++) z[i][k] += factor * moves[j][k];
+      for (let k = 0; k < UNKNOWNS; k++) z[i][k] += factor * increments[j][k];
     }
   }
 }
@@ -95,10 +95,10 @@ export function mixed(matrix, moves, z) {
 const weight = new Float64Array(1);
 
 /** h b_j times the vector field at all stages. */
-function slopes(solver, stage, start, z, moves) {
+function slopes(solver, stage, start, z, increments) {
   for (let i = 0; i < NODES; i++) {
     weight[0] = solver.h * WEIGHTS[i];
-    stageField(solver.coef[stage], start, z[i], weight, moves[i]);
+    stageField(solver.coef[stage], start, z[i], weight, increments[i]);
   }
 }
 
@@ -108,7 +108,7 @@ function changeOf(start, before, after) {
   for (let i = 0; i < DIM; i++) norm += start[i] * start[i];
   if (norm === 0) {
     norm = Number.MIN_VALUE;
-    for (const move of after) for (let k = 0; k < PLAIN; k++) norm += move[k] * move[k];
+    for (const increment of after) for (let k = 0; k < PLAIN; k++) norm += increment[k] * increment[k];
   }
   let largest = 0;
   for (let i = 0; i < NODES; i++) {
@@ -123,36 +123,36 @@ function changeOf(start, before, after) {
 }
 
 const predicted = stages();
-const mixedMoves = stages();
+const mixedIncrements = stages();
 
 /**
  * Solve for the increments of all stages by fixed-point sweeps, starting from the prediction; returns a
  * status.
  */
-export function collocate(solver, stage, start, history, moves) {
+export function collocate(solver, stage, start, history, increments) {
   let last = Infinity;
   let rising = 0;
   let rises = 0;
   if (history.count > 0 && solver.h === history.h) {
-    mixed(PREDICTION, history.moves, predicted);
+    mixed(PREDICTION, history.increments, predicted);
   } else {
     const ratio = solver.h / history.h;
     if (history.count > 0 && Math.abs(ratio) <= 1) {
-      mixed(PLACES.map((place) => factorsAt(1 + ratio * place)), history.moves, predicted);
+      mixed(PLACES.map((place) => factorsAt(1 + ratio * place)), history.increments, predicted);
     } else {
       for (const row of predicted) row.fill(0);
     }
     history.rate = 0.5;
     history.sweeps = 2;
   }
-  slopes(solver, stage, start, predicted, moves.now);
+  slopes(solver, stage, start, predicted, increments.now);
   for (let sweep = 2; sweep <= MAX_SWEEPS; sweep++) {
-    mixed(MIXING, moves.now, mixedMoves);
-    slopes(solver, stage, start, mixedMoves, moves.next);
+    mixed(MIXING, increments.now, mixedIncrements);
+    slopes(solver, stage, start, mixedIncrements, increments.next);
     solver.evaluations++;
-    [moves.now, moves.next] = [moves.next, moves.now];
+    [increments.now, increments.next] = [increments.next, increments.now];
     if (sweep < history.sweeps) continue;
-    const change = changeOf(start, moves.next, moves.now);
+    const change = changeOf(start, increments.next, increments.now);
     const rate = change / last;
     if (!Number.isFinite(change)) return "NOT_FINITE";
     if (rate > 0 && rate < 1 && change > NEARLY_ROUNDING) history.rate = 0.7 * history.rate + 0.3 * rate;
@@ -173,9 +173,9 @@ export function collocate(solver, stage, start, history, moves) {
 }
 
 /** The sum of the increments of all stages. */
-export function endOf(moves) {
+export function endOf(increments) {
   const end = new Float64Array(UNKNOWNS);
-  for (const move of moves) for (let k = 0; k < UNKNOWNS; k++) end[k] += move[k];
+  for (const increment of increments) for (let k = 0; k < UNKNOWNS; k++) end[k] += increment[k];
   return end;
 }
 
@@ -190,13 +190,13 @@ function attempt(solver, stage) {
   const end = endOf(work.now);
   stageChange(solver.coef[stage], start, end, change);
   // #if MONITOR
-  mixed(MIXING, work.now, mixedMoves);
-  const time = timeOfStep(solver, stage, start, mixedMoves);
+  mixed(MIXING, work.now, mixedIncrements);
+  const time = timeOfStep(solver, stage, start, mixedIncrements);
   if (Number.isNaN(time)) return "NOT_FINITE";
   // #endif
   if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
   pass(solver, time);
-  work.now.forEach((move, i) => keepMove(solver.coef[stage], end, move, history.moves[i]));
+  work.now.forEach((one, i) => storeIncrement(solver.coef[stage], end, one, history.increments[i]));
   history.count = 1;
   history.h = solver.h;
   turnStage(solver, stage, end);

@@ -1,4 +1,4 @@
 /** Store the increment of a stage. */
-export function keepMove(coef, end, move, to) {
-  to.set(move);
+export function storeIncrement(coef, end, increment, to) {
+  to.set(increment);
 }

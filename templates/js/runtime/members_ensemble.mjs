@@ -18,19 +18,20 @@ export class Ensemble {
     const starts = Array.from(members);
     expectOptions(options);
     const ends = starts.map((x0, m) => {
-      const own = (what, value) => {
+      const memberValue = (what, value) => {
         if (typeof value !== "object" || value === null) return value;
         if (value.length === starts.length) return value[m];
         throw new StepError("BAD_ARGUMENT", 0, `${what} must be one number, or ${starts.length}`);
       };
-      const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(name, value)]);
-      const chosen = { ...options, params: Object.fromEntries(given), t0: own("t0", options.t0), x0 };
+      const size = memberValue("h", h);
+      const params = Object.entries(options.params ?? {}).map(([name, value]) => [name, memberValue(name, value)]);
+      const chosen = { ...options, params: Object.fromEntries(params), t0: memberValue("t0", options.t0), x0 };
       chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(own("h", h), count);
+        solver.integrate(size, count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;

@@ -21,7 +21,7 @@ export class Interpolation {
     const change = new Float64Array(DIM);
     return fractions.map((fraction) => {
       const factors = factorsAt(fraction);
-      const parts = history.moves.map((move, j) => move.map((value) => factors[j] * value));
+      const parts = history.increments.map((increment, j) => increment.map((value) => factors[j] * value));
       stageChange(this.coef[0], start, endOf(parts), change);
       return this.x.map((value, i) => value + change[i]);
     });

@@ -1,6 +1,6 @@
 import { finite } from "./errors.mjs";
-import { moveHistory } from "./history_moved.mjs";
-import { takeLevel } from "./level_moved.mjs";
+import { moveHistory } from "./history_shifted.mjs";
+import { takeLevel } from "./level_of_new_state.mjs";
 import { restartAttitude } from "./attitude_gauge.mjs";
 import { DIM } from "./model.mjs";
 

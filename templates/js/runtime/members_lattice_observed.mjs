@@ -15,10 +15,10 @@ export class Observed {
     observables(this.params, x, this.sites, densities);
     const counts = countsOf(this.sites);
     return Float64Array.from(REDUCTIONS, ([kind, over], k) => {
-      const own = densities.subarray(k * count, (k + 1) * count);
-      if (kind === "max") return own.reduce((most, value) => Math.max(most, value), -Infinity);
-      if (kind === "min") return own.reduce((least, value) => Math.min(least, value), Infinity);
-      return kind === "mean" ? sumOf(own) / counts[over] : sumOf(own);
+      const ofObservable = densities.subarray(k * count, (k + 1) * count);
+      if (kind === "max") return ofObservable.reduce((most, value) => Math.max(most, value), -Infinity);
+      if (kind === "min") return ofObservable.reduce((least, value) => Math.min(least, value), Infinity);
+      return kind === "mean" ? sumOf(ofObservable) / counts[over] : sumOf(ofObservable);
     });
   }
 }

@@ -1,7 +1,7 @@
 import { startFrom } from "./start_predicted.mjs";
 import { advance } from "./algebra.mjs";
 import { TINY, solve } from "./linear.mjs";
-import { plausible, retried } from "./guess.mjs";
+import { plausible, retried } from "./predictor_checks.mjs";
 import { pass } from "./passing.mjs";
 import { timeOf } from "./level_stages.mjs";
 import { turnStage } from "./attitude_stages.mjs";

@@ -19,11 +19,11 @@ function normals(seed, member, step, values) {
  *
  * @returns {boolean} false if one is not finite, or some are missing
  */
-function draw(solver, given) {
+function draw(solver, increments) {
   const { dw, seed, member, step0, steps, h } = solver;
-  if (given) {
-    if (given.length !== DRAWS) return false;
-    dw.set(given);
+  if (increments) {
+    if (increments.length !== DRAWS) return false;
+    dw.set(increments);
   } else {
     normals(seed, member, BigInt(step0) + BigInt(steps), dw);
     const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS); // so that a step of -h inverts one of h
@@ -34,6 +34,7 @@ function draw(solver, given) {
 }
 
 /** Read the increments of the next step. Throws StepError if given ones are not admissible. */
-export function drawStep(solver, given) {
-  if (!draw(solver, given)) throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${given}`);
+export function drawStep(solver, increments) {
+  if (draw(solver, increments)) return;
+  throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${increments}`);
 }

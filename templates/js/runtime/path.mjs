@@ -1,7 +1,7 @@
 import { startFrom } from "./start_predicted.mjs";
 import { advance } from "./algebra.mjs";
 import { TINY, solve } from "./linear.mjs";
-import { plausible, retried } from "./guess.mjs";
+import { plausible, retried } from "./predictor_checks.mjs";
 import { pass } from "./passing.mjs";
 import { timeOf } from "./level_stages.mjs";
 import { turnStage } from "./attitude_stages.mjs";
@@ -73,11 +73,11 @@ const local = new Float64Array(DIM);
  * Whole path from x, in 1, 2, 4, ... pieces until each expansion converges. For any p, the end of the path
  * lies on the symplectic leaf of x.
  *
- * @returns {{good: boolean, made: number}} good: whether the path is not too long and stays in the domain;
- *     made: number of all pieces
+ * @returns {{good: boolean, piecesUsed: number}} good: whether the path is short enough and in the domain;
+ *     piecesUsed: number of all pieces
  */
 function followPath(coef, x, p, change, mean) {
-  let made = 0;
+  let piecesUsed = 0;
   for (let pieces = 1; pieces <= LONGEST_PATH; pieces *= 2) {
     let good = true;
     for (let i = 0; i < DIM; i++) {
@@ -87,15 +87,15 @@ function followPath(coef, x, p, change, mean) {
     for (let piece = 0; piece < pieces && good; piece++) {
       for (let i = 0; i < DIM; i++) start[i] = x[i] + change[i];
       good = followPiece(coef, share, start, shift, local);
-      made++;
+      piecesUsed++;
       for (let i = 0; i < DIM; i++) {
         mean[i] += (change[i] + local[i]) / pieces;
         change[i] += shift[i];
       }
     }
-    if (good) return { good, made };
+    if (good) return { good, piecesUsed };
   }
-  return { good: false, made };
+  return { good: false, piecesUsed };
 }
 
 const mean = new Float64Array(DIM);
@@ -114,7 +114,7 @@ function findResidual(solver, coef, p, y, residual, change, jacobian) {
   return path;
 }
 
-const moved = new Float64Array(DIM);
+const shifted = new Float64Array(DIM);
 const elsewhere = new Float64Array(DIM);
 const other = new Float64Array(DIM);
 const unused = new Float64Array(DIM * DIM);
@@ -122,17 +122,17 @@ const unused = new Float64Array(DIM * DIM);
 /** Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
 function differentiate(solver, coef, p, residual, jacobian) {
   let norm = TINY;
-  let made = 0;
+  let piecesUsed = 0;
   for (let i = 0; i < DIM; i++) norm = Math.max(norm, Math.abs(p[i]));
   for (let j = 0; j < DIM; j++) {
     const q = Float64Array.from(p);
     q[j] += DIFFERENCE * norm;
-    const path = findResidual(solver, coef, q, elsewhere, moved, other, unused);
-    made += path.made;
-    if (!path.good) return { good: false, made };
-    for (let i = 0; i < DIM; i++) jacobian[i * DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+    const path = findResidual(solver, coef, q, elsewhere, shifted, other, unused);
+    piecesUsed += path.piecesUsed;
+    if (!path.good) return { good: false, piecesUsed };
+    for (let i = 0; i < DIM; i++) jacobian[i * DIM + j] = (shifted[i] - residual[i]) / (q[j] - p[j]);
   }
-  return { good: true, made };
+  return { good: true, piecesUsed };
 }
 
 const p = new Float64Array(DIM);
@@ -149,12 +149,12 @@ function attempt(solver, stage) {
   const coef = solver.coef[stage];
   const history = solver.history[stage];
   let previous = Infinity;
-  let made = 0;
+  let piecesUsed = 0;
   startFrom(history, solver.x, y);
   generate(coef, y, p, jacobian);
-  for (let iteration = 0; iteration < MAX_ITERATIONS && made <= MOST_PIECES; iteration++) {
+  for (let iteration = 0; iteration < MAX_ITERATIONS && piecesUsed <= MOST_PIECES; iteration++) {
     const path = findResidual(solver, coef, p, y, residual, change, jacobian);
-    made += path.made;
+    piecesUsed += path.piecesUsed;
     if (!path.good) return "NO_CONVERGENCE";
     let size = 0;
     let norm = TINY;
@@ -178,9 +178,9 @@ function attempt(solver, stage) {
       return "OK";
     }
     if (iteration >= PATIENCE && size > CONTRACTING * previous) {
-      const found = differentiate(solver, coef, p, residual, jacobian);
-      made += found.made;
-      if (!found.good) return "NO_CONVERGENCE";
+      const differences = differentiate(solver, coef, p, residual, jacobian);
+      piecesUsed += differences.piecesUsed;
+      if (!differences.good) return "NO_CONVERGENCE";
     }
     if (!solve(jacobian, residual)) return "SINGULAR";
     for (let i = 0; i < DIM; i++) p[i] -= residual[i];

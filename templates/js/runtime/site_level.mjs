@@ -25,8 +25,8 @@ export function beginLevel(solver) {
   const energies = [partEnergy(0, solver), partEnergy(1, solver)];
   solver.level = -(energies[0] + energies[1]);
   if (Number.isFinite(solver.level) && energies[NEGATIVE] < 0) return;
-  const found = energies[NEGATIVE];
-  throw new StepError("BAD_ARGUMENT", 0, `the part of H that must be negative is ${found} at x0`);
+  const energy = energies[NEGATIVE];
+  throw new StepError("BAD_ARGUMENT", 0, `the part of H that must be negative is ${energy} at x0`);
 }
 
 /** A + e or -B: a part of K has the flow of the part of H over the time divided by this factor. */

@@ -15,24 +15,24 @@ export function carry(coef, x, y, v, sites) {
   const count = y.length / sizes.length;
   const usually = (k) => sizes[Math.floor(k / count)];
   const length = (w) => Math.sqrt(w.reduce((sum, part, k) => sum + (part / usually(k)) ** 2, 0));
-  const [own, moved] = [new Float64Array(y.length), new Float64Array(y.length)];
-  side(coef, x, y, v, sites, own);
-  const size = length(own);
+  const [right, image] = [new Float64Array(y.length), new Float64Array(y.length)];
+  side(coef, x, y, v, sites, right);
+  const size = length(right);
   if (!Number.isFinite(size)) return false;
-  const found = Float64Array.from(own);
+  const solution = Float64Array.from(right);
   let before = Infinity;
   for (let correction = 0; correction < MOST_SWEEPS; correction++) {
-    slope(coef, x, y, found, sites, moved);
-    const left = own.map((part, k) => part + moved[k] - found[k]);
+    slope(coef, x, y, solution, sites, image);
+    const left = right.map((part, k) => part + image[k] - solution[k]);
     const rest = length(left);
     if (rest <= CARRIED * size || (rest > CARRIED_SHRINKING * before && rest <= NEARLY_CARRIED * size)) {
-      follow(coef, y, found, sites, moved);
-      for (let k = 0; k < v.length; k++) v[k] += moved[k];
+      follow(coef, y, solution, sites, image);
+      for (let k = 0; k < v.length; k++) v[k] += image[k];
       return allFinite(v);
     }
     const change = linearised(coef, x, y, left, sizes, sites);
     if (change === null) return false;
-    for (let k = 0; k < found.length; k++) found[k] += change[k];
+    for (let k = 0; k < solution.length; k++) solution[k] += change[k];
     before = rest;
   }
   return false;

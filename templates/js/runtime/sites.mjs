@@ -99,11 +99,11 @@ export class Sites {
    * All parameters: the given ones, and defaults. Throws StepError unless they are known and finite, and
    * positive where required.
    */
-  #admitted(given) {
-    const unknown = Object.keys(given).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
+  #admitted(overrides) {
+    const unknown = Object.keys(overrides).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
     if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
     const params = Object.create(null);
-    for (const [name, value] of Object.entries({ ...DEFAULT_PARAMETERS, ...given })) {
+    for (const [name, value] of Object.entries({ ...DEFAULT_PARAMETERS, ...overrides })) {
       let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: one number
       // #if GRAPH
       if (AT_BONDS.includes(name)) length = this.bondCount;
@@ -193,8 +193,8 @@ export class Sites {
     /** Greedy colouring: each site takes the first colour that no earlier neighbour has. */
     this.colours = new Int32Array(this.count);
     before.forEach((others, site) => {
-      const taken = new Set(others.map((other) => this.colours[other]));
-      while (taken.has(this.colours[site])) this.colours[site]++;
+      const usedColours = new Set(others.map((other) => this.colours[other]));
+      while (usedColours.has(this.colours[site])) this.colours[site]++;
     });
     this.colourCount = this.colours.reduce((most, colour) => Math.max(most, 1 + colour), 2);
     // #endif
@@ -207,19 +207,19 @@ export class Sites {
   bonds(end, chosen, colour) {
     const key = `${end} ${chosen} ${chosen && colour}`;
     if (this.listed[key]) return this.listed[key];
-    const found = { here: [], there: [], bond: [] };
+    const lists = { here: [], there: [], bond: [] };
     for (const side of end || "ab") {
       const [here, there] = [this.ends[side], this.ends[side === "a" ? "b" : "a"]];
       here.forEach((site, k) => {
         // #if BY_COLOUR
         if (chosen && this.colours[{ here: site, there: there[k] }[chosen]] !== colour) return;
         // #endif
-        found.here.push(site);
-        found.there.push(there[k]);
-        found.bond.push(k);
+        lists.here.push(site);
+        lists.there.push(there[k]);
+        lists.bond.push(k);
       });
     }
-    const typed = Object.entries(found).map(([name, list]) => [name, Int32Array.from(list)]);
+    const typed = Object.entries(lists).map(([name, list]) => [name, Int32Array.from(list)]);
     this.listed[key] = Object.fromEntries(typed);
     return this.listed[key];
   }

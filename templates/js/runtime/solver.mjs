@@ -13,9 +13,9 @@ import { expectNonnegative } from "./nonnegative.mjs";
 import { drawStep } from "./noise.mjs";
 import { takeDraws } from "./philox.mjs";
 import { takeTime } from "./timed.mjs";
-import { takeGauge } from "./gauge_taken.mjs";
+import { takeGauge } from "./gauge_given_or_chosen.mjs";
 import { expectPassingTime } from "./level.mjs";
-import { takeLevel } from "./level_moved.mjs";
+import { takeLevel } from "./level_of_new_state.mjs";
 import { beginAttitude, elementOf } from "./attitude.mjs";
 import { restartAttitude } from "./attitude_gauge.mjs";
 import { forgetSteps } from "./gauss.mjs";
@@ -29,9 +29,9 @@ const number = new Float64Array(1);
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
  * where required, and give finite coefficients for a negligibly small step.
  */
-function admitted(given) {
-  const params = { ...DEFAULT_PARAMETERS, ...given };
-  const unknown = Object.keys(given).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
+function admitted(overrides) {
+  const params = { ...DEFAULT_PARAMETERS, ...overrides };
+  const unknown = Object.keys(overrides).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
   if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
   for (const [name, value] of Object.entries(params)) {
     const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
@@ -141,8 +141,8 @@ export class Solver {
     // #if CORRECTED
     const { steps, t } = this;
     const before = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry), steps, t };
-    const begun = count > 0 ? makeStage(this, 0, BEGIN) : "OK";
-    if (begun !== "OK") throw new StepError(begun, this.steps);
+    const startStatus = count > 0 ? makeStage(this, 0, BEGIN) : "OK";
+    if (startStatus !== "OK") throw new StepError(startStatus, this.steps);
     try {
       march(this, h, count, () => this.#stepOfRun(h));
     } finally {

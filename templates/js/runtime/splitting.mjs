@@ -6,7 +6,7 @@ import { DIM, FLOWS, SCHEDULE } from "./model.mjs";
 // ---- The step of a splitting: flows of parts of H, one after the other ----
 
 const at = new Float64Array(DIM);
-const moved = new Float64Array(DIM);
+const displacement = new Float64Array(DIM);
 /** Increments; with a monitor also the physical time of a flow, NaN outside the domain of a logarithm. */
 const change = new Float64Array(DIM + 2);
 
@@ -17,7 +17,7 @@ export function makeStage(solver, _, flows = SCHEDULE) {
   const { x, carry } = solver;
   const [rows] = solver.coef;
   at.set(x);
-  moved.set(carry);
+  displacement.set(carry);
   // #if MONITOR
   let time = 0;
   // #endif
@@ -28,8 +28,8 @@ export function makeStage(solver, _, flows = SCHEDULE) {
     time += change[DIM] + 0 * change[DIM + 1];
     // #endif
     for (let i = 0; i < DIM; i++) {
-      moved[i] += change[i];
-      at[i] = x[i] + moved[i];
+      displacement[i] += change[i];
+      at[i] = x[i] + displacement[i];
     }
   }
   solver.evaluations++;
@@ -39,9 +39,9 @@ export function makeStage(solver, _, flows = SCHEDULE) {
   pass(solver, time);
   // #endif
   for (let i = 0; i < DIM; i++) {
-    const sum = x[i] + moved[i];
+    const sum = x[i] + displacement[i];
     const added = sum - x[i];
-    carry[i] = (x[i] - (sum - added)) + (moved[i] - added);
+    carry[i] = (x[i] - (sum - added)) + (displacement[i] - added);
     x[i] = sum;
   }
   turnByFlows(solver);

@@ -21,16 +21,16 @@ function most(values, from, to) {
 /** The sizes of the fields of y, none much smaller than the largest. */
 export function usual(y) {
   const count = y.length / DIM;
-  const whole = most(y, 0, y.length);
+  const overall = most(y, 0, y.length);
   const largest = (k) => most(y, k * count, (k + 1) * count);
-  return Float64Array.from({ length: DIM }, (_, k) => largest(k) + LEAST_SIZE * whole + 1e-300);
+  return Float64Array.from({ length: DIM }, (_, k) => largest(k) + LEAST_SIZE * overall + 1e-300);
 }
 
 /** Size of a change of y, field by field. */
 export function sizeOf(change, y) {
   const count = y.length / DIM;
-  return usual(y).reduce((largest, own, k) => {
-    const size = most(change, k * count, (k + 1) * count) / own;
+  return usual(y).reduce((largest, unitOfField, k) => {
+    const size = most(change, k * count, (k + 1) * count) / unitOfField;
     return size <= largest ? largest : size;
   }, 0);
 }
@@ -83,12 +83,12 @@ export function makeStep(solver) {
   past.stages ??= SCHEDULE.map(() => ({ order: 0, differences: [] }));
   const change = new Float64Array(x.length);
   for (const [stage, [, row]] of SCHEDULE.entries()) {
-    const [coef, own] = [rows[row], past.stages[stage]];
+    const [coef, predictor] = [rows[row], past.stages[stage]];
     // #if TIMED
     sites.t = solver.t + MOMENTS[stage] * solver.h;
     // #endif
     const guess = Float64Array.from(x);
-    for (const difference of own.differences.slice(0, own.order)) {
+    for (const difference of predictor.differences.slice(0, predictor.order)) {
       for (let k = 0; k < guess.length; k++) guess[k] += difference[k];
     }
     let y = past.stiff ? null : bySweeps(coef, x, guess, sites);
@@ -97,7 +97,7 @@ export function makeStep(solver) {
       y = byNewton(coef, x, guess, sites);
     }
     if (y === null) return "NO_CONVERGENCE";
-    own.order = remember(own.differences, y.map((v, k) => v - x[k]));
+    predictor.order = remember(predictor.differences, y.map((v, k) => v - x[k]));
     // #if TANGENT
     for (const v of solver.vectors) {
       if (!carry(coef, x, y, v, sites)) return "NO_CONVERGENCE";

@@ -13,24 +13,24 @@ const WIDE = DIM + UNKNOWNS;
  * do not converge.
  */
 function variedAlong(solver, slopes, j) {
-  const [z, moves] = [stages(), stages()];
+  const [z, increments] = [stages(), stages()];
   let previous = Infinity;
   for (let sweep = 0; sweep <= MAX_SWEEPS; sweep++) {
     let [change, size] = [0, Number.MIN_VALUE];
-    for (let i = 0; i < moves.length; i++) {
+    for (let i = 0; i < increments.length; i++) {
       for (let k = 0; k < UNKNOWNS; k++) {
         let sum = slopes[i][k * WIDE + j];
         for (let l = 0; l < UNKNOWNS; l++) sum += slopes[i][k * WIDE + DIM + l] * z[i][l];
         sum *= solver.h * WEIGHTS[i];
-        change = Math.max(change, Math.abs(sum - moves[i][k]));
+        change = Math.max(change, Math.abs(sum - increments[i][k]));
         size = Math.max(size, Math.abs(sum));
-        moves[i][k] = sum;
+        increments[i][k] = sum;
       }
     }
     if (!Number.isFinite(size)) return null;
-    mixed(MIXING, moves, z);
-    if (change <= TANGENT_SOLVED * size) return moves;
-    if (change <= TANGENT_NEARLY_SOLVED * size && change > TANGENT_SHRINKING * previous) return moves;
+    mixed(MIXING, increments, z);
+    if (change <= TANGENT_SOLVED * size) return increments;
+    if (change <= TANGENT_NEARLY_SOLVED * size && change > TANGENT_SHRINKING * previous) return increments;
     previous = change;
   }
   return null;
@@ -40,17 +40,17 @@ function variedAlong(solver, slopes, j) {
 export function differentiateStage(solver, stage, at) {
   const twin = { ...at, t: at.t, coef: solver.coef, h: solver.h, evaluations: 0 };
   const start = startOf(twin);
-  const moves = { now: stages(), next: stages() };
-  const status = collocate(twin, stage, start, new History(), moves);
+  const increments = { now: stages(), next: stages() };
+  const status = collocate(twin, stage, start, new History(), increments);
   if (status !== "OK") return { status };
   const z = stages();
-  mixed(MIXING, moves.now, z);
+  mixed(MIXING, increments.now, z);
   const slopes = z.map((node) => {
-    const found = new Float64Array(UNKNOWNS * WIDE);
-    stageSlopeJacobian(solver.coef[stage], start, node, found);
-    return found;
+    const jacobian = new Float64Array(UNKNOWNS * WIDE);
+    stageSlopeJacobian(solver.coef[stage], start, node, jacobian);
+    return jacobian;
   });
-  const end = endOf(moves.now);
+  const end = endOf(increments.now);
   const change = new Float64Array(DIM);
   const outer = new Float64Array(DIM * WIDE);
   stageChange(solver.coef[stage], start, end, change);

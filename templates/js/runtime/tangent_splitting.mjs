@@ -7,7 +7,7 @@ import { identity, multiplied } from "./tangent.mjs";
 /** The product of the derivatives of the flows. */
 export function differentiateStage(solver, stage, at) {
   const y = Float64Array.from(at.x);
-  const moved = Float64Array.from(at.carry);
+  const displacement = Float64Array.from(at.carry);
   const increment = new Float64Array(DIM);
   const slope = new Float64Array(DIM * DIM);
   const derivative = identity();
@@ -17,9 +17,9 @@ export function differentiateStage(solver, stage, at) {
     const product = multiplied(slope, derivative);
     for (let k = 0; k < DIM * DIM; k++) derivative[k] += product[k];
     for (let i = 0; i < DIM; i++) {
-      moved[i] += increment[i];
-      y[i] = at.x[i] + moved[i];
+      displacement[i] += increment[i];
+      y[i] = at.x[i] + displacement[i];
     }
   }
-  return { status: "OK", change: moved.map((value, i) => value - at.carry[i]), derivative };
+  return { status: "OK", change: displacement.map((value, i) => value - at.carry[i]), derivative };
 }

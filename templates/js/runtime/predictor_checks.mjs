@@ -102,18 +102,18 @@ const value = new Float64Array(1);
  */
 export function plausible(solver, stage, increment) {
   const { params, x } = solver;
-  let moved = 0;
+  let distance = 0;
   let size = 0;
   for (let i = 0; i < DIM; i++) {
-    moved += Math.abs(increment[i]);
+    distance += Math.abs(increment[i]);
     size += Math.abs(x[i]);
   }
-  if (moved <= PLAUSIBLE * size) return true;
+  if (distance <= PLAUSIBLE * size) return true;
   vectorFieldAt(params, solver.t, x, speed);
   makePerTau(params, x, speed);
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * speed[i]);
   size += sizeOfNoise(solver);
-  if (moved <= PLAUSIBLE * size) return true;
+  if (distance <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
     energyAt(params, solver.t, point, value);
