@@ -371,7 +371,7 @@ class CompiledGauss(_CompiledSystem):
     def notes(self) -> list[str]:
         """Decisions of the compiler, and that steps to truncation are no Poisson maps."""
         defect = f"its defect is O(h^{self.order.order + 1}) in a step, and phigen verify measures it"
-        warned = [] if self.gauss.exact else [f"structure: to truncation: a step is no Poisson map; {defect}"]
+        warned = [] if self.gauss.exact else [f"structure: to truncation: a step is not a Poisson map; {defect}"]
         return [*super().notes, *warned]
 
     @property

@@ -515,7 +515,7 @@ class _Kept:
             return []
         saved = json.loads(text)
         if saved["identity"] != self.identity:
-            raise ValueError(f"{self.path} was kept by another run; remove it to begin anew")
+            raise ValueError(f"{self.path} was stored by another run; remove it to start again")
         energy = [float(e) for e in saved["energy"]]
         shared = _Shared(domain, self._file(len(energy)), (domain.fields, *domain.sizes), new=False)
         domain.restore(shared.read(), saved["steps"], saved["far"], saved["open"])

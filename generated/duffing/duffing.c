@@ -5,7 +5,7 @@
  *   generating function: S_1 ... S_5 (collected polynomial, 15 terms)
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 29 additions, 33 multiplications
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver

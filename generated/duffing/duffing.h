@@ -1,5 +1,5 @@
 /*
- * The declarations of duffing.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 04039d9c64934c7914fbc68ed9c796786ca2bf4d6dc8ecf4fafa44b6d4ba1685
  */

@@ -5,7 +5,7 @@
  *   generating function: S_1 ... S_5 (collected polynomial, 15 terms)
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 29 additions, 33 multiplications
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
  * body-sha256: c460b824e0655b1b97dfe815150a5daa997b30950fe2b570980de9ff95b427ac
  */

@@ -4,7 +4,7 @@
 #   generating function: S_1 ... S_5 (collected polynomial, 15 terms)
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 29 additions, 33 multiplications
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
 # body-sha256: 29f7580601126123e46cd55e51875a4afa0b71fa6a9d9c7c3b27793dcaee36fc
 import numpy as np

@@ -5,7 +5,7 @@
  *   scheme: splitting, H = H_1, with the exact flow of each
  *   composition: blanes-moan, 6 stages, H_1 for each colour of sites
  *   step: explicit; one step of one site: 24 multiplications, 12 functions
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
  * body-sha256: 0d5bb6baf8eaef56116caa0546e0923bd6086f8e1ee5d5695c6555939fbccdd2

@@ -1,5 +1,5 @@
 /*
- * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 9cc5305948010f95ce85af6eed11db8fe161eac0cba9d93190441b04b7ac0700
  */

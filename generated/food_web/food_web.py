@@ -4,7 +4,7 @@
 #   scheme: splitting, H = H_1, with the exact flow of each
 #   composition: blanes-moan, 6 stages, H_1 for each colour of sites
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
 # body-sha256: e70a53d7991b78c8534f1ba8ab89ee60c969ef5dfd295aa9c0d30813d95388ed
 import numpy as np

@@ -1,5 +1,5 @@
 /*
- * The declarations of guiding_centre.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 647dec6dfa0f57f55675e0a72c080b7aeac57b6a157a145e24cf109a1abf6767
  */

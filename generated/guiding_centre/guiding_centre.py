@@ -5,7 +5,7 @@
 #   step: implicit in p, each path followed by its Taylor series to round-off
 #   composition: suzuki, 5 stages of order 2
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build guiding_centre
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
 # body-sha256: 0da7a735ca5d2aa6bdbcbac2179323fdd1708764a055cd717daa583d1c3e1290
 import numpy as np

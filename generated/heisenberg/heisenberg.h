@@ -1,5 +1,5 @@
 /*
- * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 7262c1b4af6ae7668ff43fde0cb8529c9f8b2ea6ce7c372e662283bbf632b576
  */

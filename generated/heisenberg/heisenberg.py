@@ -4,7 +4,7 @@
 #   scheme: splitting, H = H_1 + H_2 + H_3, with the exact flow of each
 #   composition: strang, 1 stage, 5 flows
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
 # body-sha256: a1ccfe0dda44eb79f1ba282dc0373b4b82c6ba2e20393e513c79487b3c2046ad
 import numpy as np

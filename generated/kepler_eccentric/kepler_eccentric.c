@@ -6,7 +6,7 @@
  *   scheme: splitting, H = H_1 + H_2, with the exact flow of each
  *   composition: kahan-li, 17 stages, 35 flows
  *   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build kepler_eccentric
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; Energy level e = -H(x0): K = monitor (H + e) is 0 along a
  *   monitored trajectory; The solver

@@ -1,5 +1,5 @@
 /*
- * The declarations of kepler_eccentric.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: d62cc9923891718624ac3f8be86f6f74fede99adcd2945bf3d9fda270e9d5c28
  */

@@ -5,7 +5,7 @@
 #   scheme: splitting, H = H_1 + H_2, with the exact flow of each
 #   composition: kahan-li, 17 stages, 35 flows
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build kepler_eccentric
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
 # body-sha256: 26e4a652d6ddcc5a160bdf51b0c8e0d8884827bb371db7010f92b8dcfa84cb01
 import numpy as np

@@ -5,7 +5,7 @@
  *   structure: exact; quadratic momentum maps for P1, P2, P3, G1, G2, G3
  *   step: implicit, all stages by fixed-point sweeps to round-off
  *   one evaluation at a stage: 72 additions, 95 multiplications
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
  *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles

@@ -1,5 +1,5 @@
 /*
- * The declarations of kowalevski_gauss.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: d6e0ec366fb10d8f7f2bf46c6ca6965543a61f87fa5cd3bcbc4d4752d30cf65c
  */

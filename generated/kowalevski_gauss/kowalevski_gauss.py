@@ -4,9 +4,9 @@
 #   structure: exact; quadratic momentum maps for P1, P2, P3, G1, G2, G3
 #   step: implicit, all stages by fixed-point sweeps to round-off
 #   one evaluation at a stage: 72 additions, 95 multiplications
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build kowalevski_gauss
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: cd7a2cf1e02b0146bf81dab59e283d8fca3b12ab3c813037c50ee58756e284a3
+# body-sha256: a1363477b7e0c0030b7785a00852b47b2e070ce8b36675cfee034b391383608a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -192,7 +192,7 @@ def _stage_change(coef, x, z):
 
 
 def _next_frame(coef, z, k):
-    """Derivatives k of the unknowns as seen from the end z of a step, where the next one starts."""
+    """Derivatives k of the unknowns in the frame of the end z of a step, where the next one starts."""
     t1 = k[2] * z[5] + k[7] * z[4] + (k[4] * z[7] + k[3] * z[6]) + (k[1] * z[0] + k[0] * z[1] + (k[5] * z[2] + k[6] * z[3]))
     t2 = k[7] * z[3] - k[1] * z[2] + (k[2] * z[1] + k[5] * z[0]) + (k[4] * z[6] - k[3] * z[7] - (k[0] * z[5] + k[6] * z[4]))
     t3 = k[3] * z[1] + k[6] * z[0] - (k[7] * z[2] + k[1] * z[3]) + (k[2] * z[7] - k[0] * z[6] + (k[5] * z[4] - k[4] * z[5]))

@@ -4,7 +4,7 @@
  *   bi-realisation: canonical-euler, not symmetric
  *   generating function: S_1 (collected polynomial, 2 terms)
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 0905cd353e36c3cd30d03d8e8b731ebebfc5db4ae4d9da7f16b3d6d4a1fa6c87
  */

@@ -1,5 +1,5 @@
 /*
- * The declarations of pendulum_euler.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: d7d9dcdf77027fa7ceecc8baa3f2468526436d126fe004188168e35744cb950c
  */

@@ -4,7 +4,7 @@
  *   bi-realisation: canonical-euler, not symmetric
  *   generating function: S_1 (collected polynomial, 2 terms)
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 0d67865ab187b6fe3432fd77430720ec9f20e7adef447578db13576cd7544aa2
  */

@@ -3,7 +3,7 @@
 #   bi-realisation: canonical-euler, not symmetric
 #   generating function: S_1 (collected polynomial, 2 terms)
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
 # body-sha256: 1e0d1edc947c61a7893d567d90c885b327c69f0b166d9641241edf96cefd9497
 import numpy as np

@@ -7,7 +7,7 @@
  *   step: implicit, by sweeps over the sites until they change nothing
  *   composition: suzuki, 5 stages of order 2
  *   one step of one site: 2 additions, 6 multiplications
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables

@@ -1,5 +1,5 @@
 /*
- * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 546cd0199e06534da7eb26d7383ad69d7679efe4747816e8f1b459d163794b51
  */

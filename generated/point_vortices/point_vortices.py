@@ -6,7 +6,7 @@
 #   step: implicit, by sweeps over the sites until they change nothing
 #   composition: suzuki, 5 stages of order 2
 #   one step of one site: 2 additions, 6 multiplications
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
 # body-sha256: 5f629c384f661ff3c7dce459e94135e1b19b31f44976239ac919348a38643834
 import numpy as np

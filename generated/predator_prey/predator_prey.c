@@ -5,7 +5,7 @@
  *   generating function: S_1 ... S_3 (collected polynomial, 7 terms)
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build predator_prey
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver

@@ -1,5 +1,5 @@
 /*
- * The declarations of predator_prey.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: e8eac9f938e836d20f580b4338dbd3608040171a89a59475de91aed7612d7df8
  */

@@ -4,7 +4,7 @@
 #   generating function: S_1 ... S_3 (collected polynomial, 7 terms)
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build predator_prey
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
 # body-sha256: 0bc0f0baf9ac7607e532c68e80882c720afbcd481bb1c9f86c26fb00eb1c17b9
 import numpy as np

@@ -6,7 +6,7 @@
  *   gauge: the multiple of length is chosen at the start of each trajectory
  *   step: implicit in p, each path followed by its Taylor series to round-off
  *   one evaluation of the equation for p: 271 additions, 462 multiplications
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build quaternion_top
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver

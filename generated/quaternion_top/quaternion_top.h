@@ -1,5 +1,5 @@
 /*
- * The declarations of quaternion_top.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 3b8a9a28013b2bf6089ccd9a95885763e411eeca6e88edebd579402f7c449450
  */

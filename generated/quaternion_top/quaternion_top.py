@@ -5,7 +5,7 @@
 #   gauge: the multiple of length is chosen at the start of each trajectory
 #   step: implicit in p, each path followed by its Taylor series to round-off
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build quaternion_top
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
 # body-sha256: cec43eea5e3e6b7a5aac76d1bd1bf4996b08603d9cb10186f5a5b54ad57feade
 import numpy as np

@@ -1,5 +1,5 @@
 /*
- * The declarations of rigid_body.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 217bbbc8b2895a9ab88eacbf9bcb4709334d0bf4fd91a75aa08c1ab7d52320b0
  */

@@ -6,7 +6,7 @@
  *   gauge: the multiple of C is chosen at the start of each trajectory
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 5cb1992ebd92b089e838ce9cb6e1304acfb3ad267141681a0ee6b17051b47bd9
  */

@@ -5,7 +5,7 @@
 #   gauge: the multiple of C is chosen at the start of each trajectory
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
-# DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
+# DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
 # body-sha256: 3015f42161b2bfe64ce722f1ad0561ff55a6f46c3baa6e5d8498d676dbe6cbce
 import numpy as np

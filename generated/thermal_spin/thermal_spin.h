@@ -1,5 +1,5 @@
 /*
- * The declarations of thermal_spin.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: b3a75c169377f87d61924cda8528473d83930776ca75cb2c1a760e4f02ec2586
  */

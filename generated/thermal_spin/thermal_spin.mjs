@@ -5,13 +5,13 @@
  *   bi-realisation: exponential, symmetric
  *   generating function: S_1 (collected polynomial, 1 terms)
  *   forces: p = h (grad H + zeta)
- *   with forces a step is no Poisson map; they keep all Casimirs
- *   noise: bath_x, bath_y, bath_z; in the sense of Stratonovich, along Hamiltonian fields, so it keeps all
- *     Casimirs
+ *   with forces a step is not a Poisson map; they conserve all Casimirs
+ *   noise: bath_x, bath_y, bath_z; in the sense of Stratonovich, along Hamiltonian fields, so it conserves
+ *     all Casimirs
  *   each path of the noise has its step; strong order 1 if sources commute, else 1/2; weak order 1
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
  * body-sha256: 61a69dc10f7fbc8a280270908e3e678d31b53e6f06d09312fa34a2d0bbc1337d
  */

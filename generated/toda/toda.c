@@ -5,7 +5,7 @@
  *   scheme: splitting, H = H_1 + H_2, with the exact flow of each
  *   composition: blanes-moan-rkn, 6 stages, 13 flows, since {H_1, {H_1, {H_1, H_2}}} = 0
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
  * body-sha256: 5b8d695c7db81af16069948ec2eefc42ff6c77db4481c7f5876fdd08cd2191ab

@@ -1,5 +1,5 @@
 /*
- * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
+ * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * body-sha256: fed85edb170b14abd0bc08dd010c77d2cb55e1de974b21c2d83a6a4173e823b8
  */

@@ -5,7 +5,7 @@
  *   scheme: splitting, H = H_1 + H_2, with the exact flow of each
  *   composition: blanes-moan-rkn, 6 stages, 13 flows, since {H_1, {H_1, {H_1, H_2}}} = 0
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
- * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
+ * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * body-sha256: d86f921767253d101b0916d31533c4b3d4c7bd35241e8fe68be1189fb785b591
  */

@@ -133,7 +133,7 @@ def turning_of(
         system,
         f"reconstruct: the part {name} = {shortened(h)} of the splitting rotates about an axis that changes "
         "along its own flow, and phigen knows no group element for that",
-        "scheme: series takes every H",
+        "scheme: series applies to every H",
     )
 
 
@@ -185,7 +185,7 @@ def factor_elements(
             exponential = flow_exponential(group, p, system.positive)
             if exponential is None:
                 what = f"reconstruct: exp(t∇H) has no closed form that phigen knows for the part {shortened(factor)}"
-                raise refused(system, what, "scheme: series takes every H")
+                raise refused(system, what, "scheme: series applies to every H")
             elements.append(exponential)
         else:
             r, shift = [p[i] for i in group.rotation], [p[i] for i in group.translation]

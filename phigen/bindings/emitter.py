@@ -73,7 +73,7 @@ def binding(compilation: Compilation, language: str) -> dict[str, str]:
     files = {}
     for file, templates in target.files.items():
         comment = "#" if file.endswith(".toml") else target.comment
-        notice = f"{name} for {language}. DO NOT EDIT: the checksum below notices."
+        notice = f"{name} for {language}. DO NOT EDIT: phigen detects changes by the checksum below."
         about = [notice, f"SPDX-License-Identifier: {spec.license}"]
         body = "".join(render("bindings", template, values) for template in templates)
         files[file.replace("NAME", name)] = sealed(about, body, f"{comment} ", "", "")

@@ -43,7 +43,7 @@ def _text(system: str, solvers: Mapping[str, Collection[str]]) -> str:
         "quoted": _quoted(names),
     }
     body = render("vendor", file, values)
-    head = [f"Made by phigen vendor {__version__}, for the solvers beside it; made again whenever they are."]
+    head = [f"Written by phigen vendor {__version__} for the solvers of this folder, and rewritten together with them."]
     return "".join(f"# {line}\n" for line in [*head, f"{CHECKSUM} {checksum(body)}"]) + body
 
 

@@ -153,7 +153,7 @@ def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[li
     for box in boxes:
         name, _, ends = box.partition("=")
         if name.strip() not in domain:
-            message = f"{name.strip()!r} is no coordinate; there are {', '.join(domain)}"
+            message = f"{name.strip()!r} is not a coordinate; there are {', '.join(domain)}"
             raise click.BadParameter(message, param_hint="--box")
         domain[name.strip()] = _range(ends, "--box")
     return list(domain.values())

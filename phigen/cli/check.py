@@ -67,7 +67,7 @@ def command(
     from phigen.compiler import examine
 
     if not independent and (terms or seconds):
-        raise click.UsageError("--terms and --seconds have a meaning only with --independent")
+        raise click.UsageError("--terms and --seconds need --independent")
     collector, descriptions = Collector(), list[dict[str, object]]()
     for spec in load_all(spec_files, collector):
         with collector.collecting():

@@ -112,7 +112,7 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
     run, start = experiment.run, experiment.start
     assert start is not None
     if run.records_numbers and path.suffix.lower() == ".csv":
-        message = f"the run {run.name} has record: without state, and {path} no state to go on from"
+        message = f"the run {run.name} has record: without state, and {path} has no state to continue from"
         raise click.UsageError(f"--extend: {message}; a .npz has it")
     try:
         past = _past_of(path, run, solver.interface, start.state.shape)

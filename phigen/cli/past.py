@@ -136,7 +136,7 @@ def extended(experiment: Experiment, path: Path, solver: Solver) -> Experiment:
     """The experiment after the rows of a finished run of it."""
     names = solver.interface
     if experiment.run.record:
-        message = f"the run {experiment.run.name} has record:, and its file not all that goes on with it"
+        message = f"the run {experiment.run.name} has record:, and its file lacks values that a continuation needs"
         raise click.UsageError(f"--extend: {message}; --from starts at a file with the state")
     past = past_of(path, names, "--extend")
     expected = [name for column in columns_of(names) for name in column.names]

@@ -18,7 +18,7 @@ def print_cell(spec: Spec, cell: Cell, most: int | None) -> None:
 
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     reach = [f"{a} {h}" for a, h in zip(cell.axes, cell.hamiltonian_reach, strict=True)]
-    more = f"; H reaches {', '.join(reach)} sites far" if any(cell.hamiltonian_reach) else ""
+    more = f"; H couples sites up to {', '.join(reach)} apart" if any(cell.hamiltonian_reach) else ""
     section("Lattice", [described(cell) + more])
     if cell.parameters:
         section("Parameters", [", ".join(map(_parameter, cell.parameters))])

@@ -156,7 +156,7 @@ def remarks(tuning: Tuning) -> Iterator[str]:
         yield "The accuracy would allow a larger step, but larger steps fail or do not resolve the motion."
     if tuning.orbit_error is not None:
         yield (
-            f"The orbit itself is off by {tuning.orbit_error:.1e} of its size at most up to {tuning.clock} = "
+            f"The relative error of the orbit is {tuning.orbit_error:.1e} of its size at most up to {tuning.clock} = "
             f"{tuning.piece:.4g}: --measure orbit bounds that."
         )
     if tuning.sizes:
@@ -228,7 +228,7 @@ def unreached(tuning: Tuning) -> str:
     curve, point = tuning.closest
     title = curve.title
     if point.rounding > tuning.accuracy or any(at_floor(c.points) for c in tuning.curves if c.setting):
-        why = "smaller steps do not help: what is left is rounding"
+        why = "smaller steps do not help: the remaining error is rounding"
         hint = "ask for less accuracy" + (" or a shorter --horizon" if point.error > 2 * point.measured else "")
     else:
         why = "smaller steps would take longer than the budget allows"

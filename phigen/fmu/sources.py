@@ -30,7 +30,7 @@ def layer(compilation: Compilation, variables: Sequence[Variable], token: str) -
     body = "\n".join(['#include "' + program.name + '.h"', *sorted(amalgam.headers), "", text])
     about = [
         f"{program.name} as a functional mock-up unit for co-simulation, of FMI 2.0 and 3.0.",
-        "DO NOT EDIT: the checksum below notices.",
+        "DO NOT EDIT: phigen detects changes by the checksum below.",
         f"SPDX-License-Identifier: {program.about.license}",
     ]
     return sealed(about, fitted(body))

@@ -1,6 +1,6 @@
 """Noise through Hamiltonians: dx = … + Σ σ_k π∇g_k ∘ dW_k, in the sense of Stratonovich.
 
-Each source moves along a Hamiltonian vector field, so it keeps all Casimirs and the volume of the leaves, and without
+Each source acts along a Hamiltonian vector field, so it conserves all Casimirs and the volume of the leaves. Without
 forces the flow of each path of the noise is a Poisson map. The amplitudes σ_k depend on parameters and the time only.
 
 With forces πζ, a density exp(−H/T) on every leaf is stationary where πζ = −(1/2T) Σ σ_k² (X_k H) X_k with X_k = π∇g_k:

@@ -205,7 +205,7 @@ def system_from_spec(spec: Spec) -> System:
 def system_of_lattice(spec: Spec) -> SpecError:
     """Refuse a lattice where one system of a few coordinates is required."""
     message = f"{spec.name} is a lattice, and this is for one system of a few coordinates"
-    hint = "phigen.compile takes it as it is; phigen show --expand SIZES prints a small one as an ordinary spec"
+    hint = "phigen.compile accepts it; phigen show --expand SIZES prints a small one as an ordinary spec"
     return SpecError([spec.diagnostic(("lattice",), message, hint)])
 
 

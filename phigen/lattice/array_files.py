@@ -130,7 +130,7 @@ def _array(path: Path, shape: tuple[int, ...]) -> Floats:
             file.seek(0)
             array = np.lib.format.read_array(file, allow_pickle=False)
             if file.read(1):
-                raise ValueError("there is more in it than one array")
+                raise ValueError("it holds more than one array")
         except (tokenize.TokenError, SyntaxError, EOFError) as error:
             raise ValueError(str(error)) from None
     array = np.asarray(array, dtype=np.float64)

@@ -24,7 +24,7 @@ class Misfit:
     fitting: int
 
     def __str__(self) -> str:
-        return f"{self.size} along {self.axis} is no multiple of {self.period}"
+        return f"{self.size} along {self.axis} is not a multiple of {self.period}"
 
 
 class MisfitError(SpecError):
@@ -42,7 +42,7 @@ def cell_from_spec(spec: Spec) -> Cell:
     """
     lattice = spec.lattice
     if lattice is None:
-        raise ValueError(f"{spec.name} is no lattice")
+        raise ValueError(f"{spec.name} is not a lattice")
     brackets = _completed(spec, lattice)
     cell = Cell(
         spec.name,
@@ -107,7 +107,7 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
         spec.diagnostic(
             ("runs", m.run, "sizes"),
             f"sizes: {m}, as the colours of the splitting need",
-            f"for example {m.fitting}; scheme: series takes every size",
+            f"for example {m.fitting}; scheme: series works for every size",
         )
         for m in wrong_sizes
     ]

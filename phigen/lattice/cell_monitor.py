@@ -33,16 +33,18 @@ def expect_applicable(cell: Cell, spec: Spec) -> None:
     """Raise `SpecError` for a monitor that is not of the form of this module."""
     if spec.monitor is None:
         return
-    message, hint = "", "remove monitor; steps are equal in the time then"
+    message, hint = "", "remove monitor; then all steps have the same size in time"
     if cell.relation != PAIRS:
-        message = "monitor: lattices take it for pairs only; here all sites would have the steps of the fastest of them"
+        message = (
+            "monitor: on lattices it is offered for pairs only; here the fastest site would determine the steps of all"
+        )
     elif spec.monitor != LOGARITHMIC:
         message, hint = "monitor: an expression makes K = g(H + e), which does not split", "monitor: log"
     elif spec.scheme == "series":
         message, hint = "monitor: log needs H = A + B split in two", "scheme: splitting"
     elif cell.time or cell.forces or cell.noise:
         what = "time" if cell.time else "forces" if cell.forces else "noise"
-        message = f"monitor: log takes no {what}, with which e = -H(x0) would not be constant"
+        message = f"monitor: log is not offered with {what}: e = -H(x0) would not be constant"
     elif spec.extras.adjoint:
         message = "monitor: gradients (adjoint) are not offered with it for lattices"
         hint = "phigen show --expand 3 prints an ordinary spec of three sites, which has them"
@@ -54,7 +56,9 @@ def negative_part(cell: Cell, flows: Sequence[CellFlow], spec: Spec) -> int:
     """Return the number of the part B. Raises `SpecError` unless there are two parts, one of them negative."""
     if len(flows) != 2:
         message = f"monitor: log needs H = A + B of two parts with elementary flows; here there are {len(flows)}"
-        raise SpecError([spec.diagnostic(("monitor",), message, "remove monitor; steps are equal in the time then")])
+        raise SpecError(
+            [spec.diagnostic(("monitor",), message, "remove monitor; then all steps have the same size in time")]
+        )
     for k, flow in enumerate(flows):
         if all(sign_of(-s.expression, _positive(cell, s.expression)) == POSITIVE for s, _ in flow.summands):
             return k
@@ -64,7 +68,7 @@ def negative_part(cell: Cell, flows: Sequence[CellFlow], spec: Spec) -> int:
             return k
     parts = ", ".join(f"the sum of {shortened(flow.hamiltonian)}" for flow in flows)
     message = f"monitor: log needs a part that is negative, at least where runs start; the parts are {parts}"
-    hint = "positive: true of a parameter shows a sign; a constant can be taken from a part, in hamiltonian"
+    hint = "positive: true declares the sign of a parameter; in hamiltonian, a constant can be subtracted from a part"
     raise SpecError([spec.diagnostic(("monitor",), message, hint)])
 
 

@@ -30,7 +30,7 @@ from phigen.symbolic.symbols import BEGINS, CHOSEN, Symbol
 
 Covector = Mapping[str, Expression]
 
-_HINT = "that of a spin has one where H is linear or quadratic along an axis in it; scheme: series takes every H"
+_HINT = "that of a spin has one where H is linear or quadratic along an axis in it; scheme: series applies to every H"
 
 
 def damping_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:

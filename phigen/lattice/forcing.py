@@ -86,7 +86,7 @@ def _summand_flows(
         if isinstance(flow, str):
             message = f"scheme splitting: the force {name} has no elementary flow on the lattice: {flow}"
             place = next((host.locations[(key,)] for key in ("damping", "forces") if (key,) in host.locations), None)
-            raise SpecError([Diagnostic(message, place, "scheme: series takes every force")])
+            raise SpecError([Diagnostic(message, place, "scheme: series applies to every force")])
         yield flow
 
 
@@ -133,7 +133,7 @@ def noise_flows(
             flows = ()
         if len(flows) != 1 or flows[0].by_colour:
             reason = f"scheme: splitting needs the flow of the noise {name} in closed form, which phigen does not find"
-            raise SpecError([Diagnostic(reason, host.locations.get(("noise", name)), "scheme: series takes it")])
+            raise SpecError([Diagnostic(reason, host.locations.get(("noise", name)), "scheme: series applies to it")])
         yield _of_unit_time(flows[0])
 
 

@@ -144,7 +144,7 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
     """
     stages = _stages(spec)
     if cell.noise and len(stages[-1]) > 1:
-        message = "noise: a step is not composed of others, among which some go back"
+        message = "noise: steps are not composed, since some stages of a composition go back in time"
         raise SpecError([Diagnostic(message, spec.locations.get(("noise",)), "order: 2")])
     if cell.bond_bracket:
         message = "scheme series: brackets along bonds are not offered"

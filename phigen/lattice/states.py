@@ -67,7 +67,7 @@ def defaults_at(spec: Spec, names: Collection[str], sizes: tuple[int, ...], bond
 class _Reader:
     def __init__(self, spec: Spec, run: Run) -> None:
         if spec.lattice is None or run.lattice is None:
-            raise ValueError(f"{spec.name} is no lattice")
+            raise ValueError(f"{spec.name} is not a lattice")
         self.spec, self.run, self.lattice, self.lattice_run = spec, run, spec.lattice, run.lattice
 
     def start(self) -> Start:

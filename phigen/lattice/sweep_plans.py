@@ -191,7 +191,7 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
     coloured = any(flow.by_colour for flow in flows)
     if coloured and noise:
         message = "scheme splitting: noise is not offered where parts are those of one colour of a graph"
-        raise SpecError([Diagnostic(message, spec.locations.get(("noise",)), "scheme: series takes it")])
+        raise SpecError([Diagnostic(message, spec.locations.get(("noise",)), "scheme: series applies to it")])
     if cell.time:  # the flows of colours follow each other in the order of the parts
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
     plan = SplittingPlan(parts, _with_seams(choice, parts.colouring), noise, since)

@@ -42,7 +42,9 @@ def lines(compilation: CompiledGauss) -> list[str]:
         )
     exact = compilation.gauss.exact
     listed_lines.append(
-        "the step is a Poisson map" if exact else "the step is no Poisson map, its structure is one to truncation"
+        "the step is a Poisson map"
+        if exact
+        else "the step is not a Poisson map: its structure is exact only up to truncation errors"
     )
     return listed_lines
 

@@ -99,10 +99,10 @@ def _steps(compilation: CompiledSeries, terms: int) -> list[str]:
 
 
 def _limit(compilation: CompiledSeries, step: str, reached: int, reason: str) -> LimitError:
-    reason = reason or "the time was up"
+    reason = reason or "the time limit was reached"
     before = ["nothing was compared", "S_1 was compared", f"S_1 … S_{reached} were compared"][min(reached, 2)]
     message = f"{compilation.spec.file}: {step} was not derived a second time: {reason}; {before}"
-    hint = "--seconds gives it more time, --terms asks for fewer S_i"
+    hint = "--seconds sets a longer limit, --terms fewer S_i"
     return LimitError([Diagnostic(message, hint=hint)])
 
 

@@ -64,7 +64,7 @@ def damping(spec: Spec, starts: Sequence[Mapping[str, float]]) -> dict[str, tupl
     if rate is None:
         return {}
     positive = [p.name for p in spec.parameters if p.bound]
-    stated = not_negative("λ ≥ 0, so that damping takes energy: dH/dt ≤ 0", rate, positive, starts)
+    stated = not_negative("λ ≥ 0, so that damping removes energy: dH/dt ≤ 0", rate, positive, starts)
     return {DAMPING: (stated,)} if stated else {}
 
 

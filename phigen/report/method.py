@@ -41,7 +41,7 @@ def _gauge(compilation: Compilation) -> list[Markup]:
     subtracted += [f"{mathml.grouped(value)}<mo>&#x2062;</mo>{mathml.name(c)}" for c, value in gauge.fixed.items()]
     if not subtracted:
         return []
-    said = "From here on H stands for this: multiples of Casimirs change the error of a step, but no flow."
+    said = "Below, H denotes this function. Multiples of Casimirs change the error of a step, but not the flow."
     gauged = mathml.math(GAUGED + "".join(f"<mo>−</mo>{part}" for part in subtracted))
     return [page.heading("Gauge"), page.equations([[gauged]]), page.paragraph(said, "note")]
 

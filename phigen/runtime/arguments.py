@@ -99,7 +99,7 @@ def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -
     if t0 is None or interface.time:
         return 0.0 if t0 is None else number(t0, "the time t0")
     if "t0" not in interface.parameters:
-        raise TypeError(f"t0 has no meaning: the Hamiltonian of {interface.name} does not depend on the time")
+        raise TypeError(f"t0 is not used: the Hamiltonian of {interface.name} does not depend on the time")
     more["t0"] = t0
     return 0.0
 

@@ -92,7 +92,7 @@ class CSolver:
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> CSession:
         """See `phigen.runtime.backend.Backend`; the parameters are part of the bytes."""
         if len(saved) != self._c.solver_size():
-            raise ValueError(f"{len(saved)} bytes are no {self.interface.name}_solver of this library")
+            raise ValueError(f"{len(saved)} bytes are not a {self.interface.name}_solver of this library")
         struct, interface = aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface
         return CSession(self._c, struct, interface.dimension, interface.element, self._real)
 

@@ -46,7 +46,7 @@ def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) 
     if not resume and checkpoint.exists():
         return f"{checkpoint} belongs to an interrupted run: continue it with {how}, or remove the file"
     if resume and output is not None and output.exists() and not checkpoint.exists():
-        return f"{output} is there, but not {checkpoint}: its run is complete, and there is nothing to resume"
+        return f"{output} exists, but not {checkpoint}: its run is complete, and there is nothing to resume"
     return ""
 
 

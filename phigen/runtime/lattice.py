@@ -754,7 +754,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             try:
                 carried = session.advance_tangent(at.h, carried, count)
             except MissingExtraError:
-                hint = "compile it with tangent=True, or say tangent: true in the spec"
+                hint = "compile it with tangent=True, or write tangent: true in the spec"
                 raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
             except BackendError as error:
                 raise self.failure(error, at.h, None, at.values) from error

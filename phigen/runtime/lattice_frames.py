@@ -244,7 +244,7 @@ def is_store(path: Path) -> bool:
 def expect_store(path: Path) -> None:
     """Raise `ValueError` if a Zarr store would replace something that is not a Zarr store."""
     if path.exists() and not is_store(path):
-        raise ValueError(f"{path} is there, and is no Zarr store")
+        raise ValueError(f"{path} exists, and is not a Zarr store")
 
 
 def _write_store(path: Path, trajectory: LatticeTrajectory) -> None:

@@ -206,7 +206,7 @@ def _later(t: Floats, h: float, after: float | None) -> Floats:
 
 def _index(run: LatticeTrajectory, name: str) -> int:
     if name not in run.coordinates:
-        raise ValueError(f"{name!r} is no coordinate; there are {', '.join(run.coordinates)}")
+        raise ValueError(f"{name!r} is not a coordinate; there are {', '.join(run.coordinates)}")
     return run.coordinates.index(name)
 
 

@@ -186,7 +186,7 @@ def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) 
     count = len(splitting.flows)
     situation = "none is known to be small" if count == 2 else f"here {'is one' if count == 1 else f'are {count}'}"
     message = f"scheme splitting: composition {composition} needs H = A + εB in two parts, B small; {situation}"
-    hint = "small: true of a parameter says that what it multiplies is small"
+    hint = "small: true of a parameter declares that the terms with this factor are small"
     return SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
 
 
@@ -263,6 +263,6 @@ def _not_applicable(
         reason = "a flow of V + κ{V, {V, T}} in closed form, which phigen does not find"
     else:
         reason = "{V, {V, {V, T}}} = 0 with one of the two parts as V, which does not hold here"
-    hint = "composition: auto takes the best that applies; phigen show --scheme splitting shows the parts"
+    hint = "composition: auto chooses the best that applies; phigen show --scheme splitting shows the parts"
     place = system.locations.get(("composition",))
     return SpecError([Diagnostic(f"scheme splitting: composition {composition} needs {reason}", place, hint)])

@@ -159,9 +159,12 @@ def expect_noise(system: System, realisation: BiRealisation, order: Order, compo
     reason, hint = "", ""
     if not realisation.symmetric:
         reason = f"noise needs a symmetric bi-realisation; {realisation.kind} is not"
-        hint = "birealisation: auto; in the middle of a step is where Stratonovich's integral takes its values"
+        hint = "birealisation: auto; Stratonovich's integral is evaluated at the middle of a step"
     elif composition not in ("auto", "none"):
-        reason, hint = "noise: a step is not composed of others, among which some go back", "composition: none"
+        reason, hint = (
+            "noise: steps are not composed, since some stages of a composition go back in time",
+            "composition: none",
+        )
     elif system.forces and order.order > 2:
         reason, hint = f"with forces and noise a step has order 2, not {order.order}", "order: 2"
     if reason:
@@ -181,7 +184,7 @@ def _forced(
     if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
         reason = f"forces: a vector needs a bi-realisation in closed form; {realisation.kind} follows paths"
         place = system.locations.get(("forces", "vector"))
-        raise SpecError([Diagnostic(reason, place, "a covector is taken; or choose another birealisation")])
+        raise SpecError([Diagnostic(reason, place, "use a covector force, or choose another birealisation")])
     lowest = 2 if series.symmetric else 1
     if order.order > lowest and (composition == "none" or not series.symmetric):
         reason = f"with forces, {realisation.kind} has order {lowest} without a composition, not {order.order}"
@@ -211,7 +214,7 @@ def _composed(
             else f"composition {name} needs a symmetric bi-realisation; {realisation.kind} is not"
         )
         place = system.locations.get(("composition",)) or system.locations.get(("order",))
-        raise SpecError([Diagnostic(reason, place, "composition: none takes the series directly")])
+        raise SpecError([Diagnostic(reason, place, "composition: none uses the series without a composition")])
     note = f"composition: {composition.name}, {len(composition.fractions)} stages of order 2"
     return Discretisation(_afforded(system, realisation, series, 1, monitor), 1, composition.fractions, note)
 

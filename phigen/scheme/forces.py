@@ -1,4 +1,4 @@
-"""Header lines on forces: with forces a step is no Poisson map."""
+"""Header lines on forces: with forces a step is not a Poisson map."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def forced_lines(forced: bool, pushed: Sequence[str], how: str) -> Iterator[str]
         return
     if how:
         yield f"forces: {how}"
-    effect = f"they change {', '.join(pushed)}" if pushed else "they keep all Casimirs"
-    yield f"with forces a step is no Poisson map; {effect}"
+    effect = f"they change {', '.join(pushed)}" if pushed else "they conserve all Casimirs"
+    yield f"with forces a step is not a Poisson map; {effect}"
 
 
 def acts(force: Sequence[Expression]) -> bool:

@@ -37,7 +37,9 @@ if TYPE_CHECKING:
 MAX_SWEEPS = 100
 
 #: Hint where no exact Poisson map is known.
-TRUNCATION_HINT = "structure: to truncation takes every bracket, and is no Poisson map; scheme: series is one"
+TRUNCATION_HINT = (
+    "structure: to truncation applies to every bracket, but its steps are not Poisson maps; those of scheme: series are"
+)
 
 
 def expect_offered(spec: Spec) -> None:
@@ -209,7 +211,7 @@ def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge,
     stages = order.terms
     yield f"scheme: Gauss collocation, {stages} stage{'s' * (stages > 1)}"
     if not realisation.exact:
-        yield "structure: to truncation; a step is no Poisson map, and keeps Casimirs of degree 1 and 2 only"
+        yield "structure: to truncation; a step is not a Poisson map, and conserves Casimirs of degree 1 and 2 only"
     elif realisation.groups:
         listed = "; ".join(", ".join(system.coordinates[i] for i in g.indices) for g in realisation.groups)
         yield f"structure: exact; quadratic momentum maps for {listed}"

@@ -78,7 +78,7 @@ def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
     values = derivatives_in_next_frame(points, [symbol(s) for s in slopes])
     return Kernel(
         "next_frame",
-        "derivatives k of the unknowns as seen from the end z of a step, where the next one starts",
+        "derivatives k of the unknowns in the frame of the end z of a step, where the next one starts",
         {"coef": coefficients.slots, "z": points.unknowns, "k": slopes},
         (Output("seen", tuple(coefficients.hoist(values))),),
     )

@@ -51,13 +51,13 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
     read = {"coef": coefficients.slots, "x": points.start, "u": tuple(symbols)}
     slope = Kernel(
         "reduced_field",
-        "w times the derivatives of the iterated unknowns of a stage, by integrals u of moves",
+        "w times the derivatives of the iterated unknowns of a stage, by integrals u of increments",
         {**read, "w": (WEIGHT,), "time": (TIME, LENGTH)},
         (Output("move", tuple(coefficients.hoist(values))),),
     )
     follow = Kernel(
         "followers",
-        "the unknowns of a stage that follow from others, by integrals u of moves",
+        "the unknowns of a stage that follow from others, by integrals u of their increments",
         {**read, "time": (TIME, LENGTH)},
         (Output("offsets", tuple(coefficients.hoist(offsets))),),
     )

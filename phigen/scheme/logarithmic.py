@@ -77,23 +77,25 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
         return None
     message = ""
     if not isinstance(spec.monitor, str):
-        message = "monitor: an expression makes K = g(H + e), which does not split; scheme: splitting takes log"
+        message = "monitor: an expression makes K = g(H + e), which does not split; scheme: splitting offers log"
     elif spec.time:
         message = "monitor: not together with time: e = -H(x0) would not be constant"
     elif system.forces:
-        message = "monitor: log takes no forces, with which e = -H(x0) would not be constant"
+        message = "monitor: log is not offered with forces: e = -H(x0) would not be constant"
     elif len(flows) != 2:
         message = f"monitor: log needs H = A + B of two parts with elementary flows; here there are {len(flows)}"
     elif not isinstance(spec.gauge, str):
-        message = "monitor: log takes no gauge, since the parts of H would not be those of the motion"
+        message = "monitor: log is not offered with a gauge: the parts of H would not be those of the motion"
     if message:
-        hint = EXTENDED_SYSTEM_HINT if spec.time else "scheme: series takes an expression for g"
+        hint = EXTENDED_SYSTEM_HINT if spec.time else "scheme: series allows an expression for g"
         raise SpecError([spec.diagnostic(("monitor",), message, hint)])
     negative_flow = next((f for f in flows if _below_zero(spec, system, f.hamiltonian)), None)
     if negative_flow is None:
         parts = ", ".join(str(f.hamiltonian) for f in flows)
         message = f"monitor: log needs a part that is negative, at least where runs start; the parts are {parts}"
-        hint = "positive: true of a parameter shows a sign; a constant can be taken from a part, in hamiltonian"
+        hint = (
+            "positive: true declares the sign of a parameter; in hamiltonian, a constant can be subtracted from a part"
+        )
         raise SpecError([spec.diagnostic(("monitor",), message, hint)])
     return Logarithmic(negative_flow.hamiltonian)
 

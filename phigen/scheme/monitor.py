@@ -68,7 +68,7 @@ def monitor_of(spec: Spec) -> Expression | None:
             message = f"monitor: not together with {key} e = -H(x0) would not be constant, or nothing would adapt"
             raise SpecError([spec.diagnostic(("monitor",), message, EXTENDED_SYSTEM_HINT if spec.time else "")])
     if spec.forces and not isinstance(spec.gauge, str):
-        message = "monitor: with forces no Casimirs are taken from K, as there is none"
+        message = "monitor: with forces no Casimirs are subtracted from K, as there are none"
         raise SpecError([spec.diagnostic(("gauge",), message, "gauge: none")])
     if isinstance(spec.monitor, str):
         hint = "scheme: splitting, or dt/dtau as an expression in the coordinates"

@@ -37,7 +37,7 @@ def noise_lines(sources: Sequence[str], weak: int) -> Iterator[str]:
     if not sources:
         return
     names = ", ".join(sources)
-    yield f"noise: {names}; in the sense of Stratonovich, along Hamiltonian fields, so it keeps all Casimirs"
+    yield f"noise: {names}; in the sense of Stratonovich, along Hamiltonian fields, so it conserves all Casimirs"
     yield f"each path of the noise has its step; strong order 1 if sources commute, else 1/2; weak order {weak}"
 
 
@@ -50,7 +50,7 @@ def _flow(system: System, source: Source) -> Flow:
     noise_system = replace(system.frozen, hamiltonian=source.hamiltonian, noise=())
     reason = f"scheme: splitting needs the flow of the noise {source.name} in closed form, which phigen does not find"
     place = system.locations.get(("noise", source.name))
-    refused = SpecError([Diagnostic(reason, place, "scheme: series takes it")])
+    refused = SpecError([Diagnostic(reason, place, "scheme: series applies to it")])
     try:
         flows = split(noise_system).flows
     except SpecError:

@@ -147,7 +147,7 @@ def _draws(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
         numbers = tuple(float(n) for n in read if n is not None)
         return [Axis("seed", numbers)] if len(numbers) == len(value) else []
     if "count" not in value or len(value) > 1:
-        declared.reader.error(key, "over: seed takes a count, and nothing else", "seed: {count: 10}")
+        declared.reader.error(key, "over: seed has a count, and no other key", "seed: {count: 10}")
         return []
     return [Axis("seed", count=value["count"])]
 

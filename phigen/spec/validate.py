@@ -149,10 +149,10 @@ WITHOUT_SERIES = {
 
 #: Keys that lattices do not take: the values that do no harm, and what to do.
 NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
-    "reconstruct": ((), "phigen show --expand prints an ordinary spec of a few sites, which takes it"),
+    "reconstruct": ((), "phigen show --expand prints an ordinary spec of a few sites, where it is allowed"),
     "terms": ((), "order: sets the method of a lattice"),
     "gauge": (("auto", "none"), "gauges are those of ordinary systems"),
-    "modified_hamiltonian": ((0,), "phigen show --expand prints an ordinary spec of a few sites, which takes it"),
+    "modified_hamiltonian": ((0,), "phigen show --expand prints an ordinary spec of a few sites, where it is allowed"),
 }
 
 
@@ -161,7 +161,7 @@ NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "monitor": (
         (),
         "it changes H, so e = -H(x0) would not be constant, and in tau its amplitude would depend on the state",
-        "remove monitor; steps are equal in the time then",
+        "remove monitor; then all steps have the same size in time",
     ),
     "composition": (
         ("auto", "none"),

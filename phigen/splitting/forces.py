@@ -26,7 +26,7 @@ from phigen.symbolic.readable import shortened
 Field = tuple[Expression, ...]
 
 _DAMPING_HINT = (
-    "that of a spin has one where H is linear or quadratic along an axis in it; scheme: series takes every H"
+    "that of a spin has one where H is linear or quadratic along an axis in it; scheme: series applies to every H"
 )
 
 
@@ -159,7 +159,7 @@ def _pieces(
         if not isinstance(flow, Flow):
             message = f"scheme splitting: the force {name} has no elementary flow: {flow}"
             place = next((system.locations[key] for key in keys if key in system.locations), None)
-            raise SpecError([Diagnostic(message, place, "scheme: series takes every force")])
+            raise SpecError([Diagnostic(message, place, "scheme: series applies to every force")])
         yield flow
 
 

@@ -185,5 +185,5 @@ def _refusal(system: System, error: NoFlowError | None) -> SpecError:
     if error is None:
         return SpecError([Diagnostic("scheme splitting: H has no terms", place)])
     message = f"scheme splitting: the term {shortened(error.term.expression)} has no elementary flow: {error.reason}"
-    hint = "scheme: series takes every H; terms in coordinates that commute with one another always split"
+    hint = "scheme: series applies to every H; terms in coordinates that commute with one another always split"
     return SpecError([Diagnostic(message, place, hint)])

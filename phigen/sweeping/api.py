@@ -221,7 +221,7 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
 def _draws(value: Mapping[str, Any]) -> Axis:
     """Return the numbers of random draws as a dimension of the sweep."""
     if set(value) != {"count"}:
-        raise ValueError(f"over: seed takes a count, and nothing else, not {dict(value)!r}")
+        raise ValueError(f"over: seed has a count, and no other key, not {dict(value)!r}")
     return Axis("seed", count=arguments.count(value["count"], "over: seed: count", 1, limits.SWEPT))
 
 

@@ -41,7 +41,7 @@ def header_lines(program: Program, command: str) -> list[str]:
         lines[-1:] = (
             _on_one_line(lines[-1], *operations) if lines[-1].startswith("  step:") else [lines[-1], *operations]
         )
-    lines += _on_one_line("DO NOT EDIT: the checksum below notices", f"to regenerate: {command}")
+    lines += _on_one_line("DO NOT EDIT: phigen detects changes by the checksum below", f"to regenerate: {command}")
     return [*lines, f"SPDX-License-Identifier: {about.license}"]
 
 

@@ -253,7 +253,7 @@ def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, p
             if point.growth > LINEAR:
                 raise CheckError(
                     f"the error of the orbit grows like {clock}^{point.growth:.1f}: the motion is chaotic, and what is "
-                    f"measured over {clock} = 0 … {piece:.6g} says nothing about a longer run\n"
+                    f"measured over {clock} = 0 … {piece:.6g} is no evidence for a longer run\n"
                     f"  hint: --horizon {piece:.6g}, or --measure energy"
                 )
             return

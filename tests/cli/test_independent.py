@@ -54,7 +54,7 @@ def test_when_the_time_is_up_the_exit_code_is_that_of_a_limit(phigen, write):
     write("a.yaml")
     result = phigen("check", "--independent", "--seconds", "0.0001", "a.yaml")
     assert result.exit_code == 3
-    assert "S_1 was not derived a second time: the time was up; nothing was compared" in result.stderr
+    assert "S_1 was not derived a second time: the time limit was reached; nothing was compared" in result.stderr
 
 
 def test_a_splitting_has_nothing_to_compare(phigen, write):

@@ -54,7 +54,7 @@ def test_what_names_the_series_says_which_sizes_would_split(phigen, tmp_path):
     spec = tmp_path / "ring.yaml"
     spec.write_text(ring([1, 2, 4], 5), encoding="utf-8")
     # 3 is a multiple of 3 too, but smaller than the stencil
-    said = ": the series, since 5 along i is no multiple of 3, as a splitting with 3 colours needs; 6 would do\n"
+    said = ": the series, since 5 along i is not a multiple of 3, as a splitting with 3 colours needs; 6 would do\n"
     assert f"Bi-realisation (constant in logarithms){said}" in phigen("check", spec).stdout
     assert f"order 4, profile fast, target numpy, 1 thread{said}" in phigen("run", spec, "-t", "numpy").stdout
     assert "since" not in phigen("run", spec, "-t", "numpy", "--sizes", "6").stdout
@@ -69,12 +69,12 @@ def test_what_names_the_series_says_which_sizes_would_split(phigen, tmp_path):
 def test_what_names_a_splitting_says_which_sizes_would_take_fewer_colours_or_no_seam(phigen, tmp_path):
     spec = tmp_path / "ring.yaml"
     spec.write_text(ring([1], 9), encoding="utf-8")
-    said = "Splitting: 2 colours and a seam, since 9 along i is no multiple of 2; 8 would do without\n"
+    said = "Splitting: 2 colours and a seam, since 9 along i is not a multiple of 2; 8 would do without\n"
     assert said in phigen("check", spec).stdout
     periodic = ring([1], 9).replace("axes: [i]", "axes: [i, j], boundary: [periodic, open]").replace("[9]", "[9, 2]")
     spec.write_text(periodic, encoding="utf-8")
     said = (
-        "Splitting: 3 colours, since 9 along i is no multiple of 2, as a splitting with 2 colours needs; 8 would do\n"
+        "Splitting: 3 colours, since 9 along i is not a multiple of 2, as a splitting with 2 colours needs; 8 would do"
     )
     assert said in phigen("check", spec).stdout
 

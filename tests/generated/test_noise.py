@@ -449,7 +449,7 @@ def test_no_panel_of_a_report_sets_noise_beside_a_method_that_takes_none():
 
 def test_the_code_says_what_noise_leaves_of_it():
     text = "\n".join(emit(made("dated").program, "c", COMMAND).values())
-    assert "noise: z; in the sense of Stratonovich, along Hamiltonian fields, so it keeps all Casimirs" in text
+    assert "noise: z; in the sense of Stratonovich, along Hamiltonian fields, so it conserves all Casimirs" in text
     assert "weak order 1" in text
 
 

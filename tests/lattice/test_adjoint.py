@@ -55,7 +55,7 @@ SWUNG = DRIVEN.replace("driven", "swung").replace(
 )
 LATTICES["swung"] = LATTICES["swung series"] = {"w": 1.2, "phase": 2.0 + np.arange(SITES) / 5}
 LATTICES["driven"] = LATTICES["driven composed"] = {"w": 1.2, "A": 0.35, "phase": 0.2 + np.arange(SITES) / 5}
-#: Spins that are damped, whose flow is no multiple of what it changes.
+#: Spins that are damped, whose flow is not a multiple of what it changes.
 RELAXING = """phigen: 1
 name: relaxing
 lattice: {axes: [i], boundary: periodic}

@@ -181,7 +181,7 @@ def test_too_small_sizes_and_open_ends_beside_have_no_seam() -> None:
         solver("bogoyavlensky", (7,)).integrate(np.ones((1, 5)), H, 1)
     spec = loads(text("sheet", (7, 7), "fast").replace("boundary: periodic", "boundary: [periodic, open]"))
     (method,) = (fact for fact in compile_spec(spec).program.about.facts if fact.startswith("scheme: series"))
-    assert "7 along i is no multiple of 2" in method
+    assert "7 along i is not a multiple of 2" in method
 
 
 def test_a_lattice_with_a_seam_has_no_steps_by_hand() -> None:

@@ -669,7 +669,7 @@ def test_colours_are_such_as_all_runs_have_sizes_for(sizes: list[int], scheme: s
          'hamiltonian: "p**2/2 + q*q[i+1]"', "the orders 2, 4, 4, 6, 6, 8, 8, 10, not 12"),
         ('scheme: splitting\ncoordinates: [x]\npoisson: {brackets: {x: {"x[i+2]": "x*x[i+2]"}}}\nhamiltonian: x\n'
          'runs: {odd: {sizes: [5], initial: {x: 1}, step: 0.1, steps: 1}}',
-         "(?s)5 along i is no multiple of 3.*for example 3"),
+         "(?s)5 along i is not a multiple of 3.*for example 3"),
     ],
 )  # fmt: skip
 def test_what_has_no_step_is_refused(text: str, said: str) -> None:

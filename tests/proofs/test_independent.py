@@ -254,7 +254,9 @@ def test_the_time_is_kept_and_what_was_compared_is_said():
         found, seconds = [], 2 * seconds
         with (
             processor_seconds_below(10 * seconds),
-            pytest.raises(LimitError, match=r"S_\d+ was not derived a second time: the time was up; ") as raised,
+            pytest.raises(
+                LimitError, match=r"S_\d+ was not derived a second time: the time limit was reached; "
+            ) as raised,
         ):
             found.extend(compare(compiled("rigid_body"), 16, seconds=seconds))
     assert re.search(r"S_1 … S_\d+ were compared", str(raised.value))

@@ -82,7 +82,7 @@ def test_what_has_no_spectrum_is_told():
     run = phigen.compile(phigen.spec.loads(FERROMAGNET), target="numpy").integrate(
         near_the_ground_state(6, 0.3), 0.1, 4
     )
-    with pytest.raises(ValueError, match="'w' is no coordinate; there are x, y, z"):
+    with pytest.raises(ValueError, match="'w' is not a coordinate; there are x, y, z"):
         run.spectrum(["w"])
     with pytest.raises(ValueError, match="needs 4 frames that are equal times apart, not 2"):
         run.spectrum(["x"], after=0.3)
@@ -145,7 +145,7 @@ def test_times_that_give_no_spectrum_are_refused_before_the_run(tmp_path, monkey
         (["--at", "3,4,6,7"], "a spectrum needs frames that are equal times apart"),
         (["--until", "3"], "needs 4 frames that are equal times apart, not 2"),
         (["--until", "50"], "there are no frames from t = 60.0 on"),
-        (["-o", "folder.zarr"], "folder.zarr is there, and is no Zarr store"),
+        (["-o", "folder.zarr"], "folder.zarr exists, and is not a Zarr store"),
     ):
         result = CliRunner().invoke(group, ["run", "waves.yaml", "-t", "numpy", *options])
         assert (result.exit_code, message in " ".join(result.output.split())) == (2, True), result.output

@@ -128,7 +128,7 @@ def _cards() -> tuple[Any, list[str]]:
     return cupy, names
 
 
-_HINT = "install NVIDIA's driver, or take target opencl, which runs on processors too"
+_HINT = "install NVIDIA's driver, or use target opencl, which also runs on CPUs"
 
 
 def load(files: Mapping[str, str], interface: Interface, device: int | None = None) -> Any:

@@ -117,7 +117,7 @@ class DeviceSolver:
 
     def _failure(self, message: str, final: Floats, frames: Floats | None, done: int) -> DeviceError:
         hint = (
-            f"members from {done} on were not integrated; take fewer, or a larger stride"
+            f"members from {done} on were not integrated; use fewer members, or a larger stride"
             if done or frames is not None
             else "take fewer members"
         )

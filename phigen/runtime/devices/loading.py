@@ -19,7 +19,7 @@ def backend(files: Mapping[str, str], interface: Interface, target: str, index: 
     host = registry.target_of([file for file in files if not file.endswith("_device.h")], interface.name)
     device = device_of(target, index)
     if not (device.double or interface.single):
-        hint = "say real: float in the spec, or take another device, which PHIGEN_DEVICE names"
+        hint = "write real: float in the spec, or set PHIGEN_DEVICE to another device"
         raise DeviceError(f"{device.name} has no numbers in double precision; {hint}")
     if isinstance(interface, LatticeInterface):
         return DeviceLattice(files, interface, target, index=index)

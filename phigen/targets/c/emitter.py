@@ -119,7 +119,7 @@ def _declared_lines(program: Program) -> list[str]:
     """The header comment of the declarations; the code has the other facts."""
     name = program.name
     return [
-        f"The declarations of {name}.c. DO NOT EDIT: the checksum below notices.",
+        f"The declarations of {name}.c. DO NOT EDIT: phigen detects changes by the checksum below.",
         f"SPDX-License-Identifier: {program.about.license}",
     ]
 

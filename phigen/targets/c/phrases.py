@@ -152,7 +152,7 @@ GAUGE = Choice(
 )
 
 LEVEL = Choice(
-    "Steps are equal in tau: the energy level e has a derivative, and a step takes the time that it moves.",
+    "Steps are equal in tau: the energy level e has a derivative, and the time of a step depends on the state.",
     ("MONITOR",),
     {
         "AND_DOUBLE(e_bar)": (", double *e_bar", ""),
@@ -193,7 +193,7 @@ OWN = Choice(
 )
 
 NOISE = Choice(
-    "Noise is drawn once in a step; a run is told which random numbers are its own.",
+    "Noise is drawn once in a step; a run receives the numbers that select its random numbers.",
     ("NOISE",),
     {
         "AND_DW(dw)": (", dw", ""),

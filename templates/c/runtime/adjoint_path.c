@@ -72,21 +72,21 @@ static int phi_back_piece(const double *coef, const double p[PHI_BACK], const do
 /* Cotangents of the start of a path, of p and of the coefficients that it depends on (found, after the state), from
    those of its end and of its mean. Returns 0 if the path cannot be followed. */
 static int phi_traced_back(const double *coef, const double end[PHI_DIM], const double p[PHI_DIM],
-    const double bar[PHI_DIM], const double mean_bar[PHI_DIM], double found[PHI_BACK])
+    const double bar[PHI_DIM], const double mean_bar[PHI_DIM], double cotangents[PHI_BACK])
 {
     for (int pieces = 1; pieces <= PHI_LONGEST_PATH; pieces *= 2) {
-        double given[PHI_BACK] = { 0.0 }, change[PHI_BACK];
+        double fixed_inputs[PHI_BACK] = { 0.0 }, change[PHI_BACK];
         int good = 1;
-        for (int i = 0; i < PHI_BACK; ++i) found[i] = 0.0;
+        for (int i = 0; i < PHI_BACK; ++i) cotangents[i] = 0.0;
         for (int i = 0; i < PHI_DIM; ++i) {
-            given[i] = p[i] / (double)pieces;
-            given[PHI_DIM + i] = mean_bar[i] / (double)pieces;
-            found[i] = end[i];
-            found[PHI_DIM + i] = bar[i];
+            fixed_inputs[i] = p[i] / (double)pieces;
+            fixed_inputs[PHI_DIM + i] = mean_bar[i] / (double)pieces;
+            cotangents[i] = end[i];
+            cotangents[PHI_DIM + i] = bar[i];
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
-            good = phi_back_piece(coef, given, found, change);
-            for (int i = 0; i < PHI_BACK; ++i) found[i] += i / PHI_DIM == 2 ? change[i] / (double)pieces : change[i];
+            good = phi_back_piece(coef, fixed_inputs, cotangents, change);
+            for (int i = 0; i < PHI_BACK; ++i) cotangents[i] += i / PHI_DIM == 2 ? change[i] / (double)pieces : change[i];
         }
         if (good) return 1;
     }
@@ -125,7 +125,7 @@ static int phi_anchor(const double *coef, const double p[PHI_DIM], const double 
 static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM], phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {
-    double p[PHI_DIM], hessian[PHI_DIM * PHI_DIM], matrix[PHI_DIM * PHI_DIM], covector[PHI_DIM], mean_bar[PHI_DIM], found[PHI_BACK];
+    double p[PHI_DIM], hessian[PHI_DIM * PHI_DIM], matrix[PHI_DIM * PHI_DIM], covector[PHI_DIM], mean_bar[PHI_DIM], cotangents[PHI_BACK];
     double columns[PHI_DIM][PHI_DIM], slopes[PHI_COEFFICIENTS];
     const double zero[PHI_DIM] = { 0.0 };
     const double *end = bar->end;
@@ -134,8 +134,8 @@ static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM],
     for (int j = 0; j < PHI_DIM; ++j) {
         double unit[PHI_DIM] = { 0.0 };
         unit[j] = 1.0;
-        if (!phi_traced_back(coef, end, p, zero, unit, found)) return PHI_NO_CONVERGENCE;
-        memcpy(columns[j], found + 2 * PHI_DIM, sizeof columns[j]);
+        if (!phi_traced_back(coef, end, p, zero, unit, cotangents)) return PHI_NO_CONVERGENCE;
+        memcpy(columns[j], cotangents + 2 * PHI_DIM, sizeof columns[j]);
     }
     for (int i = 0; i < PHI_DIM; ++i)
         for (int j = 0; j < PHI_DIM; ++j) {
@@ -143,19 +143,19 @@ static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM],
             for (int k = 0; k < PHI_DIM; ++k) sum -= columns[k][i] * hessian[j * PHI_DIM + k];
             matrix[i * PHI_DIM + j] = sum;
         }
-    if (!phi_traced_back(coef, end, p, bar->x, zero, found)) return PHI_NO_CONVERGENCE;
-    memcpy(covector, found + 2 * PHI_DIM, sizeof covector);
+    if (!phi_traced_back(coef, end, p, bar->x, zero, cotangents)) return PHI_NO_CONVERGENCE;
+    memcpy(covector, cotangents + 2 * PHI_DIM, sizeof covector);
     if (!phi_solve(matrix, covector)) return PHI_SINGULAR;
     for (int i = 0; i < PHI_DIM; ++i) {
         mean_bar[i] = 0.0;
         for (int k = 0; k < PHI_DIM; ++k) mean_bar[i] += hessian[k * PHI_DIM + i] * covector[k];
     }
-    if (!phi_traced_back(coef, end, p, bar->x, mean_bar, found)) return PHI_NO_CONVERGENCE;
-    memcpy(bar->x, found + PHI_DIM, sizeof bar->x);
-    memcpy(bar->end, found, sizeof bar->end);
+    if (!phi_traced_back(coef, end, p, bar->x, mean_bar, cotangents)) return PHI_NO_CONVERGENCE;
+    memcpy(bar->x, cotangents + PHI_DIM, sizeof bar->x);
+    memcpy(bar->end, cotangents, sizeof bar->end);
     phi_slope_adjoint(coef, y, covector, slopes);
     for (int k = 0; k < PHI_COEFFICIENTS; ++k) coef_bar[k] += slopes[k];
-    for (int k = 3 * PHI_DIM; k < PHI_BACK; ++k) coef_bar[phi_back_used[k - 3 * PHI_DIM]] += found[k];
+    for (int k = 3 * PHI_DIM; k < PHI_BACK; ++k) coef_bar[phi_back_used[k - 3 * PHI_DIM]] += cotangents[k];
     return PHI_OK;
 }
 #endif

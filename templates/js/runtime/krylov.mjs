@@ -60,7 +60,7 @@ export function linearised(coef, x, y, side, sizes, sites) {
   const matrix = (scaled) => {
     const out = new Float64Array(scaled.length);
     slope(coef, x, y, scaled.map((v, k) => v * unit(k)), sites, out);
-    return out.map((moved, k) => scaled[k] - moved / unit(k));
+    return out.map((image, k) => scaled[k] - image / unit(k));
   };
   const scaled = krylov(matrix, side.map((v, k) => v / unit(k)));
   return scaled && scaled.map((v, k) => v * unit(k));
