@@ -592,8 +592,8 @@ REFUSED = {
         "so(3)", "plus", 3, ASKED, "birealisation: {kind: group-map, tau: (1 + P/2)/(1 - P/2)}"
     ): "no group element",
     SHEARED: "the part H_2 = x3*(x2**2 + x1**2)",
-    BODY + "damping: 1/10\ngauge: {C: 1}\n": "with forces no multiple of a Casimir",
-    BODY + "monitor: 1 + x1**2\ngauge: {C: 1}\n": "with a monitor no multiple of a Casimir",
+    BODY + "damping: 1/10\ngauge: {C: 1}\n": "with forces no Casimir is subtracted",
+    BODY + "monitor: 1 + x1**2\ngauge: {C: 1}\n": "with a monitor no Casimir is subtracted",
 }
 
 
