@@ -536,7 +536,7 @@ TYPES: dict[str, ParameterType] = {
 
 
 @dataclass(frozen=True)
-class Table:
+class ConstantTable:
     """Constants of the model: an array of integers with a name."""
 
     name: str

@@ -89,7 +89,7 @@ def commented(printed: ir.Function, program: Program, linkage: str = "static") -
     return "\n".join([*comment(f"/* {printed.doc}. */"), function(printed, program, linkage)])
 
 
-def table(printed: ir.Table, program: Program) -> str:
+def table(printed: ir.ConstantTable, program: Program) -> str:
     """Return the constants of a table of a solver as a line."""
     number = printed.length or ir.Constant(len(printed.values))
     length = _spelling(ir.Function("", "", Role.OTHER, (), ()), program)(number)

@@ -69,8 +69,8 @@ def in_lanes(program: Program, step: Splitting, form: str, versions: Mapping[str
 def _tables(program: Program, step: Splitting, prefix: str, suffix: str) -> str:
     """Return the part of H and the row of coefficients of each flow of a step."""
     flows, length = step.schedule.flows_of_run, ir.fixed("FLOWS")
-    parts = ir.Table(f"{prefix}part{suffix}", tuple(part + 1 for part, _ in flows), length)
-    rows = ir.Table(f"{prefix}row{suffix}", tuple(row for _, row in flows), length)
+    parts = ir.ConstantTable(f"{prefix}part{suffix}", tuple(part + 1 for part, _ in flows), length)
+    rows = ir.ConstantTable(f"{prefix}row{suffix}", tuple(row for _, row in flows), length)
     lines = [table(one, program) for one in (parts, rows)]
     return "\n".join(["/* Flows of one step: the part of H, and the row of coefficients. */", *lines]) + "\n"
 

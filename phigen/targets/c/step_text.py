@@ -94,7 +94,7 @@ def _path_constants(program: Program, step: Path) -> Sizes:
 
 def _adjoint_path(program: Program, path: PathAdjoint) -> str:
     """Return the recurrences of the reverse pass of a path, and the coefficients that it depends on."""
-    used, extended = ir.Table("back_used", tuple(path.used) or (0,)), adjoint_program(program, path)
+    used, extended = ir.ConstantTable("back_used", tuple(path.used) or (0,)), adjoint_program(program, path)
     said = "The coefficients" if path.used else "None of the coefficients is one"
     comment = f"/* {said} that the slope of a path depends on. */"
     return f"{comment}\n{table(used, program)}\n\n{_path(extended, path.recurrences, 'back')}"
