@@ -22,7 +22,7 @@ MAX_TAPE_VALUES = 1 << 22
 
 def without_pullback(interface: Interface) -> TypeError:
     """Return the error for a solver that was compiled without ``adjoint``."""
-    hint = "compile it with adjoint=True, or say adjoint: true in the spec"
+    hint = "compile it with adjoint=True, or write adjoint: true in the spec"
     return TypeError(f"{interface.name} was compiled without pullback; {hint}")
 
 
