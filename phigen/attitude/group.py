@@ -102,7 +102,7 @@ def _rotations(system: System, algebra: LieAlgebra) -> Group:
             system,
             f"reconstruct: quaternion needs three coordinates with the brackets of so(3), {{a, b}} = ±c and cyclic, "
             f"and all others together an ideal; {many} in {algebra.name}",
-            "reconstruct: matrix takes every algebra with known matrices, with scheme: series or splitting",
+            "reconstruct: matrix works for every algebra with known matrices, with scheme: series or splitting",
         )
     rotation, sign = triples[0]
     return Group(sign > 0, rotation, _vectors(algebra, rotation, sign), algebra.dimension)

@@ -69,13 +69,13 @@ def gauss_attitude(
         )
     if group.matrices:
         hint = f"{series}; on so(3) and se(3) also quaternion"
-        raise refused(system, "reconstruct: Gauss steps have a quaternion, no matrix", hint)
+        raise refused(system, "reconstruct: Gauss steps have a quaternion, not a matrix", hint)
     if system.forces and any(not z.is_zero for z in system.forces.covector):
         message = "reconstruct: with covector forces the group element of a Gauss step is not that of the body"
         raise refused(system, message, series)
     element_less_one = group_element(points, group)
     if element_less_one is None:
-        raise refused(system, "reconstruct: the group element of this algebra is no quaternion", series)
+        raise refused(system, "reconstruct: the group element of this algebra is not a quaternion", series)
     purpose = "the increment of a step, a quaternion minus 1" + ", and its translation" * bool(group.translation)
     inputs = {"coef": coefficients.slots, "z": points.unknowns}
     turn = Kernel("turn", purpose, inputs, (Output("turn", tuple(coefficients.hoist(element_less_one))),))
@@ -165,7 +165,7 @@ def rate_kernel(system: System, group: Group, gauge: Gauge, more: Sequence[Expre
     others = {"a monitor": gauge.monitor, "forces": system.forces}
     for condition, present in others.items():
         if present:
-            message = f"reconstruct: with {condition} no multiple of a Casimir is taken from H, since it turns the body"
+            message = f"reconstruct: with {condition} no Casimir is subtracted from H, since it would rotate the body"
             raise refused(system, message, "gauge: none")
     slope = gradient(total(subtracted), system.coordinates)
     turning = (*group.rotation, *group.translation)
