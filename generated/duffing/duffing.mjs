@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c460b824e0655b1b97dfe815150a5daa997b30950fe2b570980de9ff95b427ac
+ * body-sha256: 43e91ec3f06a4b363be112e4e2b8e066959948ded6ab7c6736bc2345fb3bdc26
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -219,6 +219,17 @@ export class StepError extends Error {
   }
 }
 
+/** All that solvers take; some take a part of it. */
+const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
+
+/** Throw StepError for options that no solver has, such as misspelled ones. */
+function expectOptions(options) {
+  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
+  if (!unknown.length) return;
+  const known = OPTIONS.join(", ");
+  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
+}
+
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
@@ -306,7 +317,8 @@ export class Solver {
    * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
    * @param {number} [options.t0] the time of x0, 0 by default
    */
-  constructor(options) {
+  constructor(options = {}) {
+    expectOptions(options);
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
     takeTime(this, options);
@@ -365,7 +377,8 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const twin = new Solver({ ...this, x0: this.x });
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where a system has none
+    const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
     twin.carry.set(this.carry);
@@ -426,7 +439,8 @@ export class Solver {
 
   /**
    * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
-   * good value. h and the values of options may be arrays, with a number for each state.
+   * good value. h and the values of options may be arrays, with a number for each state; throws StepError if
+   * they have another length.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
@@ -435,16 +449,23 @@ export class Solver {
    * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
-    const ends = Array.from(members, (x0, m) => {
-      const memberValue = (value) => (typeof value === "object" && value !== null ? value[m] : value);
-      const params = Object.entries(options.params ?? {}).map(([name, value]) => [name, memberValue(value)]);
-      const chosen = { ...options, params: Object.fromEntries(params), t0: memberValue(options.t0), x0 };
+    const starts = Array.from(members);
+    expectOptions(options);
+    const ends = starts.map((x0, m) => {
+      const valueOf = (what, value) => {
+        if (typeof value !== "object" || value === null) return value;
+        if (value.length === starts.length) return value[m];
+        throw new StepError("BAD_ARGUMENT", 0, `${what} must be one number, or ${starts.length}`);
+      };
+      const size = valueOf("h", h);
+      const params = Object.entries(options.params ?? {}).map(([key, value]) => [key, valueOf(key, value)]);
+      const chosen = { ...options, params: Object.fromEntries(params), t0: valueOf("t0", options.t0), x0 };
       chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(memberValue(h), count);
+        solver.integrate(size, count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0d67865ab187b6fe3432fd77430720ec9f20e7adef447578db13576cd7544aa2
+ * body-sha256: 20afd459651b9bc85aced0e317ad6d477654bce0b9250901c54117ff8e6b5e3a
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -105,6 +105,17 @@ export class StepError extends Error {
   }
 }
 
+/** All that solvers take; some take a part of it. */
+const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
+
+/** Throw StepError for options that no solver has, such as misspelled ones. */
+function expectOptions(options) {
+  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
+  if (!unknown.length) return;
+  const known = OPTIONS.join(", ");
+  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
+}
+
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
@@ -189,7 +200,8 @@ export class Solver {
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
    * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
    */
-  constructor(options) {
+  constructor(options = {}) {
+    expectOptions(options);
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
   }
@@ -245,7 +257,8 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const twin = new Solver({ ...this, x0: this.x });
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where a system has none
+    const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
     twin.carry.set(this.carry);
@@ -305,7 +318,8 @@ export class Solver {
 
   /**
    * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
-   * good value. h and the values of options may be arrays, with a number for each state.
+   * good value. h and the values of options may be arrays, with a number for each state; throws StepError if
+   * they have another length.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
@@ -314,16 +328,23 @@ export class Solver {
    * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
-    const ends = Array.from(members, (x0, m) => {
-      const memberValue = (value) => (typeof value === "object" && value !== null ? value[m] : value);
-      const params = Object.entries(options.params ?? {}).map(([name, value]) => [name, memberValue(value)]);
-      const chosen = { ...options, params: Object.fromEntries(params), t0: memberValue(options.t0), x0 };
+    const starts = Array.from(members);
+    expectOptions(options);
+    const ends = starts.map((x0, m) => {
+      const valueOf = (what, value) => {
+        if (typeof value !== "object" || value === null) return value;
+        if (value.length === starts.length) return value[m];
+        throw new StepError("BAD_ARGUMENT", 0, `${what} must be one number, or ${starts.length}`);
+      };
+      const size = valueOf("h", h);
+      const params = Object.entries(options.params ?? {}).map(([key, value]) => [key, valueOf(key, value)]);
+      const chosen = { ...options, params: Object.fromEntries(params), t0: valueOf("t0", options.t0), x0 };
       chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(memberValue(h), count);
+        solver.integrate(size, count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5cb1992ebd92b089e838ce9cb6e1304acfb3ad267141681a0ee6b17051b47bd9
+ * body-sha256: 84311f09652323784e87ff388ac1c759a1c81d0c1cf6f25ab5d5a12c89c12f68
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -517,6 +517,17 @@ export class StepError extends Error {
   }
 }
 
+/** All that solvers take; some take a part of it. */
+const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
+
+/** Throw StepError for options that no solver has, such as misspelled ones. */
+function expectOptions(options) {
+  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
+  if (!unknown.length) return;
+  const known = OPTIONS.join(", ");
+  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
+}
+
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
@@ -607,7 +618,8 @@ export class Solver {
    * @param {ArrayLike<number>} [options.gauge] multiples of one's own: the step is an exact Poisson map
    *   for each
    */
-  constructor(options) {
+  constructor(options = {}) {
+    expectOptions(options);
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
     takeGauge(this, options);
@@ -665,7 +677,8 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const twin = new Solver({ ...this, x0: this.x });
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where a system has none
+    const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
     twin.carry.set(this.carry);
@@ -726,7 +739,8 @@ export class Solver {
 
   /**
    * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
-   * good value. h and the values of options may be arrays, with a number for each state.
+   * good value. h and the values of options may be arrays, with a number for each state; throws StepError if
+   * they have another length.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
@@ -735,16 +749,23 @@ export class Solver {
    * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
-    const ends = Array.from(members, (x0, m) => {
-      const memberValue = (value) => (typeof value === "object" && value !== null ? value[m] : value);
-      const params = Object.entries(options.params ?? {}).map(([name, value]) => [name, memberValue(value)]);
-      const chosen = { ...options, params: Object.fromEntries(params), t0: memberValue(options.t0), x0 };
+    const starts = Array.from(members);
+    expectOptions(options);
+    const ends = starts.map((x0, m) => {
+      const valueOf = (what, value) => {
+        if (typeof value !== "object" || value === null) return value;
+        if (value.length === starts.length) return value[m];
+        throw new StepError("BAD_ARGUMENT", 0, `${what} must be one number, or ${starts.length}`);
+      };
+      const size = valueOf("h", h);
+      const params = Object.entries(options.params ?? {}).map(([key, value]) => [key, valueOf(key, value)]);
+      const chosen = { ...options, params: Object.fromEntries(params), t0: valueOf("t0", options.t0), x0 };
       chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(memberValue(h), count);
+        solver.integrate(size, count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;

@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d86f921767253d101b0916d31533c4b3d4c7bd35241e8fe68be1189fb785b591
+ * body-sha256: 178d58270876b3148c82fa2f5b1964b19a31ab3bbbb11b76ce2fa28294fba4ea
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -166,6 +166,17 @@ export class StepError extends Error {
   }
 }
 
+/** All that solvers take; some take a part of it. */
+const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
+
+/** Throw StepError for options that no solver has, such as misspelled ones. */
+function expectOptions(options) {
+  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
+  if (!unknown.length) return;
+  const known = OPTIONS.join(", ");
+  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
+}
+
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
@@ -236,7 +247,8 @@ export class Solver {
    * @param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number
    * for all
    */
-  constructor(options) {
+  constructor(options = {}) {
+    expectOptions(options);
     const { x0 } = options;
     const sizes = options.sizes ?? (AXES.length === 1 && x0 ? [x0.length / DIM] : []);
     this.sites = new Sites(sizes, options);
@@ -366,7 +378,7 @@ class Sites {
     const fits = (n, axis) => Number.isInteger(n) && n >= LEAST[axis] && n % PERIODS[axis] === 0;
     if (sizes.length !== AXES.length || !sizes.every(fits)) {
       const asked = AXES.map((axis, k) => `${axis} of ${LEAST[k]} or more, a multiple of ${PERIODS[k]}`);
-      throw new StepError("BAD_ARGUMENT", 0, `sizes [${sizes}]: needed is ${asked.join("; ")}`);
+      throw new StepError("BAD_ARGUMENT", 0, `sizes are [${sizes}]: needed is ${asked.join("; ")}`);
     }
     this.sizes = Object.freeze([...sizes]);
     this.count = sizes.reduce((product, n) => product * n, 1);

@@ -18,14 +18,14 @@ export class Ensemble {
     const starts = Array.from(members);
     expectOptions(options);
     const ends = starts.map((x0, m) => {
-      const memberValue = (what, value) => {
+      const valueOf = (what, value) => {
         if (typeof value !== "object" || value === null) return value;
         if (value.length === starts.length) return value[m];
         throw new StepError("BAD_ARGUMENT", 0, `${what} must be one number, or ${starts.length}`);
       };
-      const size = memberValue("h", h);
-      const params = Object.entries(options.params ?? {}).map(([name, value]) => [name, memberValue(name, value)]);
-      const chosen = { ...options, params: Object.fromEntries(params), t0: memberValue("t0", options.t0), x0 };
+      const size = valueOf("h", h);
+      const params = Object.entries(options.params ?? {}).map(([key, value]) => [key, valueOf(key, value)]);
+      const chosen = { ...options, params: Object.fromEntries(params), t0: valueOf("t0", options.t0), x0 };
       chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
