@@ -33,7 +33,7 @@ export class History {
   }
 
   /** Clear the predictor, after the state has been changed. */
-  increment() {
+  move() {
     this.clear();
   }
 
