@@ -1,5 +1,6 @@
 """Gauss steps with exact structure are Poisson maps for steps of any size; those to truncation are not, and say so."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -157,8 +158,8 @@ def test_nothing_that_is_written_calls_steps_to_truncation_poisson_maps(monitor)
     for target in ("c", "numpy", "js"):
         texts += emit(compilation.program, target, "phigen build").values()
     written = " ".join(" ".join(texts).split())
-    assert "no Poisson map" in written
-    assert written.count("Poisson map") == written.count("no Poisson map")
+    denied = len(re.findall(r"\b(?:no|not a) Poisson map", written))
+    assert 0 < denied == written.count("Poisson map")
     assert "measures it" in compilation.notes[-1]
 
 
@@ -238,7 +239,7 @@ REFUSED = {
         "no group element",
         "exact",
     ),
-    "matrix": (f"{BODY}reconstruct: matrix\nscheme: gauss\n", "a quaternion, no matrix", "quaternion"),
+    "matrix": (f"{BODY}reconstruct: matrix\nscheme: gauss\n", "a quaternion, not a matrix", "quaternion"),
     "attitude with covectors": (
         f"{BODY}reconstruct: quaternion\nforces: {{covector: {{x1: x2}}}}\nscheme: gauss\n",
         "covector",

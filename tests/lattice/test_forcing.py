@@ -370,7 +370,7 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
     ("text", "said"),
     [
         (TEXTS["bath"].replace("hamiltonian: x,", 'hamiltonian: "x*x[i+1]",'), "names no neighbours"),
-        (f"order: 4\n{TEXTS['bath']}", "a step is not composed of others"),
+        (f"order: 4\n{TEXTS['bath']}", "steps are not composed"),
         ("scheme: splitting\n" + TEXTS["damped"].replace("damping: l", "damping: l*z"), "damping has no elementary"),
         # with any colours, but it is not these that are in the way; and what colours cannot part
         (f"scheme: splitting\nlattice: {{axes: [i]}}\ndamping: 0.1\n{CANONICAL}"
