@@ -60,7 +60,7 @@ def test_lattices_compile_anew_to_another_order_and_are_no_system():
     lattice = phigen.load("fput")
     assert isinstance(lattice, phigen.LatticeSystem)
     assert phigen.api.compilation_of(lattice, order=2).cell == compilation.cell
-    with pytest.raises(phigen.SpecError, match=r"phigen\.compile takes it as it is"):
+    with pytest.raises(phigen.SpecError, match=r"phigen\.compile accepts it"):
         system_from_spec(lattice.spec)
 
 
