@@ -235,7 +235,7 @@ REFUSED = {
     "formula": (BODIES.replace("monitor: log", "monitor: x**2"), "does not split"),
     "series": (BODIES.replace("scheme: splitting", "scheme: series"), "split in two"),
     "adjoint": (BODIES + "adjoint: true\n", "gradients"),
-    "damped": (BODIES + "damping: 0.1\n", "takes no forces"),
+    "damped": (BODIES + "damping: 0.1\n", "not offered with forces"),
     "repelling": (BODIES.replace("pairs: -m", "pairs: m"), "needs a part that is negative"),
 }
 
