@@ -94,7 +94,7 @@ def test_text_that_nvrtc_refuses_is_an_error_with_its_messages(cupy):
 
 def test_a_machine_without_a_card_or_driver_is_told_what_to_install(cupy, monkeypatch):
     monkeypatch.setattr(cupy.cuda.runtime, "getDeviceCount", lambda: 0)
-    with pytest.raises(DeviceError, match="CUDA has no card; install NVIDIA's driver, or take target opencl"):
+    with pytest.raises(DeviceError, match="CUDA has no card; install NVIDIA's driver, or use target opencl"):
         phigen.compile("pendulum_euler", "cuda")
 
     def insufficient():
