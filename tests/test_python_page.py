@@ -11,7 +11,7 @@ pytest.importorskip("xarray")
 
 
 #: Pages, with the number of their commands whose answers are compared.
-PAGES = {"python": 1, "ensembles": 1, "gradients": 2}
+PAGES = {"python": 1, "ensembles": 1, "gradients": 4}
 
 
 @pytest.mark.slow
