@@ -37,47 +37,48 @@ from phigen.study.summary import Summary, summarise
 
 DOCS = Path(__file__).resolve().parent
 PAGE, FACTS, FIGURES = DOCS / "gallery.md", DOCS / "figures" / "gallery.json", DOCS / "figures" / "gallery"
-#: Steps of a run that are drawn, and crossings of a section.
+#: Largest numbers of steps in a figure of a run, and of crossings in a Poincaré section.
 DRAWN, CROSSINGS = 1500, 1500
-#: Of a curve that winds too fast for its steps less is drawn, down to so many.
+#: A trajectory that winds too fast for its rows is drawn over half the time, again and again while it has more rows.
 SHORTEST = 100
-#: Times of a diagram of a lattice, and of its errors.
+#: Rows in the diagram of a lattice, and in the curves of its errors.
 SMALL, FRAMES = 80, 200
 #: The width of the small pictures in pixels: four beside each other on a page of GitHub.
 THUMBNAIL = 190
-#: The longest formula that is shown.
+#: The largest number of characters of a formula; longer ones are shown as "…".
 LONGEST = 160
 HEAD = """# Gallery
 
-The bundled systems; each picture leads to its system. `phigen run NAME` integrates one, `phigen show NAME` prints its
-formulas, and `cp "$(phigen list --path NAME)" .` copies its spec as a start for your own.
+The systems that phigen ships; each picture is a link to its system. `phigen run NAME` integrates a system, `phigen show
+NAME` prints its formulas, and `cp "$(phigen list --path NAME)" .` copies its spec, as a start for your own.
 """
 SYSTEMS = """
 ## Systems
 
-One run of each, the longest of its spec. A dot marks where it starts; the surface is that on which the first Casimir
-is constant, where there is one of three coordinates. The tables have the largest errors over the whole run, of phigen
-and of the classical method that the spec names, with the same step. Errors are relative to the value at the start
-unless that is nearly 0.
+Each figure shows one run: the longest run of the spec. A dot marks the initial state. A system of three coordinates
+also has the level surface of its first Casimir. The tables list the largest errors over the whole run, for phigen and
+for the classical method that the spec names, with the same step size. Errors are relative to the initial value, unless
+that is nearly 0. "H, balance" is the error of the energy balance of a system with time, forces or damping, that is, of
+H minus the work done. "H, change" is the largest change of H in a run with noise.
 """
 LATTICES = """
 
 ## Lattices
 
-Systems of many identical sites, of any size ([lattices.md](lattices.md)): one run of each, its fields over space and
-time, or at some times, and what it conserved. Errors of energy and invariants are relative to the value
-at the start or, where that is nearly 0, to the magnitudes of its terms at all sites; those of Casimirs at sites are
-at the worst site.
+Systems of many identical sites, of any size ([lattices.md](lattices.md)). Each figure shows one run: its fields over
+space and time, or at selected times, and the errors of its conserved quantities. Errors of energy and invariants are
+relative to the initial value or, if that is nearly 0, to the sum of the magnitudes of the terms at all sites. Errors of
+Casimirs at sites are those of the site with the largest error.
 """
 
 
 def names() -> list[str]:
-    """The corpus, in the order of `phigen list`, without lattices, which come after it."""
+    """Names of the systems that are no lattices, in the order of `phigen list`."""
     return [name for name, path in resources.bundled().items() if path.parent == resources.bundled_specs()]
 
 
 def lattices() -> list[str]:
-    """The lattices of the corpus."""
+    """Names of the lattices, in the order of `phigen list`."""
     return [name for name, path in resources.bundled().items() if path.parent != resources.bundled_specs()]
 
 
@@ -102,7 +103,7 @@ def seed_of(found: Spec, run: Run) -> int | None:
 
 
 def facts(name: str) -> dict[str, Any]:
-    """What is measured of a spec."""
+    """Facts on a system for its entry: structure, method, formulas, and errors of its longest run."""
     found = source(name)
     compilation = compilation_of(found)
     solver, run = solver_of(compilation), longest_run(found)
@@ -142,12 +143,12 @@ def _errors(summary: Summary) -> dict[str, float]:
 
 
 def draw(name: str) -> None:
-    """The figures of a spec."""
+    """Draw the figures of a system."""
     found = source(name)
     compilation = compilation_of(found)
     solver, run = solver_of(compilation), longest_run(found)
     parameters = found.parameters_of(run)
-    # Many panels would make a large file: fewer steps there, and of very many no leaves.
+    # Many panels make a large file: from five dimensions on fewer steps, from ten on no level surfaces.
     steps = min(run.steps, DRAWN if found.dimension <= 4 else DRAWN // 2)
     casimirs = compilation.system.casimirs if found.dimension <= 9 else {}
     about: dict[str, Any] = {"t0": start_of(found, run), "seed": seed_of(found, run), "parameters": parameters}
@@ -160,13 +161,13 @@ def draw(name: str) -> None:
 
 
 def _is_curve(trajectory: Trajectory) -> bool:
-    """Whether the rows of every panel make a line."""
+    """Whether the rows in every panel are close enough to be drawn as a curve."""
     panels = groups(trajectory.coordinates)
     return all(joins(trajectory.x[:, [trajectory.coordinates.index(c) for c in panel]]) for panel in panels)
 
 
 def _sections(found: Spec, solver: Solver) -> dict[str, Any]:
-    """The crossings of each run that has a section; in three dimensions these are a point, which is no picture."""
+    """Crossings of each run that has a section. In three dimensions these are isolated points, and are left out."""
     sections = {}
     for run in found.runs.values():
         if run.section is not None and (found.dimension > 3 or found.time):
@@ -178,7 +179,7 @@ def _sections(found: Spec, solver: Solver) -> dict[str, Any]:
 
 
 def lattice_facts(name: str) -> dict[str, Any]:
-    """What is measured of a lattice, whose figure is drawn."""
+    """Facts on a lattice for its entry; also draws its figure."""
     found = source(name)
     compilation = compilation_of(found)
     solver, run = lattice_solver_of(compilation), longest_run(found)
@@ -208,7 +209,7 @@ def lattice_facts(name: str) -> dict[str, Any]:
 
 
 def page(known: dict[str, dict[str, Any]]) -> str:
-    """The page, from the specs and the facts."""
+    """Text of the page, from the specs and from the facts on each."""
     listed = [f"| [{name}](#{name}) | {known[name]['structure']} | {source(name).title} |" for name in lattices()]
     more = "\n".join([LATTICES, "| spec | sites | system |", "|---|---|---|", *listed])
     entries = [_lattice_entry(source(name), known[name]) for name in lattices()]
@@ -216,7 +217,7 @@ def page(known: dict[str, dict[str, Any]]) -> str:
 
 
 def thumbnail(name: str) -> str:
-    """The figure of a system in small, as a link to its entry."""
+    """Small figure of a system, as a link to its entry."""
     title = html.escape(source(name).title)
     image = f'<img src="figures/gallery/{name}.svg" width="{THUMBNAIL}" alt="{title}" title="{title}">'
     return f'<a href="#{name}">{image}</a>'
@@ -271,12 +272,12 @@ def _table(errors: dict[str, dict[str, float]]) -> str:
 
 
 def _shown(error: float) -> str:
-    """Two digits; of rounding errors, which differ from compiler to compiler, that they are such."""
+    """Two digits of an error, or "round-off": digits of rounding errors differ from compiler to compiler."""
     return "round-off" if error < 1e-12 else f"{error:.1e}" if np.isfinite(error) else "breaks down"
 
 
 def main(chosen: list[str]) -> None:
-    """Facts and figures of these specs, of all by default; then the page."""
+    """Write the facts and figures of the chosen systems, or of all, and then the page."""
     FIGURES.mkdir(parents=True, exist_ok=True)
     for stray in FIGURES.glob("*.svg"):
         if not chosen:

@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 04039d9c64934c7914fbc68ed9c796786ca2bf4d6dc8ecf4fafa44b6d4ba1685
+ * body-sha256: 2adbe4e37771036ba8da395ee31b4c011d9867b82d17c1afea357eee48e4fc28
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -13,13 +13,13 @@ extern "C" {
 #define duffing_ORDER 6
 #define duffing_CASIMIRS 0
 #define duffing_PHIGEN_VERSION "0.1.0"
-#define duffing_SPEC_SHA256 "72ba392fccc406dfdc3b1d47b1172899f03878892236d624cb8d53a7a18b6c1c"
+#define duffing_SPEC_SHA256 "ede43f8e6b701b5554dc52316d7c870d0e7f0b2ee5862a7290406e095a945c72"
 enum { duffing_COEFFICIENTS = 33 }; /* numbers that are functions of params and h, and of the time */
 enum { duffing_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
 
 typedef struct {
     double A;     /* amplitude of the drive */
-    double omega; /* its frequency */
+    double omega; /* frequency of the drive */
 } duffing_params;
 extern const duffing_params duffing_default_params;
 

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 43e91ec3f06a4b363be112e4e2b8e066959948ded6ab7c6736bc2345fb3bdc26
+ * body-sha256: 89ea6690d5562236986327dd348c9d70fc67be76ff798a8f11ed3bfc28766146
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -21,7 +21,7 @@
 
 const NAME = "duffing";
 const VERSION = "0.1.0";
-const SPEC_SHA256 = "72ba392fccc406dfdc3b1d47b1172899f03878892236d624cb8d53a7a18b6c1c";
+const SPEC_SHA256 = "ede43f8e6b701b5554dc52316d7c870d0e7f0b2ee5862a7290406e095a945c72";
 const DIM = 2;
 const ORDER = 6;
 const COORDINATES = Object.freeze(["q", "p"]);
@@ -30,7 +30,7 @@ const CASIMIRS = Object.freeze([]);
 /**
  * @typedef {object} Parameters
  * @property {number} A amplitude of the drive
- * @property {number} omega its frequency
+ * @property {number} omega frequency of the drive
  */
 const DEFAULT_PARAMETERS = Object.freeze({
   A: 0.1,

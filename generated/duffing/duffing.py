@@ -6,11 +6,11 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 29f7580601126123e46cd55e51875a4afa0b71fa6a9d9c7c3b27793dcaee36fc
+# body-sha256: 3039f7dcb8382d32a7d321d9a41521d45faba65475b888cca264fdd531a45a04
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "72ba392fccc406dfdc3b1d47b1172899f03878892236d624cb8d53a7a18b6c1c"
+SPEC_SHA256 = "ede43f8e6b701b5554dc52316d7c870d0e7f0b2ee5862a7290406e095a945c72"
 DIM = 2
 ORDER = 6
 COORDINATES = ("q", "p",)

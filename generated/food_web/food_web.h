@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9cc5305948010f95ce85af6eed11db8fe161eac0cba9d93190441b04b7ac0700
+ * body-sha256: 75cdbb4471e17c1fd9f4cc84d026100d60a6c1d20d9279c24225166c8282504b
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -14,11 +14,11 @@ extern "C" {
 #define food_web_ORDER 4
 #define food_web_CASIMIRS 0
 #define food_web_PHIGEN_VERSION "0.1.0"
-#define food_web_SPEC_SHA256 "16de8419a3297fb765426a07b8e18fed9d20fb7f25dc58b93db682eba04bd5c3"
+#define food_web_SPEC_SHA256 "33c365aeaaa9fcce1fd6f031be62040b3dc02f6bbb423e97e7a20f413586bc35"
 
 typedef struct {
-    const double *A; /* at bonds: how much the eater gains; NULL for the default at all of them */
-    const double *k; /* at sites: balance; NULL for the default at all of them */
+    const double *A; /* at bonds: strength of the interaction; NULL for the default at all of them */
+    const double *k; /* at sites: equilibrium; NULL for the default at all of them */
 } food_web_params;
 
 extern const food_web_params food_web_default_params;

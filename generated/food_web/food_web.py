@@ -6,11 +6,11 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e70a53d7991b78c8534f1ba8ab89ee60c969ef5dfd295aa9c0d30813d95388ed
+# body-sha256: e59a94e35bcfd23d60f9a477e9bb5e53c7b50f2fb2f42c2524408622a2e9e04f
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "16de8419a3297fb765426a07b8e18fed9d20fb7f25dc58b93db682eba04bd5c3"
+SPEC_SHA256 = "33c365aeaaa9fcce1fd6f031be62040b3dc02f6bbb423e97e7a20f413586bc35"
 DIM = 1
 ORDER = 4
 AXES = ("i",)

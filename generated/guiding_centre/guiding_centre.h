@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 647dec6dfa0f57f55675e0a72c080b7aeac57b6a157a145e24cf109a1abf6767
+ * body-sha256: 8a5b353661e657e4d807374bdf3af192c16317fbf5dd4ce794ae05ad5b13b249
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -13,7 +13,7 @@ extern "C" {
 #define guiding_centre_ORDER 4
 #define guiding_centre_CASIMIRS 0
 #define guiding_centre_PHIGEN_VERSION "0.1.0"
-#define guiding_centre_SPEC_SHA256 "2fe2b1310137da070ce71887dcad93562dc0dd719fad890ce1b776e6af4b1570"
+#define guiding_centre_SPEC_SHA256 "82d5ea90095e73077a2671c7c2e7b96d51802a2b6398fe46f5396c4225a32104"
 enum { guiding_centre_STAGES = 5 };       /* of a step */
 enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that are functions of params and h */
 enum { guiding_centre_DIFFERENCES = 9 };  /* for the predictor; more would amplify rounding */

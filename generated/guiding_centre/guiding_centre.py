@@ -7,11 +7,11 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 0da7a735ca5d2aa6bdbcbac2179323fdd1708764a055cd717daa583d1c3e1290
+# body-sha256: dfff061b387d3241af869854c8a8a518921b1b352b128d7313c28037fcea9d45
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "2fe2b1310137da070ce71887dcad93562dc0dd719fad890ce1b776e6af4b1570"
+SPEC_SHA256 = "82d5ea90095e73077a2671c7c2e7b96d51802a2b6398fe46f5396c4225a32104"
 DIM = 4
 ORDER = 4
 COORDINATES = ("x", "y", "z", "u",)

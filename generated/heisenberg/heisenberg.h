@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7262c1b4af6ae7668ff43fde0cb8529c9f8b2ea6ce7c372e662283bbf632b576
+ * body-sha256: 2aed302233553c7a4643b9e48dffe0f8dc855d0a8142ed5be5814e65af934279
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -14,7 +14,7 @@ extern "C" {
 #define heisenberg_ORDER 2
 #define heisenberg_CASIMIRS 1 /* C */
 #define heisenberg_PHIGEN_VERSION "0.1.0"
-#define heisenberg_SPEC_SHA256 "db9e76c21c97df18ba40343805d35a8a7c249010c0d791ca8dab69a55383c332"
+#define heisenberg_SPEC_SHA256 "a040bb6c643cd4238f4939d26b6bf47e380070926cd42f82989a61b8182d0d32"
 
 typedef struct {
     double J;        /* default 1.0 */

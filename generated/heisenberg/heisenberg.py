@@ -6,11 +6,11 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a1ccfe0dda44eb79f1ba282dc0373b4b82c6ba2e20393e513c79487b3c2046ad
+# body-sha256: 6b7753c43ac12d7725c35ca0368b0cb36c221bac99e3968f65d975a3878627e0
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "db9e76c21c97df18ba40343805d35a8a7c249010c0d791ca8dab69a55383c332"
+SPEC_SHA256 = "a040bb6c643cd4238f4939d26b6bf47e380070926cd42f82989a61b8182d0d32"
 DIM = 3
 ORDER = 2
 AXES = ("i", "j", "k",)

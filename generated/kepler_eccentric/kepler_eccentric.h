@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d62cc9923891718624ac3f8be86f6f74fede99adcd2945bf3d9fda270e9d5c28
+ * body-sha256: 8b7f2c990586967af0cfcfaab193e5d3219147d0e64bd9ef47fcbb939ded0899
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -13,7 +13,7 @@ extern "C" {
 #define kepler_eccentric_ORDER 8
 #define kepler_eccentric_CASIMIRS 0
 #define kepler_eccentric_PHIGEN_VERSION "0.1.0"
-#define kepler_eccentric_SPEC_SHA256 "81869181189ef5b2007d1f8ba4054229e16bdbb9b83bebe02d636128ec39e8aa"
+#define kepler_eccentric_SPEC_SHA256 "9f8cc7f788b5fd46c22be5f35d1f064d371462a0b9c6814a9326d129431a0702"
 enum { kepler_eccentric_COEFFICIENTS = 140 }; /* numbers that are functions of params and h */
 enum { kepler_eccentric_GAUGES = 1 };         /* the energy level e */
 

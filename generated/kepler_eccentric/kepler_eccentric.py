@@ -7,11 +7,11 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 26e4a652d6ddcc5a160bdf51b0c8e0d8884827bb371db7010f92b8dcfa84cb01
+# body-sha256: cbe6cbdc6cf06db9f879288b2ff1efeb8aaf6fdd62da7ec818d8815f905551eb
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "81869181189ef5b2007d1f8ba4054229e16bdbb9b83bebe02d636128ec39e8aa"
+SPEC_SHA256 = "9f8cc7f788b5fd46c22be5f35d1f064d371462a0b9c6814a9326d129431a0702"
 DIM = 4
 ORDER = 8
 COORDINATES = ("q1", "q2", "p1", "p2",)

@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d6e0ec366fb10d8f7f2bf46c6ca6965543a61f87fa5cd3bcbc4d4752d30cf65c
+ * body-sha256: bac62daba949ddd4d1197576fb6a3e42e2ed11ebcb40a04f126929f66d025c50
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -13,7 +13,7 @@ extern "C" {
 #define kowalevski_gauss_ORDER 16
 #define kowalevski_gauss_CASIMIRS 2 /* A, B */
 #define kowalevski_gauss_PHIGEN_VERSION "0.1.0"
-#define kowalevski_gauss_SPEC_SHA256 "9ee174aea24a8dd9f18ca57c6b7a1c30e626c7f36ae052fb435a963c93ab1f80"
+#define kowalevski_gauss_SPEC_SHA256 "207f4ed5fd3660d4975c60c4ec873885b380480a09e812d4abf3ef5acac67116"
 enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* numbers that are functions of params and h */
 enum { kowalevski_gauss_NODES = 8 };        /* stages of a step */
 enum { kowalevski_gauss_WIDTH = 8 };        /* of an array over the stages */

@@ -6,11 +6,11 @@
 #   one evaluation at a stage: 72 additions, 95 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a1363477b7e0c0030b7785a00852b47b2e070ce8b36675cfee034b391383608a
+# body-sha256: ff004b1846593303fd85a6da3a644ea7dd863e2268253fcd2ab66c113799e273
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "9ee174aea24a8dd9f18ca57c6b7a1c30e626c7f36ae052fb435a963c93ab1f80"
+SPEC_SHA256 = "207f4ed5fd3660d4975c60c4ec873885b380480a09e812d4abf3ef5acac67116"
 DIM = 6
 ORDER = 16
 COORDINATES = ("P1", "P2", "P3", "G1", "G2", "G3",)

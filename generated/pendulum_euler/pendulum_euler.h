@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d7d9dcdf77027fa7ceecc8baa3f2468526436d126fe004188168e35744cb950c
+ * body-sha256: 198f0c24aa40a36abae9cdc5acc495ca82bc802489950e21ae2518f55227b47d
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -13,11 +13,11 @@ extern "C" {
 #define pendulum_euler_ORDER 1
 #define pendulum_euler_CASIMIRS 0
 #define pendulum_euler_PHIGEN_VERSION "0.1.0"
-#define pendulum_euler_SPEC_SHA256 "10030022f93bccf90322e3b69b8a94dcdf9ef8ba03d95b772ef2b3dc4481dc59"
+#define pendulum_euler_SPEC_SHA256 "d5fee8a2d3fff23ddbddeab960102f5ac0a598b14e727457465bbf012b8b6b14"
 enum { pendulum_euler_COEFFICIENTS = 2 }; /* numbers that are functions of params and h */
 
 typedef struct {
-    double g; /* gravity over the length of the rod */
+    double g; /* acceleration of gravity divided by the length of the rod */
 } pendulum_euler_params;
 extern const pendulum_euler_params pendulum_euler_default_params;
 

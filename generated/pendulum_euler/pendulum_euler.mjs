@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 20afd459651b9bc85aced0e317ad6d477654bce0b9250901c54117ff8e6b5e3a
+ * body-sha256: 52523fabf8ec431ead4e06df0ce6072e65d5d0b9eb475898220883312aa79072
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -20,7 +20,7 @@
 
 const NAME = "pendulum_euler";
 const VERSION = "0.1.0";
-const SPEC_SHA256 = "10030022f93bccf90322e3b69b8a94dcdf9ef8ba03d95b772ef2b3dc4481dc59";
+const SPEC_SHA256 = "d5fee8a2d3fff23ddbddeab960102f5ac0a598b14e727457465bbf012b8b6b14";
 const DIM = 2;
 const ORDER = 1;
 const COORDINATES = Object.freeze(["q", "p"]);
@@ -28,7 +28,7 @@ const CASIMIRS = Object.freeze([]);
 
 /**
  * @typedef {object} Parameters
- * @property {number} g gravity over the length of the rod
+ * @property {number} g acceleration of gravity divided by the length of the rod
  */
 const DEFAULT_PARAMETERS = Object.freeze({
   g: 1.0,

@@ -5,11 +5,11 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 1e0d1edc947c61a7893d567d90c885b327c69f0b166d9641241edf96cefd9497
+# body-sha256: 38f2cbd30a674e3a649807106bb8e44a85f2c2fddc2e70187ffe960626dfcc1e
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "10030022f93bccf90322e3b69b8a94dcdf9ef8ba03d95b772ef2b3dc4481dc59"
+SPEC_SHA256 = "d5fee8a2d3fff23ddbddeab960102f5ac0a598b14e727457465bbf012b8b6b14"
 DIM = 2
 ORDER = 1
 COORDINATES = ("q", "p",)

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 546cd0199e06534da7eb26d7383ad69d7679efe4747816e8f1b459d163794b51
+ * body-sha256: f347075e224f3e88fa1d9fcd3fc743d9e518d9d4aeae1f6656b8383d86f1d675
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -14,7 +14,7 @@ extern "C" {
 #define point_vortices_ORDER 4
 #define point_vortices_CASIMIRS 0
 #define point_vortices_PHIGEN_VERSION "0.1.0"
-#define point_vortices_SPEC_SHA256 "804a59fbd6a75ce4716246b77b3269259aad5901c7b5e0f87e175f5913fb28ec"
+#define point_vortices_SPEC_SHA256 "d965bd92c708d41161c8d57d8630c9397f72d5c2059658e2d8ea3f1387ba2750"
 
 typedef struct {
     const double *G; /* at sites: circulation; required, because its default is an array */

@@ -8,11 +8,11 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 5f629c384f661ff3c7dce459e94135e1b19b31f44976239ac919348a38643834
+# body-sha256: a32da0921a07cceca2779ccb1ed26be0d23217c6bdb98548448f6d918dd66b62
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "804a59fbd6a75ce4716246b77b3269259aad5901c7b5e0f87e175f5913fb28ec"
+SPEC_SHA256 = "d965bd92c708d41161c8d57d8630c9397f72d5c2059658e2d8ea3f1387ba2750"
 DIM = 2
 ORDER = 4
 AXES = ("i",)

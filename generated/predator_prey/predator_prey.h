@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e8eac9f938e836d20f580b4338dbd3608040171a89a59475de91aed7612d7df8
+ * body-sha256: de29df9f5faa5391aa02c518874efa98116519543158c279007fade343f5e2e6
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -13,7 +13,7 @@ extern "C" {
 #define predator_prey_ORDER 4
 #define predator_prey_CASIMIRS 0
 #define predator_prey_PHIGEN_VERSION "0.1.0"
-#define predator_prey_SPEC_SHA256 "e9ed620ed8f3d5aad12a62fc9348c8e9ca6a49af75e51b9b9dab791a7ff33715"
+#define predator_prey_SPEC_SHA256 "f6638ff9b1337f893f25016dded17f0b3c333d111afbf6afd42449aac73b6050"
 enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that are functions of params and h */
 enum { predator_prey_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
 

@@ -6,11 +6,11 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 0bc0f0baf9ac7607e532c68e80882c720afbcd481bb1c9f86c26fb00eb1c17b9
+# body-sha256: 08f11bf53f727bd22b2a0b2a46584e7d72c028106ffb849cec116c68b401c59f
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "e9ed620ed8f3d5aad12a62fc9348c8e9ca6a49af75e51b9b9dab791a7ff33715"
+SPEC_SHA256 = "f6638ff9b1337f893f25016dded17f0b3c333d111afbf6afd42449aac73b6050"
 DIM = 2
 ORDER = 4
 COORDINATES = ("prey", "predator",)

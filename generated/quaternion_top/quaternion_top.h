@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3b8a9a28013b2bf6089ccd9a95885763e411eeca6e88edebd579402f7c449450
+ * body-sha256: a7d246cae870f638ac2c149032070b3920d431b0f61a8c8889dc5f2f7891f656
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -13,7 +13,7 @@ extern "C" {
 #define quaternion_top_ORDER 4
 #define quaternion_top_CASIMIRS 1 /* length */
 #define quaternion_top_PHIGEN_VERSION "0.1.0"
-#define quaternion_top_SPEC_SHA256 "818ae683b38dea8c70860ad173c7962b5eb71229e0d7aeaea854acb32ebba04c"
+#define quaternion_top_SPEC_SHA256 "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
 enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that are functions of params and h */
 enum { quaternion_top_GAUGES = 1 };        /* Casimirs of which multiples are subtracted from H: length */
 enum { quaternion_top_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
@@ -23,7 +23,7 @@ typedef struct {
     double I2;     /* intermediate moment of inertia */
     double I3;     /* largest moment of inertia */
     double weight; /* weight times the distance of the centre of mass from the fixed point */
-    double spring; /* stiffness of the spring that wants w = 1 or w = -1 */
+    double spring; /* stiffness of the torsion spring */
 } quaternion_top_params;
 extern const quaternion_top_params quaternion_top_default_params;
 

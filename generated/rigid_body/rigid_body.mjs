@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 84311f09652323784e87ff388ac1c759a1c81d0c1cf6f25ab5d5a12c89c12f68
+ * body-sha256: 3c1630005ed6d8b8d5d5330e2ba9e7aa6b26a45aa5581aba74eacccecab3a607
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -22,7 +22,7 @@
 
 const NAME = "rigid_body";
 const VERSION = "0.1.0";
-const SPEC_SHA256 = "8810186c1e0019884e5b3b03e44e3be202fcaec17d97ceab9967252a6cdb2d99";
+const SPEC_SHA256 = "b4b33963b7078ab9acec7b44c596aff8b157783c38bfcd02fe22b99e983ef041";
 const DIM = 3;
 const ORDER = 6;
 const COORDINATES = Object.freeze(["x1", "x2", "x3"]);

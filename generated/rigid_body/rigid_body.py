@@ -7,11 +7,11 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 3015f42161b2bfe64ce722f1ad0561ff55a6f46c3baa6e5d8498d676dbe6cbce
+# body-sha256: fbac6daa7e2d1768dc6056118666a46dc2e36e2ba7328126ffb88af492791822
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "8810186c1e0019884e5b3b03e44e3be202fcaec17d97ceab9967252a6cdb2d99"
+SPEC_SHA256 = "b4b33963b7078ab9acec7b44c596aff8b157783c38bfcd02fe22b99e983ef041"
 DIM = 3
 ORDER = 6
 COORDINATES = ("x1", "x2", "x3",)

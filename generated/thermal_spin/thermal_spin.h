@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b3a75c169377f87d61924cda8528473d83930776ca75cb2c1a760e4f02ec2586
+ * body-sha256: dd3ba90080e69787745ca636d0202352f7dff71eb04ab9cf1d2504870608ced4
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -14,7 +14,7 @@ extern "C" {
 #define thermal_spin_ORDER 2
 #define thermal_spin_CASIMIRS 1 /* length */
 #define thermal_spin_PHIGEN_VERSION "0.1.0"
-#define thermal_spin_SPEC_SHA256 "94027d99f63156278559cc210d53326037ddbd17e39528977f9fdc3b323e1de6"
+#define thermal_spin_SPEC_SHA256 "a5f42591d561fe7e58ccb74799a7eee10f3fc732e46da02243f1394d987d4a7d"
 enum { thermal_spin_COEFFICIENTS = 13 }; /* numbers that are functions of params and h, and of the noise */
 enum { thermal_spin_SOURCES = 3 }; /* sources of noise: bath_x, bath_y, bath_z */
 enum { thermal_spin_DRAWS = 3 }; /* increments of all sources in a step */
@@ -23,7 +23,7 @@ enum { thermal_spin_PARTS = 1 }; /* increments of one source in a step, one for 
 typedef struct {
     double B;            /* field along z */
     double T;            /* temperature */
-    double damping_rate; /* of Landau and Lifshitz */
+    double damping_rate; /* Landau–Lifshitz damping */
 } thermal_spin_params;
 extern const thermal_spin_params thermal_spin_default_params;
 

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: de3558c4c7ee51becefd6a3f65f0d4109aba543a62d87ec3519bec540f7003b3
+ * body-sha256: 42019b5641ad3c1c5f76c0a96acd61e0991715d6726b1335b8de0f9db91ae789
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -27,7 +27,7 @@
 
 const NAME = "thermal_spin";
 const VERSION = "0.1.0";
-const SPEC_SHA256 = "94027d99f63156278559cc210d53326037ddbd17e39528977f9fdc3b323e1de6";
+const SPEC_SHA256 = "a5f42591d561fe7e58ccb74799a7eee10f3fc732e46da02243f1394d987d4a7d";
 const DIM = 3;
 const ORDER = 2;
 const COORDINATES = Object.freeze(["x", "y", "z"]);
@@ -37,7 +37,7 @@ const CASIMIRS = Object.freeze(["length"]);
  * @typedef {object} Parameters
  * @property {number} B field along z
  * @property {number} T temperature
- * @property {number} damping_rate of Landau and Lifshitz
+ * @property {number} damping_rate Landau–Lifshitz damping
  */
 const DEFAULT_PARAMETERS = Object.freeze({
   B: 1.0,

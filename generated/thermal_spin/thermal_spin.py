@@ -12,11 +12,11 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 66e0fbb68dd597d2af2c40e4b33d4c8f4a9048985ebaeb0ccbd95470b008d0fc
+# body-sha256: 0608be8739b1a6dbfefd6c400b0cb0d2047be4f94cda133b3af3cb736984def8
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "94027d99f63156278559cc210d53326037ddbd17e39528977f9fdc3b323e1de6"
+SPEC_SHA256 = "a5f42591d561fe7e58ccb74799a7eee10f3fc732e46da02243f1394d987d4a7d"
 DIM = 3
 ORDER = 2
 COORDINATES = ("x", "y", "z",)

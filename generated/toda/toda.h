@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fed85edb170b14abd0bc08dd010c77d2cb55e1de974b21c2d83a6a4173e823b8
+ * body-sha256: bc999af48fc70c1aa779d528ada028212defb5078dfd3950e75b2e80ec0f191d
  */
 #ifndef TODA_H
 #define TODA_H
@@ -14,7 +14,7 @@ extern "C" {
 #define toda_ORDER 4
 #define toda_CASIMIRS 2 /* momentum, length */
 #define toda_PHIGEN_VERSION "0.1.0"
-#define toda_SPEC_SHA256 "f26949756f578199f03099c1eb735187896f28e684aa7a5623cea3cfe88fe402"
+#define toda_SPEC_SHA256 "fdb12f10a633d60a892c40686358bece67d0d7d2e0a768bf8ec3914cdf17aeac"
 
 typedef struct {
     char unused; /* this system has no parameters */

@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 178d58270876b3148c82fa2f5b1964b19a31ab3bbbb11b76ce2fa28294fba4ea
+ * body-sha256: 8dc5c92b9f74bed5a52a17c0531d9a370389c1aa5fa0ea0b19cf6c600d68b404
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -21,7 +21,7 @@
 
 const NAME = "toda";
 const VERSION = "0.1.0";
-const SPEC_SHA256 = "f26949756f578199f03099c1eb735187896f28e684aa7a5623cea3cfe88fe402";
+const SPEC_SHA256 = "fdb12f10a633d60a892c40686358bece67d0d7d2e0a768bf8ec3914cdf17aeac";
 const DIM = 2;
 const ORDER = 4;
 const AXES = Object.freeze(["i"]);

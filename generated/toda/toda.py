@@ -6,11 +6,11 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: f34091f4fcbfef16f21b8b291c22fc70fca3fa6700512269c3644314c84c72fd
+# body-sha256: c136a01389faceb9e79bdc9337088b9ddc2038c6e2cb165609e294c564d11b47
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "f26949756f578199f03099c1eb735187896f28e684aa7a5623cea3cfe88fe402"
+SPEC_SHA256 = "fdb12f10a633d60a892c40686358bece67d0d7d2e0a768bf8ec3914cdf17aeac"
 DIM = 2
 ORDER = 4
 AXES = ("i",)
