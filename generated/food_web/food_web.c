@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 0d5bb6baf8eaef56116caa0546e0923bd6086f8e1ee5d5695c6555939fbccdd2
+ * body-sha256: 4b86c1148e6308a3cb9607a5598e5ec0bf583c05743e7e58951f9b145f728039
  */
 #include "food_web.h"
 #include <limits.h>
@@ -93,9 +93,9 @@ typedef struct {
 /* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
-    if (sizes == NULL || sizes[0] < food_web_least[0] || sizes[0] > most / 2) return 0;
-    size_t wide = (sizes[0] + 7) / 8 * 8;
+    const size_t n = sizes != NULL ? sizes[0] : 0;
+    if (n < food_web_least[0] || n > SIZE_MAX / 128 / food_web_RESERVED) return 0;
+    const size_t wide = (n + 7) / 8 * 8;
     *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
     return 1;
 }
@@ -292,10 +292,7 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
     s->other = s->middle + sites;
     s->number = s->other + 2 * count;
     memset(s->bonds, 0, (2 * sites + 1) * sizeof *s->bonds);
-    for (size_t k = 0; k < count; ++k) {
-        ++s->bonds[bonds->ends[2 * k]];
-        ++s->middle[bonds->ends[2 * k + 1]];
-    }
+    for (size_t k = 0; k < 2 * count; ++k) ++(k % 2 == 0 ? s->bonds : s->middle)[bonds->ends[k]];
     int end = 0; /* number of bonds so far */
     for (size_t i = 0; i < sites; ++i) {
         s->bonds[i] = end += s->bonds[i];
@@ -333,9 +330,8 @@ size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
 /* Copy values of sites, the last axis fastest, into rows. */
 static void food_web_put(const food_web_solver *s, double *rows, const double *values)
 {
-    double *row = rows;
-    memset(row, 0, (size_t)s->width * sizeof *row);
-    memcpy(row, values, (size_t)s->length * sizeof *row);
+    memset(rows, 0, s->rows * (size_t)s->width * sizeof *rows);
+    memcpy(rows, values, (size_t)s->length * sizeof *rows);
 }
 
 /* Copy fields to x[field][site], without the halo. */
@@ -387,13 +383,13 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return food_web_BAD_ARGUMENT;
-    const food_web_params solver_params = params != NULL ? *params : food_web_default_params;
+    const food_web_params values = params != NULL ? *params : food_web_default_params;
     const size_t rows = food_web_shape(sizes, &width), length = sizes[0], sites = rows * length;
-    if (rows == 0 || !food_web_connected(bonds, sites) || !food_web_finite(x0, food_web_DIM * sites)
-        || !food_web_allowed(&solver_params, sites, bonds != NULL ? bonds->count : 0))
-        return food_web_BAD_ARGUMENT;
+    if (rows == 0 || !food_web_connected(bonds, sites) || !food_web_allowed(&values, sites, bonds != NULL
+        ? bonds->count : 0)) return food_web_BAD_ARGUMENT;
+    if (!food_web_finite(x0, food_web_DIM * sites)) return food_web_BAD_ARGUMENT;
     double coef[food_web_COEFFICIENTS] = { 0.0 };
-    food_web_prepare_step(&solver_params, food_web_PROBE_STEP, coef);
+    food_web_prepare_step(&values, food_web_PROBE_STEP, coef);
     if (!food_web_finite(coef, food_web_COEFFICIENTS)) return food_web_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -401,7 +397,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     s->rows = rows;
     s->length = (ptrdiff_t)length;
     s->width = width;
-    s->params = solver_params;
+    s->params = values;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = food_web_block(rows, width);
     food_web_connect(s, bonds, memory + food_web_RESERVED * block);
@@ -409,8 +405,8 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     for (size_t k = 0; k < food_web_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < food_web_GATHERED; ++k, memory += block) s->gathered[k] = memory;
     for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->x[k], x0 + k * sites);
-    food_web_put_parameters(s, &solver_params);
-    food_web_put_at_bonds(s, &solver_params);
+    food_web_put_parameters(s, &values);
+    food_web_put_at_bonds(s, &values);
     return food_web_OK;
 }
 
@@ -484,29 +480,27 @@ static int food_web_try(food_web_solver *s, size_t steps)
    several steps; if they are not finite, these steps are repeated one by one. */
 static food_web_status food_web_march(food_web_solver *s, size_t steps)
 {
-    food_web_status status = food_web_OK;
     const size_t end = s->steps + steps;
-    for (size_t stretch = food_web_STRETCH; s->steps < end && status == food_web_OK;) {
+    for (size_t stretch = food_web_STRETCH; s->steps < end;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (food_web_try(s, now)) {
-            food_web_copy(s->before, s->x, s);
-            s->steps += now;
-            s->open = food_web_FLOWS > 1;
-        } else if (now > 1) {
+        if (!food_web_try(s, now)) {
+            if (now == 1) return food_web_NOT_FINITE;
             stretch = 1;
-        } else {
-            status = food_web_NOT_FINITE;
+            continue;
         }
+        food_web_copy(s->before, s->x, s);
+        s->steps += now;
+        s->open = food_web_FLOWS > 1;
     }
-    return status;
+    return food_web_OK;
 }
 
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
     food_web_status status = food_web_set_step(s, h);
     if (status != food_web_OK || steps == 0) return status;
-    if (s->open) food_web_copy(s->x, s->before, s); /* merged with the next flow */
-    else food_web_copy(s->before, s->x, s);
+    /* an open flow is merged with the next */
+    food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = food_web_march(s, steps);
     if (s->open && !food_web_try(s, 0)) { /* the last flow of the last step; s->before stays before it */
         status = food_web_NOT_FINITE;
@@ -546,8 +540,7 @@ double food_web_hamiltonian(const food_web_solver *s)
 {
     double density[food_web_BUFFER], sum = 0.0, rest = 0.0;
     food_web_row row = food_web_row_of(s);
-    for (row.to = 0; row.to < s->length;) {
-        row.from = row.to;
+    for (; row.from < s->length; row.from = row.to) {
         row.to = s->length - row.from > food_web_BUFFER ? row.from + food_web_BUFFER : s->length;
         food_web_energy_row(&row, density);
         for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated summation after A. Neumaier */

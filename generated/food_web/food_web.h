@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 75cdbb4471e17c1fd9f4cc84d026100d60a6c1d20d9279c24225166c8282504b
+ * body-sha256: ecf64e03eb1b84307fec1ce22c1b5f083a9c1edd1d5d837cf434bcbfef496698
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -38,7 +38,7 @@ typedef struct {
     size_t sizes[food_web_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[food_web_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */
+    double *x[food_web_ARRAYS]; /* first sites of the fields, then parameters at sites */
     double *before[food_web_DIM]; /* fields before the present steps, restored if one fails */
     double *gathered[food_web_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     int *bonds, *middle; /* for each site, index in other of the first bond from it, and to it */
@@ -64,8 +64,7 @@ typedef struct {
     const size_t *ends;
 } food_web_bonds;
 
-/* Bytes of memory that food_web_init needs for these sizes and this number of bonds; 0 if there are too
-   many. */
+/* Bytes that food_web_init needs for these sizes and this number of bonds; 0 if there are too many. */
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds);
 
 /* Initialise *s with the state x0[field][site]. work has food_web_work_size(sizes, bonds->count) bytes,

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 258fdbc142087cc3f3c79f672d47ada2bbd8c55945f2e9403ac2711a77396f09
+ * body-sha256: 6fed1efa9681dc3d60f2a10b406ac9b972ad608688c0bb884983c403fa5d586c
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -569,11 +569,11 @@ size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES])
 /* Copy values of sites, the last axis fastest, into rows. */
 static void heisenberg_put(const heisenberg_solver *s, double *rows, const double *values)
 {
+    memset(rows - heisenberg_LEAD, 0, s->rows * (size_t)s->width * sizeof *rows);
     for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - heisenberg_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        heisenberg_ends(row, s->length, 0, s->length);
+        memcpy(rows + (ptrdiff_t)r * s->width, values + r * (size_t)s->length,
+            (size_t)s->length * sizeof *rows);
+        heisenberg_ends(rows + (ptrdiff_t)r * s->width, s->length, 0, s->length);
     }
 }
 
@@ -621,14 +621,13 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return heisenberg_BAD_ARGUMENT;
-    const heisenberg_params solver_params = params != NULL ? *params : heisenberg_default_params;
+    const heisenberg_params values = params != NULL ? *params : heisenberg_default_params;
     const size_t rows = heisenberg_shape(sizes, &width), length = sizes[heisenberg_AXES - 1],
         sites = rows * length;
-    if (rows == 0 || !heisenberg_finite(x0, heisenberg_DIM * sites) || !heisenberg_allowed(&solver_params,
-        sites))
-        return heisenberg_BAD_ARGUMENT;
+    if (rows == 0 || !heisenberg_allowed(&values, sites)) return heisenberg_BAD_ARGUMENT;
+    if (!heisenberg_finite(x0, heisenberg_DIM * sites)) return heisenberg_BAD_ARGUMENT;
     double coef[heisenberg_COEFFICIENTS] = { 0.0 };
-    heisenberg_prepare_step(&solver_params, heisenberg_PROBE_STEP, coef);
+    heisenberg_prepare_step(&values, heisenberg_PROBE_STEP, coef);
     if (!heisenberg_finite(coef, heisenberg_COEFFICIENTS)) return heisenberg_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -636,14 +635,14 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     s->rows = rows;
     s->length = (ptrdiff_t)length;
     s->width = width;
-    s->params = solver_params;
+    s->params = values;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + heisenberg_LEAD;
     const size_t block = heisenberg_block(rows, width);
     heisenberg_find_all_lines(s, memory - heisenberg_LEAD + heisenberg_RESERVED * block);
     for (size_t k = 0; k < heisenberg_ARRAYS; ++k, memory += block) s->x[k] = memory;
     for (size_t k = 0; k < heisenberg_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < heisenberg_DIM; ++k) heisenberg_put(s, s->x[k], x0 + k * sites);
-    heisenberg_put_parameters(s, &solver_params);
+    heisenberg_put_parameters(s, &values);
     return heisenberg_OK;
 }
 
@@ -815,34 +814,31 @@ static int heisenberg_close(heisenberg_solver *s)
    several steps; if they are not finite, these steps are repeated one by one. */
 static heisenberg_status heisenberg_march(heisenberg_solver *s, size_t steps)
 {
-    heisenberg_status status = heisenberg_OK;
     const size_t end = s->steps + steps;
-    for (size_t stretch = heisenberg_STRETCH; s->steps < end && status == heisenberg_OK;) {
+    for (size_t stretch = heisenberg_STRETCH; s->steps < end;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
         if (s->far > 0 && s->far < now) now = s->far;
-        if (heisenberg_try(s, now)) {
-            heisenberg_copy(s->before, s->x, s);
-            s->steps += now;
-            s->open = heisenberg_FLOWS > 1;
-            s->far -= s->far > 0 ? now : 0;
-        } else if (now > 1) {
-            stretch = 1;
-        } else if (s->far == 0) { /* small-argument functions return NaN out of range */
-            s->far = heisenberg_FAR_STEPS;
-            stretch = heisenberg_STRETCH;
-        } else {
-            status = heisenberg_NOT_FINITE;
+        if (!heisenberg_try(s, now)) {
+            if (now == 1 && s->far > 0) return heisenberg_NOT_FINITE;
+            /* small-argument functions return NaN out of range */
+            if (now == 1) s->far = heisenberg_FAR_STEPS;
+            stretch = now > 1 ? 1 : heisenberg_STRETCH;
+            continue;
         }
+        heisenberg_copy(s->before, s->x, s);
+        s->steps += now;
+        s->open = heisenberg_FLOWS > 1;
+        s->far -= s->far > 0 ? now : 0;
     }
-    return status;
+    return heisenberg_OK;
 }
 
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
 {
     heisenberg_status status = heisenberg_set_step(s, h);
     if (status != heisenberg_OK || steps == 0) return status;
-    if (s->open) heisenberg_copy(s->x, s->before, s); /* merged with the next flow */
-    else heisenberg_copy(s->before, s->x, s);
+    /* an open flow is merged with the next */
+    heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = heisenberg_march(s, steps);
     if (s->open && !heisenberg_close(s)) { /* the last flow of the last step; s->before stays before it */
         status = heisenberg_NOT_FINITE;
@@ -912,8 +908,7 @@ double heisenberg_hamiltonian(const heisenberg_solver *s)
     double density[heisenberg_BUFFER], sum = 0.0, rest = 0.0;
     for (size_t r = 0; r < s->rows; ++r) {
         heisenberg_row row = heisenberg_piece_of(s, r);
-        for (row.to = 0; row.to < s->length;) {
-            row.from = row.to;
+        for (; row.from < s->length; row.from = row.to) {
             row.to = s->length - row.from > heisenberg_BUFFER ? row.from + heisenberg_BUFFER : s->length;
             heisenberg_energy_row(&row, density);
             for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated summation after A. Neumaier */

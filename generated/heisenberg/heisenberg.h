@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2aed302233553c7a4643b9e48dffe0f8dc855d0a8142ed5be5814e65af934279
+ * body-sha256: 1a75c7cf6e4cb2678304970e75cb3ff8a1ed1456b7a49eba1a3f77f56c17ff30
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -36,7 +36,7 @@ typedef struct {
     size_t sizes[heisenberg_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[heisenberg_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */
+    double *x[heisenberg_ARRAYS]; /* first sites of the fields, then parameters at sites */
     double *before[heisenberg_DIM]; /* fields before the present steps, restored if one fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
@@ -51,7 +51,7 @@ typedef struct {
     double t_before_h;
 } heisenberg_solver;
 
-/* Bytes of memory that heisenberg_init needs for these sizes; 0 if they are not admissible. */
+/* Bytes that heisenberg_init needs for these sizes; 0 if they are not admissible. */
 size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has heisenberg_work_size(sizes)

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 17508859aec2b1c303dd767640dd573dd87df8434878fcba2d63409012b24a5b
+ * body-sha256: 98e8bc3595759d3e47ef21cad386e91571836cdd4e88a42786fb8dc80dd0a543
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -77,9 +77,9 @@ typedef struct {
 /* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
-    if (sizes == NULL || sizes[0] < point_vortices_least[0] || sizes[0] > most / 2) return 0;
-    size_t wide = (sizes[0] + 7) / 8 * 8;
+    const size_t n = sizes != NULL ? sizes[0] : 0;
+    if (n < point_vortices_least[0] || n > SIZE_MAX / 128 / point_vortices_RESERVED) return 0;
+    const size_t wide = (n + 7) / 8 * 8;
     *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
     return 1;
 }
@@ -306,9 +306,8 @@ size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
 /* Copy values of sites, the last axis fastest, into rows. */
 static void point_vortices_put(const point_vortices_solver *s, double *rows, const double *values)
 {
-    double *row = rows;
-    memset(row, 0, (size_t)s->width * sizeof *row);
-    memcpy(row, values, (size_t)s->length * sizeof *row);
+    memset(rows, 0, s->rows * (size_t)s->width * sizeof *rows);
+    memcpy(rows, values, (size_t)s->length * sizeof *rows);
 }
 
 /* Copy fields to x[field][site], without the halo. */
@@ -352,13 +351,12 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return point_vortices_BAD_ARGUMENT;
-    const point_vortices_params solver_params = params != NULL ? *params : point_vortices_default_params;
+    const point_vortices_params values = params != NULL ? *params : point_vortices_default_params;
     const size_t rows = point_vortices_shape(sizes, &width), length = sizes[0], sites = rows * length;
-    if (rows == 0 || !point_vortices_finite(x0, point_vortices_DIM * sites)
-        || !point_vortices_allowed(&solver_params, sites))
-        return point_vortices_BAD_ARGUMENT;
+    if (rows == 0 || !point_vortices_allowed(&values, sites)) return point_vortices_BAD_ARGUMENT;
+    if (!point_vortices_finite(x0, point_vortices_DIM * sites)) return point_vortices_BAD_ARGUMENT;
     double coef[point_vortices_COEFFICIENTS] = { 0.0 };
-    point_vortices_prepare_step(&solver_params, point_vortices_PROBE_STEP, coef);
+    point_vortices_prepare_step(&values, point_vortices_PROBE_STEP, coef);
     if (!point_vortices_finite(coef, point_vortices_COEFFICIENTS)) return point_vortices_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -366,7 +364,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     s->rows = rows;
     s->length = (ptrdiff_t)length;
     s->width = width;
-    s->params = solver_params;
+    s->params = values;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = point_vortices_block(rows, width);
     for (size_t k = 0; k < point_vortices_ARRAYS; ++k, memory += block) s->x[k] = memory;
@@ -385,7 +383,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
         for (int k = 0; k < point_vortices_DIM; ++k, memory += block) s->space[d][k] = memory;
     s->sums = memory;
     for (size_t k = 0; k < point_vortices_DIM; ++k) point_vortices_put(s, s->x[k], x0 + k * sites);
-    point_vortices_put_parameters(s, &solver_params);
+    point_vortices_put_parameters(s, &values);
     return point_vortices_OK;
 }
 
@@ -792,8 +790,7 @@ double point_vortices_hamiltonian(const point_vortices_solver *s)
 {
     double density[point_vortices_BUFFER], sum = 0.0, rest = 0.0;
     point_vortices_row row = point_vortices_row_of(s);
-    for (row.to = 0; row.to < s->length;) {
-        row.from = row.to;
+    for (; row.from < s->length; row.from = row.to) {
         row.to = s->length - row.from > point_vortices_BUFFER ? row.from + point_vortices_BUFFER : s->length;
         point_vortices_energy_row(&row, density);
         for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated summation after A. Neumaier */

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f347075e224f3e88fa1d9fcd3fc743d9e518d9d4aeae1f6656b8383d86f1d675
+ * body-sha256: 93e1523dd67197f5bf36d74395968080aa690b0605b266a73baceebe723141a6
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -46,7 +46,7 @@ typedef struct {
     size_t sizes[point_vortices_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[point_vortices_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */
+    double *x[point_vortices_ARRAYS]; /* first sites of the fields, then parameters at sites */
     double *before[point_vortices_DIM]; /* fields before the present steps, restored if one fails */
     double *gathered[point_vortices_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     /* solution of a stage before and after a sweep, with the parameters at sites */
@@ -67,7 +67,7 @@ typedef struct {
     double t_before_h;
 } point_vortices_solver;
 
-/* Bytes of memory that point_vortices_init needs for these sizes; 0 if they are not admissible. */
+/* Bytes that point_vortices_init needs for these sizes; 0 if they are not admissible. */
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has

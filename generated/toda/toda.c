@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 5b8d695c7db81af16069948ec2eefc42ff6c77db4481c7f5876fdd08cd2191ab
+ * body-sha256: a7507f4a9772d810490b927b923dd52182d66415bd8ae9843cb99413e40d9ead
  */
 #include "toda.h"
 #include <math.h>
@@ -86,9 +86,9 @@ static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
 /* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / toda_RESERVED;
-    if (sizes == NULL || sizes[0] < toda_least[0] || sizes[0] > most / 2) return 0;
-    size_t wide = toda_LEAD + ((sizes[0] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
+    const size_t n = sizes != NULL ? sizes[0] : 0;
+    if (n < toda_least[0] || n > SIZE_MAX / 128 / toda_RESERVED) return 0;
+    const size_t wide = toda_LEAD + ((n + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
     *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
     return 1;
 }
@@ -255,10 +255,9 @@ size_t toda_work_size(const size_t sizes[toda_AXES])
 /* Copy values of sites, the last axis fastest, into rows. */
 static void toda_put(const toda_solver *s, double *rows, const double *values)
 {
-    double *row = rows;
-    memset(row - toda_LEAD, 0, (size_t)s->width * sizeof *row);
-    memcpy(row, values, (size_t)s->length * sizeof *row);
-    toda_ends(row, s->length, 0, s->length);
+    memset(rows - toda_LEAD, 0, s->rows * (size_t)s->width * sizeof *rows);
+    memcpy(rows, values, (size_t)s->length * sizeof *rows);
+    toda_ends(rows, s->length, 0, s->length);
 }
 
 /* Copy fields to x[field][site], without the halo. */
@@ -286,12 +285,12 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return toda_BAD_ARGUMENT;
-    const toda_params solver_params = params != NULL ? *params : toda_default_params;
+    const toda_params values = params != NULL ? *params : toda_default_params;
     const size_t rows = toda_shape(sizes, &width), length = sizes[0], sites = rows * length;
-    if (rows == 0 || !toda_finite(x0, toda_DIM * sites) || !toda_allowed(&solver_params, sites))
-        return toda_BAD_ARGUMENT;
+    if (rows == 0 || !toda_allowed(&values, sites)) return toda_BAD_ARGUMENT;
+    if (!toda_finite(x0, toda_DIM * sites)) return toda_BAD_ARGUMENT;
     double coef[toda_COEFFICIENTS] = { 0.0 };
-    toda_prepare_step(&solver_params, toda_PROBE_STEP, coef);
+    toda_prepare_step(&values, toda_PROBE_STEP, coef);
     if (!toda_finite(coef, toda_COEFFICIENTS)) return toda_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -299,7 +298,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     s->rows = rows;
     s->length = (ptrdiff_t)length;
     s->width = width;
-    s->params = solver_params;
+    s->params = values;
     double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
     const size_t block = toda_block(rows, width);
     for (size_t k = 0; k < toda_ARRAYS; ++k, memory += block) s->x[k] = memory;
@@ -370,29 +369,27 @@ static int toda_try(toda_solver *s, size_t steps)
    several steps; if they are not finite, these steps are repeated one by one. */
 static toda_status toda_march(toda_solver *s, size_t steps)
 {
-    toda_status status = toda_OK;
     const size_t end = s->steps + steps;
-    for (size_t stretch = toda_STRETCH; s->steps < end && status == toda_OK;) {
+    for (size_t stretch = toda_STRETCH; s->steps < end;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (toda_try(s, now)) {
-            toda_copy(s->before, s->x, s);
-            s->steps += now;
-            s->open = toda_FLOWS > 1;
-        } else if (now > 1) {
+        if (!toda_try(s, now)) {
+            if (now == 1) return toda_NOT_FINITE;
             stretch = 1;
-        } else {
-            status = toda_NOT_FINITE;
+            continue;
         }
+        toda_copy(s->before, s->x, s);
+        s->steps += now;
+        s->open = toda_FLOWS > 1;
     }
-    return status;
+    return toda_OK;
 }
 
 toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 {
     toda_status status = toda_set_step(s, h);
     if (status != toda_OK || steps == 0) return status;
-    if (s->open) toda_copy(s->x, s->before, s); /* merged with the next flow */
-    else toda_copy(s->before, s->x, s);
+    /* an open flow is merged with the next */
+    toda_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = toda_march(s, steps);
     if (s->open && !toda_try(s, 0)) { /* the last flow of the last step; s->before stays before it */
         status = toda_NOT_FINITE;
@@ -431,8 +428,7 @@ double toda_hamiltonian(const toda_solver *s)
 {
     double density[toda_BUFFER], sum = 0.0, rest = 0.0;
     toda_row row = toda_row_of(s);
-    for (row.to = 0; row.to < s->length;) {
-        row.from = row.to;
+    for (; row.from < s->length; row.from = row.to) {
         row.to = s->length - row.from > toda_BUFFER ? row.from + toda_BUFFER : s->length;
         toda_energy_row(&row, density);
         for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated summation after A. Neumaier */

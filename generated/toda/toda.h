@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bc999af48fc70c1aa779d528ada028212defb5078dfd3950e75b2e80ec0f191d
+ * body-sha256: 69764e31dbdcffaa4b43263af709acfe4b19b168e5a88d3ec0aa52636a8ca6f2
  */
 #ifndef TODA_H
 #define TODA_H
@@ -35,7 +35,7 @@ typedef struct {
     size_t sizes[toda_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[toda_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */
+    double *x[toda_ARRAYS]; /* first sites of the fields, then parameters at sites */
     double *before[toda_DIM]; /* fields before the present steps, restored if one fails */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
     size_t far; /* number of the next steps that use full-range functions */
@@ -49,7 +49,7 @@ typedef struct {
     double t_before_h;
 } toda_solver;
 
-/* Bytes of memory that toda_init needs for these sizes; 0 if they are not admissible. */
+/* Bytes that toda_init needs for these sizes; 0 if they are not admissible. */
 size_t toda_work_size(const size_t sizes[toda_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has toda_work_size(sizes) bytes,

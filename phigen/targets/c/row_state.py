@@ -26,7 +26,7 @@ LATTICE = (
     ),
     StateBlock(
         "x",
-        members=("double *x[PHI_ARRAYS]; /* first sites of the fields, the state, then of parameters at sites */",),
+        members=("double *x[PHI_ARRAYS]; /* first sites of the fields, then parameters at sites */",),
         reset=("for (size_t k = 0; k < PHI_ARRAYS; ++k, memory += block) s->x[k] = memory;",),
     ),
     StateBlock(

@@ -67,10 +67,7 @@ static void phi_connect(phi_solver *s, const phi_bonds *bonds, double *memory)
     s->other = s->middle + sites;
     s->number = s->other + 2 * count;
     memset(s->bonds, 0, (2 * sites + 1) * sizeof *s->bonds);
-    for (size_t k = 0; k < count; ++k) {
-        ++s->bonds[bonds->ends[2 * k]];
-        ++s->middle[bonds->ends[2 * k + 1]];
-    }
+    for (size_t k = 0; k < 2 * count; ++k) ++(k % 2 == 0 ? s->bonds : s->middle)[bonds->ends[k]];
     int end = 0; /* number of bonds so far */
     for (size_t i = 0; i < sites; ++i) {
         s->bonds[i] = end += s->bonds[i];

@@ -44,11 +44,10 @@ size_t phi_work_size(PHI_SIZES_OF_WORK)
 /* Copy values of sites, the last axis fastest, into rows. */
 static void phi_put(const phi_solver *s, double *rows, const double *values)
 {
+    memset(PHI_MEMORY_OF(rows), 0, s->rows * (size_t)s->width * sizeof *rows);
     PHI_EACH_ROW {
-        double *row = PHI_ROW_AT(rows);
-        memset(PHI_MEMORY_OF(row), 0, (size_t)s->width * sizeof *row);
-        memcpy(row, PHI_VALUES_AT(values), (size_t)s->length * sizeof *row);
-        PHI_COPY_ENDS(row, s->length, 0, s->length)
+        memcpy(PHI_ROW_AT(rows), PHI_VALUES_AT(values), (size_t)s->length * sizeof *rows);
+        PHI_COPY_ENDS(PHI_ROW_AT(rows), s->length, 0, s->length)
     }
 }
 
@@ -97,12 +96,12 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL PHI_OR_NO_T0) return PHI_BAD_ARGUMENT;
-    const phi_params solver_params = params != NULL ? *params : phi_default_params;
+    const phi_params values = params != NULL ? *params : phi_default_params;
     const size_t rows = phi_shape(sizes, &width), length = sizes[PHI_LAST_AXIS], sites = rows * length;
-    if (rows == 0 PHI_OR_UNCONNECTED(sites) || !phi_finite(x0, PHI_DIM * sites) || !phi_allowed(&solver_params, sites PHI_AND_BONDS))
-        return PHI_BAD_ARGUMENT;
+    if (rows == 0 PHI_OR_UNCONNECTED(sites) || !phi_allowed(&values, sites PHI_AND_BONDS)) return PHI_BAD_ARGUMENT;
+    if (!phi_finite(x0, PHI_DIM * sites)) return PHI_BAD_ARGUMENT;
     double coef[PHI_COEFFICIENTS] = { 0.0 };
-    phi_prepare_step(&solver_params, PHI_PROBE_STEP, coef);
+    phi_prepare_step(&values, PHI_PROBE_STEP, coef);
     if (!phi_finite(coef, PHI_COEFFICIENTS)) return PHI_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -111,7 +110,7 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
     s->length = (ptrdiff_t)length;
     s->width = width;
     PHI_TAKE_T0
-    s->params = solver_params;
+    s->params = values;
     phi_find_seams(s);
     double *memory = PHI_FIRST_SITE((double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64));
     const size_t block = phi_block(rows, width);
@@ -122,8 +121,8 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->x[k], x0 + k * sites);
     phi_clear_carry(s);
     phi_put_kinds(s);
-    phi_put_parameters(s, &solver_params);
-    phi_put_at_bonds(s, &solver_params);
+    phi_put_parameters(s, &values);
+    phi_put_at_bonds(s, &values);
 #if PHI_MONITOR
     memset(s->clock, 0, 4 * sizeof *s->clock);
     if (!phi_take_level(s)) return PHI_BAD_ARGUMENT;
@@ -195,8 +194,7 @@ double phi_hamiltonian(const phi_solver *s)
     double density[PHI_BUFFER], sum = 0.0, rest = 0.0;
     PHI_EACH_ROW {
         phi_row row = PHI_WHOLE_ROW;
-        for (row.to = 0; row.to < s->length;) {
-            row.from = row.to;
+        for (; row.from < s->length; row.from = row.to) {
             row.to = s->length - row.from > PHI_BUFFER ? row.from + PHI_BUFFER : s->length;
             phi_energy_row(&row, density);
             for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated summation after A. Neumaier */

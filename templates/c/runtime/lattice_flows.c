@@ -144,37 +144,36 @@ static int phi_close(phi_solver *s)
    steps; if they are not finite, these steps are repeated one by one. */
 static phi_status phi_march(phi_solver *s, size_t steps)
 {
-    phi_status status = PHI_OK;
     const size_t end = s->steps + steps;
-    for (size_t stretch = PHI_STRETCH; s->steps < end && status == PHI_OK;) {
+    for (size_t stretch = PHI_STRETCH; s->steps < end;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
 #if PHI_NEAR
         if (s->far > 0 && s->far < now) now = s->far;
 #endif
-        if (phi_try(s, now)) {
-            phi_copy(s->before, s->x, s);
-            s->steps += now;
+        if (!phi_try(s, now)) {
+#if PHI_NEAR
+            if (now == 1 && s->far > 0) return PHI_NOT_FINITE;
+            if (now == 1) s->far = PHI_FAR_STEPS; /* small-argument functions return NaN out of range */
+            stretch = now > 1 ? 1 : PHI_STRETCH;
+#else
+            if (now == 1) return PHI_NOT_FINITE;
+            stretch = 1;
+#endif
+            continue;
+        }
+        phi_copy(s->before, s->x, s);
+        s->steps += now;
 #if PHI_ADJOINT && !PHI_RECOMPUTED
-            if (s->tape != NULL) s->tape += now * phi_step_tape_size(s);
+        if (s->tape != NULL) s->tape += now * phi_step_tape_size(s);
 #endif
 #if !PHI_NOISE
-            s->open = PHI_FLOWS > 1;
+        s->open = PHI_FLOWS > 1;
 #endif
 #if PHI_NEAR
-            s->far -= s->far > 0 ? now : 0;
+        s->far -= s->far > 0 ? now : 0;
 #endif
-        } else if (now > 1) {
-            stretch = 1;
-#if PHI_NEAR
-        } else if (s->far == 0) { /* small-argument functions return NaN out of range */
-            s->far = PHI_FAR_STEPS;
-            stretch = PHI_STRETCH;
-#endif
-        } else {
-            status = PHI_NOT_FINITE;
-        }
     }
-    return status;
+    return PHI_OK;
 }
 
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
@@ -184,8 +183,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
-    if (s->open) phi_copy(s->x, s->before, s); /* merged with the next flow */
-    else phi_copy(s->before, s->x, s);
+    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* an open flow is merged with the next */
 #endif
     status = phi_march(s, steps);
 #if !PHI_NOISE

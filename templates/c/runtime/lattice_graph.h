@@ -6,7 +6,7 @@ typedef struct {
     const size_t *ends;
 } phi_bonds;
 
-/* Bytes of memory that phi_init needs for these sizes and this number of bonds; 0 if there are too many. */
+/* Bytes that phi_init needs for these sizes and this number of bonds; 0 if there are too many. */
 size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds);
 
 /* Initialise *s with the state x0[field][site]. work has phi_work_size(sizes, bonds->count) bytes, aligned as by malloc,

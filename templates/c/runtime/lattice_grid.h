@@ -1,6 +1,6 @@
 #ifndef PHI_FILE_LATTICE_GRID_H
 #define PHI_FILE_LATTICE_GRID_H
-/* Bytes of memory that phi_init needs for these sizes; 0 if they are not admissible. */
+/* Bytes that phi_init needs for these sizes; 0 if they are not admissible. */
 size_t phi_work_size(const size_t sizes[PHI_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has phi_work_size(sizes) bytes, aligned as by

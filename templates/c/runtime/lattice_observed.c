@@ -28,8 +28,7 @@ void phi_observables(const phi_solver *s, double *out)
     }
     PHI_EACH_ROW {
         phi_row row = PHI_WHOLE_ROW;
-        for (row.to = 0; row.to < s->length;) {
-            row.from = row.to;
+        for (; row.from < s->length; row.from = row.to) {
             row.to = s->length - row.from > PHI_SHARE ? row.from + PHI_SHARE : s->length;
             phi_observables_row(&row, density);
             for (int k = 0; k < PHI_OBSERVABLES; ++k)

@@ -6,9 +6,9 @@
 /* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
 static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / PHI_DOUBLES_OF_SITE;
-    if (sizes == NULL || sizes[0] < phi_least[0] PHI_OR_MISFIT(0) || sizes[0] > most / 2) return 0;
-    size_t wide = PHI_WIDE((sizes[0] + 7) / 8 * 8);
+    const size_t n = sizes != NULL ? sizes[0] : 0;
+    if (n < phi_least[0] PHI_OR_MISFIT(0) || n > SIZE_MAX / 128 / PHI_DOUBLES_OF_SITE) return 0;
+    const size_t wide = PHI_WIDE((n + 7) / 8 * 8);
     *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
     return 1;
 }
