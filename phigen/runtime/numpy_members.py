@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from phigen.runtime.interface import Floats, row_steps
+from phigen.runtime.interface import BackendError, Floats, row_steps
 from phigen.runtime.members import Members
 
 
@@ -17,6 +17,8 @@ def ensemble(module: Any, members: Members, gauge: Floats | None, turned: Floats
     """
     frames = members.frames() if members.stride else None
     if not len(members):
+        if not module._admissible(module._values(dict(members.parameters))):
+            raise BackendError("BAD_ARGUMENT", 0, members.x0)
         return members.x0.copy() if frames is None else frames
     batch = MemberBatch(module, members, gauge, None if turned is None else turned[0].copy())
     if frames is not None:
@@ -32,6 +34,16 @@ def ensemble(module: Any, members: Members, gauge: Floats | None, turned: Floats
     if turned is not None and frames is None:
         turned[-1] = batch.turned
     return members.checked(batch.final if frames is None else frames, batch.failures, batch.failed_at)
+
+
+def _refused(module: Any, members: Members) -> list[int]:
+    """Return the members that no step can begin from, for their parameters or for the monitor at their start."""
+    values = module._values(dict(members.parameters))
+    refused = set(map(int, module._refused(values, members.x0))) if hasattr(module, "_refused") else set()
+    if not module._admissible(values):
+        each = (module._values(members.numbers(m)[1]) for m in range(len(members)))
+        refused |= {m for m, numbers in enumerate(each) if not module._admissible(numbers)}
+    return sorted(refused)
 
 
 class MemberBatch:
@@ -57,6 +69,8 @@ class MemberBatch:
             self.turned = first.copy()
         self._before, self._running = self.x, False
         self._select_settings()
+        if refused := _refused(module, members):
+            self._leave(dict.fromkeys(refused, "BAD_ARGUMENT"))
 
     def advance(self, steps: int) -> None:
         """Make ``steps`` steps. A step in which members fail is repeated without them."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import ALIKE, NAMES, SPECIES, TARGETS, compile_text, compiled, setting, slow_but, solver
 
-from phigen.errors import StepError
+from phigen.errors import ParameterError, StepError
 from phigen.runtime import members as sharing
 
 DISTINCT = [name for name in NAMES if name not in ALIKE]
@@ -74,6 +74,36 @@ def test_parts_of_ensembles_end_where_groups_do(monkeypatch):
 
 
 FAST = [*product(TARGETS, ["fast"])]
+
+#: Specs, with states or parameters of three members, the second of which cannot begin a step.
+REFUSED = {
+    "monitor": ("hamiltonian: p**2/2 + a*cos(q)\nmonitor: q\n", [[1.0, 0.1], [-1.0, 0.2], [0.5, 0.3]], {}),
+    "coefficient": (
+        "hamiltonian: p**2/2 + q**2/(2*(a - 1))\nscheme: splitting\n",
+        [[1.0, 0.1], [1.1, 0.2], [0.5, 0.3]],
+        {"a": [1.5, 1.0, 2.0]},
+    ),
+}
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kind", REFUSED)
+def test_a_member_that_cannot_begin_leaves_the_others_their_runs(target, kind):
+    text, start, given = REFUSED[kind]
+    pair = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+    solve = solver(compile_text(f"{pair}parameters: {{a: {{value: 1.3}}}}\norder: 4\n{text}"), target)
+    for stride in (None, 2):
+        with pytest.raises(ParameterError) as refused:
+            solve.ensemble(start, 0.01, 6, stride, **given)
+        assert refused.value.members == (1,)
+        states = refused.value.trajectory
+        for m in (0, 2):
+            run = solve.integrate(start[m], 0.01, 6, stride or 6, **{key: value[m] for key, value in given.items()})
+            np.testing.assert_allclose(states[..., m, :], run.x if stride else run.x[-1], rtol=1e-14)
+        if stride:
+            assert np.isnan(states[1:, 1]).all()
+        else:
+            np.testing.assert_array_equal(states[1], start[1])
 
 
 @pytest.mark.thin(3)
