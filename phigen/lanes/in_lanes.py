@@ -195,20 +195,23 @@ def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
 def _of_explicit(program: Program, step: Explicit) -> Packs | None:
     if not _is_lowered(program):
         return None
-    transposes = step.adjoint.steps if step.adjoint else ()
-    return _with_transposes(program, _packs(program, (step.increment,), ()), transposes, 0)
+    packs = _packs(program, (step.increment,))
+    return packs and _with_transposes(program, packs, step.adjoint.steps if step.adjoint else (), 0)
 
 
 def _of_splitting(program: Program, step: Splitting) -> Packs | None:
     if not _is_lowered(program):
         return None
-    used = operations(step.flows)
-    packs = _packs(program, step.flows, tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f in used))
+    packs = _packs(program, step.flows)
+    if packs is None:
+        return None
     segment_bytes = 2 * _DOUBLE * LANES**2 * program.dimension  # of the stored states of one pack
-    inverse_transposes = recomputing_transposes(program, step) if packs else ()
-    if packs and inverse_transposes:
-        return _with_transposes(program, replace(packs, recomputed=True), inverse_transposes, 0)
-    return _with_transposes(program, packs, step.adjoint.steps if step.adjoint else (), segment_bytes)
+    if inverse_transposes := recomputing_transposes(program, step):
+        packs = _with_transposes(program, replace(packs, recomputed=True), inverse_transposes, 0)
+    else:
+        packs = _with_transposes(program, packs, step.adjoint.steps if step.adjoint else (), segment_bytes)
+    used = operations([*packs.kernels, *packs.transposes])
+    return replace(packs, small_argument=tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f in used))
 
 
 def _of_gauss(program: Program, step: Gauss) -> Stages | None:
@@ -356,7 +359,7 @@ def _turns(program: Program) -> list[LaneKernel]:
     return [LaneKernel(kernel) for kernel in (*by_covector, attitude.turn)]
 
 
-def _packs(program: Program, kernels: Sequence[Kernel], small_argument: tuple[str, ...]) -> Packs | None:
+def _packs(program: Program, kernels: Sequence[Kernel]) -> Packs | None:
     """Return packs, if all members have the same coefficients and every function has a vector version."""
     ops = operations(kernels)
     states = 2 * PACKS_PER_GROUP * LANES * 3 * program.dimension
@@ -364,10 +367,10 @@ def _packs(program: Program, kernels: Sequence[Kernel], small_argument: tuple[st
         return None  # members of a pack begin and end their runs at different steps
     if program.held or library_calls(ops) or library_powers(kernels) or _DOUBLE * states > MAX_STACK_BYTES:
         return None
-    return Packs(tuple(kernels), with_formulas(ops), small_argument)
+    return Packs(tuple(kernels), with_formulas(ops), ())
 
 
-def _with_transposes(program: Program, packs: Packs | None, transposes: Sequence[Kernel], stored: int) -> Packs | None:
+def _with_transposes(program: Program, packs: Packs, transposes: Sequence[Kernel], stored: int) -> Packs:
     """Return packs with the transposes, if these can be computed in lanes too.
 
     Their number is the largest whose stored states fit on the stack: ``stored`` bytes for one pack, growing with the
@@ -376,7 +379,7 @@ def _with_transposes(program: Program, packs: Packs | None, transposes: Sequence
     transposes = transposes if program.offers("members") else ()
     ops = operations(transposes)
     reverse_packs = next((k for k in (PACKS_PER_GROUP, 2, 1) if 2 * k**2 * stored <= MAX_STACK_BYTES), 0)
-    if packs is None or not reverse_packs or library_calls(ops) or library_powers(transposes):
+    if not reverse_packs or library_calls(ops) or library_powers(transposes):
         return packs
     return replace(
         packs, calls=packs.calls | with_formulas(ops), transposes=tuple(transposes), reverse_packs=reverse_packs

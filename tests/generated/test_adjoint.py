@@ -474,3 +474,18 @@ def test_steps_that_forget_what_was_before_are_pulled_back_too():
         product = tangent @ product
     x0_bar = made.pullback(x, 0.4, steps, bar).x0_bar
     assert np.max(np.abs(x0_bar - bar @ product)) <= 1e-12 * np.max(np.abs(x0_bar))
+
+
+@pytest.mark.parametrize("composition", ["blanes-moan", "blanes-moan-rkn"])
+@pytest.mark.parametrize("kick", ["sin(q)", "-cos(q)"])
+def test_batches_define_functions_that_only_transposes_call(kick, composition):
+    """A kick of sin(q) calls cos, its transpose sin."""
+    text = f"hamiltonian: p**2/2 + a*{kick}\nparameters: {{a: {{value: 1.3}}}}\nscheme: splitting\norder: 4\n"
+    pair = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nadjoint: true\n"
+    solve = solver(compile_text(f"{pair}{text}composition: {composition}\n"), "c")
+    random = np.random.default_rng(3)
+    start, bars, along = (random.normal(size=(20, 2)) for _ in range(3))
+    slopes = solve.pullback(start, 0.1, 6, bars).x0_bar
+    ahead, behind = (solve.ensemble(start + sign * 1e-5 * along, 0.1, 6) for sign in (1, -1))
+    by_differences = np.sum(bars * (ahead - behind), axis=1) / 2e-5
+    np.testing.assert_allclose(np.sum(slopes * along, axis=1), by_differences, rtol=1e-8, atol=1e-8)
