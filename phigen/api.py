@@ -106,13 +106,18 @@ def compile(
     the mathematics is refuted, e.g. if π is not Poisson, and `ToolchainError` if C was requested and there is no
     working compiler, or the one named in CC does not work.
     """
-    if target != "auto" and not registry.find(target).loader:
-        runnable = ", ".join(registry.RUNNABLE)
-        raise ValueError(f"Python cannot run the target {target!r}; it can run {runnable}")
+    expect_runnable(target)
     if device is not None and target not in registry.DEVICES:
         raise ValueError(f"device={device!r} is for the targets {' and '.join(registry.DEVICES)}, not {target!r}")
     compilation = compilation_of(source, order=order, scheme=scheme, tangent=tangent, adjoint=adjoint, profile=profile)
     return (lattice_solver_of if compilation.spec.lattice else solver_of)(compilation, target, device)
+
+
+def expect_runnable(target: str) -> None:
+    """Raise `ValueError` for a target that is unknown, or that Python cannot run."""
+    if target != "auto" and not registry.find(target).loader:
+        runnable = ", ".join(registry.RUNNABLE)
+        raise ValueError(f"Python cannot run the target {target!r}; it can run {runnable}")
 
 
 def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:

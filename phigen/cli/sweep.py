@@ -14,11 +14,11 @@ from phigen.cli.arguments import (
     order_option,
     profile_option,
     scheme_option,
-    target_option,
 )
 from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.existing import expect_same_origin, force_option, wrote
 from phigen.cli.sources import load_one
+from phigen.registry import RUNNABLE
 
 if TYPE_CHECKING:
     from phigen.spec.model import Spec, SweepSettings
@@ -41,7 +41,12 @@ if TYPE_CHECKING:
     type=click.IntRange(min=1),
     help="Number of processes.  [default: one for each core, or each device]",
 )
-@target_option
+@click.option(
+    "-t",
+    "--target",
+    type=click.Choice(["auto", *RUNNABLE]),
+    help="Target that runs the members; overrides the sweep.  [default: auto]",
+)
 @order_option
 @scheme_option
 @profile_option
@@ -65,7 +70,7 @@ def command(
     output: Path | None,
     scheduler: str | None,
     workers: int | None,
-    target: str,
+    target: str | None,
     order: int | None,
     scheme: str | None,
     profile: str | None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from phigen.registry import TARGETS
+from phigen.registry import RUNNABLE, TARGETS
 from phigen.spec import limits
 from phigen.spec.kinds import (
     Boolean,
@@ -404,6 +404,7 @@ SWEEP = Record(
             Integer(1, limits.STEPS, limit=True),
             "also store states: the number of steps from one to the next",
         ),
+        RecordKey("target", OneOf(("auto", *RUNNABLE)), "target that runs the members", default="auto"),
         RecordKey("description", PROSE, "what the sweep shows"),
     ),
 )

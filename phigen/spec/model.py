@@ -340,10 +340,10 @@ class Statistic:
 
 @dataclass(frozen=True)
 class SweepSettings:
-    """A run for many values: a grid of axes, or so many ``random`` members, or those in a ``file``.
+    """A run for many values: a grid of axes, or a number of ``random`` members, or those in a ``file``.
 
-    ``keep`` (`phigen.spec.names.KEPT`, and statistics of observables) says what is stored of each, and ``frames`` that
-    every so many steps is.
+    ``keep`` (`phigen.spec.names.KEPT`, and statistics of observables) says what is stored of each member; with
+    ``frames``, the states after that number of steps are stored too. ``target`` is that of ``phigen sweep -t``.
     """
 
     name: str
@@ -354,6 +354,7 @@ class SweepSettings:
     file: str = ""
     keep: tuple[str, ...] = ("final",)
     frames: int = 0
+    target: str = "auto"
     description: str = ""
 
     @property

@@ -54,6 +54,7 @@ def sweep(
         file=words.get("file") or "",
         keep=_kept(raw.get("keep"), place, declared, observables),
         frames=raw.get("frames", 0),
+        target=raw.get("target", "auto"),
         description=raw.get("description", ""),
     )
     incomplete = len(axes) + len(words) < len(raw.get("over") or {}) or None in words.values()

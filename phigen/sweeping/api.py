@@ -15,7 +15,7 @@ import numpy as np
 
 from phigen import resources
 from phigen import spec as specs
-from phigen.api import _spec_of
+from phigen.api import _spec_of, expect_runnable
 from phigen.geometry.system import System
 from phigen.runtime import arguments
 from phigen.spec import limits
@@ -43,7 +43,7 @@ def sweep(
     output: str | PathLike[str] | None = None,
     scheduler: str | None = None,
     workers: int | None = None,
-    target: str = "auto",
+    target: str | None = None,
     order: int | None = None,
     scheme: str | None = None,
     profile: str | None = None,
@@ -67,6 +67,8 @@ def sweep(
     from phigen.sweeping.sweep import SweepSetting, made
 
     xarray = imported("xarray")
+    if target is not None:
+        expect_runnable(target)
     spec = _spec(source)
     base = _run_of(spec, run, name, initial, h, steps, parameters)
     chosen = _sweep_of(spec, name, base, over, keep, frames)

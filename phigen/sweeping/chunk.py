@@ -84,9 +84,10 @@ def _alone(name: str) -> Iterator[None]:
 def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Floats]:
     """Return results and statuses of the members with these numbers. Each member has its own path of the noise."""
     plan, count = job.plan, len(numbers)
-    parameters = {name: varied.get(name, np.full(count, value)) for name, value in plan.parameters.items()}
+    # Numbers common to all members have the shape (): solvers then share the coefficients of steps.
+    parameters = {name: varied.get(name, np.asarray(value)) for name, value in plan.parameters.items()}
     x0 = np.stack([varied.get(c, np.full(count, v)) for c, v in zip(plan.coordinates, plan.initial, strict=True)], 1)
-    h, t0 = varied.get("step", np.full(count, plan.h)), varied.get("start", np.full(count, plan.t0))
+    h, t0 = varied.get("step", np.asarray(plan.h)), varied.get("start", np.asarray(plan.t0))
     good = np.isfinite(x0).all(axis=1) & np.isfinite(h) & (h != 0) & np.isfinite(t0)
     for name, values in parameters.items():
         good &= np.isfinite(values) & ((values > 0) | (name not in solver.interface.positive))

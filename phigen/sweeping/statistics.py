@@ -72,7 +72,8 @@ def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: F
     """Return the standard errors of means (members, observables) over rows, from means of blocks."""
     values = _values(job, solver, members, rows, numbers)
     errors = np.empty(values.shape[1:])
-    clocks, which = np.unique(np.stack([members.t0, members.h], axis=1), axis=0, return_inverse=True)
+    clock = np.stack(np.broadcast_arrays(members.t0, members.h, np.empty(len(members)))[:2], axis=1)
+    clocks, which = np.unique(clock, axis=0, return_inverse=True)
     for k, (t0, h) in enumerate(clocks.tolist()):  # members with the same times of rows are averaged together
         alike = np.flatnonzero(which.reshape(-1) == k)
         columns = values[:, alike].reshape(len(values), -1)

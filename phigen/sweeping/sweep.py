@@ -16,7 +16,7 @@ from phigen._version import __version__
 from phigen.api import chosen_target, compilation_of, files_of, interface_of
 from phigen.compilation import Compilation
 from phigen.compiler import emit
-from phigen.errors import Diagnostic, FileError, SpecError
+from phigen.errors import DeviceError, Diagnostic, FileError, MissingPackageError, SpecError
 from phigen.geometry.conservation import LARGE_ENERGY_ERROR
 from phigen.memory import expect_room
 from phigen.reading import opened_text
@@ -27,6 +27,7 @@ from phigen.spec.names import KEPT
 from phigen.spec.problems import did_you_mean
 from phigen.sweeping import cluster, lattice_members, store
 from phigen.sweeping.devices import workers_of
+from phigen.sweeping.differences import differences
 from phigen.sweeping.plan import Plan, chunk_of
 from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_errors
 
@@ -42,12 +43,12 @@ _LEAST, _MOST = 32, 1 << 17
 
 @dataclass(frozen=True)
 class SweepSetting:
-    """Setting of a computation: the store, the workers, the solver."""
+    """Setting of a computation: the store, the workers, the solver. ``target`` replaces that of the sweep."""
 
     output: Path
     scheduler: str | None = None
     workers: int | None = None
-    target: str = "auto"
+    target: str | None = None
     order: int | None = None
     scheme: str | None = None
     profile: str | None = None
@@ -79,6 +80,8 @@ def made(
     time do not fit into memory, and `SweepError`.
     """
     store.imported("zarr")
+    target = chosen_target(setting.target or sweep.target)
+    workers = setting.workers or _workers(target, spec, sweep, setting)
     compilation = compilation_of(
         _with_ensembles(spec),
         order=setting.order,
@@ -88,7 +91,6 @@ def made(
     )
     listed = _listed(sweep, spec) if sweep.file else {}
     _expect_names([*(axis.name for axis in sweep.over), *listed], spec, sweep)
-    target = chosen_target(setting.target)
     plan = _plan(spec, sweep, run, {name: len(values) for name, values in listed.items()}, target)
     _expect_room_for_axes(sweep, spec)
     beside = _beside(compilation, target, spec)
@@ -98,10 +100,10 @@ def made(
         counts[:] += members, failed
         tell(members, failed)
 
-    job = _gone_on_with(setting.output, plan, beside) if setting.output.exists() else None
+    job = _gone_on_with(setting.output, plan, beside, spec, listed) if setting.output.exists() else None
     if job is None or store.waiting(job):
-        with cluster.connected(setting.scheduler, setting.workers or workers_of(target)) as (client, slots):
-            job = job or _created(setting.output, plan, beside, listed, slots)
+        with cluster.connected(setting.scheduler, workers) as (client, slots):
+            job = job or _created(setting.output, plan, beside, spec, listed, slots)
             chunks = store.waiting(job)
             if setting.scheduler is None:  # workers on another machine check the memory of that machine
                 running, held = min(slots, len(chunks)), prod(job.plan.chunk) * job.plan.bytes_of_member
@@ -116,6 +118,17 @@ def made(
     else:
         energy = energy_errors(job, compilation.system, LARGE_ENERGY_ERROR)
     return Outcome(int(counts[0]), int(counts[1]), plan.size, dims, compilation.order.order, energy)
+
+
+def _workers(target: str, spec: Spec, sweep: SweepSettings, setting: SweepSetting) -> int:
+    """Return the default number of workers. Raises `DeviceError` or `MissingPackageError` if there is no device."""
+    try:
+        return workers_of(target)
+    except (DeviceError, MissingPackageError) as error:
+        if setting.target is not None:
+            raise
+        place = spec.diagnostic(("sweeps", sweep.name, "target"), "").location
+        raise type(error)(f"{place}: {error}\n  hint: or choose another target by -t") from error
 
 
 def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> None:
@@ -183,18 +196,19 @@ def _beside(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]
     return store.made_by(interface_of(program), files_of(program, target, command), functions, spec.source)
 
 
-def _gone_on_with(output: Path, plan: Plan, beside: Mapping[str, Any]) -> store.Job:
+def _gone_on_with(
+    output: Path, plan: Plan, beside: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
+) -> store.Job:
     """Return the store of an earlier call if it belongs to this sweep. Raises `FileError`."""
     job = store.open_job(str(output))
-    stored = store.made_by(job.interface, job.files, job.functions, job.spec)
-    if store.digest_of(job.plan, stored) != store.digest_of(plan, beside):
-        message = f"{output} holds another sweep, or one by another version"
+    if phrases := differences(job, plan, beside, spec, listed):
+        message = f"{output} holds another sweep: {'; '.join(phrases)}"
         raise FileError(f"{message}\n  hint: choose another name by -o, or remove the store")
     return job
 
 
 def _created(
-    output: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats], slots: int
+    output: Path, plan: Plan, beside: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats], slots: int
 ) -> store.Job:
     """Return a new store with chunks that keep all workers busy, or the store that another process has created
     meanwhile.
@@ -207,7 +221,7 @@ def _created(
     members = int(min(max(_SECONDS / seconds, least), _MOST, max(least, plan.size // (4 * slots))))
     if store.create(output, replace(plan, chunk=chunk_of(plan, members)), beside, listed):
         return store.open_job(str(output))
-    return _gone_on_with(output, plan, beside)
+    return _gone_on_with(output, plan, beside, spec, listed)
 
 
 def _seconds_of_a_member(job: store.Job) -> float:

@@ -7,19 +7,22 @@ import sys
 import threading
 import time
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import phigen
+from phigen import resources
 from phigen import spec as specs
 from phigen.api import compilation_of
-from phigen.errors import FileError, SpecError
+from phigen.errors import FileError, MissingPackageError, SpecError
 from phigen.spec.model import Axis, SweepSettings
 from phigen.spec.sweeps import end_of_its_own
 from phigen.study.lyapunov import spectrum
-from phigen.sweeping import api, store
+from phigen.sweeping import api, chunk, store
 from phigen.sweeping.plan import Plan, chunk_of, values_of
 
 xarray = pytest.importorskip("xarray")
@@ -274,7 +277,7 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped_and_another_is_refused(sp
     data = phigen.sweep(spec, **given, progress=lambda members, failed: second.append(members))
     assert sum(second) <= 480 - sum(first)
     assert (data.status == 0).all()
-    with pytest.raises(FileError, match="holds another sweep"):
+    with pytest.raises(FileError, match=r"holds another sweep: number of steps 60, not 61\n"):
         phigen.sweep(spec, **given, steps=61)
     with pytest.raises(FileError, match="not a sweep of phigen"):
         phigen.sweep(spec, over=OVER, output=tmp_path)
@@ -395,8 +398,109 @@ def test_another_sweep_into_a_store_that_is_being_made_is_refused(cluster, tmp_p
         return create(*arguments)
 
     monkeypatch.setattr(store, "create", another_first)
-    with pytest.raises(FileError, match="holds another sweep"):
+    with pytest.raises(FileError, match=r"holds another sweep: other ranges of over\n"):
         phigen.sweep(tmp_path / "s.yaml", over={"I2": [2.0, 2.5]}, **setting)
+
+
+SPRINGS = """\
+phigen: 1
+name: chain
+lattice: {axes: [i], boundary: open}
+coordinates: [q, p]
+parameters: {k: 1}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + k*(q[i+1] - q)**2/2
+scheme: splitting
+order: 2
+runs: {go: {sizes: [4], initial: {q: "i", p: 0}, step: 0.1, steps: 20}}
+"""
+
+
+def test_only_what_determines_results_makes_another_sweep(cluster, tmp_path):
+    """Texts and targets of the spec do not, and equations, sections, starts of lattices and listed members do."""
+    setting = {"output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
+
+    def sweep(text, **more):
+        (tmp_path / "s.yaml").write_text(text)
+        return phigen.sweep(tmp_path / "s.yaml", **setting, **more)
+
+    sweep(BODY, over={"I2": [2.0, 2.5]}, keep=["crossings"])
+    texts = "title: Another title\ntargets: [numpy]\n"
+    data = sweep(BODY.replace("runs:", f"{texts}runs:"), over={"I2": [2.0, 2.5]}, keep=["crossings"])
+    assert (data.status == 0).all()
+    for old, new, said in [
+        ("section: x2", "section: x3", "another section"),
+        ("x3**2/I3)/2", "x3**2/I3)/3", "another solver: other equations"),
+    ]:
+        with pytest.raises(FileError, match=f"holds another sweep: {said}"):
+            sweep(BODY.replace(old, new), over={"I2": [2.0, 2.5]}, keep=["crossings"])
+    setting["output"] = tmp_path / "chain.zarr"
+    sweep(SPRINGS, over={"k": [1.0]})
+    sweep(SPRINGS.replace("order: 2", "order: 2\ntargets: [numpy]"), over={"k": [1.0]})
+    with pytest.raises(FileError, match=r"holds another sweep: other initial values, bonds or parameters at sites\n"):
+        sweep(SPRINGS.replace('"i"', '"2*i"'), over={"k": [1.0]})
+    setting["output"] = tmp_path / "listed.zarr"
+    (tmp_path / "m.csv").write_text("I2\n2.0\n2.5\n")
+    sweep(BODY, over={"file": "m.csv"})
+    (tmp_path / "m.csv").write_text("I2\n2.0\n2.6\n")
+    with pytest.raises(FileError, match=r"holds another sweep: other values in the file of members\n"):
+        sweep(BODY, over={"file": "m.csv"})
+
+
+def test_the_target_of_a_sweep_is_that_of_the_spec_unless_another_is_requested(cluster, tmp_path, monkeypatch):
+    from phigen.cli import group
+
+    monkeypatch.setattr(sweeping, "workers_of", lambda target: 1)
+    (tmp_path / "s.yaml").write_text(BODY + "sweeps: {one: {over: {I2: [1.5]}, target: numpy}}\n")
+    setting = {"scheduler": cluster.scheduler_address}
+    for target, expected in [(None, "numpy"), ("c", "c"), ("auto", "c")]:
+        data = phigen.sweep(tmp_path / "s.yaml", target=target, **setting)
+        assert data.attrs["target"] == expected
+    with pytest.raises(ValueError, match="unknown target 'opencll'; did you mean 'opencl'"):
+        phigen.sweep(tmp_path / "s.yaml", target="opencll")
+    command = ["sweep", str(tmp_path / "s.yaml"), "--scheduler", setting["scheduler"]]
+    for options, expected in [([], "numpy"), (["-t", "c"], "c")]:
+        output = str(tmp_path / f"{expected}.zarr")
+        done = CliRunner().invoke(group, [*command, "-o", output, *options])
+        assert done.exit_code == 0, done.output
+        assert xarray.open_zarr(output).attrs["target"] == expected
+
+
+def test_a_target_that_is_unknown_or_unavailable_is_refused_at_its_place(tmp_path, monkeypatch):
+    text = BODY + "sweeps: {one: {over: {I2: [1.5]}, target: %s}}\n"
+    with pytest.raises(SpecError, match=r":10:43: error: target: 'opencll' is not known") as refused:
+        specs.loads(text % "opencll")
+    assert "did you mean 'opencl'?" in str(refused.value)
+
+    def none(target):
+        raise MissingPackageError(f"target {target} needs CuPy")
+
+    monkeypatch.setattr(sweeping, "workers_of", none)
+    (tmp_path / "s.yaml").write_text(text % "cuda")
+    with pytest.raises(MissingPackageError, match=r"s\.yaml:10:43: target cuda needs CuPy\n  hint: .* by -t"):
+        phigen.sweep(tmp_path / "s.yaml")
+    with pytest.raises(MissingPackageError, match=r"^target cuda needs CuPy$"):
+        phigen.sweep(tmp_path / "s.yaml", target="cuda")
+
+
+@pytest.mark.parametrize("varied", [(), ("I2",), ("step",)])
+def test_numbers_common_to_all_members_are_passed_once(spec, varied):
+    """Devices share the coefficients of steps between members that have the same parameters and step."""
+    passed = []
+    solver = phigen.compile(spec, "numpy")
+    plan = Plan("p", spec.coordinates, (0.01, 1.0, 0.01), 0.1, 0.0, solver.interface.parameters, 10)
+    values = {"x1": np.array([0.1, 0.2]), "I2": np.array([2.0, 2.5]), "step": np.array([0.1, 0.2])}
+
+    def ensemble(members, threads):
+        passed.append(members)
+        return members.x0
+
+    monkeypatched = SimpleNamespace(interface=solver.interface, backend=SimpleNamespace(ensemble=ensemble))
+    chunk._measured(SimpleNamespace(plan=plan), monkeypatched, {n: values[n] for n in ("x1", *varied)}, np.arange(2))
+    (members,) = passed
+    shapes = {"I1": members.parameters["I1"], "I2": members.parameters["I2"], "step": members.h, "start": members.t0}
+    assert {name for name, value in shapes.items() if np.ndim(value)} == {*varied}
+    assert members.alike == (not varied)
 
 
 def test_members_of_a_file_are_made_in_its_order(cluster, tmp_path):
@@ -578,16 +682,15 @@ def test_large_energy_errors_of_lattices_are_counted_in_the_unit_of_runs(cluster
 
 
 @pytest.mark.slow
-def test_members_on_a_device_are_those_of_c(cluster):
+@pytest.mark.parametrize("varied", ["g", "q"])
+def test_members_on_a_device_are_those_of_c(cluster, varied):
     pytest.importorskip("pyopencl")
-    given = {
-        "over": {"g": [0.9, 1.0, 1.1]},
-        "steps": 200,
-        "keep": ["final"],
-        "scheduler": cluster.scheduler_address,
-        "profile": "small",
-    }
-    ours, theirs = (phigen.sweep("pendulum_euler", **given, target=target) for target in ("opencl", "c"))
+    given = {"scheduler": cluster.scheduler_address, "profile": "small"}
+    pendulum = Path(resources.file_of("pendulum_euler")).read_text().partition("sweeps:")[0]
+    one = f"sweeps: {{one: {{over: {{{varied}: [0.9, 1.0, 1.1]}}, keep: [final], target: opencl}}}}\n"
+    spec = specs.loads(pendulum + one)
+    ours, theirs = (phigen.sweep(spec, **given, steps=200, target=target) for target in (None, "c"))
+    assert (ours.attrs["target"], theirs.attrs["target"]) == ("opencl", "c")
     names = [name for name in ours.data_vars if name in ("q", "p", "final")]
     assert names
     for name in names:

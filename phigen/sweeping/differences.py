@@ -1,0 +1,109 @@
+"""Differences between the sweep in a store and a requested one, in what determines the results."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from phigen import spec as specs
+from phigen.runtime.interface import Floats
+from phigen.spec.model import Run, Spec
+from phigen.sweeping import store
+from phigen.sweeping.plan import Plan
+from phigen.targets import header
+
+#: Names of the entries of a plan in messages. Names of sweeps and runs, and the division into chunks, are left out: no
+#: result depends on them.
+_ENTRIES = {
+    "coordinates": "coordinates",
+    "sizes": "sizes of the lattice",
+    "initial": "initial values",
+    "parameters": "parameters",
+    "h": "step",
+    "t0": "time at the start",
+    "steps": "number of steps",
+    "axes": "ranges of over:",
+    "members": "number of members",
+    "listed": "columns of the file of members",
+    "seed": "seed of the sweep",
+    "noise": "seed of the noise",
+    "keep": "keep:",
+    "frames": "frames:",
+}
+
+#: Entries on which only statistics of observables over a run depend.
+_AVERAGED = {"after": "average: after:", "blocks": "average: blocks:", "stride": "stride:"}
+
+#: Further facts about a plan, by their names in messages.
+_FACTS = {"target": "target", "phigen": "version of phigen", "file": "folder of the spec"}
+
+#: Longest value that a message shows.
+_SHORT = 40
+
+
+def differences(
+    job: store.Job, plan: Plan, beside: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
+) -> list[str]:
+    """Return how the sweep in a store differs from a plan: one phrase for each entry that determines results.
+
+    ``beside`` are the solver and the other data for workers, ``listed`` the values from a file of members.
+    """
+    ours, theirs = plan.as_json(), job.plan.as_json()
+    entries = _ENTRIES | (_AVERAGED if any("(" in word for word in plan.keep) else {})
+    phrases = [_phrase(name, theirs[key], ours[key]) for key, name in entries.items() if theirs[key] != ours[key]]
+    before, now = theirs["about"], ours["about"]
+    phrases += [
+        _phrase(name, before.get(key), now.get(key)) for key, name in _FACTS.items() if before.get(key) != now.get(key)
+    ]
+    if not phrases:
+        phrases += _differences_of_solver(job, beside)
+        phrases += _differences_of_run(job, plan, spec)
+        if any(not np.array_equal(job.root[name][:], values) for name, values in listed.items()):
+            phrases.append("other values in the file of members")
+    return phrases
+
+
+def _phrase(name: str, stored: Any, requested: Any) -> str:
+    """``number of steps 60, not 61``, or ``other initial values``."""
+    if max(len(str(stored)), len(str(requested))) > _SHORT or isinstance(stored, list | tuple | dict):
+        return f"other {name.rstrip(':')}"
+    return f"{name} {stored}, not {requested}"
+
+
+def _differences_of_solver(job: store.Job, beside: Mapping[str, Any]) -> list[str]:
+    """Return differences of the solver, apart from the comments and the digest of the spec in its files."""
+    stored = store.made_by(job.interface, job.files, job.functions, job.spec)
+    stored_texts, texts = ([*about["files"].values(), about["functions"]] for about in (stored, beside))
+    same = stored["interface"] == beside["interface"] and [*map(_body, stored_texts)] == [*map(_body, texts)]
+    return [] if same else ["another solver: other equations, observables, order, scheme or profile"]
+
+
+def _body(text: str) -> str:
+    """Return a generated file without its header and the digest of its spec."""
+    return re.sub(r'(SPEC_SHA256\W+)"[0-9a-f]{64}"', r"\1", header.split(text)[1])
+
+
+def _differences_of_run(job: store.Job, plan: Plan, spec: Spec) -> list[str]:
+    """Return differences of what workers read from the run in the spec: sections, and the starts of lattices."""
+    if "crossings" not in plan.keep and not plan.sizes:
+        return []
+    stored_spec = specs.loads(job.spec)
+    stored, run = stored_spec.runs.get(job.plan.about["run"]), spec.runs.get(plan.about["run"])
+    if stored is None or run is None:  # a run that was built in Python
+        return []
+    phrases = []
+    if "crossings" in plan.keep and (stored.section, stored.direction) != (run.section, run.direction):
+        phrases.append("another section")
+    if run.lattice is not None and [*_start(stored_spec, stored)] != [*_start(spec, run)]:
+        phrases.append("other initial values, bonds or parameters at sites")
+    return phrases
+
+
+def _start(spec: Spec, run: Run) -> Iterator[Any]:
+    """Yield the settings that determine the start of a lattice and its arrays."""
+    if run.lattice is not None:
+        yield from (run.lattice.state, run.lattice.bonds, run.lattice.arrays, run.initial)
+    yield from ((p.name, p.values) for p in spec.parameters)
