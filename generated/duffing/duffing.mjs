@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 89ea6690d5562236986327dd348c9d70fc67be76ff798a8f11ed3bfc28766146
+ * body-sha256: ea3c41a948bedae0367dbdf1c6b0e5f7264826e382571fd45d661c7d6a071b73
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -219,15 +219,12 @@ export class StepError extends Error {
   }
 }
 
-/** All that solvers take; some take a part of it. */
-const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
-
-/** Throw StepError for options that no solver has, such as misspelled ones. */
-function expectOptions(options) {
-  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
-  if (!unknown.length) return;
-  const known = OPTIONS.join(", ");
-  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
+/** Throw StepError for options that are not known, such as misspelled ones, unless they are undefined. */
+function expectOptions(options, known) {
+  const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
+  const unknown = given.find((name) => !known.includes(name));
+  if (unknown === undefined) return;
+  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
@@ -255,6 +252,9 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 // ---- The solver ----
 
 const number = new Float64Array(1);
+
+/** The options of the constructor. */
+const OPTIONS = "x0 params t0".split(" ");
 
 /**
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
@@ -318,7 +318,7 @@ export class Solver {
    * @param {number} [options.t0] the time of x0, 0 by default
    */
   constructor(options = {}) {
-    expectOptions(options);
+    expectOptions(options, OPTIONS);
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
     takeTime(this, options);
@@ -445,12 +445,12 @@ export class Solver {
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {object} [options] as in the constructor; member is that of the first state
+   * @param {object} [options] as in the constructor, without x0
    * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
-    expectOptions(options);
+    expectOptions(options, OPTIONS.filter((name) => name !== "x0"));
     const ends = starts.map((x0, m) => {
       const valueOf = (what, value) => {
         if (typeof value !== "object" || value === null) return value;
@@ -460,7 +460,6 @@ export class Solver {
       const size = valueOf("h", h);
       const params = Object.entries(options.params ?? {}).map(([key, value]) => [key, valueOf(key, value)]);
       const chosen = { ...options, params: Object.fromEntries(params), t0: valueOf("t0", options.t0), x0 };
-      chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3c1630005ed6d8b8d5d5330e2ba9e7aa6b26a45aa5581aba74eacccecab3a607
+ * body-sha256: da8504c4223520cd9b617b6fec834dcccf076964360a136c82d3bc11ffaeffb3
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -517,15 +517,12 @@ export class StepError extends Error {
   }
 }
 
-/** All that solvers take; some take a part of it. */
-const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
-
-/** Throw StepError for options that no solver has, such as misspelled ones. */
-function expectOptions(options) {
-  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
-  if (!unknown.length) return;
-  const known = OPTIONS.join(", ");
-  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
+/** Throw StepError for options that are not known, such as misspelled ones, unless they are undefined. */
+function expectOptions(options, known) {
+  const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
+  const unknown = given.find((name) => !known.includes(name));
+  if (unknown === undefined) return;
+  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
@@ -553,6 +550,9 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 // ---- The solver ----
 
 const number = new Float64Array(1);
+
+/** The options of the constructor. */
+const OPTIONS = "x0 params gauge".split(" ");
 
 /**
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
@@ -619,7 +619,7 @@ export class Solver {
    *   for each
    */
   constructor(options = {}) {
-    expectOptions(options);
+    expectOptions(options, OPTIONS);
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
     takeGauge(this, options);
@@ -745,12 +745,12 @@ export class Solver {
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {object} [options] as in the constructor; member is that of the first state
+   * @param {object} [options] as in the constructor, without x0
    * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
-    expectOptions(options);
+    expectOptions(options, OPTIONS.filter((name) => name !== "x0"));
     const ends = starts.map((x0, m) => {
       const valueOf = (what, value) => {
         if (typeof value !== "object" || value === null) return value;
@@ -760,7 +760,6 @@ export class Solver {
       const size = valueOf("h", h);
       const params = Object.entries(options.params ?? {}).map(([key, value]) => [key, valueOf(key, value)]);
       const chosen = { ...options, params: Object.fromEntries(params), t0: valueOf("t0", options.t0), x0 };
-      chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);

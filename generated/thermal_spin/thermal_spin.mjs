@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 42019b5641ad3c1c5f76c0a96acd61e0991715d6726b1335b8de0f9db91ae789
+ * body-sha256: d0178252b92d95f97c1f172260fd72355bc3b7e256b0ed33895ce6eb6aeca249
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -314,15 +314,12 @@ export class StepError extends Error {
   }
 }
 
-/** All that solvers take; some take a part of it. */
-const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
-
-/** Throw StepError for options that no solver has, such as misspelled ones. */
-function expectOptions(options) {
-  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
-  if (!unknown.length) return;
-  const known = OPTIONS.join(", ");
-  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
+/** Throw StepError for options that are not known, such as misspelled ones, unless they are undefined. */
+function expectOptions(options, known) {
+  const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
+  const unknown = given.find((name) => !known.includes(name));
+  if (unknown === undefined) return;
+  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
@@ -350,6 +347,9 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 // ---- The solver ----
 
 const number = new Float64Array(1);
+
+/** The options of the constructor. */
+const OPTIONS = "x0 params seed member step0".split(" ");
 
 /**
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
@@ -421,7 +421,7 @@ export class Solver {
    * @param {number} [options.step0] number of steps made before x0, 0 by default
    */
   constructor(options = {}) {
-    expectOptions(options);
+    expectOptions(options, OPTIONS);
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
     takeDraws(this, options);
@@ -551,12 +551,12 @@ export class Solver {
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {object} [options] as in the constructor; member is that of the first state
+   * @param {object} [options] as in the constructor, without x0; member is that of the first state
    * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
-    expectOptions(options);
+    expectOptions(options, OPTIONS.filter((name) => name !== "x0"));
     const ends = starts.map((x0, m) => {
       const valueOf = (what, value) => {
         if (typeof value !== "object" || value === null) return value;

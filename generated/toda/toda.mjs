@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8dc5c92b9f74bed5a52a17c0531d9a370389c1aa5fa0ea0b19cf6c600d68b404
+ * body-sha256: 2a328dbf60dad5aa15c9c639bf82c9e9076b3ca5a7c62f80af85af89bb5f3e72
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -166,15 +166,12 @@ export class StepError extends Error {
   }
 }
 
-/** All that solvers take; some take a part of it. */
-const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
-
-/** Throw StepError for options that no solver has, such as misspelled ones. */
-function expectOptions(options) {
-  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
-  if (!unknown.length) return;
-  const known = OPTIONS.join(", ");
-  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
+/** Throw StepError for options that are not known, such as misspelled ones, unless they are undefined. */
+function expectOptions(options, known) {
+  const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
+  const unknown = given.find((name) => !known.includes(name));
+  if (unknown === undefined) return;
+  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
@@ -198,6 +195,9 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 }
 
 // ---- The solver ----
+
+/** The options of the constructor. */
+const OPTIONS = "x0 sizes params".split(" ");
 
 /** The coefficients of all flows or stages of a step: a row for each time. */
 function prepareStep(params, h, rows) {
@@ -248,7 +248,7 @@ export class Solver {
    * for all
    */
   constructor(options = {}) {
-    expectOptions(options);
+    expectOptions(options, OPTIONS);
     const { x0 } = options;
     const sizes = options.sizes ?? (AXES.length === 1 && x0 ? [x0.length / DIM] : []);
     this.sites = new Sites(sizes, options);

@@ -159,7 +159,7 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
     settings = {
         "coordinates": list(system.coordinates),
         "start": start,
-        "t0": float(run.start),
+        "t0": float(run.start) if system.time else None,
         "step": float(run.step),
         "order": compilation.order.order,
         "orders": list(live.solvers),
@@ -173,6 +173,8 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
         ],
         "quantities": quantities,
         "observed": list(system.observables),
+        "sizes": None,
+        "site": None,
     }
     return page.block(
         "live",
@@ -204,19 +206,26 @@ def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
     ]
 
 
+def quantity(
+    name: str, casimirs: Sequence[int] | None = None, invariants: Sequence[int] | None = None
+) -> dict[str, object]:
+    """Return the errors of a conserved quantity for the page: of Casimirs or invariants by number, else the energy."""
+    return {"name": name, "casimirs": casimirs, "invariants": invariants}
+
+
 def _quantities(system: System) -> list[dict[str, object]]:
     """Return the conserved quantities: energy, one entry for all Casimirs, one entry for all invariants."""
     moved = moving(system)
-    quantities: list[dict[str, object]] = [] if ENERGY in moved else [{"name": "energy error", "casimirs": None}]
+    quantities: list[dict[str, object]] = [] if ENERGY in moved else [quantity("energy error")]
     casimirs = {name: i for i, name in enumerate(system.casimirs) if name not in moved}
     if casimirs:
-        quantities.append({"name": _named(system, casimirs), "casimirs": [*casimirs.values()]})
+        quantities.append(quantity(_named(system, casimirs), casimirs=[*casimirs.values()]))
     invariants = {} if system.noise else {name: i for i, name in enumerate(system.invariants)}
     if invariants:
         name = f"error{'s' * (len(invariants) > 1)} of {', '.join(invariants)}"
         if len(invariants) > 3:
             name = f"error of {len(invariants)} invariants"
-        quantities.append({"name": name, "invariants": [*invariants.values()]})
+        quantities.append(quantity(name, invariants=[*invariants.values()]))
     return quantities
 
 

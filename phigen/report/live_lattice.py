@@ -25,6 +25,7 @@ from phigen.report.live import (
     Slider,
     function_of,
     general,
+    quantity,
     script,
     sides,
     slid,
@@ -104,14 +105,14 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
         "axes": list(cell.axes),
         "coordinates": list(spec.coordinates),
         "start": [],
-        "t0": float(run.start),
+        "t0": float(run.start) if spec.time else None,
         "step": float(run.step),
         "order": compilation.order.order,
         "orders": list(live.solvers),
         "sizes": sizes,
         "site": sizes.index(list(start.sizes)),
-        "bonds": start.bonds.reshape(-1).tolist(),
-        **({} if places is None else {"places": np.round(places, 4).reshape(-1).tolist()}),
+        "bonds": start.bonds.reshape(-1).tolist() if start.graph else None,
+        "places": None if places is None else np.round(places, 4).reshape(-1).tolist(),
         "parameters": [
             {
                 "name": p.name,
@@ -272,26 +273,22 @@ def _sign(spec: Spec, start: Start) -> str:
 def _quantities(compilation: CompiledLattice) -> list[dict[str, Any]]:
     """Return the conserved quantities: the energy, unless time or forces act, and one entry for all Casimirs."""
     cell, pushed = compilation.cell, compilation.program.pushed
-    quantities: list[dict[str, Any]] = [] if cell.driven else [{"name": "energy error", "casimirs": None}]
+    quantities: list[dict[str, Any]] = [] if cell.driven else [quantity("energy error")]
     casimirs = {name: k for k, name in enumerate(cell.casimirs) if name not in pushed}
     if casimirs:
-        quantities.append(
-            {
-                "name": f"Casimir error{'s' * (len(casimirs) > 1)} ({', '.join(casimirs)})",
-                "casimirs": [*casimirs.values()],
-            }
-        )
+        named = f"Casimir error{'s' * (len(casimirs) > 1)} ({', '.join(casimirs)})"
+        quantities.append(quantity(named, casimirs=[*casimirs.values()]))
     invariants, first = list(cell.invariants), len(compilation.spec.recorded)
     if invariants:
         named = f"error{'s' * (len(invariants) > 1)} of {', '.join(invariants)}"
         named = named if len(invariants) <= 3 else f"error of {len(invariants)} invariants"
-        quantities.append({"name": named, "invariants": [first + 2 * k for k in range(len(invariants))]})
+        quantities.append(quantity(named, invariants=[first + 2 * k for k in range(len(invariants))]))
     return quantities
 
 
 def _say(compilation: CompiledLattice) -> str:
     said = "Two solvers integrate the motion from the same start, in your browser. "
-    conserved = ["its invariants" if "invariants" in q else "its Casimirs" if q["casimirs"] else "its energy"
+    conserved = ["its invariants" if q["invariants"] else "its Casimirs" if q["casimirs"] else "its energy"
             for q in _quantities(compilation)]  # fmt: skip
     conserved_words = " and ".join([", ".join(conserved[:-1]), conserved[-1]] if len(conserved) > 1 else conserved)
     if not conserved_words:

@@ -42,12 +42,12 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
   }
 
   // The steps of an order with which the solver has margin and small errors, from that of the run to the first with
-  // which RK4 fails at once.
+  // which RK4 fails at once; at least one.
   function stepsOf(given, end) {
     let h = data.step;
     const at = (step) => ({ ...given, h: step }), steps = [];
     for (let k = 0; k < 5 && !hasMargin(at(h)); k++) h = shortened(h / 2);
-    for (let k = 0; k < DOUBLED && performance.now() < end; k++) {
+    for (let k = 0; k < DOUBLED && (k === 0 || performance.now() < end); k++) {
       const next = at(shortened(h * 2 ** k)), { longest, moved, speed } = view.pace(next);
       const { ours, theirs } = tried(next, 100, 60);
       if (k > 0 && (longest > CHORD || worst(ours) > MARGIN || !hasMargin(next))) break;

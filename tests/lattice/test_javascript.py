@@ -278,6 +278,8 @@ REFUSED = {
     "state": ("toda", {"x0": [1, 2, 3]}, "x0 must be 128 finite numbers"),
     "not finite": ("toda", {"sizes": [2], "x0": ["NaN", 1, 1, 1]}, "x0 must be 4 finite numbers"),
     "unknown": ("dnls", {"params": {"gamma": 1}}, "there is no parameter gamma"),
+    "no noise": ("toda", {"seed": 1}, "there is no option seed; options are x0, sizes, params"),
+    "no time": ("food_web", {"t0": 1}, "there is no option t0; options are x0, sizes, params, bonds"),
     "array": ("xxz_disorder", {"params": {}}, "the parameter B must be given: its default is an array"),
     "positive": ("kdv", {"params": {"d": 0}}, "the parameter d is 0"),
     "one site": ("food_web", {"params": {"k": [1, 1, 1, 0, 1, 1, 1, 1, 1, 1]}}, "the parameter k is"),

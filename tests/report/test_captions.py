@@ -13,7 +13,7 @@ from phigen.lattice.states import start_of
 from phigen.report.live import gathered, live_section, script
 from phigen.report.live_lattice import gathered_lattice, lattice_live_section, lattice_script
 from phigen.report.page import CURVES, FIELDS
-from phigen.resources import bundled_specs, templates
+from phigen.resources import bundled_specs, file_of, templates
 from phigen.spec import load
 
 #: Those whose JavaScript takes less than a second to make, of every kind of step; the others are slow.
@@ -36,6 +36,10 @@ const view = makeView({
   tried: (...given) => start.tried(...given), shortened,
 });
 let start = makeStart({ data, begin, view, shortened, milliseconds: { ours: 60, all: 400 } });
+// How the panel begins in a browser that has no time for trials.
+const hurry = { ours: 0, all: 0 };
+export const hurried = () => makeStart({ data, begin, view, shortened, milliseconds: hurry }).showing(standard);
+export const lacking = () => Object.keys(data).filter((name) => data[name] === null).sort();
 // With a step and a number of steps of RK4, or as the panel begins: for a given number without limits of time.
 export const raced = (h, parts, steps) => {
   if (!h && parts) {
@@ -78,6 +82,7 @@ def raced(tmp_path_factory):
         sources = [(templates() / "report" / name).read_text(encoding="utf-8") for name in names]
         path = folder / f"{given.name}.mjs"
         path.write_text("\n".join([*sources, code, RACE.replace("DATA", data)]))
+        race.path = path
         told = asked(path, f"return module.raced({float(run.step) * share}, {parts}, {steps})")
         return told, re.search(r'<p class="say">(.*?)</p>', section)[1]
 
@@ -138,3 +143,22 @@ def test_panel_begins_where_rk4_is_farther_off(raced):
     assert max(row[0] for row in told["ours"]) < 0.03
     assert told["failed"] or told["theirs"][-1][0] > 2 * told["ours"][-1][0]
     assert told["said"] == ""
+
+
+def test_panel_begins_with_the_step_of_the_run_where_there_is_no_time_for_trials(raced):
+    compilation = compiled("kepler")
+    run = first_run(compilation)
+    raced(compilation, run, 1, 1, 1)
+    setting = asked(raced.path, "return module.hurried()")
+    assert (setting["h"], setting["order"]) == (float(run.step), compilation.order.order)
+    assert setting["speed"] > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "lacking"),
+    [("kepler", ["site", "sizes", "t0"]), ("fput", ["bonds", "places", "t0"]), ("food_web", ["t0"])],
+)
+def test_data_of_the_panel_have_null_for_what_a_system_lacks(raced, name, lacking):
+    given = load(file_of(name))
+    raced(compile_spec(given) if given.lattice else compiled(name), next(iter(given.runs.values())), 1, 1, 1)
+    assert asked(raced.path, "return module.lacking()") == lacking

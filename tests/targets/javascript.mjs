@@ -40,8 +40,7 @@ function each(Solver, job, start) {
   const factors = [1, 1.01, 1.02];
   const given = Object.entries(Solver.DEFAULT_PARAMETERS).map(([name, value]) => [name, factors.map((f) => f * value)]);
   const h = Float64Array.from(factors, (f) => job.h / f);
-  const t0 = factors.map((f) => f - 1);
-  const options = { params: Object.fromEntries(given), t0 };
+  const options = { params: Object.fromEntries(given), ...(job.timed && { t0: factors.map((f) => f - 1) }) };
   const { x, status } = Solver.ensemble(factors.map(() => start), h, 5, options);
   return { x: x.map((end) => [...end]), status };
 }
@@ -60,7 +59,7 @@ function moved(Solver, job, monitored) {
   const small = solver.x.map((x) => 1e-3 * x);
   solver.step(job.h).kick(small).step(job.h).setState(solver.x).kick(small);
   const gauge = monitored ? {} : { gauge: solver.gauge };
-  const fresh = new Solver({ ...job.options, ...gauge, x0: solver.x, t0: solver.t });
+  const fresh = new Solver({ ...job.options, ...gauge, ...(job.timed && { t0: solver.t }), x0: solver.x });
   const failure = attempted(() => solver.kick(small.map(() => NaN)));
   return { x: [...solver.step(job.h).x], fresh: [...fresh.step(job.h).x], failure, steps: solver.steps };
 }

@@ -128,7 +128,8 @@ def node(folder, jobs):
         (text,) = emit(compilation.program, "js", COMMAND).values()
         path = folder / f"{k}.mjs"
         path.write_text(text, encoding="utf-8")
-        listed.append({"module": path.as_uri(), "options": options, "h": h, "steps": steps})
+        timed = bool(compilation.program.time)
+        listed.append({"module": path.as_uri(), "options": options, "h": h, "steps": steps, "timed": timed})
     return answers_of(Path(__file__).with_name("javascript.mjs"), listed)
 
 
@@ -349,7 +350,10 @@ def test_a_failing_step_is_an_exception_and_keeps_the_state(name, h, failures):
         ({"x0": [1, 2]}, "x0 must be 3 finite numbers"),
         ({}, "x0 must be 3 finite numbers"),
         ({"x0": [1, 2, "a"]}, "x0 must be 3 finite numbers"),
-        ({"x0": [1, 2, 3], "parameters": {"I1": 1}}, "there is no option parameters"),
+        ({"x0": [1, 2, 3], "parameters": {"I1": 1}}, "there is no option parameters; options are x0, params"),
+        ({"x0": [1, 2, 3], "seed": 1}, "there is no option seed; options are x0, params"),
+        ({"x0": [1, 2, 3], "t0": 1}, "there is no option t0"),
+        ({"x0": [1, 2, 3], "sizes": [1]}, "there is no option sizes"),
         ({"x0": [1, 2, 3], "params": {"J": 1}}, "there is no parameter J"),
         ({"x0": [1, 2, 3], "params": {"toString": 1}}, "there is no parameter toString"),
         ({"x0": [1, 2, 3], "params": {"I1": "2"}}, "the parameter I1 is 2"),
@@ -369,6 +373,8 @@ def test_bad_arguments_are_told(options, said, tmp_path):
     [
         ("{params: {I1: [1, 2, 3]}}", "I1 must be one number, or 2"),
         ("{parameters: {I1: 1}}", "there is no option parameters"),
+        ("{member: 1}", "there is no option member; options are params"),
+        ("{x0: [1, 1, 1]}", "there is no option x0"),
     ],
 )
 def test_bad_arguments_of_ensembles_are_told(options, said, tmp_path):

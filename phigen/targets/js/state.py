@@ -3,6 +3,7 @@ options."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -27,6 +28,12 @@ class StateFields:
 
 #: In the order of the fields of the class.
 SOLVER = (
+    StateFields(
+        options=(
+            "@param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES",
+            "@param {Partial<Parameters>} [options.params] parameters that differ from the defaults",
+        )
+    ),
     StateFields(
         fields=(
             "/** The state; change it by setState and kick only. */",
@@ -128,6 +135,42 @@ SOLVER = (
 )
 
 
+#: Lattices: their options only.
+LATTICE = (
+    StateFields(
+        options=(
+            "@param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES",
+            "@param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default",
+            "@param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number",
+            "for all",
+        )
+    ),
+    StateFields("TIMED", options=("@param {number} [options.t0] the time of x0, 0 by default",)),
+    StateFields(
+        "NOISE",
+        options=(
+            "@param {number | bigint} [options.seed] seed of the random numbers, 64 bits, 0 by default",
+            "@param {number} [options.member] member of an ensemble, 32 bits, 0 by default",
+            "@param {number} [options.step0] number of steps made before x0, below 2^48, 0 by default",
+        ),
+    ),
+    StateFields(
+        "GRAPH",
+        options=(
+            "@param {ArrayLike<number>} options.bonds the ends of all bonds, counted from 0: a, b of the first, …",
+        ),
+    ),
+)
+
+
+def _names(blocks: list[StateFields]) -> Iterator[str]:
+    """Yield the line with the names of the options."""
+    names = [
+        name for block in blocks for line in block.options for name in re.findall(r"@param.*?options\.(\w+)", line)
+    ]
+    yield f'const OPTIONS = "{" ".join(names)}".split(" ");'
+
+
 def _saved(blocks: list[StateFields], switches: Mapping[str, bool]) -> Iterator[str]:
     names = ", ".join(f'"{name}"' for block in blocks for name in block.saved)
     yield f"const SAVED = [{names}];"
@@ -138,12 +181,14 @@ PARTS: Mapping[str, Callable[[list[StateFields], Mapping[str, bool]], Iterator[s
     "fields": lambda blocks, _: (line for b in blocks for line in b.fields),
     "saved": _saved,
     "options": lambda blocks, _: (line for b in blocks for line in b.options),
+    "names": lambda blocks, _: _names(blocks),
     "arguments": lambda blocks, _: (line for b in blocks for line in b.arguments),
     "copied": lambda _, switches: iter(state.copied(switches)),
 }
 
 
 def part(name: str, switches: Mapping[str, bool]) -> list[str]:
-    """Return the lines of one of `PARTS` for a solver."""
-    blocks = [block for block in SOLVER if not block.when or holds(block.when, switches)]
-    return list(PARTS[name](blocks, switches))
+    """Return the lines of one of `PARTS` for a solver; for lattices the name begins with ``lattice_``."""
+    records = LATTICE if name.startswith("lattice_") else SOLVER
+    blocks = [block for block in records if not block.when or holds(block.when, switches)]
+    return list(PARTS[name.removeprefix("lattice_")](blocks, switches))

@@ -23,15 +23,12 @@ export class StepError extends Error {
   }
 }
 
-/** All that solvers take; some take a part of it. */
-const OPTIONS = "attitude0 bonds gauge member params position0 seed sizes step0 t0 x0".split(" ");
-
-/** Throw StepError for options that no solver has, such as misspelled ones. */
-export function expectOptions(options) {
-  const unknown = Object.keys(options).filter((name) => !OPTIONS.includes(name));
-  if (!unknown.length) return;
-  const known = OPTIONS.join(", ");
-  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown[0]}; options are ${known}`);
+/** Throw StepError for options that are not known, such as misspelled ones, unless they are undefined. */
+export function expectOptions(options, known) {
+  const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
+  const unknown = given.find((name) => !known.includes(name));
+  if (unknown === undefined) return;
+  throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
 /** Copy values, which must be `length` finite numbers; throws StepError otherwise. */

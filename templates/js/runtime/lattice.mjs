@@ -15,6 +15,9 @@ import { makeStep } from "./flows.mjs";
 
 // ---- The solver ----
 
+/** The options of the constructor. */
+// #state lattice_names
+
 /** The coefficients of all flows or stages of a step: a row for each time. */
 function prepareStep(params, h, rows) {
   TIMES.forEach((time, k) => prepareRow(params, time, h, rows[k], k));
@@ -78,24 +81,10 @@ export class Solver {
    * Start at x0. Throws StepError for arguments that are not admissible.
    *
    * @param {object} options
-   * @param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES
-   * @param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default
-   * @param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number
-   * for all
-   * #if TIMED
-   * @param {number} [options.t0] the time of x0, 0 by default
-   * #endif
-   * #if NOISE
-   * @param {number | bigint} [options.seed] seed of the random numbers, 64 bits, 0 by default
-   * @param {number} [options.member] member of an ensemble, 32 bits, 0 by default
-   * @param {number} [options.step0] number of steps made before x0, below 2^48, 0 by default
-   * #endif
-   * #if GRAPH
-   * @param {ArrayLike<number>} options.bonds the ends of all bonds, counted from 0: a, b of the first, …
-   * #endif
+   * #state lattice_options
    */
   constructor(options = {}) {
-    expectOptions(options);
+    expectOptions(options, OPTIONS);
     const { x0 } = options;
     const sizes = options.sizes ?? (AXES.length === 1 && x0 ? [x0.length / DIM] : []);
     this.sites = new Sites(sizes, options);

@@ -1,4 +1,5 @@
 import { StepError, expectOptions } from "./errors.mjs";
+import { OPTIONS } from "./model.mjs";
 import { Solver } from "./solver.mjs";
 
 /** Members of Solver: runs of many states. */
@@ -11,12 +12,16 @@ export class Ensemble {
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {object} [options] as in the constructor; member is that of the first state
+   * #if NOISE
+   * @param {object} [options] as in the constructor, without x0; member is that of the first state
+   * #else
+   * @param {object} [options] as in the constructor, without x0
+   * #endif
    * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
-    expectOptions(options);
+    expectOptions(options, OPTIONS.filter((name) => name !== "x0"));
     const ends = starts.map((x0, m) => {
       const valueOf = (what, value) => {
         if (typeof value !== "object" || value === null) return value;
@@ -26,7 +31,9 @@ export class Ensemble {
       const size = valueOf("h", h);
       const params = Object.entries(options.params ?? {}).map(([key, value]) => [key, valueOf(key, value)]);
       const chosen = { ...options, params: Object.fromEntries(params), t0: valueOf("t0", options.t0), x0 };
+      // #if NOISE
       chosen.member = (options.member ?? 0) + m;
+      // #endif
       let end = Float64Array.from(x0);
       try {
         const solver = new Solver(chosen);

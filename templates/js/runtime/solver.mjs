@@ -25,6 +25,9 @@ import { renew } from "./renewed_stages.mjs";
 
 const number = new Float64Array(1);
 
+/** The options of the constructor. */
+// #state names
+
 /**
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
  * where required, and give finite coefficients for a negligibly small step.
@@ -67,12 +70,10 @@ export class Solver {
    * Start at x0. Throws StepError for arguments that are not admissible.
    *
    * @param {object} options
-   * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
-   * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
    * #state options
    */
   constructor(options = {}) {
-    expectOptions(options);
+    expectOptions(options, OPTIONS);
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
     takeTime(this, options);
