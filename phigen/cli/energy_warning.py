@@ -17,8 +17,10 @@ from phigen.tuning.search import rounded_down
 #: Target energy error of the proposed step: small enough that orbits keep their shape.
 AIM = 1e-3
 
-#: Energy errors above this are compared with those of RK4 at the same cost, in runs of at most this number of steps.
-COMPARED, MOST_STEPS = 1e-3, 1_000_000
+#: Smaller energy errors are not compared with those of RK4: orbits keep their shape.
+LEAST_COMPARED_ERROR = 1e-3
+#: Longer runs are not compared with RK4: its error grows, that of the solver need not, and the comparison takes long.
+MOST_STEPS = 1_000_000
 #: Factor by which the energy error of RK4 must be smaller, so that the noise of clocks does not decide.
 CLEARLY = 2.0
 
@@ -49,20 +51,23 @@ def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -
     return f"{said}\n  hint: try --step {advised_step(error, h, order):g}{tune}"
 
 
-def compares_with_rk4(compilation: Compilation, target: str) -> bool:
-    """Return whether runs are compared with RK4: in C, of systems that conserve their energy, with equal steps in t."""
-    return chosen_target(target) == "c" and not compilation.system.driven and compilation.spec.monitor is None
+def compares_with_rk4(compilation: Compilation, target: str, energy: Drift, steps: int) -> bool:
+    """Return whether the energy error of a run is compared with that of RK4.
+
+    Only runs in C, with equal steps in t, of systems that conserve their energy, are compared; and only errors in the
+    range in which `rk4_warning` warns.
+    """
+    conserved = not compilation.system.driven and energy.unit.kind in _SCALES and not energy.unit.moves
+    warnable = LEAST_COMPARED_ERROR < energy.error <= LARGE_ENERGY_ERROR and steps <= MOST_STEPS
+    return conserved and warnable and compilation.spec.monitor is None and chosen_target(target) == "c"
 
 
 def rk4_warning(compilation: Compilation, problem: Problem, solver: Solver, energy: Drift) -> str:
     """Return the warning about an energy error that RK4 with as much processor time does not make; else empty.
 
-    Only errors above `COMPARED` are compared. Over longer runs the error of RK4 grows, and that of the solver need not.
+    For runs of which `compares_with_rk4` is true.
     """
-    spec, known = compilation.spec, energy.unit.kind in _SCALES and not energy.unit.moves
-    steps = problem.horizon / problem.step
-    if not (known and COMPARED < energy.error <= LARGE_ENERGY_ERROR and steps <= MOST_STEPS):
-        return ""
+    spec = compilation.spec
     theirs = rk4_energy_error(compilation, solver.backend, problem)
     if not theirs < energy.error / CLEARLY:
         return ""

@@ -439,5 +439,7 @@ def compared(
             if progress and len(numbers):
                 progress(int(numbers[-1]))
     console.detail(f"{method}: {time.perf_counter() - start:.3f} s")
-    broken = int(watch.state["good"]) < rows.count
+    broken = watch.good < rows.count
+    if broken:
+        watch.break_down()
     return watch, sketch.trajectory(names.coordinates, names.casimirs, h, run.steps, parameters, broken)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from phigen.cli.console import Console
 from phigen.cli.experiment import Experiment, loaded
 from phigen.cli.interruption import InterruptedRunError
-from phigen.cli.report_study import COMPARED, environment, studied
+from phigen.cli.report_study import environment, studied
 from phigen.errors import PhigenError, StepError
 from phigen.report.material import Material
 
@@ -77,6 +77,7 @@ def _integrated(
     """With the trajectories of the solver and of the methods that the run compares with."""
     from phigen.cli.recording import Files, Recorder, compared
     from phigen.cli.run_summary import told_steps
+    from phigen.study.classical import COMPARED
 
     compilation, run = material.compilation, experiment.run
     console.note(f"{compilation.spec.name}: run {run.name}, {run.steps} steps")

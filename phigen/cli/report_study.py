@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from phigen.runtime.interface import Floats
     from phigen.study.precision import Study
 
-#: The methods to compare with, if the run names none.
-COMPARED = ("rk4",)
 #: Repetitions of a measurement of times, and with --quick.
 _ROUNDS, _FEW_ROUNDS = 5, 2
 #: Steps over which precision is studied with --quick.
@@ -33,6 +31,7 @@ def studied(
     from phigen.api import solver_of
     from phigen.runtime import toolchain
     from phigen.study import precision, race
+    from phigen.study.classical import COMPARED
 
     if compilation.system.noise:
         return None, "Errors against step and time are not measured with noise; the strong order is above."

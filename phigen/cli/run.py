@@ -182,7 +182,7 @@ def command(
         watch, drawn[method] = compared(compilation, solver, experiment, method, console, recorder.time)
         summaries.append(watch.summary())
     warning = summary_warning(spec, summaries[0], recorder.experiment.h, solver.order)
-    if comparable and not warning and compares_with_rk4(compilation, target):
+    if comparable and not warning and compares_with_rk4(compilation, target, summaries[0].energy, recorder.steps):
         problem = problem_of(compilation, recorder.experiment, None, console)
         warning = rk4_warning(compilation, problem, solver, summaries[0].energy)
     if as_json:

@@ -146,6 +146,7 @@ def verified(
     """
     from phigen.api import chosen_target, solver_of
     from phigen.cli.endings import ended
+    from phigen.study.classical import COMPARED
     from phigen.study.verification import verify
 
     spec = compilation.spec
@@ -158,7 +159,7 @@ def verified(
     run = experiment.run
     return verify(
         compilation, solvers, run.name, experiment.initial, experiment.parameters, experiment.h, max(1, run.steps),
-        run.compare or ("rk4",), t0=experiment.t0, quick=quick, single=single,
+        run.compare or COMPARED, t0=experiment.t0, quick=quick, single=single,
     )  # fmt: skip
 
 

@@ -11,6 +11,9 @@ from phigen.runtime.interface import row_steps
 from phigen.study import dop853
 
 Floats = NDArray[np.float64]
+#: The methods that a solver is compared with if the run names none.
+COMPARED = ("rk4",)
+
 Field = Callable[[Floats], Floats]
 Step = Callable[[Field, Floats, float], Floats]
 

@@ -139,6 +139,12 @@ MEANINGS = (
         "one of the targets is wrong: an error of phigen, or of the compiler's flags",
     ),
     Meaning(
+        "single precision",
+        "with `real: float`: the difference of single steps in C from steps in double precision, and the largest "
+        "errors of Casimirs over a run in single precision. All other rows are about double precision",
+        "the C in single precision is wrong, or an intermediate value exceeds the range of single precision",
+    ),
+    Meaning(
         "largest step",
         "the largest step for which the equation of a step has a solution, as a multiple of the step of the run; "
         "at most 256",

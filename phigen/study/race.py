@@ -54,9 +54,13 @@ class Race:
 def compiled(
     compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """Return the solver and the explicit methods in C; for monitored systems all step in τ. Raises `ToolchainError`."""
+    """Return the solver and the explicit methods in C, in double precision; for monitored systems all step in τ.
+
+    Raises `ToolchainError`.
+    """
     from phigen.targets.rendering import render
 
+    compilation = compilation.in_double
     name = compilation.program.name
     files = emit(compilation.program, "c", "phigen report")
     explicit = [m for m in methods if m in TABLEAUX]

@@ -45,7 +45,8 @@ class Drift:
 class Summary:
     """Errors of one method; ``exact`` is the largest error against the closed form, None if there is none.
 
-    ``good`` rows of the states are finite; the numbers are about these. Where H is no invariant, ``energy`` is
+    ``good`` rows of the states are finite; the numbers are about these. The errors of a method that breaks down at once
+    are infinite. Where H is no invariant, ``energy`` is
     about H − ``work``, an integral that may be ``off`` by so much in the same unit, and ``change`` is the largest
     change of H itself.
     """
@@ -130,6 +131,10 @@ class Watch:
         """The number of rows received, all finite."""
         return int(self.state["good"])
 
+    def break_down(self) -> None:
+        """Accept that the method fails: there are no further rows."""
+        self.state["broken"] = np.asarray(True)
+
     def see(self, t: Floats, x: Floats) -> None:
         """Accept the next rows, times (rows,) and states (rows, DIM); rows from the first non-finite one on are
         ignored.
@@ -184,7 +189,9 @@ class Watch:
         (method, rows), state = self._about, self.state
         steps = self._run.steps if self._run else rows
         telling = rows >= 2 * WINDOWS and _is_telling(state["turns"])
-        drifts = [_drift(m, unit, steps, telling) for m, unit in zip(state["maxima"], self._units(), strict=True)]
+        failed = bool(state["broken"]) and self.good <= 1  # at the first row after the start
+        maxima = np.full_like(state["maxima"], math.inf) if failed else state["maxima"]
+        drifts = [_drift(m, unit, steps, telling) for m, unit in zip(maxima, self._units(), strict=True)]
         drift_of = iter(drifts)
         named = {kind: {name: next(drift_of) for name in group} for kind, group in self._groups.items()}
         return Summary(
@@ -192,12 +199,16 @@ class Watch:
             energy=named[ENERGY]["H"],
             casimirs=named["casimirs"],
             invariants=named["invariants"],
-            exact=Drift(float(state["exact"]), Unit(kind=RELATIVE)) if self._run and self._run.exact else None,
+            exact=Drift(math.inf if failed else float(state["exact"]), Unit(kind=RELATIVE))
+            if self._run and self._run.exact
+            else None,
             final=tuple(state["final"].tolist()),
             good=int(state["good"]),
             rows=rows,
             work=float(state["work"][0]) if self._powers else 0.0,
-            change=Drift(float(state["change"]), named[ENERGY]["H"].unit) if self._powers else None,
+            change=Drift(math.inf if failed else float(state["change"]), named[ENERGY]["H"].unit)
+            if self._powers
+            else None,
             off=float(state["work"][1]) / named[ENERGY]["H"].unit.size if self._powers else math.nan,
         )
 

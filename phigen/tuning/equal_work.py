@@ -16,7 +16,7 @@ ROWS = 2000
 
 
 def rk4_energy_error(compilation: Compilation, solver: Backend, problem: Problem) -> float:
-    """Return the energy error of RK4 whose run takes as much processor time as that of the solver.
+    """Return the energy error of RK4, in double precision, whose run takes as much processor time as the solver's.
 
     Infinity if RK4 breaks down, NaN if steps cannot be timed. Raises `ToolchainError` without a compiler.
     """
@@ -32,4 +32,5 @@ def rk4_energy_error(compilation: Compilation, solver: Backend, problem: Problem
     if states is None or not np.isfinite(states).all():
         return math.inf
     energies = problem.energies(states)
-    return float(np.max(problem.unit.errors(energies, float(energies[0]))))
+    error = float(np.max(problem.unit.errors(energies, float(energies[0]))))
+    return error if math.isfinite(error) else math.inf

@@ -3,7 +3,16 @@
 import json
 import re
 
+import numpy as np
 import pytest
+
+from phigen.api import compilation_of, solver_of
+from phigen.cli import energy_warning
+from phigen.geometry.conservation import RELATIVE, Unit
+from phigen.study import classical
+from phigen.study.summary import Drift
+from phigen.tuning.equal_work import rk4_energy_error
+from phigen.tuning.problem import SystemProblem
 
 ORBIT = """phigen: 1
 name: orbit
@@ -55,6 +64,58 @@ def test_an_energy_error_that_rk4_does_not_make_at_equal_cost_is_a_warning(phige
         assert float(said[1]) == pytest.approx(error, rel=0.1)
         assert 1e-9 < float(said[2]) < error / 2
         assert "hint: try --order 4, or --step" in found.stderr
+
+
+@pytest.mark.slow  # it compiles the solver and RK4
+def test_rk4_is_compared_in_double_precision_with_a_solver_in_single(phigen, write):
+    """RK4 makes an error of 6e-7 here at equal cost; in single precision it would be above 1e-6."""
+    spec = (
+        ORBIT.replace("order: 4\nscheme: splitting", "order: 2\nreal: float")
+        .replace("0, 0.6", "0, 0.9")
+        .replace("STEP", "0.1")
+    )
+    found = phigen("run", write("single.yaml", spec), "-t", "c")
+    said = re.search(r"the energy error reaches (\S+) of .*; RK4 with .* reaches (\S+) in this run", found.stderr)
+    assert said, found.stderr
+    assert float(said[2]) < 1e-5 < 1e-3 < float(said[1])
+
+
+@pytest.mark.parametrize(
+    ("error", "steps", "target", "compared"),
+    [
+        (5e-3, 1000, "c", True),
+        (5e-4, 1000, "c", False),
+        (0.2, 1000, "c", False),
+        (5e-3, 1_000_001, "c", False),
+        (5e-3, 1000, "numpy", False),
+    ],
+)
+def test_runs_that_cannot_be_warned_about_are_not_compared_with_rk4(error, steps, target, compared):
+    compilation = compilation_of("kepler", order=2)
+    drift = Drift(error, Unit(kind=RELATIVE))
+    assert energy_warning.compares_with_rk4(compilation, target, drift, steps) == compared
+    for unknown in (Drift(error, Unit()), Drift(error, Unit(kind=RELATIVE, moves=True))):
+        assert not energy_warning.compares_with_rk4(compilation, target, unknown, steps)
+
+
+def test_a_method_that_breaks_down_at_once_has_infinite_errors(phigen, write, monkeypatch):
+    """A field that is not a number where RK4 evaluates it leaves no row after the start."""
+    monkeypatch.setitem(classical.METHODS, "rk4", (lambda f, x, h: np.full_like(x, np.nan), 4))
+    path = write("broken.yaml", ORBIT.replace("STEP", "0.01, compare: [rk4]"))
+    ours, rk4 = json.loads(phigen("run", path, "-t", "numpy", "--json").stdout)["methods"]
+    assert (ours["good"], rk4["good"]) == (4201, 1)
+    assert ours["energy"]["error"] < 1
+    assert rk4["energy"]["error"] is None
+    assert re.search(r"energy +\S+ +inf ", phigen("run", path, "-t", "numpy").stdout)
+
+
+def test_rk4_without_a_finite_energy_has_an_infinite_error(monkeypatch):
+    """Its states may be finite numbers outside of the domain of H."""
+    compilation = compilation_of("kepler", order=2)
+    system = SystemProblem(np.array([1.0, 0, 0, 0.9]), {"mu": 1.0}, 0.1, 1.0, system=compilation.system)
+    monkeypatch.setattr(SystemProblem, "energies", lambda self, states: np.where(np.arange(len(states)), np.nan, 1.0))
+    solver = solver_of(compilation, "numpy").backend
+    assert rk4_energy_error(compilation, solver, system) == np.inf
 
 
 def test_an_energy_that_noise_changes_is_no_error(phigen):
