@@ -40,14 +40,23 @@ class Origin:
         by = "" if self.command == "run" else f" by {self.command}"
         return f"phigen origin: {quote(self.spec)} {quote(self.run)} {self.digest}{by}"
 
+    @property
+    def _kind(self) -> str:
+        return "sweep" if self.command == "sweep" else "run"
+
+    @property
+    def _named(self) -> str:
+        return f"the {self._kind} {self.run} of {self.spec}"
+
     def difference(self, other: Origin) -> str:
         """Return how another origin differs, as the end of the sentence "the file holds …"; "" if it does not."""
         if self.command != other.command:
             return f"a result of phigen {other.command}, not of phigen {self.command}"
         if (self.spec, self.run) != (other.spec, other.run):
-            return f"the run {other.run} of {other.spec}, not the run {self.run} of {self.spec}"
+            return f"{other._named}, not {self._named}"
         if self.digest != other.digest:
-            return f"the run {other.run} of another spec {other.spec}, with other equations, Casimirs or observables"
+            changed = "with other equations, Casimirs or observables"
+            return f"the {other._kind} {other.run} of another spec {other.spec}, {changed}"
         return ""
 
 

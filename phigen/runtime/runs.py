@@ -82,7 +82,10 @@ def changed(spec: Spec, run: Run, settings: Settings) -> Run:
 
 
 def _times(run: Run, times: Sequence[float], *, known_end: bool) -> tuple[Fraction, ...]:
-    """Return times of rows in the order of the run. Raises `ValueError` for one that is not after the start."""
+    """Return times of rows in the order of the run, each once.
+
+    Raises `ValueError` for times before the start, or after the end if that is known, and if there are none.
+    """
     forwards = run.step > 0
     ordered = sorted((_number(t, "at") for t in times), reverse=not forwards)
     if not ordered:

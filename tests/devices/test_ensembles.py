@@ -225,6 +225,10 @@ def test_files_say_which_steps_spill_registers():
         "the steps of kepler (4 coordinates, 118 coefficients) need more registers than cards have (kepler of order 6"
     )
     assert f"{note} spills 2.8 kB): take a lower order, or scheme" in " ".join(text.split("*/")[0].split())
+    body = spilling(compilation_of("rigid_body", order=8, profile="small").program)
+    assert (
+        "(3 coordinates, 80 coefficients) need more registers than cards have (rigid_body of order 8 spills 8.1" in body
+    )
     for name, order in (("rigid_body", 6), ("kepler", 4), ("henon_heiles", 6), ("kepler_eccentric", None)):
         assert not spilling(compilation_of(name, order=order, profile="small").program)
     assert "memory of cards" in spilling(compilation_of("nambu_pendulum", profile="small").program)
