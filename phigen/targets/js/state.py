@@ -3,7 +3,6 @@ options."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -165,10 +164,9 @@ LATTICE = (
 
 def _names(blocks: list[StateFields]) -> Iterator[str]:
     """Yield the line with the names of the options."""
-    names = [
-        name for block in blocks for line in block.options for name in re.findall(r"@param.*?options\.(\w+)", line)
-    ]
-    yield f'const OPTIONS = "{" ".join(names)}".split(" ");'
+    described = [line for block in blocks for line in block.options if line.startswith("@param")]
+    names = [line.partition(" options.")[2] or line.partition("[options.")[2] for line in described]
+    yield f'const OPTIONS = "{" ".join(name.split()[0].rstrip("]") for name in names)}".split(" ");'
 
 
 def _saved(blocks: list[StateFields], switches: Mapping[str, bool]) -> Iterator[str]:
