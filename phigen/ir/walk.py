@@ -72,7 +72,6 @@ def values(node: Any) -> Iterator[Any]:
 
 def names_in(node: Any) -> set[str]:
     """Return the names and the symbols of expressions that are read anywhere in a node."""
-    read: set[str] = set()
-    for v in values(node):
-        read |= {*symbols_of(v)} if isinstance(v, Expression) else {v.symbol} if isinstance(v, ir.Name) else set()
-    return read
+    parts = [*values(node)]
+    symbols = symbols_of(*(v for v in parts if isinstance(v, Expression)))
+    return {*symbols, *(v.symbol for v in parts if isinstance(v, ir.Name))}

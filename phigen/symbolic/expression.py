@@ -390,9 +390,13 @@ def topological(roots: Iterable[Expression], known: Container[int] = ()) -> list
         stack = [] if root in done or (known and id(root) in known) else [root]
         while stack:
             for a in stack[-1].args:
-                if a not in done and not (known and id(a) in known):
+                if a in done or (known and id(a) in known):
+                    continue
+                if a.args:
                     stack.append(a)
                     break
+                done.add(a)
+                order.append(a)
             else:
                 node = stack.pop()
                 done.add(node)

@@ -124,7 +124,8 @@ class Amalgam:
     def _printed(self, lines: Sequence[str]) -> list[str]:
         """Return lines that were printed for the solver, in its type, with macros expanded; names of the model stay."""
         named, number = set[int](), 0
-        for token in tokens("\n".join(lines)):
+        text = "\n".join(lines)
+        for token in tokens(text) if "PHI_" in text else ():
             if token.kind is TokenKind.NAME and token.text in _PHRASES:
                 named.add(number)
             number += token.text.count("\n")

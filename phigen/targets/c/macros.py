@@ -42,7 +42,7 @@ class Macros:
         """Return lines with macros expanded. Raises `ValueError` if a macro lacks arguments."""
         nothing = [name for name, macro in self._known.items() if macro == Macro(None, "")]
         lines = _without_heads(lines, nothing)
-        expanded = [(line, self._line(line)) for line in lines]
+        expanded = [(line, self._line(line) if "PHI_" in line else line) for line in lines]
         return [text for line, text in expanded if text or not line]  # a statement that is nothing leaves no line
 
     def _line(self, line: str) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 
 class TokenKind(StrEnum):
@@ -25,26 +25,27 @@ class TokenKind(StrEnum):
     DIRECTIVE = "directive"
 
 
-@dataclass(frozen=True, slots=True)
-class CToken:
+class CToken(NamedTuple):
     """A piece of C; the texts of all tokens, joined, are the original text."""
 
     kind: TokenKind
     text: str
 
 
+_COMMENT, _STRING, _NAME = r"/\*.*?\*/", r'"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'', r"[A-Za-z_]\w*"
 _TOKEN = re.compile(
-    r'(?P<comment>/\*.*?\*/)|(?P<string>"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\')'
+    rf"(?P<name>{_NAME})|(?P<space>\s+)|(?P<comment>{_COMMENT})|(?P<string>{_STRING})"
     r"|(?P<real>(?:0x[0-9a-fA-F.]+p[-+]?[0-9]+|(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[0-9]+[eE][-+]?[0-9]+)f?)"
-    r"|(?P<whole>[0-9]\w*)|(?P<name>[A-Za-z_]\w*)|(?P<space>\s+)|(?P<mark>.)",
+    r"|(?P<whole>[0-9]\w*)|(?P<mark>.)",
     re.DOTALL,
 )
+_KINDS = {kind.value: kind for kind in TokenKind}
 
 
 def tokens(text: str) -> Iterator[CToken]:
     """Yield the tokens of a text."""
     for match in _TOKEN.finditer(text):
-        yield CToken(TokenKind(match.lastgroup or ""), match[0])
+        yield CToken(_KINDS[match.lastgroup or ""], match[0])
 
 
 #: Operators of several characters; "..", which is none, begins "...".
@@ -74,6 +75,37 @@ def lexemes(text: str) -> Iterator[CToken]:
         fresh = token.kind is TokenKind.SPACE and (fresh or "\n" in token.text)
     if mark or directive:
         yield CToken(TokenKind.DIRECTIVE, directive) if directive else CToken(TokenKind.MARK, mark)
+
+
+_DIRECTIVE = rf"^[^\S\n]*\#(?:\\\n|{_COMMENT}|[^\n])*"
+_NUMBER = r"\.?[0-9](?:[eEpP][-+]|[\w.])*"
+_MODES = re.DOTALL | re.MULTILINE
+_CODE = re.compile(rf"(?P<skipped>{_DIRECTIVE}|{_COMMENT})|{_STRING}|{_NUMBER}|{_NAME}|[=!<>]=|\S", _MODES)
+_BRACES = re.compile(rf"{_DIRECTIVE}|{_COMMENT}|{_STRING}|[{{}}]", _MODES)
+_MEMBER = rf"\.\.\.|(?:\.|->)(?:\s|{_COMMENT})*{_NAME}"
+_USED = re.compile(rf"{_DIRECTIVE}|{_COMMENT}|{_STRING}|{_NUMBER}|{_MEMBER}|({_NAME})", _MODES)
+
+
+def next_token(text: str, at: int) -> re.Match[str] | None:
+    """Return the first word, literal or mark from a place on, outside comments and directives."""
+    while (match := _CODE.search(text, at)) and match["skipped"]:
+        at = match.end()
+    return match
+
+
+def closing_brace(text: str, at: int) -> int:
+    """Return the place of the brace that closes the one at a place, or the end of the text."""
+    depth = 0
+    for match in _BRACES.finditer(text, at):
+        depth += (match[0] == "{") - (match[0] == "}")
+        if depth == 0 and match[0] == "}":
+            return match.start()
+    return len(text)
+
+
+def used_names(text: str) -> set[str]:
+    """Return the identifiers in a text, without those in comments, strings and directives, and names of members."""
+    return {*_USED.findall(text)} - {""}
 
 
 def names(text: str) -> set[str]:

@@ -3,10 +3,12 @@ functions."""
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
-from phigen.targets.c.tokens import CToken, TokenKind, lexemes, names
+from phigen.targets.c.tokens import closing_brace, names, next_token, used_names
 
 #: First words of declarations that declare no function, or a function of the library.
 _TYPES = ("typedef", "enum", "struct", "union")
@@ -28,9 +30,10 @@ def without_unused(lines: Sequence[str], prefix: str) -> list[str]:
     """Return the lines without static functions that no other code calls, directly or through such functions, and
     without declarations of functions that are not defined in the lines, if their names have the prefix of the
     solver."""
-    functions = [f for f in functions_of(lines) if f.name.startswith(prefix)]
+    declarations = [*declarations_of(lines)]
+    functions = [f for f in declarations if f.name.startswith(prefix)]
     static = [f for f in functions if f.static]
-    inside = {k for f in static for k in range(f.begin, f.end)} | _declared(functions) | _types(lines)
+    inside = {k for f in static for k in range(f.begin, f.end)} | _declared(functions) | _types(lines, declarations)
     reached = _reached(_used("\n".join(line for k, line in enumerate(lines) if k not in inside)), static, lines)
     defined = {f.name for f in functions if f.defined}
     unused = [f for f in functions if (f.name not in reached if f.static else f.name not in defined)]
@@ -41,20 +44,15 @@ def _declared(functions: Iterable[Function]) -> set[int]:
     return {k for f in functions if not f.defined for k in range(f.begin, f.end)}
 
 
-def _types(lines: Sequence[str]) -> set[int]:
+def _types(lines: Sequence[str], declarations: Iterable[Function]) -> set[int]:
     """The lines that declare types, whose members may have the names of functions."""
-    types = (d for d in declarations_of(lines) if lines[d.begin].startswith(_TYPES))
+    types = (d for d in declarations if lines[d.begin].startswith(_TYPES))
     return {k for d in types for k in range(d.begin, d.end)}
 
 
 def _used(text: str) -> set[str]:
-    """The names in a text, without names of members, which follow a point or an arrow."""
-    used, before = set[str](), ""
-    for _, token in _code(text):
-        if token.kind is TokenKind.NAME and before not in (".", "->"):
-            used.add(token.text)
-        before = token.text
-    return used | {name for line in text.splitlines() if line.startswith("#") for name in names(line)}
+    """The names in a text, without names of members; of directives, the names in their first lines."""
+    return used_names(text) | {name for line in text.splitlines() if line.startswith("#") for name in names(line)}
 
 
 def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str]) -> set[str]:
@@ -78,28 +76,24 @@ def functions_of(lines: Sequence[str]) -> Iterator[Function]:
 
 def declarations_of(lines: Sequence[str]) -> Iterator[Function]:
     """Yield the declarations and definitions outside of functions; the name is empty if it is not a function."""
-    declaration, opened = _Declaration(), 0
-    for line, token in _code("\n".join(lines)):
-        if token.text == "}" and not opened:
-            declaration = _Declaration()  # the end of extern "C"
-            continue
-        declaration.take(token, line, outside=not opened)
-        opened += (token.text == "{") - (token.text == "}")
+    text, declaration, at = "\n".join(lines), _Declaration(), 0
+    line_ends = [*accumulate(len(line) + 1 for line in lines)]
+    while token := next_token(text, at):
+        at = token.end()
+        if token[0] == "}":
+            continue  # the end of extern "C"
+        declaration.take(token[0], token.start())
         if declaration.is_linkage:
-            declaration, opened = _Declaration(), 0
-        elif not opened and token.text in declaration.ends:
-            static = declaration.first == "static"
-            yield Function(declaration.name, declaration.begin, line + 1, static, token.text == "}")
             declaration = _Declaration()
-
-
-def _code(text: str) -> Iterator[tuple[int, CToken]]:
-    """Yield the tokens of a text without white space, comments and directives, each after the number of its line."""
-    line = 0
-    for token in lexemes(text):
-        if token.kind not in (TokenKind.SPACE, TokenKind.COMMENT, TokenKind.DIRECTIVE):
-            yield line, token
-        line += token.text.count("\n")
+            continue
+        if token[0] == "{":
+            at = closing_brace(text, token.start()) + 1
+            declaration.last = "}"
+        if declaration.last in declaration.ends:
+            begin, last = (bisect_right(line_ends, place) for place in (declaration.begin, at - 1))
+            is_definition = declaration.last == "}"
+            yield Function(declaration.name, begin, last + 1, declaration.first == "static", is_definition)
+            declaration = _Declaration()
 
 
 @dataclass
@@ -114,18 +108,18 @@ class _Declaration:
     in_size: bool = False  # whether the last token was in the size of an array
     has_body: bool = False
 
-    def take(self, token: CToken, line: int, *, outside: bool) -> None:
-        """Read the next token, which is ``outside`` of braces or not."""
+    def take(self, token: str, place: int) -> None:
+        """Read the next token outside of braces, or an opening brace."""
         if not self.first:
-            self.first, self.begin = token.text, line
-            self.is_plain = token.text in _NO_FUNCTIONS or not token.text[:1].islower()
-        self.in_size = token.text == "[" or (self.in_size and token.text != "]")
-        if outside and not self.name and not self.is_plain and not self.in_size:
-            if token.text == "(":
+            self.first, self.begin = token, place
+            self.is_plain = token in _NO_FUNCTIONS or not token[:1].islower()
+        self.in_size = token == "[" or (self.in_size and token != "]")
+        if not self.name and not self.is_plain and not self.in_size:
+            if token == "(":
                 self.name = self.last
-            self.is_plain = token.text in ("=", "{")
-        self.has_body = self.has_body or (outside and token.text == "{" and bool(self.name))
-        self.last = token.text
+            self.is_plain = token in ("=", "{")
+        self.has_body = self.has_body or (token == "{" and bool(self.name))
+        self.last = token
 
     @property
     def ends(self) -> tuple[str, ...]:
