@@ -10,16 +10,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from phigen.ir import nodes as ir
-from phigen.ir.passes.unread import discard_unread
+from phigen.ir.passes.unread import typed_function
 from phigen.scheme.alternation import Schedule
-from phigen.scheme.kernel import Role
 
 X, START, COEF, ROW, DISTINCT_COEF, PART, PACK, GROUP, BAR, K = (
     ir.fixed(name) for name in ("x", "start", "coef", "row", "distinct_coef", "part", "pack", "group", "bar", "k")
 )
 CHANGE, TURNED, BACK, SLOPES, BEFORE = (ir.fixed(name) for name in ("change", "turned", "back", "slopes", "before"))
 DISPLACEMENT, TAPE, ELEMENT, ROW_SIZE = (ir.fixed(name) for name in ("displacement", "tape", "element", "ROW"))
-PACKS, ELEMENTS, NONE = ir.Member(GROUP, "packs"), ir.fixed("ELEMENT"), ir.Constant(None)
+PACKS, ELEMENTS = ir.Member(GROUP, "packs"), ir.fixed("ELEMENT")
 _PACK, _GROUP = ir.RecordType("pack", mutable=True, address=True), ir.RecordType("group", mutable=True)
 _LANES = ir.Pointer(constant=False, lanes=True)
 
@@ -55,20 +54,18 @@ class FlowFunctions:
             "after": ir.Type.FLAG,
             "slope": ir.Vector(ir.Constant(self.dimension**2)),
         }
-        listed = tuple((p, types[p]) for p in parameters if p in types)
-        return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))
+        return typed_function(name, doc, parameters, body, types)
 
     def flow(self, number: int, updated: Sequence[int]) -> ir.Function:
         """Return the function that adds the increments of the ``updated`` values."""
         count = ir.Constant(max(1, len(updated)))
-        body: list[ir.Statement] = [ir.Declare(ir.Vector(count), ((CHANGE.symbol, NONE),), mutable=True)]
+        body: list[ir.Statement] = [ir.vectors(ir.Vector(count), CHANGE)]
         called = (COEF, X, *[ELEMENT] * self.turns, CHANGE, *[TURNED] * self.turns)
-        if self.turns:
-            body.append(ir.Declare(ir.Vector(ELEMENTS), ((TURNED.symbol, NONE),), mutable=True))
+        body += [ir.vectors(ir.Vector(ELEMENTS), TURNED)] * self.turns
         body.append(ir.Call(f"change{number}", called))
         body += [ir.Copy(ELEMENT, TURNED)] * self.turns
         for place, i in enumerate(updated):
-            increment = ir.Entry(CHANGE, ir.Constant(place))
+            increment = ir.entry(CHANGE, place)
             body.append(ir.Call("add", (X, DISPLACEMENT, START, ir.Constant(i), increment)))
         doc = f"Apply the flow of H_{number} to x, over the time for which coef was prepared"
         parameters = ("coef", "x", "displacement", "start", *["element"] * self.turns)
@@ -114,7 +111,7 @@ class FlowFunctions:
         body: list[ir.Statement] = [ir.Switch(PART, tuple(range(1, count + 1)), cases)]
         if self.turns:
             note, zeros = "attitude increments, already applied", ir.Listed((ir.Constant(0.0),))
-            body.insert(0, ir.Declare(ir.Vector(ELEMENTS), ((ELEMENT.symbol, zeros),), mutable=True, note=note))
+            body.insert(0, ir.vectors(ir.Vector(ELEMENTS), ELEMENT, value=zeros, note=note))
         doc = "Apply the flow of a part; slope is the derivative of its increment at the start"
         return self.function("tangent_flow", doc, ("part", "coef", "x", "displacement", "start", "slope"), tuple(body))
 
@@ -158,16 +155,14 @@ def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
     row = ir.Binary("+", coefficients, ir.Binary("*", ROW, ROW_SIZE))
     body: list[ir.Statement] = [
         ir.Declare(_PACK, ((PACK.symbol, ir.Prefix("&", ir.Entry(ir.Member(GROUP, "pack"), K))),)),
-        ir.Declare(ir.Vector(count, lanes=True), ((CHANGE.symbol, NONE),), mutable=True),
+        ir.vectors(ir.Vector(count, lanes=True), CHANGE),
         ir.Call(f"change{number}{form}_lanes", (row, x, DISTINCT_COEF, CHANGE)),
     ]
     for place, i in enumerate(updated):
-        state = (ir.Entry(array, ir.Constant(i)) for array in (x, compensation, start))
-        body.append(ir.Call("add_lanes", (*state, ir.Entry(CHANGE, ir.Constant(place)))))
+        state = (ir.entry(array, i) for array in (x, compensation, start))
+        body.append(ir.Call("add_lanes", (*state, ir.entry(CHANGE, place))))
     doc = f"The flow of H_{number} for all members of a group"
-    return _group_function(
-        f"flow{number}{form}_lanes", doc, ("row", "distinct_coef", "group"), (_over_packs(tuple(body)),)
-    )
+    return typed_function(f"flow{number}{form}_lanes", doc, tuple(_TYPES), (_over_packs(tuple(body)),), _TYPES)
 
 
 def group_schedule(schedule: Schedule, form: str) -> ir.Function:
@@ -177,24 +172,15 @@ def group_schedule(schedule: Schedule, form: str) -> ir.Function:
         yield ir.Call(f"flow{part + 1}{form}_lanes", (row, DISTINCT_COEF, GROUP))
 
     doc, body = "The flows of one step, one after the other", tuple(_in_order(schedule, ROW, None, flow))
-    return _group_function(f"flows{form}_lanes", doc, ("row", "distinct_coef", "group"), body)
+    return typed_function(f"flows{form}_lanes", doc, tuple(_TYPES), body, _TYPES)
 
 
 def _over_packs(body: ir.Block) -> ir.Loop:
     return ir.Loop("packs", body, "k", ir.Constant(0), PACKS)
 
 
-def _group_function(
-    name: str, doc: str, parameters: Sequence[str], body: ir.Block, types: Mapping[str, ir.ParameterType] | None = None
-) -> ir.Function:
-    known: dict[str, ir.ParameterType] = {
-        "row": ir.Type.FLAG,
-        "distinct_coef": ir.Type.FLAG,
-        "group": _GROUP,
-        **(types or {}),
-    }
-    listed = tuple((p, known[p]) for p in parameters if p in known)
-    return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))
+#: The types of the parameters of functions of a group.
+_TYPES: Mapping[str, ir.ParameterType] = {"row": ir.Type.FLAG, "distinct_coef": ir.Type.FLAG, "group": _GROUP}
 
 
 # ---- transposes
@@ -236,13 +222,10 @@ class FlowTransposes:
         return ir.Switch(PART, tuple(range(1, len(cases) + 1)), cases)
 
     def _results(self, *, lanes: bool = False) -> Iterator[ir.Declare]:
-        lengths = {BACK: self.dimension, SLOPES: self.row} | ({BEFORE: self.dimension} if self._restores(lanes) else {})
-        for name, length in lengths.items():
-            kind = ir.Vector(ir.Constant(length), lanes=lanes)
-            yield ir.Declare(kind, ((name.symbol, NONE),), mutable=True)
-
-    def _restores(self, lanes: bool) -> bool:
-        return lanes and self.recomputes
+        lengths = {BACK: self.dimension, SLOPES: self.row}
+        if lanes and self.recomputes:
+            lengths[BEFORE] = self.dimension
+        return (ir.vectors(ir.Vector(ir.Constant(length), lanes=lanes), name) for name, length in lengths.items())
 
     def back(self) -> ir.Function:
         """Return the function for one member."""
@@ -250,9 +233,9 @@ class FlowTransposes:
         def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
             yield ir.Call(f"flow{k}_adjoint", (COEF, X, BAR, BACK, SLOPES))
             for place, i in enumerate(flow.state):
-                yield ir.Assign(_at(BAR, i), _at(BACK, place), adds=True)
+                yield ir.Assign(ir.entry(BAR, i), ir.entry(BACK, place), adds=True)
             for place, i in enumerate(flow.row):
-                yield ir.Assign(_at(ir.fixed("coef_bar"), i), _at(SLOPES, place), adds=True)
+                yield ir.Assign(ir.entry(ir.fixed("coef_bar"), i), ir.entry(SLOPES, place), adds=True)
 
         state = ir.Vector(ir.Constant(self.dimension))
         types = {"x": replace(state, constant=True), "bar": state, "coef_bar": ir.Vector(ir.Constant(self.row))}
@@ -261,12 +244,12 @@ class FlowTransposes:
         )
         parameters = ("part", "coef", "x", "bar", "coef_bar")
         body: ir.Block = (*self._results(), self._switch(case))
-        return _group_function("follow_back", f"{doc} are added to coef_bar", parameters, body, types)
+        return typed_function("follow_back", f"{doc} are added to coef_bar", parameters, body, types)
 
     @property
-    def _stored(self) -> dict[str, ir.ParameterType]:
-        """The coordinates on the tape, of all packs of a group."""
-        return {"tape": ir.Vector(ir.Constant(self.dimension), rows=ir.fixed("BACK_PACKS"), lanes=True)}
+    def _stored(self) -> Mapping[str, ir.ParameterType]:
+        """The types of parameters: on the tape are the coordinates of all packs of a group."""
+        return {**_TYPES, "tape": ir.Vector(ir.Constant(self.dimension), rows=ir.fixed("BACK_PACKS"), lanes=True)}
 
     def group_flows(self) -> ir.Function:
         """Return the function that applies a flow to all members of a group, and stores what its transpose reads."""
@@ -274,7 +257,7 @@ class FlowTransposes:
         def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
             pack = ir.Member(ir.Entry(ir.Member(GROUP, "pack"), K), "x")
             copies = (
-                ir.Copy(_at(ir.Entry(TAPE, K), first), _at(pack, first), ir.Constant(count))
+                ir.Copy(ir.entry(ir.Entry(TAPE, K), first), ir.entry(pack, first), ir.Constant(count))
                 for first, count in flow.reads
             )
             if flow.reads:
@@ -283,7 +266,7 @@ class FlowTransposes:
 
         doc = "Apply the flow of a part to all members of a group, after storing the coordinates that its reverse pass"
         body = (self._switch(case),)
-        return _group_function("follow_lanes", f"{doc} reads", ("part", "row", "group", "tape"), body, self._stored)
+        return typed_function("follow_lanes", f"{doc} reads", ("part", "row", "group", "tape"), body, self._stored)
 
     def group_back(self) -> ir.Function:
         """Return the function that pulls cotangents back through a flow, for all members of a group."""
@@ -294,12 +277,12 @@ class FlowTransposes:
             results = (BACK, SLOPES, *[BEFORE] * self.recomputes)
             yield _in_form(f"flow{k}_adjoint", flow.far_back, (COEF, X, bars, *results))
             for place, i in enumerate(flow.before):
-                yield ir.Copy(_at(X, i), _at(BEFORE, place))
+                yield ir.Copy(ir.entry(X, i), ir.entry(BEFORE, place))
             for place, i in enumerate(flow.state):
-                yield ir.Call("gain_lanes", (_at(bars, i), _at(BACK, place)))
+                yield ir.Call("gain_lanes", (ir.entry(bars, i), ir.entry(BACK, place)))
             for place, i in enumerate(flow.row):
                 entry = ir.Entry(coefficients, ir.Binary("+", first, ir.Constant(i)))
-                yield ir.Call("gain_lanes", (entry, _at(SLOPES, place)))
+                yield ir.Call("gain_lanes", (entry, ir.entry(SLOPES, place)))
 
         x = ir.Member(ir.Entry(ir.Member(GROUP, "pack"), K), "x") if self.recomputes else ir.Entry(TAPE, K)
         coef = ir.Binary("+", ir.Entry(ir.Member(GROUP, "coef"), K), first)
@@ -313,11 +296,7 @@ class FlowTransposes:
             if self.recomputes
             else "tape holds the stored coordinates of the states before the flow"
         )
-        return _group_function("follow_back_lanes", doc, parameters, (body,), types)
-
-
-def _at(array: ir.Value, place: int) -> ir.Entry:
-    return ir.Entry(array, ir.Constant(place))
+        return typed_function("follow_back_lanes", doc, parameters, (body,), types)
 
 
 def _in_form(name: str, has_far: bool, arguments: tuple[ir.Value, ...]) -> ir.Statement:

@@ -29,13 +29,13 @@ def kernel_function(
     expanded = expand_powers([*roots, *(e for _, e in kernel.named)])
     named_values = zip(kernel.named, expanded[len(roots) :], strict=True)
     assignments, trees = assign(expanded[: len(roots)], {id(e): name for (name, _), e in named_values if e.args})
-    places = (ir.Entry(names[o.name], ir.Constant(i)) for o in kernel.outputs for i in range(len(o.values)))
+    places = (ir.entry(names[o.name], i) for o in kernel.outputs for i in range(len(o.values)))
     body = (
         *_reads(kernel, {*symbols_of(*expanded[: len(roots)])}, members, names, named=named),
         *(ir.real(a.target, a.value) for a in assignments),
         *(ir.Assign(place, tree) for place, tree in zip(places, trees, strict=True)),
     )
-    parameters = tuple(str(name.symbol.key[0]) for name in names.values())  # type: ignore[attr-defined]
+    parameters = tuple(name.text for name in names.values())
     return ir.Function(kernel.name, kernel.purpose, kernel.role, parameters, body)
 
 
@@ -51,6 +51,6 @@ def _reads(
                 place: ir.Value = ir.Member(names[argument], members[s])
                 yield ir.real(s, place) if named else ir.in_place(s, place)
             else:
-                place = names[argument] if argument in SCALARS else ir.Entry(names[argument], ir.Constant(i))
+                place = names[argument] if argument in SCALARS else ir.entry(names[argument], i)
                 internal = argument in SCALARS or isinstance(s, Symbol)
                 yield ir.in_place(s, place) if internal else ir.real(s, place)

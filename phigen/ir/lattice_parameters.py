@@ -7,11 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
 
 from phigen.ir import nodes as ir
-from phigen.ir.passes.unread import discard_unread
-from phigen.scheme.kernel import Role
+from phigen.ir.passes.unread import typed_function
 from phigen.spec.model import Parameter
 
 S, PARAMS, K, NULL = (ir.fixed(name) for name in ("s", "params", "k", "NULL"))
@@ -24,12 +22,6 @@ _TYPES: Mapping[str, ir.ParameterType] = {
     "sites": ir.Type.SIZE,
     "bonds": ir.Type.SIZE,
 }
-
-
-def _function(name: str, doc: str, parameters: Sequence[str], body: ir.Block, **types: ir.ParameterType) -> ir.Function:
-    known = {**_TYPES, **types}
-    listed = tuple((p, known[p]) for p in parameters if p in known)
-    return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))
 
 
 def are_allowed(parameters: Sequence[Parameter], members: Mapping[str, str], *, graph: bool) -> ir.Function:
@@ -49,10 +41,10 @@ def are_allowed(parameters: Sequence[Parameter], members: Mapping[str, str], *, 
             body.append(ir.If(ir.Binary("==", array, NULL), refusal))
         is_array, search = ir.Binary("!=", array, NULL), (ir.If(wrong, refusal),)
         body.append(ir.Loop("search", search, "k", ir.Constant(0), ir.fixed(p.at), condition=is_array))
-    value = reduce(lambda a, b: ir.Binary("and", a, b), conditions) if conditions else ir.Constant(1)
+    value = ir.joined("and", *conditions) if conditions else ir.Constant(1)
     names = ("params", "sites", *["bonds"] * graph)
     doc = "Whether all parameters are finite, and positive where required"
-    function = _function("allowed", doc, names, (*body, ir.Return(value)))
+    function = typed_function("allowed", doc, names, (*body, ir.Return(value)), _TYPES)
     return replace(function, returns=ir.Type.FLAG)
 
 
@@ -61,14 +53,14 @@ def copies(
 ) -> Iterator[ir.Function]:
     """Yield the functions that copy parameters at sites to ``arrays`` of rows, and parameters ``at_bonds``."""
     sites, bonds = ([p for p in parameters if p.at == at] for at in ("sites", "bonds"))
-    solver = ir.RecordType("solver", mutable=True)
+    types = {**_TYPES, "s": ir.RecordType("solver", mutable=True)}
     if sites:
         body = [
             ir.Call("put_parameter", (S, _row("x", arrays.index(p.name)), _of(PARAMS, p, members), _default(p)))
             for p in sites
         ]
         doc = "Copy the parameters at sites into rows"
-        yield _function("put_parameters", doc, ("s", "params"), (*body, _copied(sites, members)), s=solver)
+        yield typed_function("put_parameters", doc, ("s", "params"), (*body, _copied(sites, members)), types)
     if bonds:
         number = ir.Entry(ir.Member(S, "number"), K)
         selected = (
@@ -80,7 +72,7 @@ def copies(
         count = ir.Entry(ir.Member(S, "bonds"), ir.Member(S, "sites"))
         loop = ir.Loop("entries", each, "k", ir.Constant(0), count)
         doc = "Copy the parameters at bonds, in the order of the bonds of each site"
-        yield _function("put_at_bonds", doc, ("s", "params"), (loop, _copied(bonds, members)), s=solver)
+        yield typed_function("put_at_bonds", doc, ("s", "params"), (loop, _copied(bonds, members)), types)
 
 
 def _copied(parameters: Sequence[Parameter], members: Mapping[str, str]) -> ir.Assign:
@@ -100,20 +92,18 @@ def sums_of_derivatives(
     numbers = [p for p in parameters if p.at == "all"]
     if numbers:
         body = tuple(
-            ir.Assign(_of(PARAMS_BAR, p, members), ir.Entry(DERIVATIVES, ir.Constant(k)), adds=True)
-            for k, p in enumerate(numbers)
+            ir.Assign(_of(PARAMS_BAR, p, members), ir.entry(DERIVATIVES, k), adds=True) for k, p in enumerate(numbers)
         )
-        yield _function(
-            "add_numbers", "Add the derivatives by parameters with one value", ("derivatives", "params_bar"), body
-        )
+        doc = "Add the derivatives by parameters with one value"
+        yield typed_function("add_numbers", doc, ("derivatives", "params_bar"), body, _TYPES)
     by_name = {p.name: p for p in parameters}
     calls = tuple(
-        ir.Call(f"add_at_{p.at}", (S, ir.Entry(BAR, ir.Constant(bar)), _of(PARAMS_BAR, p, members)))
+        ir.Call(f"add_at_{p.at}", (S, ir.entry(BAR, bar), _of(PARAMS_BAR, p, members)))
         for name, bar in bars.items()
         for p in [by_name[name]]
     )
     doc = "Add the derivatives by parameters at sites and bonds"
-    yield _function("add_arrays", doc, ("s", "bar", "params_bar"), calls)
+    yield typed_function("add_arrays", doc, ("s", "bar", "params_bar"), calls, _TYPES)
 
 
 def _of(record: ir.Value, parameter: Parameter, members: Mapping[str, str]) -> ir.Member:
@@ -121,7 +111,7 @@ def _of(record: ir.Value, parameter: Parameter, members: Mapping[str, str]) -> i
 
 
 def _row(array: str, number: int) -> ir.Entry:
-    return ir.Entry(ir.Member(S, array), ir.Constant(number))
+    return ir.entry(ir.Member(S, array), number)
 
 
 def _default(parameter: Parameter) -> ir.Constant:

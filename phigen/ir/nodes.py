@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum, auto
+from functools import reduce
 
 from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import Expression
@@ -117,6 +118,11 @@ class Name:
     """A declared name."""
 
     symbol: str
+
+    @property
+    def text(self) -> str:
+        """The text of a fixed name."""
+        return str(self.symbol.key[0]) if isinstance(self.symbol, Symbol) else ""
 
 
 @dataclass(frozen=True)
@@ -584,14 +590,30 @@ def in_place(name: str, value: Value) -> Declare:
     return Declare(Type.REAL, ((name, value),), in_place=True)
 
 
-def real(name: str, value: Value) -> Declare:
-    """Return the declaration of one real constant."""
-    return Declare(Type.REAL, ((name, value),))
+def real(name: Name | str, value: Value, *, mutable: bool = False) -> Declare:
+    """Return the declaration of one real value."""
+    return Declare(Type.REAL, ((name.symbol if isinstance(name, Name) else name, value),), mutable=mutable)
 
 
 def index(name: Name, value: Value) -> Declare:
     """Return the declaration of one index."""
     return Declare(Type.INDEX, ((name.symbol, value),))
+
+
+def vectors(kind: Vector, *names: Name, value: Value | None = None, note: str = "") -> Declare:
+    """Return the declaration of arrays that statements write to, without a value unless one is passed."""
+    items = tuple((name.symbol, value or Constant(None)) for name in names)
+    return Declare(kind, items, note=note, mutable=True)
+
+
+def entry(array: Value, number: int | str) -> Entry:
+    """Return the element of an array with a number, or a name."""
+    return Entry(array, Constant(number))
+
+
+def joined(operator: str, *values: Value) -> Value:
+    """Return values joined by an infix operator, from the left."""
+    return reduce(lambda left, right: Binary(operator, left, right), values)
 
 
 def plus(value: Value, offset: int) -> Value:

@@ -6,12 +6,11 @@ In SIMD lanes (`lane_functions`) the sums over orders are loops, and derivatives
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 
 from phigen.ir import nodes as ir
-from phigen.ir.passes.unread import discard_unread
+from phigen.ir.passes.unread import typed_function
 from phigen.ir.walk import names_in
 from phigen.scheme.kernel import Role
 from phigen.scheme.lowering import expand_powers
@@ -39,19 +38,19 @@ class PathLayout:
 
     def coefficient(self, i: int) -> ir.Value:
         """Return coefficient i, a function of the parameters and the step."""
-        return _at(COEF, i)
+        return ir.entry(COEF, i)
 
     def covector(self, i: int) -> ir.Value:
         """Return component i of p."""
-        return _at(P, i)
+        return ir.entry(P, i)
 
     def fixed(self, i: int) -> ir.Value:
         """Return value i of those that are constant along a path."""
-        return _at(F, i)
+        return ir.entry(F, i)
 
     def series(self, i: int) -> ir.Value:
         """Return the array of the orders of series i."""
-        return _at(S, i)
+        return ir.entry(S, i)
 
     def order(self, i: int, k: ir.Value) -> ir.Value:
         """Return coefficient k of series i."""
@@ -105,11 +104,11 @@ class PathFunctions:
     def nodes(self) -> ir.Block:
         """Return the statements that compute the values e of the derived series at one point."""
         reads = self.reads((q.first for _, q in self.derived), at_point=True)
-        return (*reads, *(ir.Assign(_at(E, i), _expanded(q.first)) for i, q in self.derived))
+        return (*reads, *(ir.Assign(ir.entry(E, i), _expanded(q.first)) for i, q in self.derived))
 
     def field(self) -> ir.Block:
         """Return the statements that compute ṁ from these values."""
-        return tuple(ir.Assign(_at(FIELD, i), _at(E, slope)) for i, slope in enumerate(self.path.slopes))
+        return tuple(ir.Assign(ir.entry(FIELD, i), ir.entry(E, slope)) for i, slope in enumerate(self.path.slopes))
 
     def reads(self, expressions: Iterable[Expression], *, at_point: bool = False) -> list[ir.Statement]:
         """Return the declarations of the symbols of expressions; series are those of one point, or of order 0."""
@@ -117,7 +116,7 @@ class PathFunctions:
         listed = {momentum(c): self.layout.covector(i) for i, c in enumerate(self.program.coordinates)}
         listed |= {coefficient(i): self.layout.coefficient(i) for i in range(self.program.step.coefficients)}
         for i in range(len(self.path.series)):
-            listed[Symbol(SERIES, i)] = _at(E, i) if at_point else self.layout.order(i, ZERO)
+            listed[Symbol(SERIES, i)] = ir.entry(E, i) if at_point else self.layout.order(i, ZERO)
         listed |= {Symbol(FIXED, i): self.layout.fixed(i) for i in range(len(self.path.fixed))}
         return [ir.in_place(s, place) for s, place in listed.items() if s in used]
 
@@ -135,7 +134,7 @@ class PathFunctions:
     def _rule(self, q: NodeSeries) -> ir.Value:
         linear = self.linear(q)
         terms = [*([linear] if linear else []), *map(self._sum, q.terms)]
-        total = _sum(terms) if terms else ir.Constant(0.0)
+        total = ir.joined("+", *terms) if terms else ir.Constant(0.0)
         return ir.Binary("/", ir.Grouped(total), self.layout.order(q.divisor, ZERO)) if q.divisor is not None else total
 
     def _sum(self, t: ConvolutionTerm) -> ir.Value:
@@ -160,13 +159,11 @@ def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Functio
 
     def function(name: str, doc: str, parameters: Sequence[str], *body: ir.Statement) -> ir.Function:
         listed = {**types, **({"f": replace(values, constant=True)} if name == "order" else {})}
-        pairs = tuple((p, listed[p]) for p in parameters if p in listed)
-        return discard_unread(ir.Function(f"{kind}_{name}", doc, Role.OTHER, tuple(parameters), body, pairs))
+        return typed_function(f"{kind}_{name}", doc, parameters, body, listed)
 
     rules = build.rules()
     later = [ir.If(ir.Binary(">", K, ZERO), rules)] if rules else []
-    point: list[ir.Statement] = [ir.Declare(ir.Vector(series), ((E.symbol, ir.Constant(None)),), mutable=True)]
-    point += [ir.Declare(values, ((F.symbol, ir.Constant(None)),), mutable=True)] * bool(path.fixed)
+    point = [ir.vectors(ir.Vector(series), E), *[ir.vectors(values, F)] * bool(path.fixed)]
     of_series = f"First coefficients of the series of a {kind}; those of the coordinates are given"
     of_order = "Coefficient k of the series, and coefficient k + 1 of the coordinates"
     at_point = (*point, *build.fixed(), ir.Copy(E, M, n), *build.nodes(), *build.field())
@@ -203,19 +200,19 @@ class _LaneLayout(PathLayout):
         self._series, self._fixed = len(path.series), len(path.fixed)
 
     def coefficient(self, i: int) -> ir.Value:
-        return _in_lane(_at(COEF, i))
+        return _in_lane(ir.entry(COEF, i))
 
     def covector(self, i: int) -> ir.Value:
-        return _in_lane(_at(ir.Member(E, "p"), i))
+        return _in_lane(ir.entry(ir.Member(E, "p"), i))
 
     def fixed(self, i: int) -> ir.Value:
         further = i - self._fixed
-        place = _at(ir.Member(E, "fixed"), i) if further < 0 else _at(ir.Member(E, "slope_fixed"), further)
+        place = ir.entry(ir.Member(E, "fixed"), i) if further < 0 else ir.entry(ir.Member(E, "slope_fixed"), further)
         return _in_lane(place)
 
     def series(self, i: int) -> ir.Value:
         further = i - self._series
-        return _at(ir.Member(E, "s"), i) if further < 0 else _at(ir.Member(E, "slope"), further)
+        return ir.entry(ir.Member(E, "s"), i) if further < 0 else ir.entry(ir.Member(E, "slope"), further)
 
     def order(self, i: int, k: ir.Value) -> ir.Value:
         return _in_lane(super().order(i, k))
@@ -259,34 +256,34 @@ class _LaneFunctions:
         for i, q in series:
             terms = list[ir.Value]()
             for t in q.terms:
-                total = _in_lane(_at(SUM, len(between)))
+                total = _in_lane(ir.entry(SUM, len(between)))
                 contribution, rest = _orders(layout, t)
                 terms += [total if t.kind == "product" else ir.Binary("*", SHARE, total), *rest]
                 between.append(ir.Assign(total, contribution, adds=True))
-            value = _sum(terms) if terms else self.path.linear(q) or ir.Constant(0.0)
+            value = ir.joined("+", *terms) if terms else self.path.linear(q) or ir.Constant(0.0)
             value = ir.Binary("/", ir.Grouped(value), layout.order(q.divisor, ZERO)) if q.divisor is not None else value
             ends.append(ir.Assign(layout.order(i, K), value))
         reads = self.path.reads(factor for _, q in series for _, factor in q.linear)
-        sums = ir.Declare(
-            ir.Vector(ir.Constant(max(1, len(between))), lanes=True), ((SUM.symbol, ir.Constant(None)),), mutable=True
-        )
+        sums = ir.vectors(ir.Vector(ir.Constant(max(1, len(between))), lanes=True), SUM)
         over_orders = ir.Loop("stages", tuple(_over_lanes(between)), "j", ir.Constant(1), K)
         body = (*reads, sums, ir.Clear(SUM, None, None), over_orders, *_over_lanes(ends))
-        share = [ir.real(SHARE.symbol, ir.Binary("/", ONE, ir.Cast(K, "real")))] * (SHARE.symbol in names_in(body))
+        share = [ir.real(SHARE, ir.Binary("/", ONE, ir.Cast(K, "real")))] * (SHARE.symbol in names_in(body))
         doc = f"Coefficient k >= 1 of {purpose}: convolution sums over the orders between 0 and k, then the remaining"
-        return _lane_function(name, f"{doc} terms", ("coef", "e", "k"), (*share, *body))
+        return typed_function(name, f"{doc} terms", ("coef", "e", "k"), (*share, *body), _TYPES)
 
     def variation(self, name: str, array: str, jacobian: Sequence[SeriesEntry], width: int, whose: str) -> ir.Function:
         """Return the function that adds the product of ∂(π p)/∂m and the derivatives so far, rows of a width."""
         statements = list[ir.Statement]()
         for e in jacobian:
             entry = ir.Binary("*", SHARE, self.path.layout.order(e.series, J))
-            statements.append(ir.real(_entry(e).symbol, entry))
+            statements.append(ir.real(_entry(e), entry))
         for row in range(self.path.program.dimension):
             entries = [e for e in jacobian if e.row == row]
             for k in range(width if entries else 0):
-                products = [ir.Binary("*", _entry(e), _in_lane(_at(FROM, e.column * width + k))) for e in entries]
-                statements.append(ir.Assign(_in_lane(_at(TO, row * width + k)), _sum(products), adds=True))
+                products = [ir.Binary("*", _entry(e), _in_lane(ir.entry(FROM, e.column * width + k))) for e in entries]
+                statements.append(
+                    ir.Assign(_in_lane(ir.entry(TO, row * width + k)), ir.joined("+", *products), adds=True)
+                )
         before = ir.Entry(ir.Member(E, array), ir.Binary("-", K, J))
         doc = f"Contribution of order j of d(pi p)/dm to order k + 1 of {whose}"
         return _of_order(name, doc, ("e", "j", "k"), array, statements, {FROM: before})
@@ -296,7 +293,7 @@ class _LaneFunctions:
     ) -> ir.Function:
         """Return the function that adds order k of entries of ∂(π p)/∂m and ½π, or ∂(π p)/∂c, times factors."""
         statements = [
-            ir.Assign(_in_lane(_at(TO, i)), ir.Binary("*", factor, self.path.layout.order(e.series, K)), adds=True)
+            ir.Assign(_in_lane(ir.entry(TO, i)), ir.Binary("*", factor, self.path.layout.order(e.series, K)), adds=True)
             for i, factor, e in entries
         ]
         doc = f"Contribution of order k of the entries of pi to order k + 1 of {whose}"
@@ -312,26 +309,22 @@ def _of_order(
     places: dict[ir.Name, ir.Value],
 ) -> ir.Function:
     """Return the function that adds to order k + 1 of an array of derivatives, in one loop over lanes."""
-    if not statements:
-        return _lane_function(name, doc, parameters, ())
     pointers = {**places, TO: ir.Entry(ir.Member(E, array), ir.plus(K, 1))}
     body = (
         ir.Declare(ir.Pointer(constant=False, lanes=True), tuple((n.symbol, place) for n, place in pointers.items())),
-        ir.real(SHARE.symbol, ir.Binary("/", ONE, ir.Cast(ir.plus(K, 1), "real"))),
+        ir.real(SHARE, ir.Binary("/", ONE, ir.Cast(ir.plus(K, 1), "real"))),
         _lanes(statements),
     )
-    return _lane_function(name, doc, parameters, body)
+    return typed_function(name, doc, parameters, body if statements else (), _TYPES)
 
 
-def _lane_function(name: str, doc: str, parameters: Sequence[str], body: ir.Block) -> ir.Function:
-    types: dict[str, ir.ParameterType] = {
-        "coef": ir.Vector(None, lanes=True, restricted=True),
-        "e": ir.RecordType("expansion", mutable=True),
-        "j": ir.Type.FLAG,
-        "k": ir.Type.FLAG,
-    }
-    listed = tuple((p, types[p]) for p in parameters)
-    return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))
+#: The types of the parameters of functions in lanes.
+_TYPES: Mapping[str, ir.ParameterType] = {
+    "coef": ir.Vector(None, lanes=True, restricted=True),
+    "e": ir.RecordType("expansion", mutable=True),
+    "j": ir.Type.FLAG,
+    "k": ir.Type.FLAG,
+}
 
 
 def _lanes(statements: Iterable[ir.Statement]) -> ir.Loop:
@@ -351,20 +344,19 @@ def _orders(layout: PathLayout, t: ConvolutionTerm) -> tuple[ir.Value, list[ir.V
     last = (layout.order(t.a, K), layout.order(t.b, ZERO))
     match t.kind:
         case "product" if t.a == t.b:
-            return _product(a, b), [_product(ir.Constant(2.0), *last)]
+            return ir.joined("*", a, b), [ir.joined("*", ir.Constant(2.0), *last)]
         case "product":
-            return _product(a, b), [_product(layout.order(t.a, ZERO), layout.order(t.b, K)), _product(*last)]
+            return ir.joined("*", a, b), [
+                ir.joined("*", layout.order(t.a, ZERO), layout.order(t.b, K)),
+                ir.joined("*", *last),
+            ]
         case "chain":
-            return _product(real, a, b), [_product(*last)]
-    weight = ir.Binary("-", _product(ir.Binary("+", _exponent(t), ONE), real), ir.Cast(K, "real"))
-    return _product(weight, a, b), [_product(_exponent(t), *last)]
+            return ir.joined("*", real, a, b), [ir.joined("*", *last)]
+    weight = ir.Binary("-", ir.joined("*", ir.Binary("+", _exponent(t), ONE), real), ir.Cast(K, "real"))
+    return ir.joined("*", weight, a, b), [ir.joined("*", _exponent(t), *last)]
 
 
 # ---- values
-
-
-def _at(array: ir.Value, place: int) -> ir.Entry:
-    return ir.Entry(array, ir.Constant(place))
 
 
 def _in_lane(array: ir.Value) -> ir.Entry:
@@ -377,14 +369,6 @@ def _entry(e: SeriesEntry) -> ir.Name:
 
 def _expanded(e: Expression) -> Expression:
     return expand_powers([e])[0]
-
-
-def _sum(terms: Sequence[ir.Value]) -> ir.Value:
-    return reduce(lambda a, b: ir.Binary("+", a, b), terms)
-
-
-def _product(*factors: ir.Value) -> ir.Value:
-    return reduce(lambda a, b: ir.Binary("*", a, b), factors)
 
 
 def _exponent(t: ConvolutionTerm) -> ir.Value:

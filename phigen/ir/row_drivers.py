@@ -127,7 +127,7 @@ class RowDrivers:
         sites = self.layout.lattice.step.sites
         reaches = [bounds(w.key)[-1] for w in self.layout.lattice.weights]
         below, above = max([0, *(-low for low, _ in reaches)]), max([0, *(high for _, high in reaches)])
-        inside = [ir.Entry(ir.Member(S, "inside"), ir.Constant(k)) for k in range(2)]
+        inside = [ir.entry(ir.Member(S, "inside"), k) for k in range(2)]
         low: ir.Value = ir.Constant((below + VECTOR - 1) // VECTOR * VECTOR if vectors else below)
         high = whole_vectors(ir.plus(LENGTH, -above)) if vectors else ir.plus(LENGTH, -above)
         away: ir.Value = ir.Member(ROW, "complete")

@@ -49,7 +49,7 @@ class RowLayout:
 
     def row(self, arrays: ir.Value, line: int = 0, rows: str = "at") -> ir.Value:
         """Return the address of a row of an array; the member ``rows`` has the addresses of all rows."""
-        return arrays if self.single_row else ir.Binary("+", arrays, ir.Entry(ir.Member(ROW, rows), ir.Constant(line)))
+        return arrays if self.single_row else ir.Binary("+", arrays, ir.entry(ir.Member(ROW, rows), line))
 
 
 @dataclass(frozen=True)
@@ -96,13 +96,13 @@ class RowDeclarations:
     def _declare(self, s: ir.Declare, name: str, value: ir.Value) -> None:
         match value:
             case ir.Coefficient(k):
-                self._once(name, ir.fixed(f"c{k}"), ir.Entry(ir.fixed("coef"), ir.Constant(k)))
+                self._once(name, ir.fixed(f"c{k}"), ir.entry(ir.fixed("coef"), k))
             case ir.Time():
                 self.once.append((name, ir.Member(SOLVER, "now")))
             case ir.SystemParameter(parameter):
                 self.once.append((name, ir.Member(ir.Member(SOLVER, "params"), self.layout.members[parameter])))
             case ir.BondParameter(number, parameter):
-                at_bond = ir.Entry(ir.Entry(self.reading.at_bonds, ir.Constant(number)), BOND)
+                at_bond = ir.Entry(ir.entry(self.reading.at_bonds, number), BOND)
                 oriented = parameter in self.reading.oriented
                 self.other[name] = ir.Binary("*", ir.fixed("side"), at_bond) if oriented else at_bond
             case ir.HasColour():
@@ -196,7 +196,7 @@ class RowDeclarations:
         self._weight(name, ir.fixed(f"w{value.number}"), ir.Select(matches, ir.Constant(1.0), ir.Constant(0.0)))
 
     def _weight(self, name: str, local_name: ir.Name, value: ir.Value) -> None:
-        self.weights.append(ir.real(local_name.symbol, value))
+        self.weights.append(ir.real(local_name, value))
         self._substitute(name, local_name)
 
     def _start(self, pointer: ir.Name, kind: ir.Pointer, row: ir.Value) -> None:
@@ -215,7 +215,7 @@ class RowDeclarations:
             written = base in self.reading.updated
             kind = ir.Pointer(constant=not (written and line == 0), restricted=not written)
             number = self.layout.lattice.arrays.index(base)
-            row = self.layout.row(ir.Entry(ir.Member(ROW, "x"), ir.Constant(number)), line)
+            row = self.layout.row(ir.entry(ir.Member(ROW, "x"), number), line)
             if line:
                 neighbour_pointers.append(ir.Declare(kind, ((name.symbol, row),), note=self.layout.place(line)))
             else:
@@ -255,11 +255,11 @@ def grouped(pointers: Mapping[str, tuple[ir.Pointer, ir.Value]]) -> Iterator[ir.
 
 
 def _member(array: ir.Array) -> ir.Value:
-    return ir.Entry(ir.Member(ROW, _MEMBERS[array.storage]), ir.Constant(array.number))
+    return ir.entry(ir.Member(ROW, _MEMBERS[array.storage]), array.number)
 
 
 def _gathered(number: int) -> ir.Value:
-    return ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(number))
+    return ir.entry(ir.Member(SOLVER, "gathered"), number)
 
 
 def _beside(pointer: ir.Name, load: ir.Load) -> ir.Value:

@@ -106,7 +106,7 @@ class _Tables:
     def _value(self, value: ir.Value, selection: ir.Selection) -> ir.Value:
         match value:
             case ir.Coefficient(k):
-                return ir.Entry(ir.fixed("coef"), ir.Constant(k))
+                return ir.entry(ir.fixed("coef"), k)
             case ir.SystemParameter(name):
                 return ir.Member(self.params, name)
             case ir.Time():
@@ -114,9 +114,7 @@ class _Tables:
             case ir.BondParameter(_, name):
                 return ir.Entry(self._parameter(name), ir.Entry(ir.fixed("bond"), NUMBER))
             case ir.Inside(k):
-                return ir.Entry(
-                    self._hoisted(Symbol(PRESENT, k), ir.Entry(ir.Member(SITES, "present"), ir.Constant(k))), SITE
-                )
+                return ir.Entry(self._hoisted(Symbol(PRESENT, k), ir.entry(ir.Member(SITES, "present"), k)), SITE)
             case ir.HasColour():
                 matches = ir.Binary("==", ir.Entry(ir.Member(SITES, "colours"), SITE), COLOUR)
                 return ir.Select(matches, ir.Constant(1), ir.Constant(0))
@@ -158,7 +156,7 @@ class _Tables:
         site = self._site(load)
         if isinstance(site, ir.Name) and site not in (SITE, OTHER) and site.symbol not in self.hoisted:
             number = self.lattice.neighbours.index(load.offset)
-            table = self._hoisted(Symbol("near", number), ir.Entry(ir.Member(SITES, "near"), ir.Constant(number)))
+            table = self._hoisted(Symbol("near", number), ir.entry(ir.Member(SITES, "near"), number))
             self.hoisted.add(site.symbol)
             yield ir.index(site, ir.Entry(table, SITE))
 

@@ -78,7 +78,7 @@ def _part(
 
 
 def _entry(work: Symbol) -> ir.Entry:
-    return ir.Entry(WORKSPACE, ir.Constant(int(work.key[0])))
+    return ir.entry(WORKSPACE, int(work.key[0]))
 
 
 def _declared(statements: Sequence[ir.Statement]) -> list[str]:

@@ -19,7 +19,7 @@ def limit(extreme: str, infinity: str) -> ir.Name:
 def keep(extreme: str, place: ir.Value, value: ir.Value, number: int) -> Iterator[ir.Statement]:
     """Yield the statements that replace the value at a place by a larger or smaller one, and declare a name."""
     following = ir.fixed(f"next{number}")
-    yield ir.real(following.symbol, value)
+    yield ir.real(following, value)
     beyond = ir.Binary(_COMPARISONS[extreme], following, place)
     no_number = ir.Binary("!=", following, following)
     yield ir.Assign(place, ir.Select(ir.Binary("or", beyond, no_number), following, place))

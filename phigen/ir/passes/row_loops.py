@@ -54,7 +54,7 @@ def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, com
         field = ir.Entry(rows.pointer(s.array.name), SITE)
         if compensated:
             compensation = ir.Name(Symbol("carry", s.array.name))
-            compensation_array = ir.Entry(ir.Member(SOLVER, "carry"), ir.Constant(s.array.number))
+            compensation_array = ir.entry(ir.Member(SOLVER, "carry"), s.array.number)
             head.append(
                 ir.Declare(ir.Pointer(constant=False), ((compensation.symbol, layout.row(compensation_array)),))
             )
@@ -101,7 +101,7 @@ def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *
     """Return a kernel of the equation of a stage, which assigns or adds to its outputs."""
     loop = lowered(function)
     rows = RowDeclarations(layout).read((*function.body, *loop.body))
-    arrays = {name: layout.row(ir.Entry(ir.Member(ROW, "out"), ir.Constant(k))) for k, name in enumerate(outputs)}
+    arrays = {name: layout.row(ir.entry(ir.Member(ROW, "out"), k)) for k, name in enumerate(outputs)}
     head = grouped({name: (WRITTEN, array) for name, array in arrays.items()})
     stores = (s for s in loop.body if isinstance(s, ir.Store))
     updates = (ir.Assign(_at_site(outputs[s.array.number]), s.value, adds) for s in stores)
@@ -219,7 +219,7 @@ def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Fun
     rows = RowDeclarations(layout, Reading(oriented=bond_loop.oriented, at_bonds=bond_loop.at_bonds))
     rows.read((*bond_loop.function.body, *bond_loop.loop.body))
     count = len(bond_loop.stores)
-    sums = (ir.Entry(ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(k)), SITE) for k in range(count))
+    sums = (ir.Entry(ir.entry(ir.Member(SOLVER, "gathered"), k), SITE) for k in range(count))
     stores = [ir.Assign(place, ir.fixed(f"sum{k}"), adds=not first) for k, place in enumerate(sums)]
     body = (*together(rows.here), _begun(bond_loop.stores), _summed_over_bonds(bond_loop, rows), *stores)
     return row_function(bond_loop.function, *bond_loop.parameters, body=(*rows.before(), over_sites(body, "")))
@@ -271,7 +271,7 @@ def bond_reads(
     if reads_there:
         yield ir.index(OTHER, OTHER_SITE)
     if oriented:
-        yield ir.real(ir.fixed("side").symbol, side(sign))
+        yield ir.real(ir.fixed("side"), side(sign))
     yield from together(reads_there)
 
 
@@ -296,7 +296,7 @@ def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
     """Return the function that sums over all other sites, for the sites of a row segment."""
     rows = RowDeclarations(layout).read((*bond_loop.function.body, *bond_loop.loop.body))
     sums = [ir.fixed(f"g{s.array.number}") for s in bond_loop.stores]
-    arrays = {g.symbol: (WRITTEN, ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(k))) for k, g in enumerate(sums)}
+    arrays = {g.symbol: (WRITTEN, ir.entry(ir.Member(SOLVER, "gathered"), k)) for k, g in enumerate(sums)}
     places = [ir.Entry(g, SITE) for g in sums]
     starts = [_start(s) for s in bond_loop.stores]
     alike = {start: [p for p, other in zip(places, starts, strict=True) if other == start] for start in starts}
@@ -315,7 +315,7 @@ def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
 
 
 def _varied(number: int) -> ir.Value:
-    return ir.Entry(ir.Member(ROW, "varied"), ir.Constant(number))
+    return ir.entry(ir.Member(ROW, "varied"), number)
 
 
 def _at_site(name: str) -> ir.Value:

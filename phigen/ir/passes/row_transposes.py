@@ -79,7 +79,7 @@ def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.
     pointers = [ir.fixed(f"bar_{k}") for k in fields] or [
         ir.fixed(f"v_{k}") for k in range(layout.lattice.program.dimension)
     ]
-    around = [ir.Entry(ir.Member(ROW, "bar"), ir.Constant(k)) for k in fields]
+    around = [ir.entry(ir.Member(ROW, "bar"), k) for k in fields]
     rows = RowDeclarations(layout, Reading(transpose.recomputed, {transpose.seed: pointers, "around": around}))
     rows.read((*transpose.function.body, *loop.body))
     seeds = {d.array.number for d in _loads(loop) if d.array.storage is Storage.SEED and not d.offset}
@@ -193,7 +193,7 @@ def in_vectors(body: ir.Block, shares: Sequence[ir.Reduce]) -> Iterator[ir.State
     lanes = (ir.index(SITE, ir.Binary("+", OTHER, LANE)), *body, *adds)
     inner = ir.Loop("plain", lanes, "l", ir.Constant(0), LANES, independent="LANE")
     yield ir.Loop("plain", (inner,), "j", FROM, WHOLE, step=LANES)
-    single = (ir.Assign(ir.Entry(n, ir.Constant(0)), s.value, adds=True) for n, s in zip(names, shares, strict=True))
+    single = (ir.Assign(ir.entry(n, 0), s.value, adds=True) for n, s in zip(names, shares, strict=True))
     yield ir.Loop("plain", (*body, *single), "i", WHOLE, INDEX_TO)
     yield from _totals(shares, "total")
 
@@ -201,7 +201,7 @@ def in_vectors(body: ir.Block, shares: Sequence[ir.Reduce]) -> Iterator[ir.State
 def _totals(shares: Sequence[ir.Reduce], function: str, *arguments: ir.Value) -> Iterator[ir.Statement]:
     for k, s in enumerate(shares):
         total = ir.Called(function, (ir.fixed(f"share{k}"), *arguments))
-        yield ir.Assign(ir.Entry(SUMS, ir.Constant(s.number)), total, adds=True)
+        yield ir.Assign(ir.entry(SUMS, s.number), total, adds=True)
 
 
 # ---- bonds and pairs
@@ -245,7 +245,7 @@ def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
     head += [_zero(f"share{k}") for k in shares]
     over = _over_bonds if layout.lattice.step.others.graph else _over_pairs
     totals = (
-        ir.Assign(ir.Entry(SUMS, ir.Constant(s.number)), ir.fixed(f"share{k}"), adds=True)
+        ir.Assign(ir.entry(SUMS, s.number), ir.fixed(f"share{k}"), adds=True)
         for k, s in enumerate(updates)
         if isinstance(s, ir.Reduce)
     )
@@ -283,7 +283,7 @@ def _bond_reads(transpose: BondTranspose, rows: RowDeclarations, *, signed: bool
     if any(isinstance(value, ir.Entry) and value.index == OTHER for value in rows.other.values()):
         yield ir.index(OTHER, other)
     if signed or any(isinstance(value, ir.Binary) for value in rows.other.values()):
-        yield ir.real(ir.fixed("side").symbol, side(ONE if transpose.end == "a" else ir.Constant(-1.0)))
+        yield ir.real(ir.fixed("side"), side(ONE if transpose.end == "a" else ir.Constant(-1.0)))
     yield from together(rows.other.items())
 
 
@@ -304,7 +304,7 @@ def _over_pairs(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
     partial_sums = [ir.fixed(f"site_bar{k}") for k in range(len(updates))]
     places = [ir.Entry(name, LANE) for name in partial_sums]
     site, same = ir.index(SITE, ir.Binary("+", first, LANE)), ir.Binary("==", SITE, OTHER)
-    added = [ir.real(ir.fixed(f"add{k}").symbol, ir.Select(same, ZERO, s.value)) for k, s in enumerate(updates)]
+    added = [ir.real(ir.fixed(f"add{k}"), ir.Select(same, ZERO, s.value)) for k, s in enumerate(updates)]
     add = (ir.Assign(place, ir.fixed(f"add{k}"), adds=True) for k, place in enumerate(places))
     inner = _lanes(count, (site, *together(rows.here), *rows.computed, *added, *add), independent="SITE")
     others = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(0), LENGTH)
@@ -328,7 +328,7 @@ def _into(s: ir.Update, k: int, site: ir.Value, value: ir.Value) -> ir.Assign:
     if isinstance(s, ir.Reduce):
         return ir.Assign(ir.fixed(f"share{k}"), value, adds=True)
     if s.array.storage is Storage.SUM:
-        gathered = ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(s.array.number))
+        gathered = ir.entry(ir.Member(SOLVER, "gathered"), s.array.number)
         return ir.Assign(ir.Entry(gathered, site), value)
     return ir.Assign(ir.Entry(ir.fixed(f"bar_{s.array.number}"), site), value, adds=True)
 
@@ -338,7 +338,7 @@ def _zero(name: str) -> ir.Declare:
 
 
 def _entry(member: str, k: int) -> ir.Value:
-    return ir.Entry(ir.Member(ROW, member), ir.Constant(k))
+    return ir.entry(ir.Member(ROW, member), k)
 
 
 def _pointer(name: str, kind: ir.Pointer, value: ir.Value) -> ir.Declare:

@@ -25,7 +25,7 @@ def in_lanes(
     def at_lane(value: ir.Value) -> ir.Value:
         if not isinstance(value, ir.Entry) or not isinstance(value.array, ir.Name):
             return value
-        name = value.array.symbol.key[0]  # type: ignore[attr-defined]
+        name = value.array.text
         if name in shared:
             return value
         return ir.Entry(value, ir.Binary("*", DISTINCT_COEF, LANE) if name in alike else LANE)

@@ -21,7 +21,7 @@ def simultaneous(function: ir.Function) -> ir.Function:
             return
         names = [ir.fixed(f"change{k}") for k in range(len(stores))]
         yield from (s for s in body if not isinstance(s, ir.Update))
-        yield from (ir.real(n.symbol, s.value) for n, s in zip(names, stores, strict=True))
+        yield from (ir.real(n, s.value) for n, s in zip(names, stores, strict=True))
         yield from (replace(s, value=n) for n, s in zip(names, stores, strict=True))
 
     return map_blocks(function, change)

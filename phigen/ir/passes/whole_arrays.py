@@ -50,9 +50,9 @@ class WholeArrays:
         loop, array = _loop(function), V if function.role is Role.SWEEP_TANGENT else X
         body = [*_unless_beside(loop, array), *self._sums(function), *self._reads(function), *_copied(MOVED, array)]
         for s in _stores(loop):
-            old = ir.Entry(array, ir.Constant(s.array.number))
+            old = ir.entry(array, s.array.number)
             new = _chosen(loop.selection, ir.Binary("+", old, ir.Grouped(s.value)), old)
-            body.append(ir.Assign(ir.Entry(MOVED, ir.Constant(s.array.number)), new))
+            body.append(ir.Assign(ir.entry(MOVED, s.array.number), new))
         varied = ("v",) if array is V else ()
         parameters = ("coef", "x", *varied, "sites", *_argument(loop.selection))
         return replace(function, parameters=parameters, body=(*body, ir.Return(MOVED)))
@@ -71,8 +71,8 @@ class WholeArrays:
         values, added = _split([*_stores(_loop(function))])
         sums = () if added else self._sums(function)
         empty = ir.Called("empty", (ir.fixed(f"({len(values)}, *sites.sizes)"),), NP)
-        body = [*sums, *self._reads(function), ir.real(OUT.symbol, empty)]
-        body += [ir.Assign(ir.Entry(OUT, ir.Constant(s.array.number)), s.value) for s in values]
+        body = [*sums, *self._reads(function), ir.real(OUT, empty)]
+        body += [ir.Assign(ir.entry(OUT, s.array.number), s.value) for s in values]
         body += [ir.Assign(OUT, s.value, adds=True) for s in added]
         varied = ("v",) if "varied" in function.parameters else ()
         return replace(function, parameters=("parameters", "x", *varied, "sites"), body=(*body, ir.Return(OUT)))
@@ -88,7 +88,7 @@ class WholeArrays:
         quiet = ir.Within(ir.Called("errstate", (ir.fixed('all="ignore"'),), NP), tuple(body))
         varied = ("v",) if "varied" in functions[0].parameters else ()
         parameters = (_source(functions[0]), "x", *varied, "sites")
-        statements = (ir.real(SUMS.symbol, ir.Constant(0.0)), quiet, ir.Return(SUMS))
+        statements = (ir.real(SUMS, ir.Constant(0.0)), quiet, ir.Return(SUMS))
         return replace(functions[0], name=sums_name(functions[0].name), parameters=parameters, body=statements)
 
     # ---- transposes
@@ -96,8 +96,8 @@ class WholeArrays:
     def transposed_sweep(self, function: ir.Function, updated: Sequence[int]) -> ir.Function:
         """Return a function from the cotangent after a sweep to the cotangent before, at the state before it."""
         loop = _loop(function)
-        seeds = (_chosen(loop.selection, ir.Entry(BAR, ir.Constant(k)), ir.Constant(0.0)) for k in updated)
-        body = [*_unless_beside(loop, BAR), ir.real(ir.fixed("change_bar").symbol, ir.Listed(tuple(seeds)))]
+        seeds = (_chosen(loop.selection, ir.entry(BAR, k), ir.Constant(0.0)) for k in updated)
+        body = [*_unless_beside(loop, BAR), ir.real(ir.fixed("change_bar"), ir.Listed(tuple(seeds)))]
         body += [*self._sums(function), *self._reads(function), *_copied(BAR, BAR)]
         body += self._added_cotangents(loop)
         body += self._transposed_sums(function, ir.fixed("coef"))
@@ -119,11 +119,11 @@ class WholeArrays:
 
     def transposed_sums(self, functions: Sequence[ir.Function], name: str) -> ir.Function:
         """Return the function that maps cotangents of sums over bonds or pairs to those of their arguments."""
-        end = "here" if self.lattice.step.others.graph else AXIS.symbol.key[0]  # type: ignore[attr-defined]
+        end = "here" if self.lattice.step.others.graph else AXIS.text
         body: list[ir.Statement] = []
         for function in functions:
             loop = _loop(function)
-            seeds = ir.real(ir.fixed(HERE).symbol, ir.fixed(f"[g[{end}] for g in gathered_bar]"))
+            seeds = ir.real(ir.fixed(HERE), ir.fixed(f"[g[{end}] for g in gathered_bar]"))
             body += [*self._bonds(loop), seeds, *self._reads(function), *self._added_cotangents(loop)]
         parameters = (_source(functions[0]), "x", "gathered_bar", *_TRANSPOSED)
         return replace(functions[0], name=name, parameters=parameters, body=(*body, ir.Return(BAR)))
@@ -144,16 +144,16 @@ class WholeArrays:
         for s in loop.body:
             match s:
                 case ir.Reduce(source, number, name, value):
-                    into = ir.Entry(ir.fixed("coef_bar"), ir.Constant(number))
-                    into = into if source == "coef" else ir.Entry(ir.fixed("parameters_bar"), ir.Constant(name))
+                    into = ir.entry(ir.fixed("coef_bar"), number)
+                    into = into if source == "coef" else ir.entry(ir.fixed("parameters_bar"), name)
                     yield ir.Assign(into, ir.Called("sum", (), self._everywhere(loop, value)), adds=True)
                 case ir.Store(array, value, end="bond"):
-                    place = ir.Entry(ir.fixed("parameters_bar"), ir.Constant(array.name))
+                    place = ir.entry(ir.fixed("parameters_bar"), array.name)
                     yield ir.Call("add.at", (place, BOND, value), NP)
                 case ir.Store(array, value) if array.storage in (Storage.COTANGENT, Storage.START_COTANGENT):
-                    into = ir.Entry(ir.fixed(_ARRAYS[array.storage]), ir.Constant(array.number))
+                    into = ir.entry(ir.fixed(_ARRAYS[array.storage]), array.number)
                     if array.number >= self.lattice.program.dimension:
-                        into = ir.Entry(ir.fixed("parameters_bar"), ir.Constant(array.name))
+                        into = ir.entry(ir.fixed("parameters_bar"), array.name)
                     yield ir.Assign(into, self._returned(loop, s, value), adds=True)
 
     def _returned(self, loop: ir.Loop, s: ir.Store, value: ir.Value) -> ir.Value:
@@ -182,7 +182,7 @@ class WholeArrays:
         """Yield the statement that computes the sums over bonds or pairs that a function reads."""
         for s in function.body:
             if isinstance(s, ir.GatherSums):
-                yield ir.real(ir.fixed("gathered").symbol, self._sums_value(function, s))
+                yield ir.real(ir.fixed("gathered"), self._sums_value(function, s))
 
     def _sums_value(self, function: ir.Function, s: ir.GatherSums) -> ir.Value:
         varied = (V,) if "varied" in function.parameters else ()
@@ -222,13 +222,13 @@ class WholeArrays:
     def _value(self, function: ir.Function, value: ir.Value) -> ir.Value:
         match value:
             case ir.Coefficient(k):
-                return ir.Entry(ir.fixed("coef"), ir.Constant(k))
+                return ir.entry(ir.fixed("coef"), k)
             case ir.SystemParameter(name):
-                return ir.Entry(ir.fixed("parameters"), ir.Constant(name))
+                return ir.entry(ir.fixed("parameters"), name)
             case ir.Time():
                 return ir.Member(SITES, "t")
             case ir.BondParameter(_, name):
-                return ir.Entry(ir.Entry(ir.Member(SITES, "parameters"), ir.Constant(name)), BOND)
+                return ir.Entry(ir.entry(ir.Member(SITES, "parameters"), name), BOND)
             case ir.Inside(_, bounds):
                 return ir.Called("present", tuple(ir.Constant(k) for pair in bounds for k in pair), SITES)
             case ir.HasColour():
@@ -247,9 +247,9 @@ class WholeArrays:
         storage, number = ir.fixed(_ARRAYS.get(array.storage, array.name)), ir.Constant(array.number)
         whole: ir.Value = ir.Entry(storage, number)
         if array.storage is Storage.STATE and array.name in increments:
-            whole = ir.Entry(ir.Member(SITES, "dw"), ir.Constant(increments.index(array.name)))
+            whole = ir.entry(ir.Member(SITES, "dw"), increments.index(array.name))
         elif array.storage is Storage.STATE and array.name not in fields:
-            whole = ir.Entry(ir.Member(SITES, "parameters"), ir.Constant(array.name))
+            whole = ir.entry(ir.Member(SITES, "parameters"), array.name)
         if end and self.lattice.step.others.graph and array.storage is not Storage.SEED:
             return ir.Entry(whole, ir.fixed("here" if end == "a" else "there"))
         if end == "a" and array.storage is not Storage.SEED:
@@ -290,7 +290,7 @@ def _source(function: ir.Function) -> str:
 
 
 def _copied(name: ir.Name, value: ir.Value) -> Iterator[ir.Statement]:
-    yield ir.real(name.symbol, ir.Called("copy", (), value))
+    yield ir.real(name, ir.Called("copy", (), value))
 
 
 def _unless_beside(loop: ir.Loop, unchanged: ir.Value) -> Iterator[ir.Statement]:

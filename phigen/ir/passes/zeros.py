@@ -36,7 +36,7 @@ def stored_array(s: ir.Statement) -> str:
     """Return the name of the array that a statement stores to or clears, or nothing."""
     place = s.target if isinstance(s, ir.Assign) else s if isinstance(s, ir.Clear) else None
     array = place.array if isinstance(place, ir.Entry | ir.Clear) else None
-    return str(array.symbol.key[0]) if isinstance(array, ir.Name) else ""  # type: ignore[attr-defined]
+    return array.text if isinstance(array, ir.Name) else ""
 
 
 def _is_zero(s: ir.Statement) -> bool:

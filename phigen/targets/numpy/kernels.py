@@ -41,7 +41,7 @@ def over_states(function: ir.Function) -> ir.Function:
     def read(name: str, value: ir.Value) -> ir.Value:
         match value:
             case ir.Member(_, member):
-                return ir.Entry(ir.fixed("parameters"), ir.Constant(member))
+                return ir.entry(ir.fixed("parameters"), member)
             case ir.Entry(array, index) if not isinstance(name, Symbol):
                 return ir.Entry(array, ir.Several((ir.fixed("..."), index)))
         return value

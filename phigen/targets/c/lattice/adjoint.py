@@ -151,7 +151,7 @@ class _Reverse:
         for k, part in enumerate(parts, 1):
             setup: ir.Block = (_ARRAYS["x"], _ARRAYS["bar"], _ARRAYS["handed"])
             if step.equation:
-                y = ir.Entry(ir.Member(S, "y"), ir.Constant(2))
+                y = ir.entry(ir.Member(S, "y"), 2)
                 setup = (member("x", y), _ARRAYS["bar"], member("handed", ir.Member(S, "handed")))
             in_first: ir.Block = (member("varied", ir.fixed("v")),) if step.equation else ()
             if receives:

@@ -290,7 +290,7 @@ def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir
     """Yield the declarations of the parameters at bonds in other orders."""
     listed = layout.step.sites.at_bonds
     for order in dict.fromkeys(order for order in used if order):
-        yield _arrays(order, [ir.Entry(ir.Member(S, "at_bonds"), ir.Constant(listed.index(p))) for p in order])
+        yield _arrays(order, [ir.entry(ir.Member(S, "at_bonds"), listed.index(p)) for p in order])
 
 
 def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
@@ -299,7 +299,7 @@ def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.S
         increments = turned_increments(layout.step.sites, layout.arrays, order)
         other = {**dict(zip(layout.arrays, order, strict=False)), **increments}
         places = [layout.arrays.index(other.get(a, a)) for a in layout.arrays]
-        yield _arrays(order, [ir.Entry(STATE, ir.Constant(place)) for place in places])
+        yield _arrays(order, [ir.entry(STATE, place) for place in places])
 
 
 def _arrays(order: tuple[str, ...], arrays: Sequence[ir.Value]) -> ir.Declare:
