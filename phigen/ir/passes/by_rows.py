@@ -10,7 +10,8 @@ from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.nodes import Storage
 from phigen.symbolic.symbols import Symbol
 
-SITE, OTHER, BOND, ROW = (ir.fixed(name) for name in ("i", "j", "k", "row"))
+#: Index of the site of the loop, of the other site of a bond or pair, and of the bond; the sign of its direction.
+SITE, OTHER, BOND, SIDE, ROW = (ir.fixed(name) for name in ("i", "j", "k", "side", "row"))
 SOLVER, AT_BONDS = ir.Member(ROW, "s"), ir.Member(ir.Member(ROW, "s"), "at_bonds")
 FROM, TO, LENGTH = ir.Member(ROW, "from"), ir.Member(ROW, "to"), ir.Member(SOLVER, "length")
 
@@ -104,7 +105,7 @@ class RowDeclarations:
             case ir.BondParameter(number, parameter):
                 at_bond = ir.Entry(ir.entry(self.reading.at_bonds, number), BOND)
                 oriented = parameter in self.reading.oriented
-                self.other[name] = ir.Binary("*", ir.fixed("side"), at_bond) if oriented else at_bond
+                self.other[name] = ir.Binary("*", SIDE, at_bond) if oriented else at_bond
             case ir.HasColour():
                 chosen = ir.Binary("==", ir.Entry(ir.Member(SOLVER, "colours"), SITE), ir.Member(ROW, "chosen"))
                 self._substitute(name, ir.Select(chosen, ir.Constant(1.0), ir.Constant(0.0)))
@@ -130,7 +131,7 @@ class RowDeclarations:
             case Storage.SUM if self.reading.local:
                 self._substitute(name, ir.fixed(f"sum{array.number}"))
             case Storage.SUM:
-                self._substitute(name, ir.Entry(_gathered(array.number), SITE))
+                self._substitute(name, ir.Entry(gathered(array.number), SITE))
             case Storage.SEED if load.offset:
                 line = self.layout.line(load.offset)
                 pointer = ir.Name(Symbol("around", array.number, line))
@@ -234,6 +235,17 @@ def lowered(function: ir.Function) -> ir.Loop:
     return loop
 
 
+def rows_of(function: ir.Function, layout: RowLayout, reading: Reading | None = None) -> RowDeclarations:
+    """Return the declarations of the values that a function on the level of sites reads."""
+    rows = RowDeclarations(layout, reading or Reading())
+    return rows.read((*function.body, *lowered(function).body))
+
+
+def stores_of(function: ir.Function) -> list[ir.Store]:
+    """Return the stores in the loop of a function on the level of sites."""
+    return [s for s in lowered(function).body if isinstance(s, ir.Store)]
+
+
 def over_sites(body: Iterable[ir.Statement], independent: str = "SITE", **fields: object) -> ir.Loop:
     """Return the loop over the sites of a row segment."""
     loop = ir.Loop("row", tuple(body), low=FROM, high=TO, limit="to", independent=independent)
@@ -258,7 +270,8 @@ def _member(array: ir.Array) -> ir.Value:
     return ir.entry(ir.Member(ROW, _MEMBERS[array.storage]), array.number)
 
 
-def _gathered(number: int) -> ir.Value:
+def gathered(number: int) -> ir.Value:
+    """Return the array of a sum over bonds or pairs."""
     return ir.entry(ir.Member(SOLVER, "gathered"), number)
 
 

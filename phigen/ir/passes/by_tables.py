@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
-from phigen.ir.passes.extremes import keep, limit
+from phigen.ir.passes.extremes import limit, updates
 from phigen.ir.walk import names_in, statements
 from phigen.scheme.kernel import Role
 from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
@@ -90,10 +90,8 @@ class _Tables:
 
     def _lowered(self, s: ir.Statement, selection: ir.Selection) -> Iterator[ir.Statement]:
         match s:
-            case ir.Store(array, value, extreme=extreme) if extreme:
-                yield from keep(extreme, self._element(array, SITE), value, array.number)
-            case ir.Store(array, value, adds):
-                yield ir.Assign(self._element(array, SITE), value, adds)
+            case ir.Store(array, value):
+                yield from updates(s, self._element(array, SITE), value)
             case ir.Declare(items=((name, ir.Load() as load),)):
                 yield from self._neighbour(load)
                 in_place = load.array.storage is not ir.Storage.STATE

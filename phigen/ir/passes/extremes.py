@@ -16,10 +16,13 @@ def limit(extreme: str, infinity: str) -> ir.Name:
     return ir.fixed(infinity if extreme == "min" else f"-{infinity}")
 
 
-def keep(extreme: str, place: ir.Value, value: ir.Value, number: int) -> Iterator[ir.Statement]:
-    """Yield the statements that replace the value at a place by a larger or smaller one, and declare a name."""
-    following = ir.fixed(f"next{number}")
+def updates(s: ir.Store, place: ir.Value, value: ir.Value) -> Iterator[ir.Statement]:
+    """Yield the statements that take a value into the sum, or the extreme, at a place, or that assign it."""
+    if not s.extreme:
+        yield ir.Assign(place, value, s.adds)
+        return
+    following = ir.fixed(f"next{s.array.number}")
     yield ir.real(following, value)
-    beyond = ir.Binary(_COMPARISONS[extreme], following, place)
+    beyond = ir.Binary(_COMPARISONS[s.extreme], following, place)
     no_number = ir.Binary("!=", following, following)
     yield ir.Assign(place, ir.Select(ir.Binary("or", beyond, no_number), following, place))

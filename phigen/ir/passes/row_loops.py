@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,19 +14,24 @@ from phigen.ir.passes.by_rows import (
     LENGTH,
     OTHER,
     ROW,
+    SIDE,
     SITE,
     SOLVER,
     WRITTEN,
     Reading,
     RowDeclarations,
     RowLayout,
+    gathered,
     grouped,
     lowered,
     over_sites,
+    rows_of,
+    stores_of,
     together,
 )  # fmt: skip
-from phigen.ir.passes.extremes import keep, limit
+from phigen.ir.passes.extremes import limit, updates
 from phigen.ir.passes.unread import discard_unread
+from phigen.ir.walk import names_in
 from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import ZERO as NOTHING
 from phigen.symbolic.expression import Expression
@@ -41,30 +46,25 @@ SITES: ir.Value = ir.Cast(ir.Member(SOLVER, "sites"))
 
 def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, compensated: bool = False) -> ir.Function:
     """Return a sweep; the colour of a coloured one is in its code, or a member of the row if it is ``passed``."""
-    loop, tangent = lowered(function), function.role is Role.SWEEP_TANGENT
-    stores = [s for s in loop.body if isinstance(s, ir.Store)]
-    updated = frozenset(s.array.name for s in stores) if not tangent else frozenset[str]()
-    rows = RowDeclarations(layout, Reading(updated)).read((*function.body, *loop.body))
+    stores = stores_of(function)
+    if function.role is Role.SWEEP_TANGENT:
+        names = {s.array.number: Symbol("out", s.array.name) for s in sorted(stores, key=lambda s: s.array.name)}
+        return _storing(function, layout, names, "varied", ir.Pointer(constant=False), adds=True)
+    rows = rows_of(function, layout, Reading(frozenset(s.array.name for s in stores)))
     head, body = list[ir.Statement](), [*rows.at_site(), *rows.computed]
-    if tangent:
-        head += grouped({Symbol("out", s.array.name): (ir.Pointer(constant=False), layout.row(_varied(s.array.number)))
-                         for s in sorted(stores, key=lambda s: s.array.name)})  # fmt: skip
-        body += [ir.Assign(_at_site(Symbol("out", s.array.name)), s.value, adds=True) for s in stores]
-    for k, s in enumerate(stores if not tangent else ()):
+    for k, s in enumerate(stores):
         field = ir.Entry(rows.pointer(s.array.name), SITE)
         if compensated:
             compensation = ir.Name(Symbol("carry", s.array.name))
-            compensation_array = ir.entry(ir.Member(SOLVER, "carry"), s.array.number)
-            head.append(
-                ir.Declare(ir.Pointer(constant=False), ((compensation.symbol, layout.row(compensation_array)),))
-            )
+            compensation_row = layout.row(ir.entry(ir.Member(SOLVER, "carry"), s.array.number))
+            head.append(ir.Declare(ir.Pointer(constant=False), ((compensation.symbol, compensation_row),)))
             body += compensated_sum(k, field, ir.Entry(compensation, SITE), s.value)
         elif s.array.name in rows.loaded:
             body.append(ir.Assign(field, ir.Accumulated(ir.Name(s.array.name), s.value)))
         else:
             body.append(ir.Assign(field, s.value, adds=True))
-    colour = loop.selection.colour
-    swept = ir.Member(ROW, "swept") if passed and not tangent else ir.Constant(colour)
+    colour = lowered(function).selection.colour
+    swept = ir.Member(ROW, "swept") if passed else ir.Constant(colour)
     return row_function(function, "coef", "row", body=(*head, *rows.before(), of_colour(body, colour, swept, layout)))
 
 
@@ -99,14 +99,19 @@ def compensated_sum(k: int, field: ir.Value, compensation: ir.Value, increment: 
 
 def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Function:
     """Return a kernel of the equation of a stage, which assigns or adds to its outputs."""
-    loop = lowered(function)
-    rows = RowDeclarations(layout).read((*function.body, *loop.body))
-    arrays = {name: layout.row(ir.entry(ir.Member(ROW, "out"), k)) for k, name in enumerate(outputs)}
-    head = grouped({name: (WRITTEN, array) for name, array in arrays.items()})
-    stores = (s for s in loop.body if isinstance(s, ir.Store))
-    updates = (ir.Assign(_at_site(outputs[s.array.number]), s.value, adds) for s in stores)
-    body = (*rows.at_site(), *rows.computed, *updates)
-    return row_function(function, "coef", "row", body=(*head, *rows.before(), over_sites(body)))
+    return _storing(function, layout, dict(enumerate(outputs)), "out", WRITTEN, adds=adds)
+
+
+def _storing(
+    function: ir.Function, layout: RowLayout, names: Mapping[int, str], member: str, kind: ir.Pointer, *, adds: bool
+) -> ir.Function:
+    """Return a function that stores to the arrays of a ``member`` of the row, by pointers with ``names``."""
+    rows, colour = rows_of(function, layout), lowered(function).selection.colour
+    head = grouped({name: (kind, layout.row(ir.entry(ir.Member(ROW, member), k))) for k, name in names.items()})
+    places = ((ir.Entry(ir.Name(names[s.array.number]), SITE), s.value) for s in stores_of(function))
+    body = (*rows.at_site(), *rows.computed, *(ir.Assign(place, value, adds) for place, value in places))
+    loop = of_colour(body, colour, ir.Constant(colour), layout)
+    return row_function(function, "coef", "row", body=(*head, *rows.before(), loop))
 
 
 @dataclass(frozen=True)
@@ -144,7 +149,7 @@ class BondLoop:
     @property
     def stores(self) -> list[ir.Store]:
         """The values that are summed."""
-        return [s for s in self.loop.body if isinstance(s, ir.Store)]
+        return stores_of(self.function)
 
 
 def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], apart: ir.Value = SITES) -> ir.Function:
@@ -152,11 +157,9 @@ def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], a
 
     The values of one site are at the distance ``apart``.
     """
-    loop = lowered(function)
-    rows = RowDeclarations(layout).read((*function.body, *loop.body))
-    calls_first = [ir.Call(name, (ROW,)) for name in calls]
-    body = (*rows.at_site(), *rows.computed, *_observed(loop))
-    head = (*calls_first, *_apart(loop, apart), *rows.before())
+    rows, stores = rows_of(function, layout), stores_of(function)
+    body = (*rows.at_site(), *rows.computed, *_observed(stores))
+    head = (*(ir.Call(name, (ROW,)) for name in calls), *_apart(stores, apart), *rows.before())
     return row_function(function, "row", "out", body=(*head, over_sites(body)))
 
 
@@ -164,7 +167,7 @@ def observable_with_bonds(
     function: ir.Function, layout: RowLayout, sums: Sequence[BondLoop], apart: ir.Value = SITES
 ) -> ir.Function:
     """Return an observable where each site sums over its own bonds."""
-    loop = lowered(function)
+    loop, observed = lowered(function), stores_of(function)
     oriented = frozenset[str]().union(*(s.oriented for s in sums))
     outer = [*function.body, *(s for bond_loop in sums for s in bond_loop.function.body)]
     order = [*layout.members]
@@ -179,8 +182,8 @@ def observable_with_bonds(
         rows.computed = [s for s in bond_loop.loop.body if _is_computed(s)]
         bond_loops.append(_summed_over_bonds(bond_loop, rows))
     stores = [s for bond_loop in sums for s in bond_loop.stores]
-    body = (*rows.at_site(), _begun(stores), *bond_loops, *computed, *_observed(loop))
-    return row_function(function, "row", "out", body=(*_apart(loop, apart), *rows.before(), over_sites(body, "")))
+    body = (*rows.at_site(), _begun(stores), *bond_loops, *computed, *_observed(observed))
+    return row_function(function, "row", "out", body=(*_apart(observed, apart), *rows.before(), over_sites(body, "")))
 
 
 def _is_computed(s: ir.Statement) -> bool:
@@ -191,35 +194,28 @@ def _at_bond(s: ir.Statement) -> bool:
     return isinstance(s, ir.Declare) and isinstance(s.items[0][1], ir.BondParameter)
 
 
-def _apart(loop: ir.Loop, apart: ir.Value) -> list[ir.Statement]:
+def _apart(stores: Sequence[ir.Store], apart: ir.Value) -> list[ir.Statement]:
     """Return the declaration of the distance between the values of a site, if there are several."""
-    several = any(isinstance(s, ir.Store) and s.array.number for s in loop.body)
-    return [ir.index(ir.fixed("apart"), apart)] * several
+    return [ir.index(ir.fixed("apart"), apart)] * any(s.array.number for s in stores)
 
 
-def _observed(loop: ir.Loop) -> Iterator[ir.Statement]:
+def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
     """Yield the stores of values for callers; a share that adds to the first value becomes a term of it."""
-    stores = [s for s in loop.body if isinstance(s, ir.Store)]
-    shares = [s.value for s in stores if s.adds]
+    shares, apart = [s.value for s in stores if s.adds], ir.fixed("apart")
     for s in stores:
         if not s.adds:
             k = s.array.number
-            place: ir.Value = SITE
-            if k:
-                apart = ir.fixed("apart")
-                place = ir.Binary("+", apart if k == 1 else ir.Binary("*", ir.Constant(k), apart), SITE)
-            value = s.value
-            for share in shares:
-                value = share if value is NOTHING else ir.Binary("+", value, share)
-            yield ir.Assign(ir.Entry(OUT, ir.Binary("-", place, FROM)), value)
+            first = apart if k == 1 else ir.Binary("*", ir.Constant(k), apart)
+            place = ir.Binary("+", first, SITE) if k else SITE
+            terms = [*([s.value] if s.value is not NOTHING or not shares else []), *shares]
+            yield ir.Assign(ir.Entry(OUT, ir.Binary("-", place, FROM)), ir.joined("+", *terms))
 
 
 def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Function:
     """Return the function that sums over the bonds of each site; unless ``first``, it adds to the sums."""
-    rows = RowDeclarations(layout, Reading(oriented=bond_loop.oriented, at_bonds=bond_loop.at_bonds))
-    rows.read((*bond_loop.function.body, *bond_loop.loop.body))
-    count = len(bond_loop.stores)
-    sums = (ir.Entry(ir.entry(ir.Member(SOLVER, "gathered"), k), SITE) for k in range(count))
+    reading = Reading(oriented=bond_loop.oriented, at_bonds=bond_loop.at_bonds)
+    rows, count = rows_of(bond_loop.function, layout, reading), len(bond_loop.stores)
+    sums = (ir.Entry(gathered(k), SITE) for k in range(count))
     stores = [ir.Assign(place, ir.fixed(f"sum{k}"), adds=not first) for k, place in enumerate(sums)]
     body = (*together(rows.here), _begun(bond_loop.stores), _summed_over_bonds(bond_loop, rows), *stores)
     return row_function(bond_loop.function, *bond_loop.parameters, body=(*rows.before(), over_sites(body, "")))
@@ -236,55 +232,35 @@ def _start(s: ir.Store) -> ir.Value:
     return limit(s.extreme, "HUGE_VAL") if s.extreme else ZERO
 
 
-def _update(s: ir.Store, place: ir.Value, value: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statements that take a value into a sum or an extreme."""
-    if s.extreme:
-        yield from keep(s.extreme, place, value, s.array.number)
-    else:
-        yield ir.Assign(place, value, adds=True)
-
-
 def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
     """Return the loop over the bonds of a site."""
     sign = ir.fixed("sign") if "sign" in bond_loop.arguments else ONE
-    body = [
-        *bond_reads(bond_loop.loop, rows, across=bond_loop.across, oriented=bool(bond_loop.oriented), sign=sign),
-        *rows.computed,
-    ]
-    body += [u for s in bond_loop.stores for u in _update(s, ir.fixed(f"sum{s.array.number}"), s.value)]
-    return bonds_of(bond_loop.loop, body, across=bond_loop.across)
+    updated = (u for s in bond_loop.stores for u in updates(s, ir.fixed(f"sum{s.array.number}"), s.value))
+    return bonds_of(bond_loop.loop, rows, updated, sign, across=bond_loop.across)
 
 
-def bond_reads(
-    loop: ir.Loop, rows: RowDeclarations, *, oriented: bool, sign: ir.Value, across: bool = False
-) -> Iterator[ir.Statement]:
-    """Yield the statements that skip bonds without a site of the colour, and that read at the ends of the others.
+def bonds_of(
+    loop: ir.Loop, rows: RowDeclarations, updated: Iterable[ir.Statement], sign: ir.Value, *, across: bool = False
+) -> ir.Loop:
+    """Return the loop over the bonds of a site: those that begin there, those that end there, or both.
 
-    With ``across`` the caller decides by a flag which end has the colour.
+    It skips bonds without a site of the colour; with ``across`` the caller decides by a flag which end has the colour.
+    ``sign`` is that of the direction of bonds, seen from the site where they begin.
     """
     names = [s.items[0][0] for s in loop.body if isinstance(s, ir.Declare)]
-    reads_there = [(name, rows.other[name]) for name in rows.other if name in names]
-    coloured_site = ir.Select(ir.fixed("across"), OTHER_SITE, SITE) if across else OTHER_SITE
+    reads_there = [(name, value) for name, value in rows.other.items() if name in names]
+    read = names_in((*(value for _, value in reads_there), tuple(updated := [*updated])))
+    body = list[ir.Statement]()
     if across or loop.chosen == "there":
+        coloured_site = ir.Select(ir.fixed("across"), OTHER_SITE, SITE) if across else OTHER_SITE
         colour = ir.Entry(ir.Member(SOLVER, "colours"), coloured_site)
-        yield ir.If(ir.Binary("!=", colour, ir.Member(ROW, "chosen")), (ir.Continue(),))
-    if reads_there:
-        yield ir.index(OTHER, OTHER_SITE)
-    if oriented:
-        yield ir.real(ir.fixed("side"), side(sign))
-    yield from together(reads_there)
-
-
-def side(sign: ir.Value) -> ir.Value:
-    """Return the sign of the direction of a bond, seen from the site."""
-    middle = ir.Entry(ir.Member(SOLVER, "middle"), SITE)
-    minus = ir.Constant(-sign.value) if isinstance(sign, ir.Constant) else ir.Prefix("-", sign)  # type: ignore[operator]
-    return ir.Select(ir.Binary("<", BOND, middle), sign, minus)
-
-
-def bonds_of(loop: ir.Loop, body: Iterable[ir.Statement], *, across: bool = False) -> ir.Loop:
-    """Return the loop over the bonds of a site: those that begin there, those that end there, or both."""
+        body.append(ir.If(ir.Binary("!=", colour, ir.Member(ROW, "chosen")), (ir.Continue(),)))
+    body += [ir.index(OTHER, OTHER_SITE)] * (OTHER.symbol in read)
     first, middle = (ir.Entry(ir.Member(SOLVER, name), SITE) for name in ("bonds", "middle"))
+    minus = ir.Constant(-sign.value) if isinstance(sign, ir.Constant) else ir.Prefix("-", sign)  # type: ignore[operator]
+    direction = ir.Select(ir.Binary("<", BOND, middle), sign, minus)
+    body += [ir.real(SIDE, direction)] * (SIDE.symbol in read)
+    body += [*together(reads_there), *rows.computed, *updated]
     end = ir.Entry(ir.Member(SOLVER, "bonds"), ir.plus(SITE, 1))
     low, high = {"": (first, end), "a": (first, middle), "b": (middle, end)}[loop.end]
     at_colour = ir.Binary("==", ir.Entry(ir.Member(SOLVER, "colours"), SITE), ir.Member(ROW, "chosen"))
@@ -294,9 +270,9 @@ def bonds_of(loop: ir.Loop, body: Iterable[ir.Statement], *, across: bool = Fals
 
 def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
     """Return the function that sums over all other sites, for the sites of a row segment."""
-    rows = RowDeclarations(layout).read((*bond_loop.function.body, *bond_loop.loop.body))
+    rows = rows_of(bond_loop.function, layout)
     sums = [ir.fixed(f"g{s.array.number}") for s in bond_loop.stores]
-    arrays = {g.symbol: (WRITTEN, ir.entry(ir.Member(SOLVER, "gathered"), k)) for k, g in enumerate(sums)}
+    arrays = {g.symbol: (WRITTEN, gathered(k)) for k, g in enumerate(sums)}
     places = [ir.Entry(g, SITE) for g in sums]
     starts = [_start(s) for s in bond_loop.stores]
     alike = {start: [p for p, other in zip(places, starts, strict=True) if other == start] for start in starts}
@@ -306,17 +282,9 @@ def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
     ]
     same = ir.Binary("==", SITE, OTHER)
     values = [ir.Select(same, start, s.value) for start, s in zip(starts, bond_loop.stores, strict=True)]
-    updates = (u for s, p, v in zip(bond_loop.stores, places, values, strict=True) for u in _update(s, p, v))
-    inner = over_sites((*together(rows.here), *rows.computed, *updates))
+    updated = (u for s, p, v in zip(bond_loop.stores, places, values, strict=True) for u in updates(s, p, v))
+    inner = over_sites((*together(rows.here), *rows.computed, *updated))
     outer = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(0), LENGTH)
     return row_function(
         bond_loop.function, *bond_loop.parameters, body=(*rows.before(), *grouped(arrays), *clear, outer)
     )
-
-
-def _varied(number: int) -> ir.Value:
-    return ir.entry(ir.Member(ROW, "varied"), number)
-
-
-def _at_site(name: str) -> ir.Value:
-    return ir.Entry(ir.Name(name), SITE)

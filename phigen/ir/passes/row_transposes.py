@@ -18,18 +18,21 @@ from phigen.ir.passes.by_rows import (
     OTHER,
     READ,
     ROW,
+    SIDE,
     SITE,
-    SOLVER,
     TO,
     WRITTEN,
     Reading,
     RowDeclarations,
     RowLayout,
+    gathered,
     lowered,
     over_sites,
+    rows_of,
+    stores_of,
     together,
 )  # fmt: skip
-from phigen.ir.passes.row_loops import ONE, ZERO, bonds_of, of_colour, row_function, side
+from phigen.ir.passes.row_loops import ONE, ZERO, bonds_of, of_colour, row_function
 from phigen.scheme.kernel import Role
 from phigen.symbolic.symbols import HERE
 
@@ -75,23 +78,21 @@ class Transpose:
 def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.Function:
     """Return the first loop of a transpose; with ``vectors`` sums over sites stay in registers."""
     loop, fields = lowered(transpose.function), transpose.fields
-    row = layout.row
-    pointers = [ir.fixed(f"bar_{k}") for k in fields] or [
-        ir.fixed(f"v_{k}") for k in range(layout.lattice.program.dimension)
-    ]
+    variations = [ir.fixed(f"v_{k}") for k in range(layout.lattice.program.dimension)]
+    pointers = [ir.fixed(f"bar_{k}") for k in fields] or variations
     around = [ir.entry(ir.Member(ROW, "bar"), k) for k in fields]
-    rows = RowDeclarations(layout, Reading(transpose.recomputed, {transpose.seed: pointers, "around": around}))
-    rows.read((*transpose.function.body, *loop.body))
-    seeds = {d.array.number for d in _loads(loop) if d.array.storage is Storage.SEED and not d.offset}
-    handed_values, stores = _stores(transpose, loop, rows)
-    written_bars = {s.array.number for s in _updates(loop) if s.array.storage in _COTANGENTS and not any(s.offset)}
+    reading = Reading(transpose.recomputed, {transpose.seed: pointers, "around": around})
+    rows, seeds = rows_of(transpose.function, layout, reading), _seeds(loop)
+    handed_values, stores = _stores(transpose, rows)
+    written_bars = {
+        s.array.number for s in stores_of(transpose.function) if s.array.storage in _COTANGENTS and not any(s.offset)
+    }
     written_bars |= {h.base for h in transpose.received} | {fields[k] for k in seeds if fields}
-    head, colour = list[ir.Statement](), loop.selection.colour
-    if not fields:
-        head += [_pointer(f"v_{k}", READ, row(_entry("varied", k))) for k in sorted(seeds)]
-    head += [_pointer(f"bar_{k}", WRITTEN, row(_entry("bar", k))) for k in sorted(written_bars)]
+    colour = loop.selection.colour
+    head: list[ir.Statement] = [_pointer("v", "varied", k, layout, READ) for k in seeds if not fields]
+    head += [_pointer("bar", "bar", k, layout) for k in sorted(written_bars)]
     for array in handed_values:
-        head.append(_pointer(f"handed_{array}", WRITTEN, row(_entry("handed", array))))
+        head.append(_pointer("handed", "handed", array, layout))
         if colour is not None:
             head.append(ir.Clear(ir.fixed(f"handed_{array}"), FROM, ir.Binary("-", TO, FROM)))
     received_pointers, added = _added_up("received", transpose.received, layout)
@@ -107,14 +108,12 @@ def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.
 _COTANGENTS = (Storage.COTANGENT, Storage.START_COTANGENT)
 
 
-def _stores(
-    transpose: Transpose, loop: ir.Loop, rows: RowDeclarations
-) -> tuple[dict[int, ir.Value], list[ir.Statement]]:
+def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.Value], list[ir.Statement]]:
     """Return the cotangents for other sites, by their arrays, and the statements that store all values of a site."""
     places = {(h.base, h.offset): h.array for h in transpose.handed}
     handed_values: dict[int, ir.Value] = {}
     stores: list[ir.Statement] = []
-    for s in _updates(loop):
+    for s in stores_of(transpose.function):
         number = s.array.number
         if s.array.storage is Storage.SUM_COTANGENT:
             handed_values[transpose.sums_from + number] = s.value
@@ -134,8 +133,7 @@ def _stores(
 def handing(name: str, doc: str, handed: Sequence[Handed], layout: RowLayout) -> ir.Function:
     """Return the second loop: each site adds the cotangents that its neighbours have stored."""
     pointers, added = _added_up("handed", handed, layout)
-    bars = dict.fromkeys(h.base for h in handed)
-    head = [_pointer(f"bar_{k}", WRITTEN, layout.row(_entry("bar", k))) for k in bars]
+    head = [_pointer("bar", "bar", k, layout) for k in dict.fromkeys(h.base for h in handed)]
     return ir.Function(name, doc, Role.OTHER, ("row",), (*pointers, *head, over_sites(added)))
 
 
@@ -150,10 +148,10 @@ def _added_up(
         opposite = tuple(-o for o in h.offset)
         line = layout.line(opposite)
         name = f"{prefix}_{h.array}" + (f"_{line}" if line else "")
-        place = layout.row(_entry(prefix, h.array), line, "givers" if open_rows else "at")
-        pointers[name] = _pointer(name, READ, place)
+        place = layout.row(ir.entry(ir.Member(ROW, prefix), h.array), line, "givers" if open_rows else "at")
+        pointers[name] = ir.Declare(READ, ((ir.fixed(name).symbol, place),))
         value = ir.Entry(ir.fixed(name), ir.plus(SITE, opposite[-1]))
-        sums[h.base] = ir.Binary("+", sums[h.base], value) if h.base in sums else value
+        sums[h.base] = ir.joined("+", *([sums[h.base]] if h.base in sums else []), value)
     added = (ir.Assign(ir.Entry(ir.fixed(f"bar_{k}"), SITE), value, adds=True) for k, value in sums.items())
     return [*pointers.values()], [*added]
 
@@ -174,7 +172,7 @@ def in_batches(
     added = (ir.Assign(ir.Entry(n, at_site), s.value, adds=True) for n, s in zip(names, shares, strict=True))
     count, left = ir.Binary("-", TO, FROM), ir.Binary("-", TO, BEGIN)
     yield ir.index(APART, ir.Select(ir.Binary("<", count, BATCH), count, ir.Cast(BATCH)))
-    yield ir.Declare(ir.Vector(BATCH), tuple((n.symbol, ir.Constant(None)) for n in names), mutable=True)
+    yield ir.vectors(ir.Vector(BATCH), *names)
     yield from (ir.Clear(n, None, APART) for n in names)
     end = ir.index(END, ir.Select(ir.Binary("<", left, BATCH), TO, ir.Binary("+", BEGIN, BATCH)))
     inner = of_colour((*body, *added), colour, swept, layout, BEGIN, high=END, limit="")
@@ -185,7 +183,7 @@ def in_batches(
 def in_vectors(body: ir.Block, shares: Sequence[ir.Reduce]) -> Iterator[ir.Statement]:
     """Yield the loops over vectors of 8 sites, then over the remaining sites; partial sums stay in registers."""
     names = [ir.fixed(f"share{k}") for k in range(len(shares))]
-    yield ir.Declare(ir.Vector(ir.Constant(8)), tuple((n.symbol, ir.Listed((ZERO,))) for n in names), mutable=True)
+    yield ir.vectors(ir.Vector(ir.Constant(8)), *names, value=ir.Listed((ZERO,)))
     rest = ir.Binary("%", ir.Binary("-", INDEX_TO, FROM), ir.Constant(8))
     yield ir.Declare(ir.Type.INDEX, ((INDEX_TO.symbol, TO), (WHOLE.symbol, ir.Binary("-", INDEX_TO, rest))))
     yield ir.index(LANES, ir.Called("LANES", (ir.Binary("-", WHOLE, FROM),)))
@@ -221,12 +219,6 @@ class BondTranspose:
     count: int
     oriented: frozenset[str] = frozenset()
 
-    def rows(self, layout: RowLayout) -> RowDeclarations:
-        """Return the declarations of the values that the function reads."""
-        arrays = [ir.fixed(f"handed_{self.sums_from + k}") for k in range(self.count)]
-        reading = Reading(seeds={HERE: arrays}, here=self.end, oriented=self.oriented)
-        return RowDeclarations(layout, reading).read((*self.function.body, *lowered(self.function).body))
-
     @property
     def updates(self) -> list[ir.Update]:
         """The values that are added up."""
@@ -235,12 +227,14 @@ class BondTranspose:
 
 def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
     """Return the transpose of a function that sums over bonds or pairs."""
-    rows, loop, updates = transpose.rows(layout), lowered(transpose.function), transpose.updates
+    updates, first = transpose.updates, transpose.sums_from
+    arrays = [ir.fixed(f"handed_{first + k}") for k in range(transpose.count)]
+    reading = Reading(seeds={HERE: arrays}, here=transpose.end, oriented=transpose.oriented)
+    rows = rows_of(transpose.function, layout, reading)
     head = [*rows.before()]
-    seeds = {transpose.sums_from + d.array.number for d in _loads(loop) if d.array.storage is Storage.SEED}
-    head += [_pointer(f"handed_{k}", ir.Pointer(), _entry("handed", k)) for k in sorted(seeds)]
-    bars = {s.array.number for s in updates if isinstance(s, ir.Store) and s.array.storage is Storage.COTANGENT}
-    head += [_pointer(f"bar_{k}", ir.Pointer(constant=False), _entry("bar", k)) for k in sorted(bars)]
+    head += [_pointer("handed", "handed", first + k, None, ir.Pointer()) for k in _seeds(lowered(transpose.function))]
+    bars = {s.array.number for s in stores_of(transpose.function) if s.array.storage is Storage.COTANGENT}
+    head += [_pointer("bar", "bar", k, None, ir.Pointer(constant=False)) for k in sorted(bars)]
     shares = [k for k, s in enumerate(updates) if isinstance(s, ir.Reduce)]
     head += [_zero(f"share{k}") for k in shares]
     over = _over_bonds if layout.lattice.step.others.graph else _over_pairs
@@ -258,33 +252,21 @@ def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
 
     Contributions to a sum over all sites are first summed at each site, so that few additions depend on one another.
     """
-    loop, updates = lowered(transpose.function), transpose.updates
+    updates = transpose.updates
     at_bonds = {k: s.array for k, s in enumerate(updates) if isinstance(s, ir.Store) and s.end == "bond"}
-    sign_changing = [k for k, array in at_bonds.items() if array.name in transpose.oriented]
-    inner = [*_bond_reads(transpose, rows, signed=bool(sign_changing)), *rows.computed]
+    inner = list[ir.Statement]()
     for k, s in enumerate(updates):
-        value = ir.Binary("*", ir.fixed("side"), ir.Grouped(s.value)) if k in sign_changing else s.value
+        changes_sign = k in at_bonds and at_bonds[k].name in transpose.oriented
+        value = ir.Binary("*", SIDE, ir.Grouped(s.value)) if changes_sign else s.value
         place: ir.Value = ir.fixed(f"site_bar{k}")
         if k in at_bonds:
             place = ir.Entry(ir.fixed(f"bar_{at_bonds[k].number}"), BOND)
         inner.append(ir.Assign(place, value, adds=True))
+    bonds = bonds_of(lowered(transpose.function), rows, inner, ONE if transpose.end == "a" else ir.Constant(-1.0))
     summed = [k for k in range(len(updates)) if k not in at_bonds]
     zeros = (_zero(f"site_bar{k}") for k in summed)
     stores = (_into(updates[k], k, SITE, ir.fixed(f"site_bar{k}")) for k in summed)
-    return over_sites((*together(rows.here), *zeros, bonds_of(loop, inner), *stores), "")
-
-
-def _bond_reads(transpose: BondTranspose, rows: RowDeclarations, *, signed: bool) -> Iterator[ir.Statement]:
-    """Yield the statements that skip bonds without a site of the colour, and that read at the ends of the others."""
-    other = ir.Entry(ir.Member(SOLVER, "other"), BOND)
-    if lowered(transpose.function).chosen == "there":
-        colour = ir.Entry(ir.Member(SOLVER, "colours"), other)
-        yield ir.If(ir.Binary("!=", colour, ir.Member(ROW, "chosen")), (ir.Continue(),))
-    if any(isinstance(value, ir.Entry) and value.index == OTHER for value in rows.other.values()):
-        yield ir.index(OTHER, other)
-    if signed or any(isinstance(value, ir.Binary) for value in rows.other.values()):
-        yield ir.real(ir.fixed("side"), side(ONE if transpose.end == "a" else ir.Constant(-1.0)))
-    yield from together(rows.other.items())
+    return over_sites((*together(rows.here), *zeros, bonds, *stores), "")
 
 
 def _over_pairs(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
@@ -311,7 +293,7 @@ def _over_pairs(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
     stores = (_into(s, k, ir.Binary("+", first, LANE), places[k]) for k, s in enumerate(updates))
     body = (
         ir.Declare(ir.Type.INDEX, sizes),
-        ir.Declare(ir.Vector(batch), tuple((name.symbol, ir.Constant(None)) for name in partial_sums), mutable=True),
+        ir.vectors(ir.Vector(batch), *partial_sums),
         _lanes(count, tuple(ir.Assign(place, ZERO) for place in places)),
         others,
         _lanes(left, tuple(stores), note="beyond are numbers, but no sites"),
@@ -328,27 +310,23 @@ def _into(s: ir.Update, k: int, site: ir.Value, value: ir.Value) -> ir.Assign:
     if isinstance(s, ir.Reduce):
         return ir.Assign(ir.fixed(f"share{k}"), value, adds=True)
     if s.array.storage is Storage.SUM:
-        gathered = ir.entry(ir.Member(SOLVER, "gathered"), s.array.number)
-        return ir.Assign(ir.Entry(gathered, site), value)
+        return ir.Assign(ir.Entry(gathered(s.array.number), site), value)
     return ir.Assign(ir.Entry(ir.fixed(f"bar_{s.array.number}"), site), value, adds=True)
 
 
 def _zero(name: str) -> ir.Declare:
-    return ir.Declare(ir.Type.REAL, ((ir.fixed(name).symbol, ZERO),), mutable=True)
+    return ir.real(ir.fixed(name), ZERO, mutable=True)
 
 
-def _entry(member: str, k: int) -> ir.Value:
-    return ir.entry(ir.Member(ROW, member), k)
+def _pointer(prefix: str, member: str, k: int, layout: RowLayout | None, kind: ir.Pointer = WRITTEN) -> ir.Declare:
+    """Return the declaration of the pointer to an array of a member of the row; with a layout, to its row there."""
+    array = ir.entry(ir.Member(ROW, member), k)
+    return ir.Declare(kind, ((ir.fixed(f"{prefix}_{k}").symbol, layout.row(array) if layout else array),))
 
 
-def _pointer(name: str, kind: ir.Pointer, value: ir.Value) -> ir.Declare:
-    return ir.Declare(kind, ((ir.fixed(name).symbol, value),))
-
-
-def _loads(loop: ir.Loop) -> Iterator[ir.Load]:
-    declared = (s.items for s in loop.body if isinstance(s, ir.Declare))
-    return (value for items in declared for _, value in items if isinstance(value, ir.Load))
-
-
-def _updates(loop: ir.Loop) -> Iterator[ir.Store]:
-    return (s for s in loop.body if isinstance(s, ir.Store))
+def _seeds(loop: ir.Loop) -> list[int]:
+    """Return the numbers of the cotangents of outputs that a loop reads at its site, or at the ends of its bonds."""
+    loads = (
+        value for s in loop.body if isinstance(s, ir.Declare) for _, value in s.items if isinstance(value, ir.Load)
+    )
+    return sorted({v.array.number for v in loads if v.array.storage is Storage.SEED and not v.offset})

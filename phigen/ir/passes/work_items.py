@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
-from phigen.ir.passes.extremes import keep, limit
+from phigen.ir.passes.extremes import limit, updates
 from phigen.ir.passes.row_loops import compensated_sum
 from phigen.symbolic.symbols import Symbol
 
@@ -77,9 +77,7 @@ class _WorkItems:
             start = limit(s.extreme, "HUGE_VAL") if s.extreme else before
             yield ir.Declare(ir.Type.REAL, ((total.symbol, start),), mutable=True)
         body: list[ir.Statement] = [new for s in loop.body if isinstance(s, ir.Declare) for new in self.lowered(s)]
-        for s, total in zip(stores, totals, strict=True):
-            added = [ir.Assign(total, s.value, adds=True)]
-            body += keep(s.extreme, total, s.value, s.array.number) if s.extreme else added
+        body += (new for s, total in zip(stores, totals, strict=True) for new in updates(s, total, s.value))
         yield _over_bonds(body) if self.lattice.step.others.graph else _over_pairs(body)
         yield from (ir.Assign(self._element(s.array, SITE), total) for s, total in zip(stores, totals, strict=True))
 
