@@ -222,29 +222,24 @@ class LatticeLoops:
     @cached_property
     def weights(self) -> tuple[Symbol, ...]:
         """The weights of terms at open ends, in the order in which kernels read them."""
-        return weights(self.program, self.step)
+        equation = self.step.equation
+        kernels = (*(sweep.kernel for sweep in self.step.sweeps), *(equation.kernels if equation else ()))
+        return _present((*kernels, *self.program.observables.kernels), symbols.PRESENT)
 
     @cached_property
     def seams(self) -> tuple[Symbol, ...]:
         """The tests for boundary seams, in the order in which kernels read them."""
-        return begins(self.step)
+        return _present((sweep.kernel for sweep in self.step.sweeps), symbols.BEGINS)
 
 
 def _function(kernel: Kernel, parameters: tuple[str, ...], *body: ir.Statement) -> ir.Function:
     return loop_invariant(ir.Function(kernel.name, kernel.purpose, kernel.role, parameters, body))
 
 
-def begins(step: Sweeps) -> tuple[Symbol, ...]:
-    """Return the symbols that are 1 at sites of a colour on the boundary seams of a sweep, for all sweeps."""
-    read = (s for sweep in step.sweeps for s in sweep.kernel.inputs["present"])
-    return tuple(dict.fromkeys(s for s in read if isinstance(s, Symbol) and kind_of(s) == symbols.BEGINS))
-
-
-def weights(program: Program, step: Sweeps) -> tuple[Symbol, ...]:
-    """Return the symbols that are 1 for terms of H within the open ends, in the order of kernels."""
-    kernels = (*(sweep.kernel for sweep in step.sweeps), *(step.equation.kernels if step.equation else ()))
-    present = (w for kernel in (*kernels, *program.observables.kernels) for w in kernel.inputs["present"])
-    return tuple(dict.fromkeys(w for w in present if isinstance(w, Symbol) and kind_of(w) == symbols.PRESENT))
+def _present(kernels: Iterable[Kernel], kind: str) -> tuple[Symbol, ...]:
+    """Return the symbols of a kind that are 1 at some sites only, in the order in which kernels read them."""
+    read = (s for kernel in kernels for s in kernel.inputs["present"])
+    return tuple(dict.fromkeys(s for s in read if isinstance(s, Symbol) and kind_of(s) == kind))
 
 
 def bounds(key: Sequence[str | int]) -> list[tuple[int, int]]:

@@ -88,9 +88,7 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     from phigen.targets.c.lattice.sweep_functions import parameters, sweeps
 
     assert isinstance(lanes, Rows)
-    has |= lattice_layout.switches(program, step, lattice_layout.layout_of(program, step)) | {
-        "NEAR": bool(lanes.limited)
-    }
+    has |= lattice_layout.switches(lattice_layout.layout_of(program, step)) | {"NEAR": bool(lanes.limited)}
     texts = {
         "declarations.h": lattice_model.declarations(program, step),
         "model.h": lattice_model.model(program, step),

@@ -17,7 +17,7 @@ from phigen.ir import nodes as ir
 from phigen.ir.lattice_parameters import sums_of_derivatives
 from phigen.ir.passes import row_transposes
 from phigen.ir.passes.by_rows import ROW
-from phigen.ir.passes.row_transposes import Handed
+from phigen.ir.passes.row_transposes import Handed, Transpose
 from phigen.ir.row_drivers import (
     BEGIN,
     COEF,
@@ -55,7 +55,6 @@ from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets.c.kernels import function
 from phigen.targets.c.language import members
-from phigen.targets.c.lattice.adjoint_loops import First, Seeds, handed_by
 from phigen.targets.c.lattice.layout import Layout, layout_of
 from phigen.targets.c.lattice.loops import RowLoops, code
 from phigen.targets.c.lattice.loops import printed as loop_text
@@ -81,19 +80,22 @@ class Back:
 
 @dataclass(frozen=True)
 class _Pulled:
-    """A transposed kernel, and the place of its cotangents.
+    """A transposed kernel of a ``sweep``, or of a stage, and the place of its cotangents.
 
-    ``gather`` has the sums that it reads; ``ends`` are the kernels of these, with the parameters that have the opposite
-    sign seen from b, and their transposes. ``before`` are statements for a row segment before its calls. The fields
-    ``recomputed`` are recomputed by the kernel, or by another one from sums that the transposes over bonds or pairs
-    compute. The cotangents that the flow after it passes are ``taken``. It is the transpose of the ``sweep``.
+    The cotangents of its values are symbols of the kind ``seed``. They are in the arrays of cotangents with the numbers
+    ``bars``, or if these are empty in the variation of the row. ``gather`` has the sums that it reads; ``ends`` are the
+    kernels of these, with the parameters that have the opposite sign seen from b, and their transposes. ``before`` are
+    statements for a row segment before its calls. The fields ``recomputed`` are recomputed by the kernel, or by another
+    one from sums that the transposes over bonds or pairs compute. The cotangents that the flow after it passes are
+    ``taken``.
     """
 
     kernel: Kernel
-    seeds: Seeds
+    seed: str
     gather: Gather | None
     ends: tuple[tuple[Ends, frozenset[str], Kernel], ...]
     before: ir.Block = ()
+    bars: tuple[int, ...] = ()
     recomputed: tuple[int, ...] = ()
     undo: Kernel | None = None
     taken: tuple[Handed, ...] = ()
@@ -105,12 +107,24 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
     layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
     texts = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
     texts += [function(program, adjoint.refresh)] if adjoint.refresh else []
-    reverse = _Reverse(RowLoops(program, layout), rows, kernels)
+    reverse = _Reverse(RowLoops(layout), rows, kernels)
     parts = [*(reverse.of_equation() if step.equation else reverse.of_parts())]
     loops = {loop.name: loop for part in parts for loop in part.loops}
     texts += [loop_text(program, loop) for loop in loops.values()]
     texts += reverse.drivers(parts)
     return "\n".join([_tables(program, step, parts, adjoint.steps), *texts, _added(program, step, layout)])
+
+
+def handed_by(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
+    """List the cotangents that a kernel passes to neighbours, in arrays from the first on; equal values share one."""
+    arrays: dict[int, int] = {}
+    contributions = []
+    for name, value in kernel.along("site"):
+        base, offset = layout.step.sites.places[name]
+        if any(offset) and not value.is_zero:
+            array = arrays.setdefault(id(value), first + len(arrays))
+            contributions.append(Handed(array, layout.bar(base), offset))
+    return contributions
 
 
 _ARRAYS = {name: member(name, ir.fixed(name)) for name in ("x", "bar", "handed", "received")}
@@ -200,7 +214,6 @@ class _Reverse:
             received = tuple(h for kernel in back[after] for h in handed_by(layout, kernel, 0)) if taking else ()
             for sweep, kernel in zip(step.parts[k], back[k], strict=True):
                 bars = tuple(layout.bar(program.coordinates[i]) for i in sweep.moved)
-                seeds = Seeds("change_bar", bars, sweep.colour)
                 ends = tuple(self._ends_back(sweep.gather))
                 moved = sweep.moved if recomputed else ()
                 alike = len(ends) == 1 and ends[0][0].of_all
@@ -210,7 +223,8 @@ class _Reverse:
                 before += (member("window", ir.Constant(float(kind))),) if kind is not None else ()
                 if received:
                     transposed = replace(transposed, name=f"{transposed.name}_after{after + 1}")
-                pulled.append(_Pulled(transposed, seeds, sweep.gather, ends, before, moved, undo, received, sweep))
+                seed, gather = "change_bar", sweep.gather
+                pulled.append(_Pulled(transposed, seed, gather, ends, before, bars, moved, undo, received, sweep))
             origin = f"the sweeps of H_{k + 1} have changed"
             both = self._back(f"hand{k + 1}", origin, pulled, apart=handed_apart(program, step)[k])
             along = [pair for kernel in back[k] for pair in kernel.along("site")]
@@ -239,7 +253,7 @@ class _Reverse:
                 for e, opposite, back in self._ends_back(read)
             )
             before = tuple(ir.Call(e.kernel.name, (SEGMENT,)) for e, _ in over_ends(gather))
-            pulled = _Pulled(kernel, Seeds(seed), read, ends, before if summed and number == 0 else ())
+            pulled = _Pulled(kernel, seed, read, ends, before if summed and number == 0 else ())
             yield self._back(name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
     def _back(self, name: str, whom: str, pulled: Sequence[_Pulled], *, apart: bool = True) -> Back:
@@ -258,9 +272,14 @@ class _Reverse:
         def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], recomputed: Sequence[str]) -> ir.Block:
             """Return the calls of a kernel, in each form."""
             sums, blocks = one.gather.names if one.gather else (), dict[str, ir.Block]()
-            build = First(self.loops, kernel, one.seeds, sums, tuple(listed), arrays, tuple(recomputed), one.taken)
-            for form, versions in self.loops.forms(self.rows, [build.on_sites]).items():
-                parts = build.loops_of(form, versions)
+            on_sites = self.loops.sites.recomputing(kernel, sums, recomputed, one.sweep.colour if one.sweep else None)
+            summed = len(sums) * any(o.name == "gathered_bar" for o in kernel.outputs)
+            build = Transpose(
+                on_sites, one.seed, one.bars, tuple(listed), arrays, summed, one.taken, frozenset(recomputed)
+            )
+            for form, versions in self.loops.forms(self.rows, [on_sites]).items():
+                of_form = (replace(build, function=f) for f in self.loops.after_passes(on_sites, form, versions))
+                parts = [row_transposes.transposed(f, layout, vectors=self.loops.fast) for f in of_form]
                 blocks[form] = tuple(called(loop, sites) for loop, sites in calls_of(parts, one.sweep))
                 loops.extend(parts)
             return in_forms(blocks)
@@ -282,7 +301,7 @@ class _Reverse:
             first.append(self.row_drivers.copied_ends(_HANDED, array, near_ends=near_ends))
         if beside and apart:
             purpose = f"contributions to the cotangents of sites by those that {whom}"
-            loops.append(row_transposes.handing(name, purpose, beside, self.loops.rows))
+            loops.append(row_transposes.handing(name, purpose, beside, self.loops.layout))
             second.append(ir.Call(name, (SEGMENT,)))
         recomputed = sorted({f for one in pulled for f in one.recomputed})
         return Back(tuple(loops), tuple(first), tuple(second), arrays, tuple(recomputed))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from phigen.ir.lattice_loops import LatticeLoops, begins, weights
+from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.passes.by_rows import RowLayout
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
@@ -21,7 +21,6 @@ from phigen.scheme.sweep_facts import (
     wide,
 )
 from phigen.scheme.sweep_inverse import can_recompute_fields
-from phigen.symbolic.symbols import Symbol
 from phigen.targets import lattice_values
 from phigen.targets.c.language import members
 
@@ -30,31 +29,25 @@ MOST_REMEMBERED = 14
 
 
 @dataclass(frozen=True)
-class Layout:
-    """The layout. ``lines`` are rows near a row, by their offsets; ``halo`` is the number of sites copied beside it."""
+class Layout(RowLayout):
+    """The rows of a lattice: ``halo`` is the number of sites copied beside a row."""
 
-    step: Sweeps
-    lines: tuple[tuple[int, ...], ...]
-    halo: int
-    weights: tuple[Symbol, ...]
-    arrays: tuple[str, ...]
+    halo: int = 0
     slopes: bool = True  # whether the code has kernels of variations, or takes differences of sweeps
 
-    def loops(self, program: Program) -> LatticeLoops:
-        """Return the builder of the loops."""
-        return LatticeLoops(program, self.step)
+    @property
+    def program(self) -> Program:
+        """The program."""
+        return self.lattice.program
 
-    def rows(self, program: Program) -> RowLayout:
-        """Return the rows that loops read."""
-        return RowLayout(self.loops(program), self.lines, members(program))
+    @property
+    def step(self) -> Sweeps:
+        """The step."""
+        return self.lattice.step
 
     def bar(self, array: str) -> int:
         """The number of the cotangents of a field, or of a parameter at sites or bonds."""
-        return [*self.arrays, *self.step.sites.at_bonds].index(array)
-
-    def leaves_out(self, colour: int | None) -> bool:
-        """Whether loops for the sites of a colour, or for all sites, omit some sites."""
-        return self.step.sites.colours > 1 and colour is not None
+        return [*self.lattice.arrays, *self.step.sites.at_bonds].index(array)
 
     @property
     def partners(self) -> Partners:
@@ -79,28 +72,31 @@ class Layout:
 
 def layout_of(program: Program, step: Sweeps) -> Layout:
     """The layout of a lattice."""
-    sites = step.sites
+    lattice, sites = LatticeLoops(program, step), step.sites
     offsets = [offset for _, offset in sites.places.values()]
-    offsets += [tuple(map(int, s.key[1:])) for s in begins(step)]
+    offsets += [tuple(map(int, s.key[1:])) for s in lattice.seams]
     offsets += [tuple(-o for o in offset) for offset in offsets] if step.adjoint else []
     lines = dict.fromkeys([(0,) * (len(sites.axes) - 1), *sorted({o[:-1] for o in offsets})])
     halo = max((abs(o[-1]) for o in offsets), default=0)
-    arrays = (*program.coordinates, *sites.parameters, *sites.increments)
-    layout = Layout(step, tuple(lines), halo, weights(program, step), arrays)
-    banded = band(step) > 0 and program.offers("recurrences")
-    return replace(layout, slopes=program.profile == "fast" or program.extras.tangent or banded or bool(step.adjoint))
+    slopes = program.profile == "fast" or program.extras.tangent or _banded(program, step) or bool(step.adjoint)
+    return Layout(lattice, tuple(lines), members(program), halo, slopes)
 
 
-def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
+def _banded(program: Program, step: Sweeps) -> bool:
+    return band(step) > 0 and program.offers("recurrences")
+
+
+def switches(layout: Layout) -> dict[str, bool]:
     """The switches of the runtime for lattices."""
-    banded = band(step) > 0 and program.offers("recurrences")
+    program, step = layout.program, layout.step
+    banded, weights = _banded(program, step), layout.lattice.weights
     return lattice_values.switches(step) | {
         "CASIMIRS": bool(program.casimirs),
         "KICKED": program.offers("kicks") and program.profile == "fast",
-        "OPEN": bool(layout.weights),
+        "OPEN": bool(weights),
         "SPREAD": program.profile == "fast",
-        "BESIDE": bool(layout.weights) and program.profile == "fast",
-        "BETWEEN": (bool(layout.weights) and program.profile == "fast")
+        "BESIDE": bool(weights) and program.profile == "fast",
+        "BETWEEN": (bool(weights) and program.profile == "fast")
         or any(wide(step.sites, sweep) for part in step.parts for sweep in part)
         or bool(step.sites.seams),
         "OPEN_ROWS": step.sites.open[-1],

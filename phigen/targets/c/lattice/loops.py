@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.passes import row_loops, row_transposes
-from phigen.ir.passes.by_rows import RowLayout
 from phigen.ir.passes.forms import FULL_RANGE, IN_LANES, calling, forms_of
 from phigen.ir.passes.open_ends import divided_at_ends
 from phigen.ir.passes.simultaneous import simultaneous
@@ -72,8 +71,12 @@ def share(densities: Kernel) -> int:
 class RowLoops:
     """The loops over sites of one lattice, by rows."""
 
-    program: Program
     layout: Layout
+
+    @property
+    def program(self) -> Program:
+        """The program."""
+        return self.layout.program
 
     @property
     def fast(self) -> bool:
@@ -83,12 +86,7 @@ class RowLoops:
     @property
     def sites(self) -> LatticeLoops:
         """The builder of the loops on the level of sites."""
-        return self.layout.loops(self.program)
-
-    @property
-    def rows(self) -> RowLayout:
-        """The rows that loops read."""
-        return self.layout.rows(self.program)
+        return self.layout.lattice
 
     @property
     def versions(self) -> Mapping[str, str]:
@@ -112,7 +110,7 @@ class RowLoops:
         """Return the loops that update some fields of the sites of a row, or their variation."""
         loops = self.after_passes(self.sites.sweep(sweep), form, versions)
         compensated = self.program.compensated
-        return [row_loops.sweep(loop, self.rows, passed=not self.fast, compensated=compensated) for loop in loops]
+        return [row_loops.sweep(loop, self.layout, passed=not self.fast, compensated=compensated) for loop in loops]
 
     def stage(self, kernel: Kernel, form: str, versions: Mapping[str, str], *, adds: bool) -> list[ir.Function]:
         """Return the loops of a kernel of the equation of a stage, which assign or add to the arrays of the row."""
@@ -121,7 +119,7 @@ class RowLoops:
         if kernel.role is Role.OWN_SLOPE:
             outputs = [Symbol("out", f, g) for f in fields for g in fields]
         loops = self.after_passes(self.sites.stage(kernel), form, versions)
-        return [row_loops.stage(loop, self.rows, outputs, adds=adds) for loop in loops]
+        return [row_loops.stage(loop, self.layout, outputs, adds=adds) for loop in loops]
 
     def sums(self, gather: Gather | None, *, swept: bool = False) -> Iterator[ir.Function]:
         """Yield the loops that sum over all bonds of a site, or its pairs with other sites.
@@ -134,8 +132,8 @@ class RowLoops:
         for number, (ends, oriented) in enumerate(over_ends(gather) if gather else ()):
             arguments = self.told_of_bonds(ends, oriented) if swept else ()
             one = self._bond_loop(ends, oriented, {} if observed else self.versions, arguments)
-            over = row_loops.over_bonds(one, self.rows, first=number == 0) if self.layout.graph else None
-            yield over or row_loops.over_pairs(one, self.rows)
+            over = row_loops.over_bonds(one, self.layout, first=number == 0) if self.layout.graph else None
+            yield over or row_loops.over_pairs(one, self.layout)
 
     def told_of_bonds(self, ends: Ends, oriented: frozenset[str]) -> tuple[str, ...]:
         """Return further arguments of short loops over bonds, so that several parts of H share a loop.
@@ -173,7 +171,7 @@ class RowLoops:
             of_bonds = row_transposes.BondTranspose(
                 replace(built, name=name, doc=purpose), end, first, len(transpose.inputs[HERE]), oriented
             )
-            yield row_transposes.transposed_sums(of_bonds, self.rows)
+            yield row_transposes.transposed_sums(of_bonds, self.layout)
 
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function that fills arrays over the sites with the values of a kernel.
@@ -186,12 +184,13 @@ class RowLoops:
         built = replace(built, name=f"{kernel.name}_row", doc=f"{kernel.purpose}, at the sites of a row")
         if meant and self.layout.sums_up:
             sums = [self._bond_loop(ends, oriented, {}) for ends, oriented in meant]
-            return row_loops.observable_with_bonds(built, self.rows, sums, apart)
-        return row_loops.observable(built, self.rows, [ends.kernel.name for ends, _ in meant], apart)
+            return row_loops.observable_with_bonds(built, self.layout, sums, apart)
+        return row_loops.observable(built, self.layout, [ends.kernel.name for ends, _ in meant], apart)
 
 
-def observables(program: Program, loops: RowLoops) -> Sequence[str]:
+def observables(loops: RowLoops) -> Sequence[str]:
     """Return the text of the functions of observables."""
+    program = loops.program
     observed = (*program.observables.kernels, *loops.layout.step.rate_kernels)
     kernels = (kernel for kernel in observed if kernel.roots)
     return [printed(program, loops.observable(kernel), inline=False) for kernel in kernels]

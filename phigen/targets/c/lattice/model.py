@@ -30,13 +30,13 @@ def declarations(program: Program, step: Sweeps) -> str:
     """Return the public declarations: sizes and parameters."""
     member, layout = members(program), layout_of(program, step)
     listed = [_declared(p, member[p.name]) for p in program.parameters]
-    arrays = len(layout.arrays)
+    arrays = len(layout.lattice.arrays)
     sizes = [
         ("ARRAYS", arrays, f"arrays over the sites: fields, then parameters{', then noise' * bool(program.noise)}"),
         ("COEFFICIENTS", max(1, step.row * rows_of(step)), "numbers that are functions of params and h"),
     ]
     if step.equation:
-        stages, has = len(program.fractions), switches(program, step, layout)
+        stages, has = len(program.fractions), switches(layout)
         sizes += [("STAGES", stages, "stages of a step")] if stages > 1 else []
         sizes += (
             [("DIRECTIONS", LatticeNewtonPolicy().directions, "dimension of a Krylov space")] if has["KRYLOV"] else []
@@ -82,9 +82,9 @@ def _gathered(layout: Layout) -> int:
     return max([1, *(len(g.names) for g in (*swept, *seen))])
 
 
-def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> int:
+def _reserved(layout: Layout, has: Mapping[str, bool]) -> int:
     """Arrays over the sites in the memory of a solver."""
-    dimension, stage = program.dimension, 0
+    program, dimension, stage = layout.program, layout.program.dimension, 0
     if layout.step.equation:
         stage = 2 if layout.slopes else 3  # y before and after a sweep, and varied
         stage += len(program.fractions) * _differences(program) * has["GUESSES"]
@@ -96,7 +96,7 @@ def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> int:
     fields = dimension + 2 * dimension * has["COMPENSATED"]  # the state before a step, and compensation terms
     fields += bool(layout.step.sites.seams)  # and the kinds of sites
     fields += 2 * has["MONITOR"]  # densities, and the clock
-    return len(layout.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage
+    return len(layout.lattice.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage
 
 
 def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
@@ -139,12 +139,12 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
 def model(program: Program, step: Sweeps) -> str:
     """Tables, and functions called before the steps."""
     layout = layout_of(program, step)
-    has = switches(program, step, layout)
+    has = switches(layout)
     values = {
         "NAME": program.name,
         "defaults": ", ".join("NULL" if p.at != "all" else repr(float(p.value)) for p in program.parameters) or "0",
-        "constants": [*_constants(program, step, layout, has)],
-        **_tables_of_sites(program, step, layout, has),
+        "constants": [*_constants(layout, has)],
+        **_tables_of_sites(layout, has),
         **_tables_of_flows(step),
         "middles": ", ".join(map(repr, program.midpoints)),
         "fractions": len(program.fractions) > 1,
@@ -162,17 +162,15 @@ def model(program: Program, step: Sweeps) -> str:
     return "".join([*texts, commented(allowed, program), "\n", prepare])
 
 
-def _constants(
-    program: Program, step: Sweeps, layout: Layout, has: Mapping[str, bool]
-) -> Iterator[tuple[str, int, str]]:
+def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, int, str]]:
     """Names, values, and comments."""
-    sites, several = step.sites, len(step.sites.axes) > 1
+    program, step, sites, several = layout.program, layout.step, layout.step.sites, not layout.single_row
     if densities := program.observables.named:
         yield "SHARE", share(densities), "sites whose densities of observables are computed in one go"
     if has["HALO"]:
         yield "HALO", layout.halo, "sites that are copied beside a row"
         yield "LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row"
-    yield "RESERVED", _reserved(program, layout, has), "arrays over the sites in the memory of a solver"
+    yield "RESERVED", _reserved(layout, has), "arrays over the sites in the memory of a solver"
     if several:
         yield "LINES", len(layout.lines), "rows that kernels read: the row itself and its neighbours"
     yield "ROW", max(1, step.row), "coefficients of one flow"
@@ -202,17 +200,17 @@ def _constants(
         far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = max(1, *far) if several else 1
         yield "SPAN", span, "slices on either side of a slice that a flow reads; see wavefront blocking"
-    if layout.weights and several:
-        yield "WEIGHTS", len(layout.weights), "kinds of terms that open ends take away"
+    if layout.lattice.weights and several:
+        yield "WEIGHTS", len(layout.lattice.weights), "kinds of terms that open ends take away"
     if sites.colours > 1:
         yield "COLOUR_COUNT", sites.colours, "colours of sites"
         yield "COLOUR_STRIDE", sites.weights[-1], "change of the colour number from site to site along a row"
 
 
-def _tables_of_sites(program: Program, step: Sweeps, layout: Layout, has: Mapping[str, bool]) -> dict[str, object]:
+def _tables_of_sites(layout: Layout, has: Mapping[str, bool]) -> dict[str, object]:
     """Tables that are the same in all steps: the shape of the lattice, the neighbours that kernels read, the sweeps."""
-    sites, several = step.sites, len(step.sites.axes) > 1
-    stages = [_braced(step.stage(k, program.coordinates)) for k in range(len(step.parts))] if has["BY_HAND"] else []
+    step, sites, several, fields = layout.step, layout.step.sites, not layout.single_row, layout.program.coordinates
+    stages = [_braced(step.stage(k, fields)) for k in range(len(step.parts))] if has["BY_HAND"] else []
     return {
         "least": ", ".join(map(str, sites.least)),
         "periods": ", ".join(map(str, sites.periods)) if has["PERIODIC_COLOURS"] else "",
@@ -220,7 +218,9 @@ def _tables_of_sites(program: Program, step: Sweeps, layout: Layout, has: Mappin
         "ends": several or has["BANDED"],
         "open": ", ".join(str(int(o)) for o in sites.open),
         "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
-        "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w.key)]) for w in layout.weights if several),
+        "weights": ", ".join(
+            _braced([_braced(pair) for pair in bounds(w.key)]) for w in layout.lattice.weights if several
+        ),
         "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 and (several or sites.seams) else "",
         "seams": ", ".join(_braced([s.period, s.wide, s.near]) for s in sites.seams),
         "graph": layout.graph,

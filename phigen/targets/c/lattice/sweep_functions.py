@@ -47,7 +47,7 @@ from phigen.targets.c.loops import commented, function
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     """All kernels as loops over sites, and the loops of each part of H."""
     layout = layout_of(program, step)
-    loops, equation = RowLoops(program, layout), step.equation
+    loops, equation = RowLoops(layout), step.equation
     texts = [
         *functions.called(program, [equation.slope] if equation and not layout.slopes else ()),
         *functions.phi_lanes(program, set(rows.small_argument)),
@@ -63,24 +63,24 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
         texts += [printed(program, loop) for loop in loops.sums(gather)]
     if equation:
         texts += _of_equation(loops, equation.relax, rows, end=equation.advance)
-        if switches(program, step, layout)["SITE_BLOCKS"]:
+        if switches(layout)["SITE_BLOCKS"]:
             texts += _of_equation(loops, site_block(step, program.coordinates, equation.relax))
         for kernel in (equation.slope, *equation.tangents) if layout.slopes else ():
             texts += _of_equation(loops, kernel)
-    return "\n".join([*texts, *observables(program, loops)])
+    return "\n".join([*texts, *observables(loops)])
 
 
 def parameters(program: Program, step: Sweeps) -> str:
     """Print the functions that copy parameters at sites and bonds to the arrays that loops read."""
-    arrays = layout_of(program, step).arrays
+    arrays = layout_of(program, step).lattice.arrays
     listed = copies(program.parameters, members(program), arrays, step.sites.at_bonds)
     return "".join(commented(copy, program) + "\n" for copy in listed)
 
 
 def drivers(loops: RowLoops) -> RowDrivers:
     """Return the builder of the row drivers of a lattice."""
-    by_hand = switches(loops.program, loops.layout.step, loops.layout)["BY_HAND"]
-    return RowDrivers(loops.rows, loops.layout.halo, may_be_empty=by_hand, one_loop=not loops.fast)
+    by_hand = switches(loops.layout)["BY_HAND"]
+    return RowDrivers(loops.layout, loops.layout.halo, may_be_empty=by_hand, one_loop=not loops.fast)
 
 
 def driver_text(program: Program, driver: ir.Function) -> str:
@@ -129,7 +129,7 @@ class _PartLoops:
     @property
     def by_part(self) -> bool:
         """Whether each part has a driver of its own, which compilers make faster where rows are short."""
-        return self.loops.fast and not self.loops.rows.single_row and not self.varied
+        return self.loops.fast and not self.loops.layout.single_row and not self.varied
 
     def texts(self) -> Iterator[str]:
         """Yield the loops and the drivers; loops of equal code are one, whichever parts need them."""
@@ -142,7 +142,7 @@ class _PartLoops:
             loop = replace(same[0].loop, name=shared or same[0].loop.name)
             names[key] = loop.name
             yield printed(program, loop, [call.loop.doc for call in same])
-        has, coloured = switches(program, step, layout), bool(step.by_colour)
+        has, coloured = switches(layout), bool(step.by_colour)
         threads = 0 if self.varied or has["SHARED"] else 512 if has["PAIRS"] else 4096
         name = (
             "tangent_rows" if self.varied else f"sweep_{'colour' if coloured else 'part'}" if threads else "sweep_rows"
@@ -207,7 +207,7 @@ class _PartLoops:
                 others.append(_Call(again[k], None, arguments(k, bonds, sign), bonds=bonds))
             yield _Call(loop, None, arguments(k, (), 1.0), others=tuple(others))
         loops = self.loops.sweep(sweep, form, versions)
-        swept = not self.loops.fast and layout.leaves_out(sweep.colour) and not sweep.is_tangent
+        swept = not self.loops.fast and layout.step.sites.colours > 1 and not sweep.is_tangent
         colour, window = sweep.colour if swept else None, first_kind(layout.step.sites, sweep)
         called = calls_of(loops, sweep)
         if len(loops) == 1 and wide(layout.step.sites, sweep):
@@ -296,9 +296,9 @@ def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir
 def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
     """Yield the declarations of the arrays over the sites with the fields in other orders."""
     for order in dict.fromkeys(order for order in used if order):
-        increments = turned_increments(layout.step.sites, layout.arrays, order)
-        other = {**dict(zip(layout.arrays, order, strict=False)), **increments}
-        places = [layout.arrays.index(other.get(a, a)) for a in layout.arrays]
+        increments = turned_increments(layout.step.sites, layout.lattice.arrays, order)
+        other = {**dict(zip(layout.lattice.arrays, order, strict=False)), **increments}
+        places = [layout.lattice.arrays.index(other.get(a, a)) for a in layout.lattice.arrays]
         yield _arrays(order, [ir.entry(STATE, place) for place in places])
 
 
