@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
@@ -72,8 +72,7 @@ class _Tables:
             self.head.append(ir.Unpack(("sums",), SITES))
             self.head += _cleared(s)
         if s.kind == "pairs":
-            other = ir.If(ir.Binary("==", OTHER, SITE), (ir.Continue(),))
-            return _counted("i", COUNT, (_counted("j", COUNT, (other, *body)),))
+            return _counted("i", COUNT, (over_pairs(body),))
         if s.kind == "bonds":
             bonds = ir.Called("bonds", (ir.Constant(s.end), ir.Constant(s.chosen), *[COLOUR] * bool(s.chosen)), SITES)
             self.head.append(ir.Unpack(("here", "there", "bond"), bonds))
@@ -128,10 +127,10 @@ class _Tables:
         if array.storage is not ir.Storage.STATE or array.name in fields:
             whole = ir.fixed(_ARRAYS.get(array.storage, "out"))
             sums = array.storage is ir.Storage.SUM and self.function.role is not Role.GATHER
-            return ir.Entry(ir.Member(SITES, "sums") if sums else whole, _of_field(site, array.number))
+            return ir.Entry(ir.Member(SITES, "sums") if sums else whole, of_array(site, array.number))
         if array.name in increments:
             increments_array = self._hoisted(Symbol("at", "dw"), ir.Member(SITES, "dw"))
-            return ir.Entry(increments_array, _of_field(site, increments.index(array.name)))
+            return ir.Entry(increments_array, of_array(site, increments.index(array.name)))
         return ir.Entry(self._parameter(array.name), site)
 
     def _parameter(self, name: str) -> ir.Name:
@@ -163,16 +162,21 @@ def _counted(variable: str, end: ir.Value, body: ir.Block) -> ir.Loop:
     return ir.Loop("plain", body, variable, ir.Constant(0), end)
 
 
+def over_pairs(body: Iterable[ir.Statement]) -> ir.Loop:
+    """Return the loop over all other sites."""
+    return _counted("j", COUNT, (ir.If(ir.Binary("==", OTHER, SITE), (ir.Continue(),)), *body))
+
+
 def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:
     """Yield the calls that set extremes to their initial values; callers set sums to 0."""
     for s in loop.body:
         if isinstance(s, ir.Store) and s.extreme:
-            ends = _of_field(ir.Constant(0), s.array.number), _of_field(ir.Constant(0), s.array.number + 1)
+            ends = of_array(ir.Constant(0), s.array.number), of_array(ir.Constant(0), s.array.number + 1)
             yield ir.Call("fill", (limit(s.extreme, "Infinity"), *ends), ir.fixed("sums"))
 
 
-def _of_field(site: ir.Value, number: int) -> ir.Value:
-    """Return the index of a site in an array of all fields."""
+def of_array(site: ir.Value, number: int) -> ir.Value:
+    """Return the index of a site in one of several consecutive arrays."""
     if number == 0:
         return site
     return ir.Binary("+", site, COUNT if number == 1 else ir.Binary("*", ir.Constant(number), COUNT))

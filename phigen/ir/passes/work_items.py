@@ -7,13 +7,13 @@ from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
+from phigen.ir.passes.by_tables import COUNT, OTHER, SITE, of_array, over_pairs
 from phigen.ir.passes.extremes import limit, updates
 from phigen.ir.passes.row_loops import compensated_sum
 from phigen.symbolic.symbols import Symbol
 
-#: Index of the site of a work item, of the other site of a bond or pair, of the bond among those of a site; the number
-#: of all sites.
-SITE, OTHER, BOND, COUNT = map(ir.fixed, ("i", "j", "b", "count"))
+#: Index of the bond among those of a site.
+BOND = ir.fixed("b")
 
 #: The first arguments of all kernels, before the arrays.
 ARGUMENTS = ("items", "count", "sites", "coefficients", "first")
@@ -78,7 +78,7 @@ class _WorkItems:
             yield ir.Declare(ir.Type.REAL, ((total.symbol, start),), mutable=True)
         body: list[ir.Statement] = [new for s in loop.body if isinstance(s, ir.Declare) for new in self.lowered(s)]
         body += (new for s, total in zip(stores, totals, strict=True) for new in updates(s, total, s.value))
-        yield _over_bonds(body) if self.lattice.step.others.graph else _over_pairs(body)
+        yield _over_bonds(body) if self.lattice.step.others.graph else over_pairs(body)
         yield from (ir.Assign(self._element(s.array, SITE), total) for s, total in zip(stores, totals, strict=True))
 
     def lowered(self, s: ir.Statement) -> Iterator[ir.Statement]:
@@ -93,7 +93,7 @@ class _WorkItems:
                     site = ir.Name(Symbol("beside", number))
                     if number not in self.declared:
                         self.declared.add(number)
-                        yield ir.index(site, ir.Entry(ir.fixed("neighbours"), _of_array(SITE, number)))
+                        yield ir.index(site, ir.Entry(ir.fixed("neighbours"), of_array(SITE, number)))
                 yield ir.real(name, self._element(load.array, site))
             case ir.Declare(items=((name, value),)):
                 yield replace(s, items=((name, self._value(value)),))
@@ -144,18 +144,5 @@ def _over_bonds(body: list[ir.Statement]) -> ir.Statement:
     return ir.Loop("plain", (other, *body), "b", _entry("starts", SITE), high)
 
 
-def _over_pairs(body: list[ir.Statement]) -> ir.Statement:
-    """Return the loop over all other sites."""
-    other = ir.If(ir.Binary("==", OTHER, SITE), (ir.Continue(),))
-    return ir.Loop("plain", (other, *body), "j", ir.Constant(0), COUNT)
-
-
 def _entry(array: str, site: ir.Value, number: int = 0) -> ir.Value:
-    return ir.Entry(ir.fixed(array), _of_array(site, number))
-
-
-def _of_array(site: ir.Value, number: int) -> ir.Value:
-    """Return the index of a site in one of several consecutive arrays."""
-    if number == 0:
-        return site
-    return ir.Binary("+", site, COUNT if number == 1 else ir.Binary("*", ir.Constant(number), COUNT))
+    return ir.Entry(ir.fixed(array), of_array(site, number))
