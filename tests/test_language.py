@@ -1,6 +1,7 @@
 """The language of CONTRIBUTING, as far as a machine sees it, in the whole package."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -72,3 +73,20 @@ def test_class_names_occur_once() -> None:
     trees = [ast.parse(f.read_text(encoding="utf-8")) for f in files]
     names = [node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
     assert {name for name in names if names.count(name) > 1} <= SHARED_CLASS_NAMES
+
+
+#: Words that comments repeat on purpose: an argument is called steps, a type long long.
+REPEATED = {"steps", "planes", "long"}
+
+
+def test_no_comment_of_generated_code_repeats_a_word() -> None:
+    files = [f for f in (ROOT / "generated").rglob("*") if f.suffix in {".c", ".h", ".js", ".mjs"}]
+    files += (ROOT / "tests" / "golden").glob("*.txt")
+    assert len(files) > 40
+    repeated = {
+        f"{f.name}: {pair[0]}"
+        for f in files
+        for pair in re.finditer(r"(?<![\w.$-])([A-Za-z]{3,})(?: |\n   )\1(?![\w.$(-])", f.read_text(encoding="utf-8"))
+        if pair[1] not in REPEATED
+    }
+    assert repeated == set()

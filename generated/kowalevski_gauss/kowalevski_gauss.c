@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
  *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 111808c73d20fa70ea46b01f78e8a3fe4b4fe9f8ff4542b0a28344e0da71025a
+ * body-sha256: 06e3bc5dd0e0e524b9a137f0f85183d02f6441b0c57bf93976666a25e368ca9b
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -743,7 +743,7 @@ kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
 {
     if (s == NULL || change == NULL) return kowalevski_gauss_BAD_ARGUMENT;
     if (!kowalevski_gauss_advance(s, change, s->carry)) return kowalevski_gauss_BAD_ARGUMENT;
-    s->history.kicked = 1; /* the moves of the last step still predict those of the next one */
+    s->history.kicked = 1; /* the increments of the last step still predict those of the next one */
     return kowalevski_gauss_OK;
 }
 

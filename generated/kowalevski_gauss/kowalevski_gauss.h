@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bac62daba949ddd4d1197576fb6a3e42e2ed11ebcb40a04f126929f66d025c50
+ * body-sha256: 003344341124e4561af3dc44521fa4245755a8ccf34f43f6fc8a132bd95cf0fd
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -37,8 +37,8 @@ const char *kowalevski_gauss_status_string(kowalevski_gauss_status status); /* t
 /* Results of the last steps, by which the next one predicts the starting values of its iteration. They affect
    the speed only. */
 typedef struct {
-    int count;     /* steps in moves */
-    int latest;    /* index of the last step in moves */
+    int count;     /* steps in increments */
+    int latest;    /* index of the last step in increments */
     int sweeps;    /* number of the first sweep over the stages whose change is measured */
     int predictor; /* number of the predictor */
     int age;       /* steps since all predictors were compared for the first time */

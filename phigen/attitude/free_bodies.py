@@ -15,9 +15,8 @@ Then θ = t w_l − β_h n ∫S²/(1 − nS²)dt + χ/L, where χ is the angle o
     (1 − (Q − WC)T²/2(1 + D),  LS(c/L² + β_m(Q + W)T²/2(1 + D))).
 
 An error of the angle does not change the momentum in space. Near x' = -x, where M is undefined, the attitude has
-relative errors of about 1e-16/ν with ν = 1 + x·x'/|x|²; this occurs near the separatrix, from one unstable rotation to the
-opposite one. For momenta in space the element is the inverse of that
-for −H.
+relative errors of about 1e-16/ν with ν = 1 + x·x'/|x|²; this occurs near the separatrix, from one unstable rotation
+to the opposite one. For momenta in space the element is the inverse of that for −H.
 """
 
 from __future__ import annotations

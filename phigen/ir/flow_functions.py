@@ -93,11 +93,9 @@ class FlowFunctions:
             pair = (*self._flow(others[0][0], _row(K)), *self._flow(outer, _row(ir.plus(K, 1))))
             count, two = ir.Constant(len(schedule.begin)), ir.Constant(2)
             body.append(ir.Loop("stages", pair, "k", ir.Constant(1), count, step=two))
-        doc = (
-            "Corrector: flows before the first step of a run, or after its last one; includes half a flow of the larger"
-        )
+        doc = "Corrector: flows before the first step of a run or after the last; has half a flow of the larger part"
         parameters = ("after", "coef", "x", "displacement", "start", *["tape"] * self.stores)
-        return self.function("corrector", f"{doc} larger part", parameters, tuple(body))
+        return self.function("corrector", doc, parameters, tuple(body))
 
     def tangent(self, count: int) -> ir.Function:
         """Return the function that applies one of ``count`` flows, after the derivative of its increment."""

@@ -132,7 +132,7 @@ static int phi_best_predictor(phi_history *past, double scale, phi_lanes *reads)
 }
 
 #else
-/* The values of the unknowns that the predictor derives from the moves of the last step. */
+/* The values of the unknowns that the predictor derives from the increments of the last step. */
 static void phi_predict(phi_history *past, int predictor, phi_lanes *z)
 {
     phi_mixed(phi_prediction[predictor], past->increments[past->latest], z);

@@ -25,8 +25,8 @@ typedef struct {
     phi_lanes carry[PHI_DIM], coef[PHI_COEFFICIENTS];
     phi_lanes weights[PHI_NODES][1]; /* h b_j */
     phi_batch increments[PHI_EARLIER];    /* stage increments of the last steps, in the frame of the end of the last one */
-    int latest;    /* index of the last step in moves */
-    int count;     /* steps in moves */
+    int latest;    /* index of the last step in increments */
+    int count;     /* steps in increments */
     int predictor; /* number of the predictor */
     int age;       /* steps since all predictors were compared for the first time */
     int sweeps;    /* number of the first sweep whose change is measured */

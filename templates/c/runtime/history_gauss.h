@@ -3,8 +3,8 @@
 /* Results of the last steps, by which the next one predicts the starting values of its iteration. They affect the speed
    only. */
 typedef struct {
-    int count;     /* steps in moves */
-    int latest;    /* index of the last step in moves */
+    int count;     /* steps in increments */
+    int latest;    /* index of the last step in increments */
     int sweeps;    /* number of the first sweep over the stages whose change is measured */
     int predictor; /* number of the predictor */
 #if PHI_STAGED

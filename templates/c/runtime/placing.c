@@ -56,7 +56,7 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
 #if PHI_RECURRENCES
     phi_move_guesses(s, from);
 #elif PHI_GAUSS
-    s->history.kicked = 1; /* the moves of the last step still predict those of the next one */
+    s->history.kicked = 1; /* the increments of the last step still predict those of the next one */
 #elif PHI_GUESSED
     PHI_EACH_STAGE
         for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];

@@ -51,7 +51,7 @@ export function forgetSteps(solver) {
 }
 
 /**
- * The factors of the moves in the offsets of the unknowns from the end of a step, at a fraction of it: the
+ * The factors of the increments in the offsets of the unknowns from the end of a step, at a fraction of it: the
  * collocation polynomial, as integrals of Lagrange polynomials from 1 on, by sums of Legendre polynomials.
  */
 export function factorsAt(fraction) {
