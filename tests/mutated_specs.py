@@ -243,7 +243,7 @@ runs:
   b: {sizes: [6], initial: {random: uniform, seed: 1, scale: 0.5, mean: i/2}, step: 0.1, steps: 4, stride: 2,
       record: [M, energy]}
   c: {sizes: [6], initial: [1, 2], step: 0.1, duration: 0.4, parameters: {B: [1, 2, 3, 4, 5, 6], k: i + 1, g: 0}}
-sweeps: {s: {run: a, over: {g: [1, 2], seed: {count: 2}}}}
+sweeps: {s: {run: a, over: {g: [1, 2], seed: {count: 2}}, target: numpy}}
 """,
     "plane": """\
 phigen: 1

@@ -89,8 +89,7 @@ class AllowedNames:
             return f"{shown(name)} is not a finite number", ""
         if name == "t":
             return "the name 't' is not declared", "where things depend on the time, time: t declares its name"
-        candidates = [*self.names, *SPEC_FUNCTIONS, *CONSTANTS]
-        return f"the name {shown(name)} is not declared", did_you_mean(name, candidates)
+        return f"the name {shown(name)} is not declared", did_you_mean(name, [*self.names, *CONSTANTS])
 
 
 _TOKEN = re.compile(
@@ -376,10 +375,10 @@ class Parser:
         opening = self.here
         self.position += 1
         arity = SPEC_FUNCTIONS.get(token.text)
-        if arity is None and token.text in PIECEWISE_FUNCTIONS and self.scope.lookup(token.text) is None:
+        if arity is None and token.text in PIECEWISE_FUNCTIONS and token.text not in self.scope.names:
             return self.piecewise(token, opening)
         if arity is None:
-            declared = self.scope.lookup(token.text) is not None
+            declared = token.text in self.scope.names or token.text in CONSTANTS
             known = [*SPEC_FUNCTIONS, *(PIECEWISE_FUNCTIONS if self.scope.piecewise else ())]
             guess = did_you_mean(token.text, known, OTHER_FUNCTIONS) or "functions are " + ", ".join(known)
             hint = f"products are written with *: {token.text}*(…)" if declared else guess

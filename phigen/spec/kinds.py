@@ -335,24 +335,52 @@ class Record(Kind):
         return f"a mapping ({self.what})" if " " in self.what else "a mapping"
 
     def read(self, node: Node, path: Path, reader: Reader) -> dict[str, Any] | None:
-        known = {f.key: f for f in self.fields}
+        known = {f.key for f in self.fields}
         if not isinstance(node, MappingNode):
             return self.mismatch(node, path, reader, self.instructions(node))
         values = {}
         for name, (key, item) in node.entries.items():
-            if name not in known:
-                reader.error(key, f"{self.what} has no key {shown(name)}", self._hint(name, node))
-                if meant := self._meant(name, node):  # so that nobody says it is missing
-                    reader.locations.setdefault((*path, meant), key.location)
-            else:
-                inner = (*path, name)
-                reader.locations[inner] = place(key, item)
-                reader.purposes[inner] = known[name].description
-                value = known[name].kind.read(item, inner, reader)
+            if name in known:
+                value = self._read_value(name, key, item, path, reader)
                 if value is not None:
                     values[name] = value
+        for name in [name for name in node.entries if name not in known]:
+            meant, value = self._read_unknown(name, node, path, reader)
+            if value is not None:
+                values.setdefault(meant, value)
         self.check_presence(node, reader)
         return values
+
+    def _read_value(self, name: str, key: Scalar, item: Node, path: Path, reader: Reader) -> Any:
+        """Return the value of a known key; for a misspelt word, which is an error, the word that it resembles."""
+        known = next(f for f in self.fields if f.key == name)
+        inner = (*path, name)
+        reader.locations[inner] = place(key, item)
+        reader.purposes[inner] = known.description
+        value = known.kind.read(item, inner, reader)
+        if value is None and isinstance(known.kind, OneOf) and isinstance(item, Scalar):
+            return intended(item.text, known.kind.words) or None
+        return value
+
+    def _read_unknown(self, name: str, node: MappingNode, path: Path, reader: Reader) -> tuple[str, Any]:
+        """Report an unknown key; return the missing key that it stands for, and its value as such, None if unreadable.
+
+        So names that it declares are known, and errors within it are reported. A synonym of a key has no value: values
+        under the name of another program often have another form.
+        """
+        key, item = node.entries[name]
+        hint, meant = self._hint(name, node), self._meant(name, node)
+        reader.error(key, f"{self.what} has no key {shown(name)}", hint)
+        if not meant:
+            return meant, None
+        if name in MEANT or meant in node.entries or (*path, meant) in reader.locations or "did you mean" not in hint:
+            reader.locations.setdefault((*path, meant), key.location)  # so that nobody says it is missing
+            return meant, None
+        before = reader.problems.copy()
+        value = self._read_value(meant, key, item, path, reader)
+        if value is None:
+            reader.problems.restore(before)
+        return meant, value
 
     def _meant(self, name: str, node: MappingNode) -> str:
         """Return the existing key that an unknown name resembles, if it is not given yet; or ""."""

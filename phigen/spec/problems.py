@@ -77,6 +77,16 @@ class Problems:
         if len(self.found) >= limits.ERRORS:
             raise self.error()
 
+    def copy(self) -> Problems:
+        """Return the errors so far, for `restore`."""
+        twin = Problems(self.file)
+        twin.found, twin.only_limits = dict(self.found), self.only_limits
+        return twin
+
+    def restore(self, before: Problems) -> None:
+        """Drop the errors since a `copy`."""
+        self.found, self.only_limits = dict(before.found), before.only_limits
+
     def forget(self, line: int) -> None:
         """Drop the errors of a line, which follow from one that is reported instead."""
         self.found = {at: d for at, d in self.found.items() if at[0].line != line}
