@@ -11,7 +11,7 @@ from phigen.cli.arguments import ORDER, many_specs, order_option, scheme_option
 from phigen.cli.console import Console, heading, out, out_json, pass_console, verbosity
 from phigen.cli.failures import Collector
 from phigen.cli.sources import load_all
-from phigen.errors import CheckError, SpecError
+from phigen.errors import CheckError, Diagnostic, SpecError
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
@@ -69,7 +69,9 @@ def command(
     if not independent and (terms or seconds):
         raise click.UsageError("--terms and --seconds need --independent")
     collector, descriptions = Collector(), list[dict[str, object]]()
-    for spec in load_all(spec_files, collector):
+    specs = load_all(spec_files, collector)
+    _say_unexamined(collector, console)
+    for spec in specs:
         with collector.collecting():
             examination = examine(spec, order=order, scheme=scheme)
             described = _described(examination)
@@ -137,6 +139,29 @@ def _collect(examination: Examination, collector: Collector, console: Console) -
         collector.errors.append(examination.obstacle)
     elif examination.compilation:
         _expect_targets(examination.spec, examination.compilation, collector)
+    if examination.spec.lattice:
+        _expect_starts(examination.spec, collector)
+
+
+def _say_unexamined(collector: Collector, console: Console) -> None:
+    """Say of specs with errors that nothing was proved of them."""
+    places = [d.location for e in collector.errors if isinstance(e, SpecError) for d in e.diagnostics]
+    for file in dict.fromkeys(place.file for place in places if place):
+        console.note(f"{file}: nothing was proved, because the spec has errors")
+
+
+def _expect_starts(spec: Spec, collector: Collector) -> None:
+    """Collect the refusals of runs of a lattice whose initial values or parameters do not fit."""
+    from phigen.lattice.states import start_of
+
+    refused: dict[str, Diagnostic] = {}
+    for run in spec.runs.values():
+        try:
+            start_of(spec, run)
+        except SpecError as error:
+            refused |= {str(d): d for d in error.diagnostics}
+    if refused:
+        collector.errors.append(SpecError(list(refused.values())))
 
 
 def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) -> None:

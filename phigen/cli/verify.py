@@ -1,5 +1,5 @@
-"""``phigen verify``: build every target of specs, measure the promised properties of the solvers, and compare with
-bounds."""
+"""``phigen verify``: build the targets of specs that Python can run, measure the promised properties of the solvers,
+and compare with bounds."""
 
 from __future__ import annotations
 

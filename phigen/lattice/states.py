@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from phigen.errors import SpecError
 from phigen.lattice.array_files import bonds_in, values_in
 from phigen.memory import expect_room
-from phigen.spec.model import LatticeRunSettings, Run, Spec, Values
+from phigen.spec.model import LatticeRunSettings, Parameter, Run, Spec, Values
 from phigen.symbolic.arrays import evaluate
 
 Floats = NDArray[np.float64]
@@ -90,10 +90,17 @@ class _Reader:
                     values = values or p.values
                     default = np.full(shape, float(p.value))
                     parameters[p.name] = default if values is None else self.arrays.read(values, shape, p.name)
-                if p.refuses(float(np.min(parameters[p.name], initial=1.0))):
-                    message = f"the parameter {p.name!r} is {p.bound} by declaration, but not all its values are"
-                    raise self._error("parameters", message)
+                self._expect_in_bound(p, np.asarray(parameters[p.name]))
         return Start(sizes, self._state(sizes), parameters, bonds, bool(self.lattice.graph))
+
+    def _expect_in_bound(self, p: Parameter, values: Floats) -> None:
+        """Raise `SpecError` if values at sites or bonds are outside of the declared bound of a parameter."""
+        if values.size and p.refuses(float(np.min(values))):
+            worst = np.unravel_index(np.argmin(values), values.shape)
+            place, noun = ", ".join(map(str, worst)), p.at.removesuffix("s")
+            where = f"{float(values[worst]):g} at {noun} {place if len(worst) == 1 else f'({place})'}"
+            message = f"the parameter is {p.bound} by declaration, but {where}"
+            raise self.arrays.refused(p.name, message)
 
     def _expect_room(self, sizes: Sequence[int]) -> None:
         """Raise `SpecError` if the arrays over sites do not fit in memory together."""
@@ -155,7 +162,7 @@ class _Arrays:
             try:
                 return values_in(self.folder / values.file, name, shape)
             except (OSError, ValueError) as error:
-                raise self._refused(name, f"cannot read {values.file!r}: {_reason(error)}") from None
+                raise self.refused(name, f"cannot read {values.file!r}: {_reason(error)}") from None
         elif values.listed:
             array = np.array([float(v) for v in values.listed])
             if array.size == np.prod(shape):
@@ -170,12 +177,12 @@ class _Arrays:
             array += evaluate([values.formula], self.indices)[0]
         if array.shape != shape:
             needed, actual = "×".join(map(str, shape)), "×".join(map(str, array.shape))
-            raise self._refused(name, f"{actual} values, not {needed}")
+            raise self.refused(name, f"{actual} values, not {needed}")
         if not np.all(np.isfinite(array)):
-            raise self._refused(name, "not all values are finite")
+            raise self.refused(name, "not all values are finite")
         return array
 
-    def _refused(self, name: str, message: str) -> SpecError:
+    def refused(self, name: str, message: str) -> SpecError:
         """Return the error for values of a field, of a parameter, or of the whole state, at their place in the spec."""
         run_path = ("runs", self.run)
         paths = [(*run_path, "parameters", name), ("parameters", name, "value"), (*run_path, "initial", name)]

@@ -27,7 +27,7 @@ from phigen.series.reference_axioms import defects
 from phigen.series.reference_functions import Functions, Sign, derivative
 from phigen.series.reference_paths import source_of_paths
 from phigen.symbolic.expression import Expression, symbol
-from phigen.symbolic.verdict import CHECKED, POINTS, PROVED, REFUTED, UNDECIDED, Statement, sample_point
+from phigen.symbolic.verdict import CHECKED, POINTS, PROVED, REFUTED, UNDECIDED, Statement, refutation, sample_point
 
 #: Seconds allowed for the second derivation of one spec by default.
 SECONDS = 60.0
@@ -275,7 +275,7 @@ def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: 
         point_or_count = _tried([theirs, mine], positive)
         if isinstance(point_or_count, str):
             where = f"{label}, " if label else ""
-            return Statement(name, REFUTED, f"{where}at {point_or_count}", _cut(sympy.sstr(functions.expression(rest))))
+            return Statement(name, REFUTED, f"{where}{point_or_count}", _cut(sympy.sstr(functions.expression(rest))))
         fewest = min(fewest, point_or_count)
     if not open_pairs:
         return Statement(name, PROVED, detail)
@@ -300,9 +300,8 @@ def _tried(pair: Sequence[Any], positive: Collection[str]) -> str | int:
             if not (mpmath.isfinite(theirs) and mpmath.isfinite(mine)):
                 continue
             if abs(theirs - mine) > mpmath.mpf(10) ** -AGREEING * (1 + abs(mine)):
-                where = ", ".join(f"{n} = {v}" for n, v in point.items())
-                shown = where if len(where) <= _LONGEST else f"point {k}"
-                return f"{shown}: {mpmath.nstr(theirs, 12)}, not {mpmath.nstr(mine, 12)}"
+                difference = f"{mpmath.nstr(theirs, 12)}, not {mpmath.nstr(mine, 12)}"
+                return refutation({n: str(v) for n, v in point.items()}, k, difference)
         agreeing += 1
         if agreeing == POINTS or not symbols:
             break

@@ -47,6 +47,11 @@ MOST_STEPS, FEW_STEPS = 20_000, 2_000
 STATES = 4
 
 
+def order_limit(stated: float, slack: float = ORDER_SLACK) -> str:
+    """The limit for an observed order: ``at least 3.7, stated 4``."""
+    return f"at least {stated - slack:.1f}, stated {stated:g}"
+
+
 @dataclass(frozen=True)
 class Check:
     """One property: the measured ``value``, ``passed``, and the ``limit`` in words, empty if the value is not judged.
@@ -226,7 +231,7 @@ def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
     observed_order = strong_order(*about, subject.h, min(subject.steps, 8))
     reason, limit = (
         f"{observed_order:.2f} instead of {stated:g}",
-        f"at least {stated - STRONG_SLACK:.1f}, stated {stated:g}",
+        order_limit(stated, STRONG_SLACK),
     )
     yield Check(
         "strong order, along common paths", observed_order, limit, observed_order >= stated - STRONG_SLACK, reason
@@ -253,7 +258,7 @@ def _order_check(title: str, subject: Subject, *, quick: bool) -> Check:
         observation = measures.observed_order(solver, reference, subject.start, length * subject.h)
         if observation.exact or observation.order >= stated - ORDER_SLACK:
             break
-    limit = f"at least {stated - ORDER_SLACK:.1f}, stated {stated}"
+    limit = order_limit(stated)
     others = {
         name: measures.observed_order(m, reference, subject.start, length * subject.h).order
         for name, m in subject.others.items()
@@ -485,7 +490,7 @@ def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
         limit = power - MODIFIED_SLACK * (power - series.powers[m - 1])
         reason = f"shrinks like h^{shown:.2f} instead of h^{power}"
         name = f"modified H, {m} correction{'s' * (m > 1)}: order"
-        yield Check(name, shown, f"at least {limit:.1f}, stated {power}", shown >= limit, reason)
+        yield Check(name, shown, order_limit(power, power - limit), shown >= limit, reason)
 
 
 def step_check(subject: Subject, states: Sequence[Floats]) -> Check:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -101,7 +101,7 @@ def _at_points(
             where = f"{label}, " if label else ""
             more = f"; {len(pending)} parts do not reduce to 0" if len(pending) > 1 else ""
             failing = tuple((part, cut(shown(i))) for i, (part, _) in enumerate(pending[:MOST_LISTED]) if part)
-            return Statement(name, REFUTED, f"{where}at {point_or_count}{more}", cut(shown(k)), failing)
+            return Statement(name, REFUTED, f"{where}{point_or_count}{more}", cut(shown(k)), failing)
         fewest = min(fewest, point_or_count)
     parts = ", ".join(label for label, _ in pending if label)
     about = f" for {parts}" if parts and len(parts) <= LONGEST else ""
@@ -111,7 +111,7 @@ def _at_points(
 
 
 def _refuting_point(expression: Expression, positive: Collection[str]) -> str | int:
-    """A point where the expression is not zero and its value, as text; else the number of points tried."""
+    """A point where the expression is not zero and its value, ``at x=11/7: -8.5``; else the number of points tried."""
     names = symbols_of(expression)
     tried = 0
     for k in range(_ATTEMPTS):
@@ -121,12 +121,19 @@ def _refuting_point(expression: Expression, positive: Collection[str]) -> str | 
         except DomainError:
             continue
         if value:
-            where = ", ".join(f"{plain(n)}={v}" for n, v in point.items())
-            return f"{where if len(where) <= LONGEST else f'point {k}'}: {value}"
+            return refutation({plain(n): str(v) for n, v in point.items()}, k, value)
         tried += 1
         if tried == POINTS or not names:
             break
     return tried
+
+
+def refutation(point: Mapping[str, str], number: int, value: str) -> str:
+    """``at x=11/7: -8.5``, with the number of a point that is too long; without names ``everywhere -2``."""
+    if not point:
+        return f"everywhere {value}"
+    where = ", ".join(f"{name}={coordinate}" for name, coordinate in point.items())
+    return f"at {where if len(where) <= LONGEST else f'point {number}'}: {value}"
 
 
 def _value(expression: Expression, point: dict[str, Fraction]) -> str:

@@ -116,3 +116,44 @@ def test_show_prints_the_lattice_of_a_system_written_out(phigen):
     assert shown.lattice.axes == ("i",)
     done = phigen("show", "kepler", "--lattice")
     assert (done.exit_code, "kepler is not recognised as a lattice" in done.stderr) == (1, True)
+
+
+START = """\
+phigen: 1
+name: start
+lattice: {axes: [i], boundary: periodic}
+coordinates: [q, p]
+parameters: {k: {value: "2 - i", at: sites, positive: true}}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + k*(q[i+1] - q)**2/2
+runs:
+  a: {sizes: [6], initial: {q: 1, p: 0}, step: 0.1, steps: 10}
+  b: {sizes: [2], initial: {q: [1, 2, 3], p: 0}, step: 0.1, steps: 10}
+"""
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_values_that_do_not_fit_are_refused_at_the_place_of_their_formula(phigen, tmp_path, command):
+    path = tmp_path / "start.yaml"
+    path.write_text(START)
+    done = phigen(command, path)
+    assert done.exit_code == 1
+    said = "start.yaml:5:25: error: k: the parameter is positive by declaration, but -3 at site 5"
+    assert said in done.stderr
+    assert ("start.yaml:10:29: error: q: 3 values, not 2" in done.stderr) == (command == "check")
+
+
+def test_verify_says_at_which_states_a_lattice_is_examined(phigen, tmp_path):
+    path = tmp_path / "start.yaml"
+    path.write_text(START.replace('"2 - i"', "1").replace("steps: 10}", "steps: 400}"))
+    done = phigen("verify", path, "--run", "a", "--quick")
+    assert "evaluated at the start, after every 4 steps and at the end" in done.stdout, done.stdout
+    assert "at least 3.7, stated 4" in done.stdout or "at least 1.7, stated 2" in done.stdout
+
+
+def test_check_says_that_nothing_is_proved_of_a_spec_with_errors(phigen, tmp_path):
+    path = tmp_path / "start.yaml"
+    path.write_text(START.replace("hamiltonian: p**2", "hamiltonian: r**2"))
+    done = phigen("check", path)
+    assert (done.exit_code, done.stdout) == (1, "")
+    assert f"{path}: nothing was proved, because the spec has errors" in done.stderr

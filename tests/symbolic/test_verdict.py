@@ -33,6 +33,11 @@ def test_nonzero_residual_is_refuted_with_label_point_and_residual():
     assert str(statement).startswith("s: refuted (second, at x=")
 
 
+def test_a_constant_residual_is_refuted_without_a_point():
+    statement = decide_zero("s", [("(x, y)", number(-2))])
+    assert str(statement).startswith("s: refuted ((x, y), everywhere -2)")
+
+
 @pytest.mark.parametrize(
     ("residual", "shown"),
     [
