@@ -17,12 +17,13 @@ from phigen.targets.c import phrases, states
 from phigen.targets.c.files import calls_left_out, left_out
 from phigen.targets.c.macros import Macros
 from phigen.targets.c.real import DOUBLE, Real
-from phigen.targets.c.tokens import TokenKind, tokens
+from phigen.targets.c.tokens import lines_with
 from phigen.targets.c.unused import without_unused
 from phigen.targets.features import holds
 
 #: Names of phrases; names of the model are in `phigen.targets.c.language`.
 _PHRASES = phrases.names()
+_PREFIX = re.compile(r"\b(?:phi|PHI)_")
 
 
 @dataclass
@@ -73,25 +74,26 @@ class Amalgam:
         lines: list[str] = []
         pending: list[str] = []
         for line in self._selected((resources.templates() / "c/runtime" / file).read_text(encoding="utf-8")):
-            if line == '#include "phrases.h"':
-                continue
-            if line.startswith('#include "state_'):
+            if not line.startswith("#include "):
+                pending.append(line)
+            elif line.startswith('#include "state_'):
                 pending += states.part(line.split('"')[1], self.switches)
-                continue
-            if line.startswith('#include "'):
-                lines += [*self._own(pending), *self._expanded(line.split('"')[1])]
-                pending = []
             elif line.startswith("#include <"):
                 self.headers.add(line)
-            else:
-                pending.append(line)
+            elif line != '#include "phrases.h"':
+                lines += [*self._own(pending), *self._expanded(line.split('"')[1])]
+                pending = []
         return [*lines, *self._own(pending)]
 
     def _selected(self, text: str) -> list[str]:
         """Return the lines of a text that the switches select."""
         chosen: list[str] = []
         frames: list[list[bool]] = []  # of open #ifs: this branch is on, one was on, on a switch
+        selected = True  # whether all branches that are open are on
         for line in text.splitlines():
+            if not line.startswith("#"):
+                chosen += [line] * selected
+                continue
             directive, _, condition = line.partition(" ")
             if directive in ("#if", "#ifdef", "#ifndef"):
                 ours = "PHI_" in condition
@@ -110,12 +112,11 @@ class Amalgam:
                     frames.pop()
             elif directive == "#define" and condition.startswith("PHI_FILE_"):
                 keep = False
-                if all(frame[0] for frame in frames):
-                    self._defined.add(condition)
+                self._defined |= {condition} if selected else set()
             else:
                 keep = True
-            if keep and all(frame[0] for frame in frames):
-                chosen.append(line)
+            selected = all(frame[0] for frame in frames)
+            chosen += [line] * (keep and selected)
         return chosen
 
     def _holds(self, condition: str) -> bool:
@@ -123,12 +124,7 @@ class Amalgam:
 
     def _printed(self, lines: Sequence[str]) -> list[str]:
         """Return lines that were printed for the solver, in its type, with macros expanded; names of the model stay."""
-        named, number = set[int](), 0
-        text = "\n".join(lines)
-        for token in tokens(text) if "PHI_" in text else ():
-            if token.kind is TokenKind.NAME and token.text in _PHRASES:
-                named.add(number)
-            number += token.text.count("\n")
+        named = lines_with("\n".join(lines), _PHRASES)
         spelt_lines: list[str] = []
         for k, line in enumerate(lines):
             spelt_lines += map(self._prefixed, self._macros.expanded([line])) if k in named else [line]
@@ -139,12 +135,13 @@ class Amalgam:
         return self.real.spelt("\n".join(lines)).split("\n") if lines else []
 
     def _prefixed(self, line: str) -> str:
-        return re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line)
+        return _PREFIX.sub(f"{self.name}_", line)
 
     def _own(self, lines: Sequence[str]) -> list[str]:
         """Return lines of the runtime with macros expanded, and with the prefix of the solver."""
-        lines = [line for line in lines if not self._not_called.match(line)]
-        return self._typed([self._prefixed(line) for line in self._macros.expanded(lines)])
+        lines = [line for line in lines if not (line.endswith(");") and self._not_called.match(line))]
+        expanded = self._macros.expanded(lines)
+        return self._typed(self._prefixed("\n".join(expanded)).split("\n") if expanded else [])
 
 
 #: Line between header and source while both are processed as one text.

@@ -28,7 +28,7 @@ def _aligned(lines: Iterable[str]) -> Iterator[str]:
     """Yield the lines with the trailing comments of successive lines aligned, if they fit."""
     run: list[tuple[str, str]] = []
     for line in [*lines, ""]:
-        match = _BEHIND.fullmatch(line)
+        match = _BEHIND.fullmatch(line) if line.endswith("*/") else None
         if match:
             run.append((match[1], match[2]))
             continue
@@ -66,7 +66,7 @@ def _statement(lines: list[str], first: int) -> int:
     """Return the number of the line in which all parentheses of a statement are closed."""
     depth = 0
     for k in range(first, len(lines)):
-        code = _STRING.sub("", lines[k])
+        code = _STRING.sub("", lines[k]) if '"' in lines[k] else lines[k]
         depth += code.count("(") - code.count(")")
         if depth <= 0:
             return k

@@ -7,7 +7,7 @@ a block is empty, such as a loop that is made once, the statement loses its inde
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 _NAME = re.compile(r"\bPHI_\w+")
@@ -32,16 +32,20 @@ class Macros:
     """Macros by their names."""
 
     _known: dict[str, Macro] = field(default_factory=dict)
+    _heads: re.Pattern[str] | None = None  # of macros that are empty, made when they are needed
 
     def define(self, line: str) -> None:
         """Add the macro that a line defines, if it defines one."""
         if match := _DEFINITION.match(line):
             self._known[match[1]] = Macro(tuple(match[2].split(", ")) if match[2] else None, match[3] or "")
+            self._heads = None
 
     def expanded(self, lines: Sequence[str]) -> list[str]:
         """Return lines with macros expanded. Raises `ValueError` if a macro lacks arguments."""
-        nothing = [name for name, macro in self._known.items() if macro == Macro(None, "")]
-        lines = _without_heads(lines, nothing)
+        self._heads = self._heads or _pattern_of_heads(
+            n for n, macro in self._known.items() if macro == Macro(None, "")
+        )
+        lines = _without_heads(lines, self._heads)
         expanded = [(line, self._line(line) if "PHI_" in line else line) for line in lines]
         return [text for line, text in expanded if text or not line]  # a statement that is nothing leaves no line
 
@@ -75,19 +79,27 @@ def _arguments(line: str, at: int) -> tuple[list[str], int]:
     raise ValueError(f"a macro whose arguments do not end on its line: {line.strip()}")
 
 
-def _without_heads(lines: Sequence[str], heads: Sequence[str]) -> list[str]:
+def _pattern_of_heads(names: Iterable[str]) -> re.Pattern[str]:
+    """Return the pattern of lines that begin with one of the names."""
+    return re.compile(rf"^( *)(?:{'|'.join(names) or '(?!)'})(?: (.*))?$")
+
+
+def _without_heads(lines: Sequence[str], heads: re.Pattern[str]) -> list[str]:
     """Return lines without the given heads of loops; the body of a loop, in braces or not, is dedented."""
-    over = re.compile(rf"^( *)(?:{'|'.join(heads)})(?: (.*))?$") if heads else re.compile("(?!)")
     remaining: list[str] = []
     ends: list[tuple[str, str]] = []  # of each loop that was struck out: its indentation, and the line that ends it
     for line in lines:
+        named = "PHI_" in line
+        if not ends and not named:
+            remaining.append(line)
+            continue
         while ends and ends[-1][1] == "" and not line.startswith(ends[-1][0] + " "):
             ends.pop()
         if ends and line == ends[-1][1]:
             ends.pop()
             continue
         shift = 4 * len(ends)
-        match = over.match(line)
+        match = heads.match(line) if named else None
         if match is None:
             remaining.append(line[shift:] if line.startswith(" " * shift) else line)
         elif match[2] in (None, "{"):

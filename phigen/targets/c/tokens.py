@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -83,6 +83,7 @@ _MODES = re.DOTALL | re.MULTILINE
 _CODE = re.compile(rf"(?P<skipped>{_DIRECTIVE}|{_COMMENT})|{_STRING}|{_NUMBER}|{_NAME}|[=!<>]=|\S", _MODES)
 _BRACES = re.compile(rf"{_DIRECTIVE}|{_COMMENT}|{_STRING}|[{{}}]", _MODES)
 _MEMBER = rf"\.\.\.|(?:\.|->)(?:\s|{_COMMENT})*{_NAME}"
+_RUNTIME_WORD = re.compile(rf"{_COMMENT}|{_STRING}|\b(PHI_\w*)", re.DOTALL)
 _USED = re.compile(rf"{_DIRECTIVE}|{_COMMENT}|{_STRING}|{_NUMBER}|{_MEMBER}|({_NAME})", _MODES)
 
 
@@ -113,12 +114,18 @@ def names(text: str) -> set[str]:
     return {match[0] for match in _TOKEN.finditer(text) if match.lastgroup == "name"}
 
 
+def lines_with(text: str, words: Container[str]) -> set[int]:
+    """Return the numbers of the lines in which words of the runtime begin, outside comments and strings."""
+    numbers, number, at = set[int](), 0, 0
+    for match in _RUNTIME_WORD.finditer(text):
+        number, at = number + text.count("\n", at, match.start()), match.start()
+        if match[1] in words:
+            numbers.add(number)
+    return numbers
+
+
 def without_word(text: str, word: str) -> str:
     """Return a text without a word and the space after it."""
-    pieces: list[str] = []
-    dropped = False
-    for token in tokens(text):
-        behind, dropped = dropped, token.text == word
-        if not dropped:
-            pieces.append(token.text[1:] if behind and token.text.startswith(" ") else token.text)
-    return "".join(pieces)
+    return re.sub(
+        rf"{_COMMENT}|{_STRING}|\b{word}\b ?", lambda m: "" if m[0].rstrip(" ") == word else m[0], text, flags=re.DOTALL
+    )
