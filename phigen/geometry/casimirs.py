@@ -43,8 +43,8 @@ def found_casimirs(
     ranks = generic_ranks([poisson, slopes])
     if ranks is None:
         return {}, ("no Casimirs were searched for: no point of the domain of π was found",)
-    rank, known = ranks
-    missing = len(coordinates) - rank - known
+    rank, independent = ranks
+    missing = len(coordinates) - rank - independent
     casimirs: list[Expression] = []
     notes: list[str] = []
     if missing > 0:
@@ -52,9 +52,9 @@ def found_casimirs(
             for candidate in _candidates(coordinates, poisson, shape, form, notes):
                 slope = gradient(candidate, coordinates)
                 ranks = generic_ranks([[*slopes, slope]])
-                if ranks is None or ranks[0] <= known:
+                if ranks is None or ranks[0] <= independent:
                     continue
-                slopes, known = [*slopes, slope], ranks[0]
+                slopes, independent = [*slopes, slope], ranks[0]
                 casimirs.append(candidate)
                 running.done = len(casimirs)
                 if len(casimirs) == missing:

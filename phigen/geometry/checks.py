@@ -51,8 +51,8 @@ def invariant_statements(system: System) -> Iterator[Statement]:
         slopes = gradient(invariant, system.coordinates)
         rate = total(s * f for s, f in zip(slopes, flow, strict=True) if not s.is_zero)
         rate += total(gradient(invariant, system.times))
-        plain = f"d{name}/dt" if system.forces else f"{{{name}, H}}"
-        label = f"{{{name}, H}} + ∂{name}/∂{system.time}" if system.time and not system.forces else plain
+        title = f"d{name}/dt" if system.forces else f"{{{name}, H}}"
+        label = f"{{{name}, H}} + ∂{name}/∂{system.time}" if system.time and not system.forces else title
         yield decide_zero(f"{name} is invariant", [(label, rate)], system.positive)
 
 
@@ -89,11 +89,13 @@ def noise_statements(system: System) -> Iterator[Statement]:
     rates = [total(a * b for a, b in zip(slope, field, strict=True)) for field in fields]
     spread = [total(r * e for r, e in zip(rates, entries, strict=True)) for entries in zip(*fields, strict=True)]
     tangent = hamiltonian_vector_field(system.poisson, system.forces.covector)
-    drawn = [a + b for a, b in zip(tangent, system.forces.vector, strict=True)]
-    temperature = _temperature(system, slope, drawn, spread)
+    diffusive_rate = [a + b for a, b in zip(tangent, system.forces.vector, strict=True)]
+    temperature = _temperature(system, slope, diffusive_rate, spread)
     if temperature is None:
         return
-    residuals = [(c, 2 * temperature * a + b) for c, a, b in zip(system.coordinates, drawn, spread, strict=True)]
+    residuals = [
+        (c, 2 * temperature * a + b) for c, a, b in zip(system.coordinates, diffusive_rate, spread, strict=True)
+    ]
     name = f"the density exp(−H/θ) on the leaves is stationary, with θ = {shortened(temperature)}"
     balanced = decide_zero(name, residuals, system.positive)
     if balanced.holds:
@@ -116,32 +118,32 @@ def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
     first, second = system.noise[i], system.noise[j]
     field = hamiltonian_vector_field(system.poisson, second.impulse(system.coordinates))
     bracket = total(a * b for a, b in zip(first.impulse(system.coordinates), field, strict=True))
-    moved = hamiltonian_vector_field(system.poisson, gradient(bracket, system.coordinates))
-    return f"{{{first.name}, {second.name}}}", total(m * m for m in moved)
+    bracket_field = hamiltonian_vector_field(system.poisson, gradient(bracket, system.coordinates))
+    return f"{{{first.name}, {second.name}}}", total(m * m for m in bracket_field)
 
 
 def _temperature(
-    system: System, slope: Sequence[Expression], drawn: Sequence[Expression], spread: Sequence[Expression]
+    system: System, slope: Sequence[Expression], diffusive_rate: Sequence[Expression], spread: Sequence[Expression]
 ) -> Expression | None:
     """The T for which 2T (πζ + f) + Σ σ² (XH) X has no component along ∇H at some point; None if there is none."""
-    lost = total(a * b for a, b in zip(slope, drawn, strict=True))
+    loss = total(a * b for a, b in zip(slope, diffusive_rate, strict=True))
     gained = total(a * b for a, b in zip(slope, spread, strict=True))
     for k in range(ATTEMPTS):
         point = {c: number(v) for c, v in sample_point(system.coordinates, (), k).items()}
-        down, up = substitute([lost, gained], point)
-        if not (down.is_zero or up.is_zero):
-            return _ratio(-up, 2 * down)
+        loss_value, gain_value = substitute([loss, gained], point)
+        if not (loss_value.is_zero or gain_value.is_zero):
+            return _ratio(-gain_value, 2 * loss_value)
     return None
 
 
-def _ratio(above: Expression, below: Expression) -> Expression:
+def _ratio(numerator: Expression, denominator: Expression) -> Expression:
     """A quotient with common factors cancelled."""
     for _ in range(2):  # squares of roots are recognised in the second ring only
-        tower = Tower(symbols_of(above, below), [above, below])
-        a, b = (tower.simplified(e) for e in tower.convert_all([above, below]))
+        tower = Tower(symbols_of(numerator, denominator), [numerator, denominator])
+        a, b = (tower.simplified(e) for e in tower.convert_all([numerator, denominator]))
         common = a.gcd(b)
-        above, below = tower.expression(a / common), tower.expression(b / common)
-    return above / below
+        numerator, denominator = tower.expression(a / common), tower.expression(b / common)
+    return numerator / denominator
 
 
 def rank_statement(system: System) -> Statement:
@@ -151,6 +153,6 @@ def rank_statement(system: System) -> Statement:
     if ranks is None:
         return Statement("rank of π", UNDECIDED, f"no point of the domain among {ATTEMPTS} tried")
     rank, independent = ranks
-    known = f"{independent} of {system.dimension - rank} independent Casimirs known"
+    casimir_count = f"{independent} of {system.dimension - rank} independent Casimirs known"
     notes = "".join(f"; {note}" for note in system.notes)
-    return Statement("rank of π", CHECKED, f"{rank} at {POINTS} generic points, {known}{notes}")
+    return Statement("rank of π", CHECKED, f"{rank} at {POINTS} generic points, {casimir_count}{notes}")

@@ -65,15 +65,15 @@ def units(
     quantities: Iterable[Expression], coordinates: Sequence[str], parameters: Mapping[str, float], start: Floats
 ) -> list[Unit]:
     """The unit of each quantity on a trajectory from the state ``start`` (DIM,)."""
-    at = {**parameters, **dict(zip(coordinates, np.asarray(start).tolist(), strict=True))}
-    values = (value_and_terms(q, coordinates, at) for q in quantities)
+    point_values = {**parameters, **dict(zip(coordinates, np.asarray(start).tolist(), strict=True))}
+    values = (value_and_terms(q, coordinates, point_values) for q in quantities)
     return [unit_of(float(value), float(terms)) for value, terms in values]
 
 
 def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> dict[str, Unit]:
     """The units of the energy and the Casimirs of a system, by their names."""
-    named = {ENERGY: system.hamiltonian, **system.casimirs}
-    return dict(zip(named, units(named.values(), system.coordinates, parameters, start), strict=True))
+    quantities = {ENERGY: system.hamiltonian, **system.casimirs}
+    return dict(zip(quantities, units(quantities.values(), system.coordinates, parameters, start), strict=True))
 
 
 def moving(system: System) -> list[str]:
@@ -107,15 +107,15 @@ def stated(units_by_name: Mapping[str, Unit]) -> str:
     """The sentence that names the units of errors; ``units_by_name`` are units by the names of quantities."""
     errors = "Errors and changes" if any(unit.moves for unit in units_by_name.values()) else "Errors"
     relative = any(unit.kind == RELATIVE for unit in units_by_name.values())
-    said = [f"{errors} are relative to the value at the start"] if relative else []
-    for kind, how in (
+    clauses = [f"{errors} are relative to the value at the start"] if relative else []
+    for kind, description in (
         (TERMS, "relative to Σ |xᵢ ∂ᵢ{0}| at the start, since {0} is nearly 0 there"),
         (SITES, "relative to Σ |{0} of a site| at the start, since {0} is nearly 0 there"),
         (ABSOLUTE, "absolute, since {0} is 0 at the start"),
     ):
         for name in (name for name, unit in units_by_name.items() if unit.kind == kind):
-            said.append(f"{'those' if said else errors} of {name} are {how.format(_letter(name))}")
-    return f"{'; '.join(said)}."
+            clauses.append(f"{'those' if clauses else errors} of {name} are {description.format(_letter(name))}")
+    return f"{'; '.join(clauses)}."
 
 
 def _letter(name: str) -> str:

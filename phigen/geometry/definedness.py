@@ -32,8 +32,8 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
         if divisor:
             yield Statement(f"{name} is defined", REFUTED, divisor)
         elif not _has_value(roots, system.positive, starts):
-            tried = f"no value at any of {len(SCALES) * POINTS} points"
-            reason = f"{tried}, nor where a run starts" if starts else tried
+            evidence = f"no value at any of {len(SCALES) * POINTS} points"
+            reason = f"{evidence}, nor where a run starts" if starts else evidence
             yield Statement(f"{name} is defined", REFUTED if starts else UNDECIDED, reason)
 
 
@@ -41,9 +41,9 @@ def undefined_starts(system: System, starts: Mapping[str, Point]) -> Iterator[St
     """A statement for each run, by its name, at whose start some part of the system has no value."""
     parts = _parts(system)
     for run, point in starts.items():
-        without = [name for name, roots in parts.items() if not _is_defined(roots, point)]
-        if without:
-            yield Statement(start_is_defined(run), UNDECIDED, f"no value of {', '.join(without)} there")
+        undefined = [name for name, roots in parts.items() if not _is_defined(roots, point)]
+        if undefined:
+            yield Statement(start_is_defined(run), UNDECIDED, f"no value of {', '.join(undefined)} there")
 
 
 def start_is_defined(run: str) -> str:
@@ -69,8 +69,8 @@ def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> 
             if _may_be_zero(argument, positive):
                 statement = decide_zero("", [("", argument)], positive)
                 if statement.holds:
-                    what = "the logarithm of" if e.op == "log" else "a division by"
-                    return f"{what} {shortened(argument)}, which is 0: {statement.verdict}"
+                    operation = "the logarithm of" if e.op == "log" else "a division by"
+                    return f"{operation} {shortened(argument)}, which is 0: {statement.verdict}"
     return ""
 
 

@@ -67,8 +67,8 @@ def _se(n: int) -> tuple[int, list[Entries]]:
 
 def _sl(n: int) -> tuple[int, list[Entries]]:
     diagonal = [_unit(i, i) | _unit(i + 1, i + 1, -1) for i in range(n - 1)]
-    below = [(i, j) for i, j in _all(n) if i > j]
-    return n, diagonal + [_unit(i, j) for i, j in _upper(n) + below]
+    lower_positions = [(i, j) for i, j in _all(n) if i > j]
+    return n, diagonal + [_unit(i, j) for i, j in _upper(n) + lower_positions]
 
 
 def _gl(n: int) -> tuple[int, list[Entries]]:
@@ -81,18 +81,18 @@ def _su(n: int) -> tuple[int, list[Entries]]:
     imaginary += [_unit(k, k) | _unit(k + 1, k + 1, -1) for k in range(n - 1)]
     basis = [_complexified(m, {}) for m in real] + [_complexified({}, m) for m in imaginary]
     if n == 2:  # −iσ_1/2, −iσ_2/2, −iσ_3/2
-        basis = [{at: -v / 2 for at, v in m.items()} for m in (basis[1], basis[0], basis[2])]
+        basis = [{position: -v / 2 for position, v in m.items()} for m in (basis[1], basis[0], basis[2])]
     return 2 * n, basis
 
 
 def _complexified(real: Entries, imaginary: Entries) -> Entries:
     """The real matrix (a −b; b a) of a + ib, rows and columns interleaved as re, im, re, im, …"""
-    out = {}
+    real_entries = {}
     for (i, j), v in real.items():
-        out[2 * i, 2 * j] = out[2 * i + 1, 2 * j + 1] = v
+        real_entries[2 * i, 2 * j] = real_entries[2 * i + 1, 2 * j + 1] = v
     for (i, j), v in imaginary.items():
-        out[2 * i, 2 * j + 1], out[2 * i + 1, 2 * j] = -v, v
-    return out
+        real_entries[2 * i, 2 * j + 1], real_entries[2 * i + 1, 2 * j] = -v, v
+    return real_entries
 
 
 def _sp(size: int) -> tuple[int, list[Entries]]:
@@ -129,8 +129,8 @@ FAMILIES: dict[str, tuple[int, Callable[[int], int], Callable[[int], tuple[int, 
 def dimension(family: str, size: int) -> int:
     """Dimension of a named algebra; raises `SpecError` for an unknown family or a size it does not have."""
     if family not in FAMILIES:
-        known = ", ".join(f"{name}(n)" for name in FAMILIES)
-        raise SpecError([Diagnostic(f"unknown Lie algebra {family}({size})", hint=f"known families: {known}")])
+        families = ", ".join(f"{name}(n)" for name in FAMILIES)
+        raise SpecError([Diagnostic(f"unknown Lie algebra {family}({size})", hint=f"known families: {families}")])
     smallest, dimension_of, _ = FAMILIES[family]
     if size < smallest:
         raise SpecError([Diagnostic(f"{family}({size}) does not exist: its size is at least {smallest}")])
@@ -143,7 +143,7 @@ def named(family: str, size: int) -> LieAlgebra:
     """A named algebra with its defining representation; raises as `dimension`."""
     dimension(family, size)
     matrix_size, basis = FAMILIES[family][2](size)
-    matrices = [{at: number(v) for at, v in sorted(m.items())} for m in basis]
+    matrices = [{position: number(v) for position, v in sorted(m.items())} for m in basis]
     return algebra_of_sparse_matrices(f"{family}({size})", matrix_size, matrices)
 
 

@@ -126,24 +126,24 @@ def _nambu(coordinates: Sequence[str], casimirs: Sequence[Expression]) -> Matrix
 
 
 def _minor(
-    rows: Sequence[Sequence[Expression]], columns: Sequence[int], known: dict[tuple[int, ...], Expression]
+    rows: Sequence[Sequence[Expression]], columns: Sequence[int], minors: dict[tuple[int, ...], Expression]
 ) -> Expression:
     """The determinant of as many of the last rows as there are columns, by Laplace expansion along the first of them.
 
-    ``known`` caches the minors: there are 2ⁿ of them, whereas the expansion has n! terms.
+    ``minors`` caches the minors: there are 2ⁿ of them, whereas the expansion has n! terms.
     """
     if not columns:
         return ONE
     key = tuple(columns)
-    if key not in known:
+    if key not in minors:
         terms = []
         for k, column in enumerate(columns):
             entry = rows[len(rows) - len(columns)][column]
             if not entry.is_zero:
-                term = entry * _minor(rows, (*columns[:k], *columns[k + 1 :]), known)
+                term = entry * _minor(rows, (*columns[:k], *columns[k + 1 :]), minors)
                 terms.append(term if k % 2 == 0 else -term)
-        known[key] = total(terms)
-    return known[key]
+        minors[key] = total(terms)
+    return minors[key]
 
 
 def _expect_dimension(name: str, dimension: int, coordinates: int) -> None:
@@ -151,7 +151,7 @@ def _expect_dimension(name: str, dimension: int, coordinates: int) -> None:
         raise SpecError([Diagnostic(f"{name} has dimension {dimension}, but there are {coordinates} coordinates")])
 
 
-def _expect_square(rows: Sequence[Sequence[Expression]], n: int, what: str) -> None:
+def _expect_square(rows: Sequence[Sequence[Expression]], n: int, name: str) -> None:
     if len(rows) != n or any(len(row) != n for row in rows):
         shape = "×".join([str(len(rows)), str(len(rows[0]) if rows else 0)])
-        raise SpecError([Diagnostic(f"the {what} is {shape}, but there are {n} coordinates")])
+        raise SpecError([Diagnostic(f"the {name} is {shape}, but there are {n} coordinates")])

@@ -40,10 +40,10 @@ def ideal_projections(algebra: LieAlgebra) -> list[Rows]:
 
 
 def _refined(part: Any, idempotent: Any) -> list[Any]:
-    inside = part * idempotent
-    if inside != idempotent * part or inside * inside != inside:
+    ideal = part * idempotent
+    if ideal != idempotent * part or ideal * ideal != ideal:
         return [part]
-    return [p for p in (inside, part - inside) if p.rank()]
+    return [p for p in (ideal, part - ideal) if p.rank()]
 
 
 def _centroid(algebra: LieAlgebra) -> list[Any]:
@@ -73,9 +73,9 @@ def _idempotents(element: Any) -> list[Any]:
     idempotents = []
     for factor, multiplicity in factors:
         primary = factor**multiplicity
-        rest = fmpq_poly(minimal / primary)
-        _, _, cofactor = primary.xgcd(rest)
-        idempotents.append(_value(cofactor * rest, element))
+        other_factor = fmpq_poly(minimal / primary)
+        _, _, cofactor = primary.xgcd(other_factor)
+        idempotents.append(_value(cofactor * other_factor, element))
     return idempotents
 
 

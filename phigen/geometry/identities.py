@@ -60,10 +60,10 @@ def _expansion(e: Expression, moving: Sequence[str]) -> Expression | None:
     """The Taylor polynomial about the first point that has one; None if none has."""
     slopes = gradient(e, moving)
     parts = [e, *slopes, *(c for slope in slopes for c in gradient(slope, moving))]
-    others = [s for s in symbols_of(e) if s not in moving]
+    parameters = [s for s in symbols_of(e) if s not in moving]
     for first, step in _BASES:
         base = {c: Fraction(first + k * step) for k, c in enumerate(moving)}
-        at_base = [_simplified(v) for v in _at(parts, base, others)]
+        at_base = [_simplified(v) for v in _at(parts, base, parameters)]
         if at_base:
             d = [symbol(c) - v for c, v in base.items()]
             directions = [number(1), *d, *(a * b / 2 for a in d for b in d)]
@@ -71,10 +71,10 @@ def _expansion(e: Expression, moving: Sequence[str]) -> Expression | None:
     return None
 
 
-def _at(parts: Sequence[Expression], base: Mapping[str, Fraction], others: Sequence[str]) -> list[Expression]:
+def _at(parts: Sequence[Expression], base: Mapping[str, Fraction], parameters: Sequence[str]) -> list[Expression]:
     """The expressions at a point of the coordinates; none if they have no values there."""
     try:
-        evaluate_precisely(parts, {**sample_point(others, others, 0), **base}, DIGITS)
+        evaluate_precisely(parts, {**sample_point(parameters, parameters, 0), **base}, DIGITS)
     except DomainError:
         return []
     return substitute(parts, {c: number(v) for c, v in base.items()})

@@ -18,8 +18,8 @@ def jacobi_identity(system: System) -> Statement:
     """
     names = system.coordinates
     entries = [e for row in system.poisson for e in row]
-    others = [s for s in symbols_of(*entries) if s not in names]
-    tower = Tower([*names, *others], entries, names)
+    parameters = [s for s in symbols_of(*entries) if s not in names]
+    tower = Tower([*names, *parameters], entries, names)
     residuals = list(_residuals(system, tower))
     count = len(names) * (len(names) - 1) * (len(names) - 2) // 6
     detail = f"{count} component{'' if count == 1 else 's'}"
@@ -40,10 +40,10 @@ def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
             for j, entry in row.items():
                 for a in sorted(index[s] for s in tower.names_in(entry) if s in index):
                     slope = tower.derivative(entry, names[a])
-                    for k, other in rows[a].items() if slope != 0 else ():
+                    for k, second_factor in rows[a].items() if slope != 0 else ():
                         if k not in (i, j) and (i < j < k or j < k < i or k < i < j):  # a cyclic permutation
-                            at = (min(i, j, k), i + j + k - min(i, j, k) - max(i, j, k), max(i, j, k))
-                            sums[at] = sums.get(at, tower.zero) + tower.product(slope, other)
+                            indices = (min(i, j, k), i + j + k - min(i, j, k) - max(i, j, k), max(i, j, k))
+                            sums[indices] = sums.get(indices, tower.zero) + tower.product(slope, second_factor)
     for (i, j, k), residual in sorted(sums.items(), key=lambda item: item[0]):
         if residual != 0:
             yield f"({names[i]}, {names[j]}, {names[k]})", residual

@@ -68,7 +68,7 @@ class LieAlgebra:
         """The algebra with the negated bracket, represented by −ρ(E_i)."""
         rep = self.representation
         if rep is not None:
-            negated = tuple({at: -v for at, v in m.items()} for m in rep.matrices)
+            negated = tuple({position: -v for position, v in m.items()} for m in rep.matrices)
             rep = Representation(f"minus {rep.name}", rep.size, negated)
         constants = {ij: {k: -c for k, c in row.items()} for ij, row in self.constants.items()}
         return LieAlgebra(f"{self.name} with sign minus", self.dimension, constants, rep, self.labels)

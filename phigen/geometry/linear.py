@@ -43,18 +43,18 @@ class Span(Generic[Key]):
 
     def coordinates(self, vector: Mapping[Key, Scalar]) -> dict[int, Scalar] | None:
         """c with vector = Σ c[i]·vectors[i], only non-zero c[i]; None if the vector is not in the span."""
-        rest, combination = self._reduce(vector)
-        return None if rest else {i: -c for i, c in sorted(combination.items())}
+        remainder, combination = self._reduce(vector)
+        return None if remainder else {i: -c for i, c in sorted(combination.items())}
 
     def _insert(self, position: int, vector: Mapping[Key, Scalar]) -> bool:
-        rest, combination = self._reduce(vector)
-        if not rest:
+        remainder, combination = self._reduce(vector)
+        if not remainder:
             return False
-        one = self._field.one
-        pivot = min(sorted(rest), key=lambda k: 0 if rest[k] == one or -rest[k] == one else 1)
-        scale = one / rest[pivot]
-        combination[position] = one
-        entries = {k: v * scale for k, v in rest.items()}
+        unit = self._field.one
+        pivot = min(sorted(remainder), key=lambda k: 0 if remainder[k] == unit or -remainder[k] == unit else 1)
+        scale = unit / remainder[pivot]
+        combination[position] = unit
+        entries = {k: v * scale for k, v in remainder.items()}
         combination = {i: c * scale for i, c in combination.items()}
         for row in self._rows:
             if pivot in row.entries:
@@ -66,13 +66,13 @@ class Span(Generic[Key]):
         return True
 
     def _reduce(self, vector: Mapping[Key, Scalar]) -> tuple[dict[Key, Scalar], dict[int, Scalar]]:
-        rest = {k: v for k, v in vector.items() if v != 0}
+        remainder = {k: v for k, v in vector.items() if v != 0}
         combination: dict[int, Scalar] = {}
         # Reduced rows: no row contains the pivot of another, so only the pivots of the vector itself matter.
-        for row, factor in [(self._by_pivot[k], v) for k, v in rest.items() if k in self._by_pivot]:
-            add_multiple(rest, row.entries, -factor)
+        for row, factor in [(self._by_pivot[k], v) for k, v in remainder.items() if k in self._by_pivot]:
+            add_multiple(remainder, row.entries, -factor)
             add_multiple(combination, row.combination, -factor)
-        return rest, combination
+        return remainder, combination
 
 
 def add_multiple(target: dict[Key, Scalar], source: Mapping[Key, Scalar], factor: Scalar) -> None:
@@ -92,15 +92,15 @@ def kernel(field: Field, rows: Sequence[Mapping[int, Scalar]], size: int) -> lis
     """
     echelon: dict[int, dict[int, Scalar]] = {}
     for row in sorted(rows, key=len):
-        rest = {k: v for k, v in row.items() if v != 0}
-        while rest:
-            pivot = min(rest)
-            known = echelon.get(pivot)
-            if known is None:
-                scale = field.one / rest[pivot]
-                echelon[pivot] = {k: v * scale for k, v in rest.items()}
+        remainder = {k: v for k, v in row.items() if v != 0}
+        while remainder:
+            pivot = min(remainder)
+            pivot_row = echelon.get(pivot)
+            if pivot_row is None:
+                scale = field.one / remainder[pivot]
+                echelon[pivot] = {k: v * scale for k, v in remainder.items()}
                 break
-            add_multiple(rest, known, -rest[pivot])
+            add_multiple(remainder, pivot_row, -remainder[pivot])
         if len(echelon) == size:
             return []
     for pivot in sorted(echelon, reverse=True):
@@ -108,9 +108,10 @@ def kernel(field: Field, rows: Sequence[Mapping[int, Scalar]], size: int) -> lis
         for k in sorted(k for k in row if k > pivot and k in echelon):
             add_multiple(row, echelon[k], -row[k])
     return [
-        {pivot: -row[free] for pivot, row in sorted(echelon.items()) if free in row} | {free: field.one}
-        for free in range(size)
-        if free not in echelon
+        {pivot: -row[free_column] for pivot, row in sorted(echelon.items()) if free_column in row}
+        | {free_column: field.one}
+        for free_column in range(size)
+        if free_column not in echelon
     ]
 
 

@@ -37,7 +37,7 @@ def algebra_of_sparse_matrices(
 ) -> LieAlgebra:
     """`from_matrices` for matrices given by their non-zero entries (row, column) → value."""
     field = Field(e for m in matrices for e in m.values())
-    converted = [{at: field.convert(e) for at, e in m.items()} for m in matrices]
+    converted = [{position: field.convert(e) for position, e in m.items()} for m in matrices]
     span = Span(field, converted)
     if span.dependent:
         which = span.dependent[0] + 1
@@ -68,10 +68,10 @@ def product(a: SparseMatrix, b: SparseMatrix) -> SparseMatrix:
     rows: dict[int, list[tuple[int, object]]] = {}
     for (r, c), v in b.items():
         rows.setdefault(r, []).append((c, v))
-    out: SparseMatrix = {}
+    entries: SparseMatrix = {}
     for (r, c), v in a.items():
-        add_multiple(out, {(r, column): w for column, w in rows.get(c, ())}, v)
-    return out
+        add_multiple(entries, {(r, column): w for column, w in rows.get(c, ())}, v)
+    return entries
 
 
 def from_structure_constants(
@@ -82,9 +82,9 @@ def from_structure_constants(
     Raises `SpecError` for indices out of range, pairs that contradict antisymmetry, and a failing Jacobi
     identity (naming the triple).
     """
-    used = [i for i, row in structure.items() for j, ks in row.items() for i in (i, j, *ks)]
-    if used and max(used) >= dimension:
-        message = f"structure constants use E{max(used) + 1}, but there are {dimension} coordinates"
+    indices = [i for i, row in structure.items() for j, ks in row.items() for i in (i, j, *ks)]
+    if indices and max(indices) >= dimension:
+        message = f"structure constants use E{max(indices) + 1}, but there are {dimension} coordinates"
         raise SpecError([Diagnostic(message)])
     constants: dict[tuple[int, int], dict[int, Expression]] = {}
     for i in range(dimension):
@@ -140,6 +140,6 @@ def jacobi_residuals(algebra: LieAlgebra, i: int, j: int, k: int) -> dict[int, E
     terms: dict[int, list[Expression]] = {}
     for a, b, c in ((i, j, k), (j, k, i), (k, i, j)):
         for m, v in algebra.bracket(a, b).items():
-            for out, w in algebra.bracket(m, c).items():
-                terms.setdefault(out, []).append(v * w)
+            for component, w in algebra.bracket(m, c).items():
+                terms.setdefault(component, []).append(v * w)
     return {m: s for m, parts in sorted(terms.items()) if not (s := total(parts)).is_zero}

@@ -28,18 +28,18 @@ def polynomial_casimirs(
     ones of lower degree. Degrees whose linear system is too large are skipped, and ``notes`` says so.
     """
     n = len(coordinates)
-    listed = (
+    candidates = (
         _linear_terms(shape.algebra)
         if isinstance(shape, LiePoisson)
         else coordinate_terms(coordinates, [e for row in poisson for e in row])
     )
-    if listed is None:
+    if candidates is None:
         notes.append("polynomial Casimirs were not searched for: π is not polynomial in the coordinates")
         return
-    field = Field(c for terms in listed for c in terms.values())
+    field = Field(c for terms in candidates for c in terms.values())
     # Columns of π: the equations are Σ_j π_ij ∂_j C = 0, one for each row i.
-    entries = [[_converted(field, listed[i * n + j]) for j in range(n)] for i in range(n)]
-    homogeneous = len({sum(e) for terms in listed for e in terms}) <= 1
+    entries = [[_converted(field, candidates[i * n + j]) for j in range(n)] for i in range(n)]
+    homogeneous = len({sum(e) for terms in candidates for e in terms}) <= 1
     largest = UNKNOWNS if field.is_rational else UNKNOWNS_WITH_PARAMETERS
     variables = [symbol(c) for c in coordinates]
     for d in range(1, degree + 1):
@@ -69,9 +69,9 @@ def _converted(field: Field, terms: Terms) -> dict[Exponents, Scalar]:
 
 def _monomials(n: int, degree: int) -> list[Exponents]:
     monomials = []
-    for chosen in combinations_with_replacement(range(n), degree):
+    for factors in combinations_with_replacement(range(n), degree):
         exponents = [0] * n
-        for i in chosen:
+        for i in factors:
             exponents[i] += 1
         monomials.append(tuple(exponents))
     return monomials

@@ -86,8 +86,8 @@ def sign_of(e: Expression, positive: Collection[str]) -> str | None:
         if e.op == "pow":
             # A fractional power of a non-negative value, which is not negative.
             exponent = Fraction(e.value)
-            even = exponent.denominator % 2 == 0 or exponent.numerator % 2 == 0
-            sign = args[0] or (NOT_NEGATIVE if even else None)
+            is_even = exponent.denominator % 2 == 0 or exponent.numerator % 2 == 0
+            sign = args[0] or (NOT_NEGATIVE if is_even else None)
             return POSITIVE if sign and exponent < 0 else sign  # 1/0 has no value
         return _ALWAYS.get(e.op)
 

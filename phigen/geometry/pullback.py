@@ -42,8 +42,8 @@ def change_of_coordinates(form: PullbackForm, coordinates: Sequence[str]) -> Coo
     _expect_size(form, coordinates)
     backward = form.inverse or _inverse(form, coordinates)
     forward = dict(zip(form.coordinates, form.map, strict=True))
-    again = substitute(backward, forward)
-    statement = decide_zero("inverse", [(c, e - symbol(c)) for c, e in zip(coordinates, again, strict=True)])
+    composed = substitute(backward, forward)
+    statement = decide_zero("inverse", [(c, e - symbol(c)) for c, e in zip(coordinates, composed, strict=True)])
     if not statement.holds:
         detail = f"{statement.detail}; residual {statement.residual}"
         raise SpecError([Diagnostic(f"pullback: inverse is not the inverse of map: {detail}")])
@@ -61,12 +61,12 @@ def pulled_back(form: PullbackForm, inner: Matrix, coordinates: Sequence[str]) -
         )
     forward = dict(zip(form.coordinates, change.forward, strict=True))
     n = len(coordinates)
-    moved = [substitute(row, forward) for row in inner]
+    inner_brackets = [substitute(row, forward) for row in inner]
     upper = {}
     for i in range(n):
         for j in range(i + 1, n):
             a, b = change.jacobian[i], change.jacobian[j]
-            upper[i, j] = _simplified(total(a[k] * moved[k][m] * b[m] for k in range(n) for m in range(n)))
+            upper[i, j] = _simplified(total(a[k] * inner_brackets[k][m] * b[m] for k in range(n) for m in range(n)))
     return skew(upper, n)
 
 
@@ -82,11 +82,11 @@ def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression
     if of_affine is not None:
         return of_affine
     left = dict(zip(form.coordinates, form.map, strict=True))
-    known: dict[str, Expression] = {}
+    solutions: dict[str, Expression] = {}
     while left:
-        solution = _next_solved(left, known, coordinates)
+        solution = _next_solved(left, solutions, coordinates)
         if solution is None:
-            unknown = [c for c in coordinates if c not in known]
+            unknown = [c for c in coordinates if c not in solutions]
             raise SpecError(
                 [
                     Diagnostic(
@@ -96,9 +96,9 @@ def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression
                 ]
             )
         y, x, value = solution
-        known[x] = _simplified(value)
+        solutions[x] = _simplified(value)
         del left[y]
-    return tuple(known[c] for c in coordinates)
+    return tuple(solutions[c] for c in coordinates)
 
 
 def _of_affine_map(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...] | None:
@@ -116,13 +116,13 @@ def _of_affine_map(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expr
 
 
 def _next_solved(
-    left: Mapping[str, Expression], known: Mapping[str, Expression], coordinates: Sequence[str]
+    left: Mapping[str, Expression], solutions: Mapping[str, Expression], coordinates: Sequence[str]
 ) -> tuple[str, str, Expression] | None:
     for y, e in left.items():
-        (now,) = substitute([e], known)
-        unknown = [c for c in coordinates if c not in known and c in symbols_of(now)]
+        (substituted,) = substitute([e], solutions)
+        unknown = [c for c in coordinates if c not in solutions and c in symbols_of(substituted)]
         if len(unknown) == 1:
-            value = _solved(now, symbol(y), unknown[0])
+            value = _solved(substituted, symbol(y), unknown[0])
             if value is not None:
                 return y, unknown[0], value
     return None
@@ -132,23 +132,23 @@ def _solved(e: Expression, value: Expression, x: str) -> Expression | None:
     """x from e(x) = value: directly where e is linear in x, else one operation after the other."""
     slope = _simplified(derivatives([e], x)[0])
     if x not in symbols_of(slope):
-        (rest,) = substitute([e], {x: ZERO})
-        return (value - rest) / slope
-    inside = [a for a in e.args if x in symbols_of(a)]
-    if len(inside) != 1:
+        (constant,) = substitute([e], {x: ZERO})
+        return (value - constant) / slope
+    dependent = [a for a in e.args if x in symbols_of(a)]
+    if len(dependent) != 1:
         return None
-    argument = inside[0]
-    others = [a for a in e.args if a is not argument]
+    argument = dependent[0]
+    independent = [a for a in e.args if a is not argument]
     match e.op:
         case "add":
-            return _solved(argument, value - others[0], x)
+            return _solved(argument, value - independent[0], x)
         case "sub":
-            moved = value + others[0] if e.args[0] is argument else others[0] - value
-            return _solved(argument, moved, x)
+            right_side = value + independent[0] if e.args[0] is argument else independent[0] - value
+            return _solved(argument, right_side, x)
         case "neg":
             return _solved(argument, -value, x)
         case "mul":
-            return _solved(argument, value / others[0], x)
+            return _solved(argument, value / independent[0], x)
         case "pow" if e.value == -1 or (e.value.numerator == 1 and e.value > 0):
             return _solved(argument, power(value, 1 / Fraction(e.value)), x)
         case op if op in FUNCTIONS and (inverse := FUNCTIONS[op].inverse):

@@ -44,15 +44,15 @@ def indecomposable_parts(algebra: LieAlgebra) -> list[list[int]]:
     """The finest partition of the basis into ideals spanned by basis elements; indices from 0, sorted."""
     part = list(range(algebra.dimension))
     for (i, j), row in algebra.constants.items():
-        joined = {part[m] for m in (i, j, *row)}
-        least = min(joined)
-        part = [least if p in joined else p for p in part]
+        merged = {part[m] for m in (i, j, *row)}
+        least = min(merged)
+        part = [least if p in merged else p for p in part]
     return [[i for i, p in enumerate(part) if p == label] for label in sorted(set(part))]
 
 
 def restricted(algebra: LieAlgebra, part: Sequence[int]) -> LieAlgebra:
     """The ideal spanned by some basis elements, with that basis."""
-    position = {i: new for new, i in enumerate(part)}
+    position = {i: new_index for new_index, i in enumerate(part)}
     constants = {
         (position[i], position[j]): {position[k]: c for k, c in row.items()}
         for (i, j), row in algebra.constants.items()
@@ -67,8 +67,8 @@ def _matching_families(algebra: LieAlgebra) -> Iterator[Representation]:
     if not algebra.field.is_rational or algebra.dimension > _LARGEST_MATCHED or not algebra.constants:
         return
     for family, size in families_of_dimension(algebra.dimension):
-        known = named(family, size)
-        for candidate in (known, known.opposite()):
+        family_algebra = named(family, size)
+        for candidate in (family_algebra, family_algebra.opposite()):
             rep = candidate.representation
             if rep is not None and _plain(candidate) == _plain(algebra):
                 yield rep
@@ -88,9 +88,9 @@ def _rows_of(matrices: Sequence[Sparse], field: Field) -> list[dict[int, Scalar]
     """Equations on v for Σ v_i·matrices[i] = 0."""
     rows: dict[tuple[int, int], dict[int, Scalar]] = {}
     for i, m in enumerate(matrices):
-        for at, v in m.items():
-            rows.setdefault(at, {})[i] = v
-    return [rows[at] for at in sorted(rows)]
+        for position, v in m.items():
+            rows.setdefault(position, {})[i] = v
+    return [rows[position] for position in sorted(rows)]
 
 
 def _with_characters(
@@ -101,21 +101,21 @@ def _with_characters(
     A nilpotent block costs nothing in PE_iP, where a diagonal one would add a cubic term.
     """
     derived = [{k: field.convert(c) for k, c in row.items()} for row in algebra.constants.values()]
-    chosen: list[dict[int, Scalar]] = []
-    seen: list[dict[int, Scalar]] = []  # values of the chosen forms on the centre
+    forms: list[dict[int, Scalar]] = []
+    central_values: list[dict[int, Scalar]] = []  # values of the chosen forms on the centre
     for form in kernel(field, derived, algebra.dimension):
         values = {m: v for m, z in enumerate(centre) if (v := _pairing(form, z, field)) != 0}
-        if values and not Span(field, [*seen, values]).dependent:
-            chosen.append(form)
-            seen.append(values)
-    if len(chosen) < len(centre):
+        if values and not Span(field, [*central_values, values]).dependent:
+            forms.append(form)
+            central_values.append(values)
+    if len(forms) < len(centre):
         return
     n = algebra.dimension
     matrices = [dict(m) for m in adjoint]
-    for extra, form in enumerate(chosen):
+    for extra, form in enumerate(forms):
         for i, value in form.items():
             matrices[i][n + 2 * extra, n + 2 * extra + 1] = value
-    yield _named(f"the adjoint matrices and {len(chosen)} nilpotent character(s)", n + 2 * len(chosen), matrices, field)
+    yield _named(f"the adjoint matrices and {len(forms)} nilpotent character(s)", n + 2 * len(forms), matrices, field)
 
 
 def _pairing(form: dict[int, Scalar], vector: dict[int, Scalar], field: Field) -> Scalar:
@@ -133,8 +133,10 @@ def _two_step(algebra: LieAlgebra, adjoint: list[Sparse], field: Field) -> Itera
     if any(adjoint[k] for k in touched) and not _is_two_step(algebra, adjoint, field):
         return
     n = algebra.dimension
-    half = field.one / field.number(2)
-    matrices = [{at: v * half for at, v in m.items()} | {(i, n): field.one} for i, m in enumerate(adjoint)]
+    one_half = field.one / field.number(2)
+    matrices = [
+        {position: v * one_half for position, v in m.items()} | {(i, n): field.one} for i, m in enumerate(adjoint)
+    ]
     yield _named("the affine matrices of a two-step nilpotent algebra", n + 1, matrices, field)
 
 
@@ -142,12 +144,14 @@ def _is_two_step(algebra: LieAlgebra, adjoint: list[Sparse], field: Field) -> bo
     for i, j in combinations(range(algebra.dimension), 2):
         image: Sparse = {}
         for k, c in algebra.bracket(i, j).items():
-            for at, v in adjoint[k].items():
-                image[at] = image.get(at, field.zero) + field.convert(c) * v
+            for position, v in adjoint[k].items():
+                image[position] = image.get(position, field.zero) + field.convert(c) * v
         if any(v != 0 for v in image.values()):
             return False
     return True
 
 
 def _named(name: str, size: int, matrices: Sequence[Sparse], field: Field) -> Representation:
-    return Representation(name, size, tuple({at: field.expression(v) for at, v in sorted(m.items())} for m in matrices))
+    return Representation(
+        name, size, tuple({position: field.expression(v) for position, v in sorted(m.items())} for m in matrices)
+    )

@@ -24,8 +24,8 @@ def separated(coordinates: Sequence[str], poisson: Matrix) -> Separated | None:
     Each entry is factored into irreducible polynomials over Q in coordinates, parameters and function values.
     """
     upper = {(i, j): poisson[i][j] for j in range(len(coordinates)) for i in range(j)}
-    others = [s for s in symbols_of(*upper.values()) if s not in coordinates]
-    tower = Tower([*coordinates, *others], upper.values())
+    parameters = [s for s in symbols_of(*upper.values()) if s not in coordinates]
+    tower = Tower([*coordinates, *parameters], upper.values())
     entries = {ij: tower.simplified(e) for ij, e in zip(upper, tower.convert_all(list(upper.values())), strict=True)}
     factor_parts: dict[int, list[tuple[Poly, int]]] = {}
     constants = {}
@@ -48,10 +48,10 @@ def _parts(tower: Tower, element: Poly, coordinates: Sequence[str]) -> dict[int,
     content, factors = element.factor()
     parts: dict[int, list[tuple[Poly, int]]] = {-1: [(tower.context.constant(content), 1)]}
     for factor, multiplicity in factors:
-        used = [i for i, c in enumerate(coordinates) if tower.depends_on(factor, [c])]
-        if len(used) > 1:
+        indices = [i for i, c in enumerate(coordinates) if tower.depends_on(factor, [c])]
+        if len(indices) > 1:
             return None
-        parts.setdefault(used[0] if used else -1, []).append((factor, int(multiplicity)))
+        parts.setdefault(indices[0] if indices else -1, []).append((factor, int(multiplicity)))
     return {k: sorted(p, key=lambda item: (str(item[0]), item[1])) for k, p in parts.items()}
 
 

@@ -123,9 +123,9 @@ def _split(tower: Tower, element: Poly, coordinates: Sequence[str]) -> Terms | N
     if element == 0:  # nearly all entries of large structures
         return {}
     size = len(coordinates)
-    used = element.degrees()
+    degrees = element.degrees()
     for position, g in enumerate(tower.generators, len(tower.symbols)):
-        if used[position] and tower.depends_on(tower.variable(g.name), coordinates):
+        if degrees[position] and tower.depends_on(tower.variable(g.name), coordinates):
             return None
     groups: dict[tuple[int, ...], dict[tuple[int, ...], object]] = {}
     for monomial, c in element.to_dict().items():
@@ -146,9 +146,9 @@ def _constant(coordinates: Sequence[str], entries: dict[tuple[int, int], Terms],
     if not values or not units or len(set(partners)) < len(partners):
         return Constant(matrix)
     pairs = sorted(ij if values[ij].value == 1 else (ij[1], ij[0]) for ij in values)
-    rest = tuple(c for i, c in enumerate(coordinates) if i not in partners)
+    unpaired = tuple(c for i, c in enumerate(coordinates) if i not in partners)
     q = tuple(coordinates[i] for i, _ in pairs)
-    return Canonical(q, tuple(coordinates[j] for _, j in pairs), rest, matrix)
+    return Canonical(q, tuple(coordinates[j] for _, j in pairs), unpaired, matrix)
 
 
 def _log_canonical(n: int, entries: dict[tuple[int, int], Terms]) -> Shape | None:

@@ -49,10 +49,10 @@ def expression(value: Any) -> Expression:
     return _convert(sympy.sympify(value, strict=True), {})
 
 
-def _convert(e: Any, known: dict[Any, Expression]) -> Expression:
-    converted = known.get(e)
+def _convert(e: Any, symbols_by_name: dict[Any, Expression]) -> Expression:
+    converted = symbols_by_name.get(e)
     if converted is None:
-        converted = known[e] = _node(e, [_convert(a, known) for a in e.args])
+        converted = symbols_by_name[e] = _node(e, [_convert(a, symbols_by_name) for a in e.args])
     return converted
 
 
@@ -76,8 +76,8 @@ def _node(e: Any, args: list[Expression]) -> Expression:
         return power(args[0], args[1])
     name = type(e).__name__
     name = _FROM_SYMPY.get(name, name)
-    known = FUNCTIONS.get(name)
-    if known and known.arity == len(args) and (name == "sign" or not known.own):
+    function = FUNCTIONS.get(name)
+    if function and function.arity == len(args) and (name == "sign" or not function.own):
         return call(name, *args)
     raise SpecError([Diagnostic(f"{e} has no counterpart in phigen", hint=f"known functions: {', '.join(FUNCTIONS)}")])
 
@@ -107,8 +107,8 @@ def closed_function(order: int, s: Any) -> Any:
 def expanded_function(order: int, s: Any, degree: int) -> Any:
     """A derivative of φ as a polynomial in s, correct up to a degree: φ(s) = Σ |B_{2n+2}| s^n/(2n+2)!."""
     u = sympy.Dummy("u")
-    known = (abs(sympy.bernoulli(2 * n + 2)) / sympy.factorial(2 * n + 2) * u**n for n in range(degree + order + 1))
-    return sympy.diff(sum(known), u, order).subs(u, s)
+    terms = (abs(sympy.bernoulli(2 * n + 2)) / sympy.factorial(2 * n + 2) * u**n for n in range(degree + order + 1))
+    return sympy.diff(sum(terms), u, order).subs(u, s)
 
 
 class _Sympy(Arithmetic[Any]):
@@ -203,12 +203,12 @@ def _assumed(parameter: Parameter) -> dict[str, bool]:
 
 def free_symbols(names: Iterable[str], used_names: Iterable[str]) -> list[Any]:
     """Real symbols of these names, with _ after names in use."""
-    used = {str(name) for name in used_names}
+    taken_names = {str(name) for name in used_names}
     result = []
     for name in names:
-        while name in used:
+        while name in taken_names:
             name += "_"
-        used.add(name)
+        taken_names.add(name)
         result.append(sympy.Symbol(name, real=True))
     return result
 

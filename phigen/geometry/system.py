@@ -63,8 +63,8 @@ class System:
             raise missing_attribute(self, name)
 
     def __repr__(self) -> str:
-        shown = text(self.hamiltonian)
-        energy = shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}…"
+        hamiltonian = text(self.hamiltonian)
+        energy = hamiltonian if len(hamiltonian) <= _SHOWN else f"{hamiltonian[:_SHOWN]}…"
         return f"<System {self.name}: ({', '.join(self.coordinates)}), H = {energy}>"
 
     @property
@@ -122,9 +122,9 @@ class System:
         """Contribution of the forces to the rate of change of a function F: ∇F·(πζ + f). For H it is their power."""
         if self.forces is None:
             return ZERO
-        moved = hamiltonian_vector_field(self.poisson, self.forces.covector)
+        field = hamiltonian_vector_field(self.poisson, self.forces.covector)
         slopes = gradient(function, self.coordinates)
-        return total(s * (a + b) for s, a, b in zip(slopes, moved, self.forces.vector, strict=True) if not s.is_zero)
+        return total(s * (a + b) for s, a, b in zip(slopes, field, self.forces.vector, strict=True) if not s.is_zero)
 
     def forced_rate_of_casimir(self, casimir: Expression) -> Expression:
         """Contribution of the forces to the rate of change of a Casimir: ∇C·f, since πζ conserves it."""

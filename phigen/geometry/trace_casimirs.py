@@ -26,7 +26,7 @@ def trace_casimirs(coordinates: Sequence[str], representation: Representation) -
     field = Field(v for m in representation.matrices for v in m.values())
     if not field.is_rational:
         return
-    matrices = [{at: field.convert(v) for at, v in m.items()} for m in representation.matrices]
+    matrices = [{position: field.convert(v) for position, v in m.items()} for m in representation.matrices]
     form = [{j: t for j, b in enumerate(matrices) if (t := _trace(field, a, b)) != 0} for a in matrices]
     span = Span(field, form)
     if span.dependent:
