@@ -108,14 +108,14 @@ class HamiltonJacobi:
         alpha: Callable[[int], Sequence[Expression]],
         coordinates: Sequence[str],
         static: Sequence[str],
-        most: int,
+        max_terms: int,
         *,
         symmetric: bool,
         times: Sequence[str] = (),
     ) -> None:
         self.hamiltonian, self.coordinates, self.symmetric = hamiltonian, tuple(coordinates), symmetric
         self.static, self.times = tuple(static), tuple(times)
-        self._source, self._most = alpha, most
+        self._source, self._most = alpha, max_terms
 
     @cached_property
     def alpha(self) -> tuple[Expression, ...]:
@@ -229,16 +229,16 @@ class _Recursion:
 
     def _expect_small(self, terms: int) -> None:
         """Raise `OverflowError` if the sizes so far predict that ∇S_terms will be too large to evaluate."""
-        *_, before, last = [0, 0, *self._sizes]
-        if last < FORESEEN or before == 0:
+        *_, previous, latest = [0, 0, *self._sizes]
+        if latest < FORESEEN or previous == 0:
             return
-        growth = log(self._sizes[last] / self._sizes[before]) / log(last / before)
-        size = self._sizes[last] * (terms / last) ** growth
+        growth = log(self._sizes[latest] / self._sizes[previous]) / log(latest / previous)
+        size = self._sizes[latest] * (terms / latest) ** growth
         if size > MOST_SLOPES:
             raise OverflowError(f"the gradient of S_{terms} would have about {size:.0f} terms")
 
     def _next(self, running: progress.Stage) -> Any:
-        i, even = len(self._found), self._symmetric and len(self._found) % 2 == 1
+        i, vanishes = len(self._found), self._symmetric and len(self._found) % 2 == 1
         moves = i > 0 and not (self._symmetric and i % 2 == 0)
         slopes = self._slope(self._found[-1], self._coordinates) if moves else [self._zero] * len(self._momenta)
         if moves and self.ring.bytes_per_term:
@@ -247,7 +247,7 @@ class _Recursion:
         self._taylor.advance(inputs, running)
         if i and isinstance(self._found[-1], Sized) and len(self._found[-1]) > limits.SERIES_TERMS:
             raise OverflowError(f"S_{i} has {len(self._found[-1])} terms")
-        if even:
+        if vanishes:
             return self._zero
         coefficient = self._taylor.coefficients(self._target)[i]
         for rate in self._slope(self._found[-1], self._times) if moves else ():
@@ -280,8 +280,8 @@ def residual(
     result = []
     for i, s in enumerate(series.terms):
         taylor.advance(dict(zip(momenta, slopes[i], strict=True)) | beginning(tower, times, i))
-        rest = s * tower.constant(i + 1) - taylor.coefficients(target)[i]
+        difference = s * tower.constant(i + 1) - taylor.coefficients(target)[i]
         for t in times if i else ():
-            rest -= tower.derivative(series.terms[i - 1], t) * tower.constant(Fraction(1, 2))
-        result.append(rest)
+            difference -= tower.derivative(series.terms[i - 1], t) * tower.constant(Fraction(1, 2))
+        result.append(difference)
     return result

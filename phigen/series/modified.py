@@ -91,14 +91,14 @@ class _ModifiedRecursion:
             return
         levels = [self._level(j, r - 1 - j) for j in range(r - 1)]
         half = self.tower.constant(Fraction(1, 2))
-        known = self._integral(
+        integral = self._integral(
             self.tower.combine([*levels, *(half * self.tower.derivative(self.last, t) for t in self.times)])
         )
         target = self.kept[r - 1] if r <= len(self.kept) else self.tower.zero
-        correction = target - self._at_one(known)
+        correction = target - self._at_one(integral)
         if len(correction) > MOST_TERMS:
             raise OverflowError(f"H_{r - 1} has {len(correction)} terms")
-        self._keep(correction, known + self.tower.variable(FRACTION) * correction)
+        self._keep(correction, integral + self.tower.variable(FRACTION) * correction)
 
     def _keep(self, correction: Poly, s: Poly) -> None:
         self.last = s

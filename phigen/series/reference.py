@@ -88,20 +88,20 @@ def _coefficient(
     i: int,
     energy: Coefficients,
     source: Sequence[Coefficients],
-    known: Sequence[Any],
+    terms: Sequence[Any],
     x: Sequence[Any],
     times: Sequence[Any],
 ) -> Any:
     """[t^i] Σ_ν H_ν Δ(t)^ν + ½ ∂_τ S_t, with Δ(t) = Σ_μ a_μ p(t)^μ, p(t) = Σ_j t^j ∇S_j, and Δ_τ(t) = −t/2."""
-    slopes = [[derivative(s, c) for s in known] for c in x]
-    every = [*energy.values(), *(a for d in source for a in d.values()), *(g for row in slopes for g in row)]
-    rates = [derivative(s, t) / 2 for t in times for s in known[-1:]]
-    functions = Functions([*every, *rates])
+    slopes = [[derivative(s, c) for s in terms] for c in x]
+    operands = [*energy.values(), *(a for d in source for a in d.values()), *(g for row in slopes for g in row)]
+    rates = [derivative(s, t) / 2 for t in times for s in terms[-1:]]
+    functions = Functions([*operands, *rates])
     momentum = Series(functions, lambda k, j: functions.element(slopes[k][j - 1]))
-    back = {1: functions.element(sympy.Rational(-1, 2))}
+    unit_shift = {1: functions.element(sympy.Rational(-1, 2))}
     displacement = Series(
         functions,
-        lambda k, j: momentum.combined(source[k], j) if k < len(x) else back.get(j, functions.ring.zero),
+        lambda k, j: momentum.combined(source[k], j) if k < len(x) else unit_shift.get(j, functions.ring.zero),
     )
     coefficient = functions.total([displacement.combined(energy, i), *map(functions.element, rates)])
     zero = functions.seems_zero(coefficient) and functions.vanishes(
@@ -128,10 +128,10 @@ class Series:
         if not any(mu):
             return self._functions.ring(int(j == 0))
         k = next(k for k, e in enumerate(mu) if e)
-        rest = _raised(mu, k, -1)
-        shares = range(1, j - sum(rest) + 1)
-        return self._functions.total(self._coefficient(k, a) * self._power(rest, j - a) for a in shares)
+        remainder = _raised(mu, k, -1)
+        shares = range(1, j - sum(remainder) + 1)
+        return self._functions.total(self._coefficient(k, a) * self._power(remainder, j - a) for a in shares)
 
 
-def _raised(index: Index, k: int, by: int) -> Index:
-    return (*index[:k], index[k] + by, *index[k + 1 :])
+def _raised(index: Index, k: int, shift: int) -> Index:
+    return (*index[:k], index[k] + shift, *index[k + 1 :])

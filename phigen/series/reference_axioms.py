@@ -39,21 +39,23 @@ def defects(
             residuals[f"{{α_{x[i]}, α_{x[j]}}}"] = parts.bracket(i, j, m) - at_alpha.combined(entry, m)
             residuals[f"{{β_{x[i]}, β_{x[j]}}}"] = parts.bracket(n + i, n + j, m) + at_beta.combined(entry, m)
         residuals |= {f"{{α_{x[i]}, β_{x[j]}}}": parts.bracket(i, n + j, m) for i in range(n) for j in range(n)}
-        for name, rest in residuals.items():
-            if not functions.vanishes(rest):
-                yield f"{name} in degree {m}", functions.expression(rest)
+        for name, residual in residuals.items():
+            if not functions.vanishes(residual):
+                yield f"{name} in degree {m}", functions.expression(residual)
 
 
 class _Parts:
     """The maps by degree in p, with their slopes, as elements of one ring."""
 
-    def __init__(self, maps: Sequence[Coefficients], others: Sequence[Any], x: Sequence[Any], p: Sequence[Any]) -> None:
+    def __init__(
+        self, maps: Sequence[Coefficients], parameters: Sequence[Any], x: Sequence[Any], p: Sequence[Any]
+    ) -> None:
         n = len(x)
         self._maps = [{(0,) * n: x[k % n], **{mu: a for mu, a in f.items() if any(mu)}} for k, f in enumerate(maps)]
         self._slopes = [[{mu: derivative(a, c) for mu, a in f.items()} for c in x] for f in self._maps]
         self._p = p
-        every = [*self._maps, *(s for slopes in self._slopes for s in slopes)]
-        self.functions = Functions([*p, *others, *(e for f in every for e in f.values())])
+        operands = [*self._maps, *(s for slopes in self._slopes for s in slopes)]
+        self.functions = Functions([*p, *parameters, *(e for f in operands for e in f.values())])
         self._known: dict[tuple[int, int, int | None], Any] = {}
 
     def deviation(self, first: int) -> Series:
@@ -74,9 +76,9 @@ class _Parts:
         """The part of a map, or of its derivative along x_c, of a degree in p."""
         key = (f, degree, c)
         if key not in self._known:
-            listed = self._maps[f] if c is None else self._slopes[f][c]
+            series_of_component = self._maps[f] if c is None else self._slopes[f][c]
             element = self.functions.element
-            terms = (element(a) * self._monomial(mu) for mu, a in listed.items() if sum(mu) == degree)
+            terms = (element(a) * self._monomial(mu) for mu, a in series_of_component.items() if sum(mu) == degree)
             self._known[key] = self.functions.total(terms)
         return self._known[key]
 

@@ -53,12 +53,12 @@ class Functions:
     """The ring of polynomials over Q in the functions that some expressions contain."""
 
     def __init__(self, expressions: Iterable[Any]) -> None:
-        listed: dict[Any, None] = {}
-        _list_functions(expressions, listed)
-        symbols = [sympy.Dummy() for _ in listed] or [sympy.Dummy()]
+        functions: dict[Any, None] = {}
+        _list_functions(expressions, functions)
+        symbols = [sympy.Dummy() for _ in functions] or [sympy.Dummy()]
         self.ring, *generators = ring(symbols, sympy.QQ)
-        self._generators = dict(zip(listed, generators, strict=False))
-        self._written = dict(zip(symbols, listed, strict=False))
+        self._generators = dict(zip(functions, generators, strict=False))
+        self._written = dict(zip(symbols, functions, strict=False))
         self._known: dict[Any, Any] = {}
 
     def __iter__(self) -> Any:
@@ -95,11 +95,11 @@ class Functions:
 
     def split(self, element: Any, variables: Sequence[Any]) -> dict[tuple[int, ...], Any]:
         """The coefficients of the monomials in some of the functions, by their exponents."""
-        places = [self.ring.gens.index(self._generators[f]) for f in variables]
+        positions = [self.ring.gens.index(self._generators[f]) for f in variables]
         parts: dict[tuple[int, ...], dict[Any, Any]] = {}
         for m, c in element.items():
-            rest = tuple(0 if k in places else e for k, e in enumerate(m))
-            parts.setdefault(tuple(m[k] for k in places), {})[rest] = c
+            remainder = tuple(0 if k in positions else e for k, e in enumerate(m))
+            parts.setdefault(tuple(m[k] for k in positions), {})[remainder] = c
         return {mu: self.ring.from_dict(part) for mu, part in parts.items()}
 
     def vanishes(self, element: Any) -> bool:
@@ -123,11 +123,11 @@ class Functions:
     def seems_zero(self, element: Any) -> bool:
         """Whether the element is 0 at one point: cheap, and a hint only."""
         symbols = sorted(set().union(*(f.free_symbols for f in self._generators)), key=str)
-        at = [sympy.Rational(7 + 3 * k, 5 + 2 * k) for k in range(len(symbols))]
+        point = [sympy.Rational(7 + 3 * k, 5 + 2 * k) for k in range(len(symbols))]
         with mpmath.workdps(_DIGITS):
             functions = sympy.lambdify(symbols, list(self._generators), modules=[{"Sign": mpmath.sign}, "mpmath"])
             try:
-                values = functions(*(mpmath.mpf(v.p) / v.q for v in at))
+                values = functions(*(mpmath.mpf(v.p) / v.q for v in point))
             except (ArithmeticError, ValueError):
                 return False
             terms = [
@@ -149,18 +149,18 @@ def expanded(e: Any) -> Any:
     return functions.expression(functions.element(e))
 
 
-def _list_functions(expressions: Iterable[Any], listed: dict[Any, None]) -> None:
+def _list_functions(expressions: Iterable[Any], functions: dict[Any, None]) -> None:
     """Add the functions that occur, each after those that its relation refers to."""
     for e in expressions:
-        if e in listed or e.is_Rational:
+        if e in functions or e.is_Rational:
             continue
         parts = [(a, 1) for a in e.args] if e.is_Add else _factors(e)
         if parts != [(e, 1)]:
-            _list_functions([a for a, _ in parts], listed)
+            _list_functions([a for a, _ in parts], functions)
             continue
         relation = _relation(e)
-        _list_functions([relation[1]] if relation else [], listed)
-        listed[e] = None
+        _list_functions([relation[1]] if relation else [], functions)
+        functions[e] = None
 
 
 def _relation(f: Any) -> tuple[int, Any] | None:
@@ -185,8 +185,8 @@ def _factors(e: Any) -> list[tuple[Any, int]]:
         u = e.args[0]
         return [(u, 1), (Sign(u), 1)] if isinstance(e, sympy.Abs) else [(Sign(u), 1)]
     if type(e) in _QUOTIENTS:
-        over, under = _QUOTIENTS[type(e)]
-        return [(over(*e.args), 1), (1 / under(*e.args), 1)]
+        numerator, denominator = _QUOTIENTS[type(e)]
+        return [(numerator(*e.args), 1), (1 / denominator(*e.args), 1)]
     if e.is_Pow or isinstance(e, sympy.exp):
         base, exponent = e.as_base_exp()
         terms = sympy.Add.make_args(expanded(exponent))
@@ -199,13 +199,13 @@ def _powers(base: Any, exponent: Any) -> list[tuple[Any, int]]:
     c, m = exponent.as_coeff_Mul(rational=True)
     if m != 1:
         return [(base ** (sympy.sign(c) * m / c.q), abs(int(c.p)))]
-    whole, rest = divmod(int(c.p), int(c.q))
+    quotient, remainder = divmod(int(c.p), int(c.q))
     content, primitive = (sympy.S.One, base) if base.is_number else base.primitive()
-    powers = [(content**c, 1), (primitive ** sympy.Rational(1, c.q), rest)]
-    if whole > 0:
-        powers.append((primitive, whole))
+    powers = [(content**c, 1), (primitive ** sympy.Rational(1, c.q), remainder)]
+    if quotient > 0:
+        powers.append((primitive, quotient))
     elif primitive.could_extract_minus_sign():
-        powers += [(sympy.Integer(-1) ** whole, 1), (1 / -primitive, -whole)]
+        powers += [(sympy.Integer(-1) ** quotient, 1), (1 / -primitive, -quotient)]
     else:
-        powers.append((1 / primitive, -whole))
+        powers.append((1 / primitive, -quotient))
     return [(f, n) for f, n in powers if n and f != 1]

@@ -29,18 +29,18 @@ def paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], s: Any) -> Iterator[
 
 def _part(poisson: Any, lower_terms: Sequence[Sequence[Any]], x: Sequence[Any], p: Sequence[Any], s: Any) -> list[Any]:
     """m_k from those before it."""
-    below, n = len(lower_terms), len(x)
-    tensor = [[taylor(poisson[a, b], x, below) for b in range(n)] for a in range(n)]
-    every = [c for row in tensor for entry in row for c in entry.values()]
-    functions = Functions([*every, *p, s, *(m for part in lower_terms for m in part)])
+    degree, n = len(lower_terms), len(x)
+    tensor = [[taylor(poisson[a, b], x, degree) for b in range(n)] for a in range(n)]
+    operands = [c for row in tensor for entry in row for c in entry.values()]
+    functions = Functions([*operands, *p, s, *(m for part in lower_terms for m in part)])
     deviation = Series(functions, lambda k, j: functions.element(lower_terms[j - 1][k]))
-    return [_centred(functions, _velocity(functions, deviation, row, p, below), s) for row in tensor]
+    return [_centred(functions, _velocity(functions, deviation, row, p, degree), s) for row in tensor]
 
 
-def _velocity(functions: Functions, deviation: Series, row: Sequence[Any], p: Sequence[Any], below: int) -> Any:
+def _velocity(functions: Functions, deviation: Series, row: Sequence[Any], p: Sequence[Any], degree: int) -> Any:
     """One component of π(m)p in degree k, of π(m) in degree k − 1."""
     return functions.total(
-        deviation.combined(entry, below) * functions.element(pb) for entry, pb in zip(row, p, strict=True)
+        deviation.combined(entry, degree) * functions.element(pb) for entry, pb in zip(row, p, strict=True)
     )
 
 
@@ -65,7 +65,7 @@ def source_of_paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], time: int 
         while len(parts) < degree:
             parts.append([m.subs(s, time) for m in next(following)])
         functions = Functions([*p, *(m for part in parts for m in part)])
-        ends = [functions.total(functions.element(part[k]) for part in parts[:degree]) for k in range(len(x))]
-        return [{mu: functions.expression(c) for mu, c in functions.split(e, p).items()} for e in ends]
+        end_point = [functions.total(functions.element(part[k]) for part in parts[:degree]) for k in range(len(x))]
+        return [{mu: functions.expression(c) for mu, c in functions.split(e, p).items()} for e in end_point]
 
     return source
