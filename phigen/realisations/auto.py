@@ -24,14 +24,14 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     """The bi-realisation that fits the shape of π; its ``explanation`` names the kind and the reason."""
     match system.shape:
         case Constant() | Canonical():
-            chosen = constant.build(system, choice)
+            realisation = constant.build(system, choice)
         case LogCanonical():
-            chosen = log_canonical.build(system, choice)
+            realisation = log_canonical.build(system, choice)
         case LiePoisson() | Affine():
-            chosen = _of_algebra(system, choice)
+            realisation = _of_algebra(system, choice)
         case _:
-            chosen = _general(system, choice)
-    return replace(chosen, explanation=f"auto picked {chosen.kind}, since {chosen.explanation}")
+            realisation = _general(system, choice)
+    return replace(realisation, explanation=f"auto picked {realisation.kind}, since {realisation.explanation}")
 
 
 def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
@@ -46,10 +46,10 @@ def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
         candidate = cayley.build(system, choice)
     except SpecError as error:
         followed = exponential.followed(system, choice)
-        why = error.diagnostics[0].message
-        return replace(followed, explanation=f"{followed.explanation}; no Cayley transform either: {why}")
-    why = "the exponential has no closed form that phigen finds, and would have to follow paths numerically"
-    return replace(candidate, explanation=f"{candidate.explanation}; {why}")
+        reason = error.diagnostics[0].message
+        return replace(followed, explanation=f"{followed.explanation}; no Cayley transform either: {reason}")
+    reason = "the exponential has no closed form that phigen finds, and would have to follow paths numerically"
+    return replace(candidate, explanation=f"{candidate.explanation}; {reason}")
 
 
 def _general(system: System, choice: BirealisationChoice) -> BiRealisation:

@@ -48,8 +48,8 @@ def check(system: System, realisation: BiRealisation) -> list[Statement]:
 
 def _inner(inner: tuple[System, BiRealisation]) -> list[Statement]:
     """The brackets of the inner structure of a pull-back, with its coordinates in the statement."""
-    where = f"in the coordinates {', '.join(inner[0].coordinates)}"
-    return [replace(s, detail=f"{s.detail}, {where}" if s.detail else where) for s in check(*inner)[1:4]]
+    place = f"in the coordinates {', '.join(inner[0].coordinates)}"
+    return [replace(s, detail=f"{s.detail}, {place}" if s.detail else place) for s in check(*inner)[1:4]]
 
 
 def _unit(system: System, realisation: BiRealisation) -> Statement:
@@ -76,8 +76,8 @@ def _in_exponentials(e: Expression) -> Expression:
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         if node.op in ("sinh", "cosh"):
-            up, down = call("exp", args[0]), call("exp", -args[0])
-            return number(Fraction(1, 2)) * (up - down if node.op == "sinh" else up + down)
+            growing, decaying = call("exp", args[0]), call("exp", -args[0])
+            return number(Fraction(1, 2)) * (growing - decaying if node.op == "sinh" else growing + decaying)
         return rebuild(node, args)
 
     return fold([e], visit)[0]
@@ -101,23 +101,23 @@ def _brackets(system: System, realisation: BiRealisation) -> Iterator[Statement]
     # p ↦ −p changes the sign of brackets: if it maps α to β, half of the brackets follow from the others.
     mirrored = realisation.symmetric and is_symmetric(alpha, beta, system.coordinates)
     everything = [*alpha, *beta, *pulled[0], *([] if mirrored else pulled[1])]
-    others = [s for s in symbols_of(*everything) if s not in variables]
-    tower = Tower([*variables, *others], everything, variables)
+    parameters = [s for s in symbols_of(*everything) if s not in variables]
+    tower = Tower([*variables, *parameters], everything, variables)
     images = tower.convert_all([*alpha, *beta])
     a, b = ([_Differential(tower, f, system.coordinates, covector) for f in half] for half in (images[:n], images[n:]))
 
-    def own(half: list[_Differential], targets: Sequence[Expression], sign: int) -> Iterator[Residual]:
+    def own(differentials: list[_Differential], targets: Sequence[Expression], sign: int) -> Iterator[Residual]:
         for (i, j), target in zip(pairs, targets, strict=True):
-            yield i, j, half[i].bracket(half[j]) - sign * tower.convert(target)
+            yield i, j, differentials[i].bracket(differentials[j]) - sign * tower.convert(target)
 
     def decided(title: str, count: int, residuals: Iterator[Residual]) -> Statement:
-        names, listed = system.coordinates, []
+        names, labelled = system.coordinates, []
         with progress.stage(title, count) as running:
             for i, j, element in residuals:
                 running.done += 1
                 if element != 0:
-                    listed.append((f"({names[i]}, {names[j]})", element))
-        return decide_elements("bi-realisation: " + title, tower, listed, system.positive)
+                    labelled.append((f"({names[i]}, {names[j]})", element))
+        return decide_elements("bi-realisation: " + title, tower, labelled, system.positive)
 
     first = decided(ALPHA, len(pairs), own(a, pulled[0], 1))
     yield first
@@ -125,18 +125,18 @@ def _brackets(system: System, realisation: BiRealisation) -> Iterator[Statement]
         yield replace(first, name="bi-realisation: " + BETA, detail="as for α, by β(x, p) = α(x, −p)", residual="")
     else:
         yield decided(BETA, len(pairs), own(b, pulled[1], -1))
-    across = [(i, j) for i in range(n) for j in range(i if mirrored else 0, n)]
-    yield decided(MIXED, len(across), ((i, j, a[i].bracket(b[j])) for i, j in across))
+    mixed_pairs = [(i, j) for i in range(n) for j in range(i if mirrored else 0, n)]
+    yield decided(MIXED, len(mixed_pairs), ((i, j, a[i].bracket(b[j])) for i, j in mixed_pairs))
 
 
 class _Differential:
     """The non-zero partial derivatives of an element in x and in p."""
 
     def __init__(self, tower: Tower, element: Poly, coordinates: Sequence[str], covector: Sequence[str]) -> None:
-        self._zero, used = tower.zero, tower.names_in(element)
+        self._zero, used_names = tower.zero, tower.names_in(element)
 
         def slopes(names: Sequence[str]) -> dict[int, Poly]:
-            return {i: d for i, c in enumerate(names) if c in used and (d := tower.derivative(element, c)) != 0}
+            return {i: d for i, c in enumerate(names) if c in used_names and (d := tower.derivative(element, c)) != 0}
 
         self.in_x, self.in_p = slopes(coordinates), slopes(covector)
 

@@ -112,34 +112,34 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
 
     Raises `SpecError` naming what was tried.
     """
-    tried: dict[str, str] = {}
+    failures: dict[str, str] = {}
     if algebra.representation is not None:
         form = _product(algebra, algebra.representation)
         if not isinstance(form, _Escape):
             return form, f"with {algebra.representation.name}"
-        tried[algebra.representation.name] = _refusal(algebra, algebra.representation, form)
+        failures[algebra.representation.name] = _refusal(algebra, algebra.representation, form)
     terms: Trilinear = {}
-    used: dict[str, list[str]] = {}
+    kinds: dict[str, list[str]] = {}
     for part in indecomposable_parts(algebra):
         ideal = restricted(algebra, part)
         for representation in candidates(ideal):
             form = _product(ideal, representation)
             if not isinstance(form, _Escape):
                 terms |= {(part[i], part[a], part[b], part[k]): c for (i, a, b, k), c in form.items()}
-                used.setdefault(representation.name, []).append(f"({', '.join(ideal.labels)})")
+                kinds.setdefault(representation.name, []).append(f"({', '.join(ideal.labels)})")
                 break
-            tried[representation.name] = _refusal(ideal, representation, form)
+            failures[representation.name] = _refusal(ideal, representation, form)
         else:
             _expect_poisson(algebra)
-            tried = tried or {"": f"no faithful representation of {ideal.name} was found"}
+            failures = failures or {"": f"no faithful representation of {ideal.name} was found"}
             raise refuse(
-                f"birealisation {KIND} does not apply to {algebra.name}: {'; '.join(tried.values())}",
+                f"birealisation {KIND} does not apply to {algebra.name}: {'; '.join(failures.values())}",
                 "the kind exponential needs no representation; "
                 "a closed faithful representation can be given as lie_algebra: {matrices: […]}",
             )
-    if len(used) == 1 and max(map(len, used.values())) == 1:
-        return terms, f"with {next(iter(used))}"
-    return terms, "with " + "; ".join(f"{name} for {', '.join(parts)}" for name, parts in used.items())
+    if len(kinds) == 1 and max(map(len, kinds.values())) == 1:
+        return terms, f"with {next(iter(kinds))}"
+    return terms, "with " + "; ".join(f"{name} for {', '.join(parts)}" for name, parts in kinds.items())
 
 
 def _expect_poisson(algebra: LieAlgebra) -> None:
@@ -163,7 +163,9 @@ def _refusal(algebra: LieAlgebra, representation: Representation, escape: _Escap
 def _product(algebra: LieAlgebra, representation: Representation) -> Trilinear | _Escape:
     """The trilinear form of P E_i P, or the first product that is not in the algebra."""
     field = Field(v for m in representation.matrices for v in m.values())
-    matrices: list[Sparse] = [{at: field.convert(v) for at, v in m.items()} for m in representation.matrices]
+    matrices: list[Sparse] = [
+        {position: field.convert(v) for position, v in m.items()} for m in representation.matrices
+    ]
     span = Span(field, matrices)
     rows = [_by_row(m) for m in matrices]
     beginning: dict[int, list[int]] = {}  # row → the matrices that have entries in it
@@ -196,13 +198,13 @@ def _by_row(m: Sparse) -> dict[int, list[tuple[int, Scalar]]]:
 
 
 def _times(a: Sparse, rows: dict[int, list[tuple[int, Scalar]]]) -> Sparse:
-    out: Sparse = {}
+    entries: Sparse = {}
     for (r, c), v in a.items():
         for column, w in rows.get(c, ()):
-            at = r, column
-            value = out[at] + v * w if at in out else v * w
+            position = r, column
+            value = entries[position] + v * w if position in entries else v * w
             if value == 0:
-                del out[at]
+                del entries[position]
             else:
-                out[at] = value
-    return out
+                entries[position] = value
+    return entries

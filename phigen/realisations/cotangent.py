@@ -32,8 +32,8 @@ class Cotangent:
     def __init__(self, coordinates: Sequence[str], expressions: Sequence[Expression]) -> None:
         self.size = len(coordinates)
         self.names = (*coordinates, *covector_names(coordinates))
-        others = [s for s in symbols_of(*expressions) if s not in self.names]
-        self.tower = Tower([*self.names, *others], expressions, self.names)
+        parameters = [s for s in symbols_of(*expressions) if s not in self.names]
+        self.tower = Tower([*self.names, *parameters], expressions, self.names)
         self.variables = [self.tower.variable(name) for name in self.names]
 
     # -- functions --------------------------------------------------------------------------------

@@ -13,14 +13,14 @@ KIND = "custom"
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     """The bi-realisation with ``choice.alpha`` and ``choice.beta``; raises `SpecError` for wrong sizes or symbols."""
-    allowed = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
+    known_symbols = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
     for name, maps in (("alpha", choice.alpha), ("beta", choice.beta)):
         if len(maps) != system.dimension:
             raise refuse(f"birealisation {name} has {len(maps)} components for {system.dimension} coordinates")
-        unknown = [s for s in symbols_of(*maps) if s not in allowed]
+        unknown = [s for s in symbols_of(*maps) if s not in known_symbols]
         if unknown:
-            wrong = plain(unknown[0])
-            raise refuse(f"birealisation {name} uses {wrong}, which is not a coordinate, a parameter or p_NAME")
+            unknown_name = plain(unknown[0])
+            raise refuse(f"birealisation {name} uses {unknown_name}, which is not a coordinate, a parameter or p_NAME")
     x = [symbol(c) for c in system.coordinates]
     return BiRealisation(
         KIND,

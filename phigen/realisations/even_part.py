@@ -73,24 +73,24 @@ def _parts(algebra: LieAlgebra) -> list[list[int]]:
     inner = {ij: {k: c for k, c in row.items() if k in touching} for ij, row in sorted(algebra.constants.items())}
     parts = indecomposable_parts(LieAlgebra(algebra.name, algebra.dimension, inner))
     outer = [{k for (i, _), row in algebra.constants.items() if i in part for k in row} for part in parts]
-    return [sorted({*part, *more}) for part, more in zip(parts, outer, strict=True) if part[0] in touching]
+    return [sorted({*part, *added}) for part, added in zip(parts, outer, strict=True) if part[0] in touching]
 
 
 def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
     """The closed form on an ideal spanned by basis elements: as a whole, or by summands in another basis."""
-    whole = _closed(ideal, x, p)
-    if whole is not None:
-        return whole
+    closed = _closed(ideal, x, p)
+    if closed is not None:
+        return closed
     projections = ideal_projections(ideal)
     if len(projections) < 2:
         return None
     # M_p = Σ M_{e_a p}, and M_{e_a p} M_{e_b p} = 0 for a ≠ b.
     summands = [_closed(ideal, x, applied(e, p, ZERO)) for e in projections]
-    present = [s for s in summands if s is not None]
-    if len(present) < len(summands):
+    closed_summands = [s for s in summands if s is not None]
+    if len(closed_summands) < len(summands):
         return None
-    values = tuple(total(column) for column in zip(*(s.values for s in present), strict=True))
-    return EvenPart(values, tuple(form for s in present for form in s.forms))
+    values = tuple(total(column) for column in zip(*(s.values for s in closed_summands), strict=True))
+    return EvenPart(values, tuple(form for s in closed_summands for form in s.forms))
 
 
 def matrix_of(algebra: LieAlgebra, p: Sequence[Expression]) -> list[Vector]:
@@ -170,14 +170,14 @@ def _nilpotent(tower: Tower, matrix: Sequence[Vector], x: Vector) -> EvenPart | 
 def _semisimple(tower: Tower, matrix: Sequence[Vector], x: Vector, root: Poly) -> EvenPart | None:
     s = tower.expression(root)
     first = times(matrix, times(matrix, x))  # N x
-    rest = [a + s * b for a, b in zip(times(matrix, times(matrix, first)), first, strict=True)]  # (N + s) N x
+    residual = [a + s * b for a, b in zip(times(matrix, times(matrix, first)), first, strict=True)]  # (N + s) N x
     simplest = f"φ(s), s = {_shown(s)}"
-    if _vanish(tower, rest):
+    if _vanish(tower, residual):
         return EvenPart(tuple(call("phi0", s) * v for v in first), (f"M⁴ = −s M², hence {simplest}",))
-    last = [a + s * b for a, b in zip(times(matrix, times(matrix, rest)), rest, strict=True)]
+    last = [a + s * b for a, b in zip(times(matrix, times(matrix, residual)), residual, strict=True)]
     if not _vanish(tower, last):
         return None
-    values = tuple(call("phi0", s) * v - call("phi1", s) * w for v, w in zip(first, rest, strict=True))
+    values = tuple(call("phi0", s) * v - call("phi1", s) * w for v, w in zip(first, residual, strict=True))
     return EvenPart(values, (f"M²(M² + s)² = 0, hence φ(s) and φ'(s), s = {_shown(s)}",))
 
 
@@ -189,5 +189,5 @@ def _vanish(tower: Tower, vector: Sequence[Expression]) -> bool:
 
 
 def _shown(s: Expression) -> str:
-    written = str(substitute([s], {name: symbol(plain(name)) for name in symbols_of(s)})[0])
-    return written if len(written) < 60 else "a quadratic form in p"
+    formula = str(substitute([s], {name: symbol(plain(name)) for name in symbols_of(s)})[0])
+    return formula if len(formula) < 60 else "a quadratic form in p"

@@ -58,7 +58,7 @@ def _assembled(system: System, even: EvenPart) -> BiRealisation:
     displacement = tuple(e - half * d for e, d in zip(curvature, increment, strict=True))
     alpha = _sums(x, displacement)
     beta = _sums(x, [e + half * d for e, d in zip(curvature, increment, strict=True)])
-    what = "linear" if isinstance(system.shape, LiePoisson) else "affine, linear on a central extension"
+    shape = "linear" if isinstance(system.shape, LiePoisson) else "affine, linear on a central extension"
     return BiRealisation(
         KIND,
         system.coordinates,
@@ -67,8 +67,8 @@ def _assembled(system: System, even: EvenPart) -> BiRealisation:
         displacement,
         increment,
         is_symmetric(alpha, beta, system.coordinates),
-        explanation=f"π is {what}: τ = exp in closed form ({_listed(even.forms)}); symmetric, β − α = π(x)p, exact for "
-        "linear H",
+        explanation=f"π is {shape}: τ = exp in closed form ({_listed(even.forms)}); symmetric, β − α = π(x)p, "
+        "exact for linear H",
         reference=REFERENCE,
     )
 

@@ -91,8 +91,8 @@ def _motion(c: str, g: Expression, u: Expression, positive: Collection[str]) -> 
         return _quadratic(symbol(c), g, u, (a, b, constant), positive)
     rate = _constant(derivative(g, c) / g, c)
     if rate is not None and not rate.is_zero:
-        early, late = (-call("log", 1 + sign * _HALF * rate * u * g) / rate for sign in (1, -1))
-        return _Motion(early, late, late - early)
+        backward, forward = (-call("log", 1 + sign * _HALF * rate * u * g) / rate for sign in (1, -1))
+        return _Motion(backward, forward, forward - backward)
     degree = _constant(symbol(c) * derivative(g, c) / g, c)
     if degree is not None and degree.is_number and degree.value != 1:
         return _monomial(symbol(c), g, u, degree.value)
@@ -101,8 +101,8 @@ def _motion(c: str, g: Expression, u: Expression, positive: Collection[str]) -> 
 
 def _exponential(g: Expression, u: Expression, rate: Expression) -> _Motion:
     exponent = _HALF * rate * u
-    early, late = (g * (call("exp", e) - 1) / rate for e in (-exponent, exponent))
-    return _Motion(early, late, 2 * g * call("sinh", exponent) / rate)
+    backward, forward = (g * (call("exp", e) - 1) / rate for e in (-exponent, exponent))
+    return _Motion(backward, forward, 2 * g * call("sinh", exponent) / rate)
 
 
 def _quadratic(
@@ -119,15 +119,15 @@ def _quadratic(
         s = -(squared * u**2)
         spread = 1 - s * call("phi0", s)
         slope = _HALF * u * tilt
-        early, late = -(_HALF * g * u) / (spread + slope), (_HALF * g * u) / (spread - slope)
-        return _Motion(early, late, g * u * spread / ((spread + slope) * (spread - slope)))
+        backward, forward = -(_HALF * g * u) / (spread + slope), (_HALF * g * u) / (spread - slope)
+        return _Motion(backward, forward, g * u * spread / ((spread + slope) * (spread - slope)))
     T = _HALF * u
     if not squared.is_zero:
         turns = squared.is_number and squared.value < 0
         w = sqrt(-squared if turns else squared)
         T = call("tan" if turns else "tanh", w * T) / w
-    early, late = -(g * T) / (1 + T * tilt), g * T / (1 - T * tilt)
-    return _Motion(early, late, 2 * g * T / (1 - (T * tilt) ** 2))
+    backward, forward = -(g * T) / (1 + T * tilt), g * T / (1 - T * tilt)
+    return _Motion(backward, forward, 2 * g * T / (1 - (T * tilt) ** 2))
 
 
 def _is_positive(e: Expression, positive: Collection[str]) -> bool:
@@ -142,10 +142,10 @@ def _is_positive(e: Expression, positive: Collection[str]) -> bool:
 
 
 def _monomial(x: Expression, g: Expression, u: Expression, degree: Fraction) -> _Motion:
-    rest = 1 - degree
-    ratio = _HALF * number(rest) * u * (g / x)
-    early, late = (x * (power(1 + sign * ratio, 1 / rest) - 1) for sign in (-1, 1))
-    return _Motion(early, late, late - early)
+    complement = 1 - degree
+    ratio = _HALF * number(complement) * u * (g / x)
+    backward, forward = (x * (power(1 + sign * ratio, 1 / complement) - 1) for sign in (-1, 1))
+    return _Motion(backward, forward, forward - backward)
 
 
 def _constant(e: Expression, c: str) -> Expression | None:

@@ -59,14 +59,14 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     symmetric = is_symmetric(alpha, beta, system.coordinates)
     flow = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
     difference = simplified_differences(beta, alpha)
-    plain = decide_zero("β − α = πp", [("", d - f) for d, f in zip(difference, flow, strict=True)])
+    flow_statement = decide_zero("β − α = πp", [("", d - f) for d, f in zip(difference, flow, strict=True)])
     return BiRealisation(
         KIND,
         system.coordinates,
         alpha,
         beta,
         simplified_differences(alpha, x),
-        flow if plain.verdict == "proved" else difference,
+        flow if flow_statement.verdict == "proved" else difference,
         symmetric,
         explanation=f"π is linear: the map τ of the spec with {representation.name}; "
         + ("symmetric" if symmetric else "not symmetric, so order k takes S_1 … S_k"),
@@ -153,7 +153,7 @@ class _Trivialised:
 
     def _eliminated(self, rows: list[list[Scalar]], n: int) -> list[list[Scalar]]:
         """The first n columns made the identity; refused if equations contradict each other."""
-        done: list[list[Scalar]] = []
+        reduced: list[list[Scalar]] = []
         for k in range(n):
             pivot = next((r for r in rows if r[k] != 0), None)
             if pivot is None:
@@ -161,8 +161,8 @@ class _Trivialised:
             rows.remove(pivot)
             scale = self._field.one / pivot[k]
             pivot = [v * scale for v in pivot]
-            rows, done = ([_without(r, pivot, k) for r in part] for part in (rows, done))
-            done.append(pivot)
+            rows, reduced = ([_without(r, pivot, k) for r in part] for part in (rows, reduced))
+            reduced.append(pivot)
         for row in rows:
             escaping = next((i for i, v in enumerate(row[n:]) if v != 0), None)
             if escaping is not None:
@@ -171,7 +171,7 @@ class _Trivialised:
                     f"(no combination of the ∂τ/∂p is τ times the matrix of {self._names[escaping]})",
                     "relations between functions of p, such as sin² + cos² = 1, are not used here",
                 )
-        return done
+        return reduced
 
 
 def _without(row: list[Scalar], pivot: list[Scalar], k: int) -> list[Scalar]:

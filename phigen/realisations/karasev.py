@@ -57,20 +57,20 @@ def series(system: System, degree: int) -> list[Expression]:
     powers = [list(flow)]
     for _ in range(degree - 1):
         powers.append(_along(powers[-1], coordinates, flow))
-    known = [x]  # known[d] is α up to degree d
+    approximations = [x]  # approximations[d] is α up to degree d
     for order in range(1, degree + 1):
         # D^j x is itself of degree j in p, so there α is needed up to degree order − j only.
         shifts = [
-            substitute(powers[j - 1], dict(zip(coordinates, known[order - j], strict=True)))
+            substitute(powers[j - 1], dict(zip(coordinates, approximations[order - j], strict=True)))
             for j in range(1, order + 1)
         ]
-        known.append(
+        approximations.append(
             [
                 xi - total(number(Fraction(1, factorial(j + 2))) * shift[i] for j, shift in enumerate(shifts))
                 for i, xi in enumerate(x)
             ]
         )
-    return known[-1]
+    return approximations[-1]
 
 
 def _along(functions: list[Expression], coordinates: tuple[str, ...], flow: tuple[Expression, ...]) -> list[Expression]:

@@ -81,4 +81,4 @@ class MatrixFunction(Arithmetic[Matrix]):
 
 
 def _entrywise(combine: Callable[[Expression, Expression], Expression], a: Matrix, b: Matrix) -> Matrix:
-    return [[combine(u, v) for u, v in zip(row, other, strict=True)] for row, other in zip(a, b, strict=True)]
+    return [[combine(u, v) for u, v in zip(row, other_row, strict=True)] for row, other_row in zip(a, b, strict=True)]

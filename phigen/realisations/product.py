@@ -54,7 +54,7 @@ def assembled(
         values = {c: e for r in realisations for c, e in zip(r.coordinates, getattr(r, name), strict=True)}
         return tuple(values.get(c, ZERO) for c in system.coordinates)
 
-    listed = [f"({', '.join(r.coordinates)}): {r.kind}, {_short(r.explanation)}" for r in realisations]
+    descriptions = [f"({', '.join(r.coordinates)}): {r.kind}, {_short(r.explanation)}" for r in realisations]
     return BiRealisation(
         KIND,
         system.coordinates,
@@ -64,7 +64,7 @@ def assembled(
         joined("increment"),
         symmetric=all(r.symmetric for r in realisations),
         exact=all(r.exact for r in realisations),
-        explanation=f"π is block diagonal, block by block: {'; '.join(listed)}",
+        explanation=f"π is block diagonal, block by block: {'; '.join(descriptions)}",
         reference="; ".join(dict.fromkeys(r.reference for r in realisations)),
     )
 

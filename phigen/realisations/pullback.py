@@ -77,7 +77,7 @@ def moved(
     """ψ⁻¹ ∘ map ∘ T*ψ⁻¹."""
     p = covector_symbols(system.coordinates)
     covector = [total(pi * row[a] for pi, row in zip(p, change.jacobian, strict=True)) for a in range(len(p))]
-    inside = dict(zip(form.coordinates, change.forward, strict=True))
-    inside |= dict(zip(covector_names(form.coordinates), covector, strict=True))
-    images = substitute(maps, inside)
+    substitution = dict(zip(form.coordinates, change.forward, strict=True))
+    substitution |= dict(zip(covector_names(form.coordinates), covector, strict=True))
+    images = substitute(maps, substitution)
     return tuple(substitute(change.backward, dict(zip(form.coordinates, images, strict=True))))

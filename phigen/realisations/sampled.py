@@ -43,11 +43,11 @@ def brackets_at_points(system: System, realisation: BiRealisation, titles: Seque
     variables = [*system.coordinates, *covector_names(system.coordinates)]
     slopes: tuple[list[list[Expression]], ...] = ([], [])
     with progress.stage("derivatives of α and β", 2 * system.dimension) as running:
-        for half, rows in zip(maps, slopes, strict=True):
-            for e in half:
+        for one_map, rows in zip(maps, slopes, strict=True):
+            for e in one_map:
                 rows.append(gradient(e, variables))
                 running.done += 1
-    names = symbols_of(*(e for half in maps for e in half), *(e for row in system.poisson for e in row))
+    names = symbols_of(*(e for one_map in maps for e in one_map), *(e for row in system.poisson for e in row))
     missing = [v for v in variables if v not in names]
     failures_at_points: list[list[str]] = []
     with progress.stage("brackets at points", POINTS) as running:
@@ -82,15 +82,15 @@ def _failures(
 ) -> list[str]:
     """For each of the three families a pair whose bracket is wrong at the point, as text; empty if there is none."""
     n, names = system.dimension, system.coordinates
-    values = iter(evaluate_exactly([e for half in slopes for row in half for e in row], point))
+    values = iter(evaluate_exactly([e for one_map in slopes for row in one_map for e in row], point))
     (a_x, a_p), (b_x, b_p) = (_halves([[next(values) for _ in range(2 * n)] for _ in names]) for _ in maps)
-    at_alpha, at_beta = (_tensor(system, half, point) for half in maps)
+    at_alpha, at_beta = (_tensor(system, one_map, point) for one_map in maps)
 
     def wrong(bracket: Any, expected: Any) -> str:
-        rest = bracket - expected
-        pairs = ((i, j) for i in range(n) for j in range(n) if rest[i, j] != 0)
+        difference = bracket - expected
+        pairs = ((i, j) for i in range(n) for j in range(n) if difference[i, j] != 0)
         i, j = next(pairs, (-1, -1))
-        return "" if i < 0 else f"({names[i]}, {names[j]}), at a point: {float(rational(rest[i, j])):.4g}"
+        return "" if i < 0 else f"({names[i]}, {names[j]}), at a point: {float(rational(difference[i, j])):.4g}"
 
     return [
         wrong(a_x * a_p.transpose() - a_p * a_x.transpose(), at_alpha),

@@ -81,8 +81,8 @@ def _closed_flow(spray: Spray, i: int) -> tuple[Expression, Expression] | None:
     """x_i∘Φ^{−½} − x_i and x_i∘Φ^{½} − x_i∘Φ^{−½}, if the Lie series of x_i ends or L_X x_i = v x_i with L_X v = 0."""
     tower = spray.space.tower
     x = tower.variable(spray.space.names[i])
-    rate, rest = divmod(spray.field[i], x)
-    if rest == 0 and rate != 0 and tower.is_zero(spray.apply(rate)):
+    rate, remainder = divmod(spray.field[i], x)
+    if remainder == 0 and rate != 0 and tower.is_zero(spray.apply(rate)):
         half = number(Fraction(1, 2)) * tower.expression(rate)
         coordinate = symbol(spray.space.names[i])
         return coordinate * (call("exp", -half) - 1), 2 * (coordinate * call("sinh", half))
@@ -126,7 +126,7 @@ def _terminating(system: System, spray: Spray) -> BiRealisation | None:
 
 
 def _exact(
-    system: System, spray: Spray, displacement: Sequence[Expression], increment: Sequence[Expression], why: str
+    system: System, spray: Spray, displacement: Sequence[Expression], increment: Sequence[Expression], reason: str
 ) -> BiRealisation:
     alpha, beta = _maps(system, displacement)
     symmetric = is_symmetric(alpha, beta, system.coordinates)
@@ -138,7 +138,7 @@ def _exact(
         tuple(displacement),
         tuple(increment),
         symmetric,
-        explanation=f"Poisson spray ({spray.name}): {why}; exact and symmetric",
+        explanation=f"Poisson spray ({spray.name}): {reason}; exact and symmetric",
         reference=REFERENCE,
     )
 

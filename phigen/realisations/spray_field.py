@@ -72,8 +72,8 @@ def _natural(system: System) -> list[Expression]:
 def _checked(system: System, forces: Sequence[Expression]) -> Sequence[Expression]:
     if len(forces) != system.dimension:
         raise refuse(f"spray has {len(forces)} components for {system.dimension} coordinates")
-    allowed = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
-    unknown = [s for s in symbols_of(*forces) if s not in allowed]
+    known_symbols = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
+    unknown = [s for s in symbols_of(*forces) if s not in known_symbols]
     if unknown:
         raise refuse(f"spray uses {plain(unknown[0])}, which is not a coordinate, a parameter or p_NAME")
     return forces
@@ -83,14 +83,14 @@ def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]
     """A smooth function that is homogeneous of degree 2 is a quadratic form, so the ring decides."""
     space, n = spray.space, system.dimension
     tower = space.tower
-    inside = [
+    non_polynomial = [
         k
         for k, g in enumerate(tower.generators, len(tower.symbols))
         if any(tower.depends_on(a, space.names[n:]) for a in g.arguments)
     ]
     for c, component, e in zip(system.coordinates, spray.field[n:], forces, strict=True):
         degrees = {sum(m[n : 2 * n]) for m in component.to_dict()}
-        if degrees - {2} or any(component.degrees()[k] for k in inside):
+        if degrees - {2} or any(component.degrees()[k] for k in non_polynomial):
             raise refuse(
                 f"spray: the component of p_{c}, {shortened(e)}, is not homogeneous of degree 2 in the covector",
                 "a spray has components Σ f_kl(x) p_k p_l",

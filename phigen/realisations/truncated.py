@@ -28,8 +28,8 @@ class _HomogeneousParts:
         self.coordinates, self.covector = system.coordinates, covector_names(system.coordinates)
         at_zero = substitute(closure(expressions), dict.fromkeys(self.covector, ZERO))
         variables = [*self.coordinates, *self.covector]
-        others = [s for s in symbols_of(*expressions) if s not in variables]
-        self.tower = Tower([*variables, *others], at_zero, variables)
+        parameters = [s for s in symbols_of(*expressions) if s not in variables]
+        self.tower = Tower([*variables, *parameters], at_zero, variables)
         taylor = Taylor(expressions, self.tower, self.covector)
         for k in range(degree + 1):
             # Along p ↦ tp the coefficient of t^k is the part of degree k.
@@ -71,19 +71,19 @@ def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterato
     try:
         parts = _HomogeneousParts(system, [*maps, *pulled], degree)
     except OverflowError:
-        beyond = EXACT_PATH if realisation.path else "not checked"
+        note = EXACT_PATH if realisation.path else "not checked"
         for title in titles:
-            yield Statement(f"bi-realisation: {title}{suffix}", UNDECIDED, f"too many terms to expand; {beyond}")
+            yield Statement(f"bi-realisation: {title}{suffix}", UNDECIDED, f"too many terms to expand; {note}")
         return
 
     def label(i: int, j: int, m: int) -> str:
         return f"({system.coordinates[i]}, {system.coordinates[j]}) in degree {m}"
 
-    beyond = EXACT_PATH if realisation.path else "α and β have no terms of higher degree, so the axiom is approximate"
+    note = EXACT_PATH if realisation.path else "α and β have no terms of higher degree, so the axiom is approximate"
 
     def decided(name: str, residuals: Iterator[tuple[str, Poly]]) -> Statement:
         title = f"bi-realisation: {name}{suffix}"
-        return decide_elements(title, parts.tower, residuals, system.positive, f"each degree by itself; {beyond}")
+        return decide_elements(title, parts.tower, residuals, system.positive, f"each degree by itself; {note}")
 
     def own(first: int, sign: int) -> Iterator[tuple[str, Poly]]:
         for m in range(degree):
@@ -92,5 +92,7 @@ def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterato
 
     yield decided(titles[0], own(0, 1))
     yield decided(titles[1], own(n, -1))
-    mixed = ((label(i, j, m), parts.bracket(i, n + j, m)) for m in range(degree) for i in range(n) for j in range(n))
-    yield decided(titles[2], mixed)
+    mixed_brackets = (
+        (label(i, j, m), parts.bracket(i, n + j, m)) for m in range(degree) for i in range(n) for j in range(n)
+    )
+    yield decided(titles[2], mixed_brackets)
