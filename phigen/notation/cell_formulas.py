@@ -29,22 +29,22 @@ def described(cell: Cell) -> str:
 def brackets(cell: Cell) -> list[tuple[str, Expression]]:
     """Return the non-zero brackets, {a, b} or {b, a}: first those of fields of one site, then with neighbours."""
     entries: list[tuple[str, Expression]] = []
-    seen: set[tuple[str, str]] = set()
-    for (f, other), value in (*cell.bracket.items(), *cell.bond_bracket.items()):
-        if (f, other) not in seen:
-            entries.append((f"{{{f}, {other}}}", value))
-            seen |= {(f, other), _mirrored(cell, f, other)}
+    printed_pairs: set[tuple[str, str]] = set()
+    for (f, second_field), value in (*cell.bracket.items(), *cell.bond_bracket.items()):
+        if (f, second_field) not in printed_pairs:
+            entries.append((f"{{{f}, {second_field}}}", value))
+            printed_pairs |= {(f, second_field), _mirrored(cell, f, second_field)}
     return entries
 
 
-def _mirrored(cell: Cell, f: str, other: str) -> tuple[str, str]:
+def _mirrored(cell: Cell, f: str, second_field: str) -> tuple[str, str]:
     if cell.relation != GRID:
-        return other, f
-    base, offset = cell.place(other)
+        return second_field, f
+    base, offset = cell.place(second_field)
     return base, cell.at(f, tuple(-o for o in steps(offset)))
 
 
-def sections(cell: Cell, most: int | None = SHOWN) -> list[tuple[str, list[tuple[str, str]]]]:
+def sections(cell: Cell, max_terms: int | None = SHOWN) -> list[tuple[str, list[tuple[str, str]]]]:
     """Yield titles with lines (left, right) of text."""
     contents = [
         ("Poisson tensor of a site" if cell.is_local else "Poisson tensor", brackets(cell)),
@@ -56,16 +56,16 @@ def sections(cell: Cell, most: int | None = SHOWN) -> list[tuple[str, list[tuple
         ("At a site", rates(cell)),
     ]
     return [
-        (title, list(zip((n for n, _ in listed), readable([e for _, e in listed], most), strict=True)))
-        for title, listed in contents
-        if listed
+        (title, list(zip((n for n, _ in lines), readable([e for _, e in lines], max_terms), strict=True)))
+        for title, lines in contents
+        if lines
     ]
 
 
 def _forces(cell: Cell) -> list[tuple[str, Expression]]:
     acting = cell.forces
-    listed = [(f"ζ_{f}", e) for f, e in acting.covector.items()] + [(f"f_{f}", e) for f, e in acting.vector.items()]
-    return [*listed, *([("λ", acting.damping)] if acting.damping is not None else [])]
+    lines = [(f"ζ_{f}", e) for f, e in acting.covector.items()] + [(f"f_{f}", e) for f, e in acting.vector.items()]
+    return [*lines, *([("λ", acting.damping)] if acting.damping is not None else [])]
 
 
 def _noise(cell: Cell) -> list[tuple[str, Expression]]:
@@ -74,8 +74,8 @@ def _noise(cell: Cell) -> list[tuple[str, Expression]]:
 
 
 def _densities(cell: Cell) -> list[tuple[str, Expression]]:
-    each = {"sites": cell.hamiltonian, "bonds": cell.bond_hamiltonian, "pairs": cell.pair_hamiltonian}
-    return [(f"h, of {what}", e) for what, e in each.items() if not e.is_zero]
+    densities = {"sites": cell.hamiltonian, "bonds": cell.bond_hamiltonian, "pairs": cell.pair_hamiltonian}
+    return [(f"h, of {domain}", e) for domain, e in densities.items() if not e.is_zero]
 
 
 def rates(cell: Cell) -> list[tuple[str, Expression]]:
@@ -98,17 +98,17 @@ def formulas(cell: Cell) -> Iterator[tuple[str, list[Equation]]]:
     if left := [(_bracket(cell, name), e) for name, e in brackets(cell)]:
         yield "Poisson tensor", _equations(cell, left)
     sums = {"sites": cell.axes or ("i",), "bonds": ("a", "b"), "pairs": ("a", "b")}
-    each = {"sites": cell.hamiltonian, "bonds": cell.bond_hamiltonian, "pairs": cell.pair_hamiltonian}
-    pieces: list[str] = []
-    for what, density in each.items():
+    densities = {"sites": cell.hamiltonian, "bonds": cell.bond_hamiltonian, "pairs": cell.pair_hamiltonian}
+    markup_terms: list[str] = []
+    for domain, density in densities.items():
         if not density.is_zero:
-            written = mathml.grouped(_indexed(cell, density)) if what == "sites" else mathml.grouped(density)
-            pieces.append(("<mo>+</mo>" if pieces else "") + _sum("∑", sums[what], what) + written)
-    yield "Hamiltonian", [("<mi>H</mi>", pieces or ["<mn>0</mn>"])]
+            markup = mathml.grouped(_indexed(cell, density)) if domain == "sites" else mathml.grouped(density)
+            markup_terms.append(("<mo>+</mo>" if markup_terms else "") + _sum("∑", sums[domain], domain) + markup)
+    yield "Hamiltonian", [("<mi>H</mi>", markup_terms or ["<mn>0</mn>"])]
     integrals = [(n, e, kind) for n, (e, kind) in cell.casimirs.items()]
     integrals += [(n, e, "sum") for n, e in cell.invariants.items()]
     if integrals:
-        yield "Casimirs and invariants", [_integral(cell, *listed) for listed in integrals]
+        yield "Casimirs and invariants", [_integral(cell, *integral) for integral in integrals]
     if cell.relation == GRID:
         field = [(mathml.dotted(_site(cell, f, cell.origin)), e) for f, e in vector_field(cell).items()]
         yield "Equations of motion", _equations(cell, field)
@@ -118,8 +118,8 @@ def _integral(cell: Cell, name: str, density: Expression, kind: str) -> Equation
     axes = cell.axes or ("i",)
     left = mathml.name(_site(cell, name, cell.origin) if kind == "sites" else name)
     sign = {"sites": "", "sum": _sum("∑", axes, "sites"), "product": _sum("∏", axes, "sites")}[kind]
-    whole = _indexed(cell, density)
-    return left, [sign + mathml.grouped(whole)] if sign else mathml.pieces(whole)
+    integrand = _indexed(cell, density)
+    return left, [sign + mathml.grouped(integrand)] if sign else mathml.pieces(integrand)
 
 
 def _equations(cell: Cell, formulas: Sequence[tuple[str, Expression]]) -> list[Equation]:
@@ -129,8 +129,8 @@ def _equations(cell: Cell, formulas: Sequence[tuple[str, Expression]]) -> list[E
 
 def _indexed(cell: Cell, e: Expression) -> Expression:
     """Return the expression with explicit indices, also for the site itself."""
-    moved = {name: symbol(_site(cell, *place)) for name, place in cell.places(e).items()}
-    return substitute([e], moved)[0]
+    indexed = {name: symbol(_site(cell, *site)) for name, site in cell.places(e).items()}
+    return substitute([e], indexed)[0]
 
 
 def _site(cell: Cell, name: str, offset: Offset) -> str:
@@ -141,11 +141,11 @@ def _site(cell: Cell, name: str, offset: Offset) -> str:
 
 
 def _bracket(cell: Cell, name: str) -> str:
-    f, other = name[1:-1].split(", ", 1)
-    return mathml.bracket(_site(cell, *cell.place(f)), _site(cell, *cell.place(other)))
+    f, second_field = name[1:-1].split(", ", 1)
+    return mathml.bracket(_site(cell, *cell.place(f)), _site(cell, *cell.place(second_field)))
 
 
-def _sum(sign: str, indices: Sequence[str], what: str) -> str:
-    between = {"sites": "<mo>,</mo>", "bonds": "<mo>,</mo>", "pairs": "<mo>&lt;</mo>"}[what]
-    listed = between.join(f"<mi>{i}</mi>" for i in indices)
-    return f"<msub><mo>{sign}</mo><mrow>{listed}</mrow></msub>"
+def _sum(sign: str, indices: Sequence[str], domain: str) -> str:
+    separator = {"sites": "<mo>,</mo>", "bonds": "<mo>,</mo>", "pairs": "<mo>&lt;</mo>"}[domain]
+    index_list = separator.join(f"<mi>{i}</mi>" for i in indices)
+    return f"<msub><mo>{sign}</mo><mrow>{index_list}</mrow></msub>"

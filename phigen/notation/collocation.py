@@ -10,8 +10,10 @@ from phigen.symbolic.readable import readable
 def method(compilation: CompiledGauss) -> str:
     """Return the description of a method, such as ``order 8, 4 stages, exact``."""
     stages, note = compilation.order.terms, compilation.order.note
-    said = f"order {compilation.order.order}, {stages} stage{'s' * (stages > 1)}, structure {compilation.structure}"
-    return said + (f" ({note})" if note else "")
+    description = (
+        f"order {compilation.order.order}, {stages} stage{'s' * (stages > 1)}, structure {compilation.structure}"
+    )
+    return description + (f" ({note})" if note else "")
 
 
 def equations() -> list[tuple[str, str]]:
@@ -28,17 +30,17 @@ def lines(compilation: CompiledGauss) -> list[str]:
     """Return lines that describe the unknowns, one line for each part, and the step."""
     listed_lines, names = [], compilation.system.coordinates
     for part in compilation.gauss.parts:
-        listed = ", ".join(names[i] for i in part.indices)
+        unknowns = ", ".join(names[i] for i in part.indices)
         if isinstance(part, Plain):
-            listed_lines.append(f"{listed}: themselves")
+            listed_lines.append(f"{unknowns}: themselves")
             continue
         if isinstance(part, LogarithmicBlock):
-            listed_lines.append(f"{listed}: their logarithms")
+            listed_lines.append(f"{unknowns}: their logarithms")
             continue
         shifts = [f"{names[i]} + {readable([s], None)[0]}" for i, s in zip(part.indices, part.shift, strict=True)]
-        shown = listed if all(s.is_zero for s in part.shift) else ", ".join(shifts)
+        description = unknowns if all(s.is_zero for s in part.shift) else ", ".join(shifts)
         listed_lines.append(
-            f"{shown}: x̃(G E_a G*) with G in an algebra of dimension {part.algebra.dimension}, G = 1 at the start"
+            f"{description}: x̃(G E_a G*) with G in an algebra of dimension {part.algebra.dimension}, G = 1 at the start"
         )
     exact = compilation.gauss.exact
     listed_lines.append(

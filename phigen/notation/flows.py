@@ -31,19 +31,19 @@ def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
     """
     entries: dict[str, Expression] = {}
     for number, matrix in matrices(compilation):
-        places = [_place(matrix, k) for k in range(len(matrix.rates))]
+        indices = [_place(matrix, k) for k in range(len(matrix.rates))]
         entries |= {
-            e: symbol(Symbol(f"{EXPONENTIAL}{number}", at)) for e, at in zip(matrix.symbols, places, strict=True)
+            e: symbol(Symbol(f"{EXPONENTIAL}{number}", index)) for e, index in zip(matrix.symbols, indices, strict=True)
         }
     coordinates = compilation.system.coordinates
-    moved = {c: symbol(c) + e for c, e in zip(coordinates, flow.increment, strict=True) if not e.is_zero}
-    return dict(zip(moved, substitute(list(moved.values()), entries), strict=True))
+    new_values = {c: symbol(c) + e for c, e in zip(coordinates, flow.increment, strict=True) if not e.is_zero}
+    return dict(zip(new_values, substitute(list(new_values.values()), entries), strict=True))
 
 
 def matrices(compilation: CompiledSplitting) -> list[tuple[str, MatrixExponential]]:
     """Return the distinct matrix exponentials of all flows with numbers; the number of a single one is empty."""
-    listed = list(dict.fromkeys(e for flow in compilation.splitting.flows for e in flow.exponentials))
-    return [(str(k) if len(listed) > 1 else "", e) for k, e in enumerate(listed, 1)]
+    distinct = list(dict.fromkeys(e for flow in compilation.splitting.flows for e in flow.exponentials))
+    return [(str(k) if len(distinct) > 1 else "", e) for k, e in enumerate(distinct, 1)]
 
 
 def rates(number: str, matrix: MatrixExponential) -> dict[Symbol, Expression]:
@@ -63,23 +63,25 @@ def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expre
     return [(c, f) for c, f in zip(coordinates, flow.force, strict=True) if not f.is_zero]
 
 
-def formulas(compilation: CompiledSplitting, most: int | None) -> list[tuple[str, str]]:
+def formulas(compilation: CompiledSplitting, max_terms: int | None) -> list[tuple[str, str]]:
     """Return the parts of H and the images of the coordinates under their flows, as pairs of a name and a text.
 
     Repeated subexpressions of long formulas have names, σ with a number, and come last.
     """
-    listed: list[tuple[str, str]] = []
+    equations: list[tuple[str, str]] = []
     for k, flow in enumerate(compilation.splitting.flows, 1):
-        moved = images(compilation, flow)
-        named = [f"{flow.letter}_{k}{': ' * bool(c)}{c}" for c, _ in definitions(flow, compilation.system.coordinates)]
+        new_values = images(compilation, flow)
+        definition_lines = [
+            f"{flow.letter}_{k}{': ' * bool(c)}{c}" for c, _ in definitions(flow, compilation.system.coordinates)
+        ]
         local = [e for _, e in definitions(flow, compilation.system.coordinates)]
-        listed += zip(named, readable(local, most), strict=True)
-        listed += [(f"Φ_{k}: {name}", text) for name, text in named_parts.texts(moved, most)]
+        equations += zip(definition_lines, readable(local, max_terms), strict=True)
+        equations += [(f"Φ_{k}: {name}", text) for name, text in named_parts.texts(new_values, max_terms)]
     for number, matrix in matrices(compilation):
-        listed.append((f"{EXPONENTIAL}{number}", f"exp(h*{RATES}{number}) - 1"))
+        equations.append((f"{EXPONENTIAL}{number}", f"exp(h*{RATES}{number}) - 1"))
         entries = rates(number, matrix)
-        listed += zip(map(plain, entries), readable(list(entries.values()), most), strict=True)
-    return listed
+        equations += zip(map(plain, entries), readable(list(entries.values()), max_terms), strict=True)
+    return equations
 
 
 def schedule(step: Step) -> list[tuple[int, float]]:
@@ -95,12 +97,12 @@ def described(compilation: CompiledSplitting) -> dict[str, object]:
     """
     parts = []
     for flow in compilation.splitting.flows:
-        moved = images(compilation, flow)
+        new_values = images(compilation, flow)
         local = definitions(flow, compilation.system.coordinates)
-        texts = readable([*(e for _, e in local), *moved.values()], None)
+        texts = readable([*(e for _, e in local), *new_values.values()], None)
         force = {c: t for (c, _), t in zip(local, texts, strict=False)}
         part: dict[str, object] = {"force": force} if flow.force else {"hamiltonian": texts[0]}
-        parts.append(part | {"flow": dict(zip(moved, texts[len(local) :], strict=True)), "manner": flow.manner})
+        parts.append(part | {"flow": dict(zip(new_values, texts[len(local) :], strict=True)), "manner": flow.manner})
     steps = [[part + 1, time] for part, time in schedule(compilation.program.step)]
     generators = {
         f"{EXPONENTIAL}{number}": [
@@ -110,5 +112,5 @@ def described(compilation: CompiledSplitting) -> dict[str, object]:
         ]
         for number, matrix in matrices(compilation)
     }
-    said: dict[str, object] = {"generators": generators} if generators else {}
-    return {"scheme": "splitting", "parts": parts, **said, "flows": steps}
+    description: dict[str, object] = {"generators": generators} if generators else {}
+    return {"scheme": "splitting", "parts": parts, **description, "flows": steps}

@@ -23,9 +23,9 @@ def method(compilation: CompiledSeries) -> str:
     terms += f" with p = {p}" if pushes else ""
     if stage is not plan:
         return f"order {plan.order}, composed of {len(compilation.program.fractions)} stages of order 2 from {terms}"
-    why = "symmetric, so the terms of even index vanish" if compilation.symmetric else "not symmetric"
+    reason = "symmetric, so the terms of even index vanish" if compilation.symmetric else "not symmetric"
     note = f" ({plan.note})" if plan.note else ""
-    return f"order {plan.order} from {terms}; {why}{note}"
+    return f"order {plan.order} from {terms}; {reason}{note}"
 
 
 @dataclass(frozen=True)
@@ -46,29 +46,33 @@ class Generating:
         return f"from S_{self.beyond} on there are too many terms to be written out; the code shares their parts"
 
 
-def series_formulas(compilation: CompiledSeries, most: int | None) -> Generating:
-    """Return the generating function of a series as far as it can be written out; ``most`` limits the terms of each
-    S_i.
-    """
+def series_formulas(compilation: CompiledSeries, max_terms: int | None) -> Generating:
+    """Return the generating function of a series if it can be written out, with ``max_terms`` terms of each S_i."""
     plan = compilation.stage
     pushed = compilation.system.forces or compilation.system.noise
-    more = not pushed and plan is compilation.order and plan.order <= _MODIFIED_UP_TO
-    series = compilation.series.written(plan.order + 1 if more else plan.terms)
-    listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
-    known = len(series.terms)
-    leading = of_polynomial(series.tower, -series.terms[plan.order], most) if more and known > plan.order else None
-    following = known + 1 + (compilation.symmetric and known % 2 == 1)  # index of the next non-zero term
-    return Generating(listed, leading, following if known < plan.terms else None)
+    has_modified = not pushed and plan is compilation.order and plan.order <= _MODIFIED_UP_TO
+    series = compilation.series.written(plan.order + 1 if has_modified else plan.terms)
+    polynomials = [
+        (i, of_polynomial(series.tower, s, max_terms)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0
+    ]
+    term_count = len(series.terms)
+    leading = (
+        of_polynomial(series.tower, -series.terms[plan.order], max_terms)
+        if has_modified and term_count > plan.order
+        else None
+    )
+    following = term_count + 1 + (compilation.symmetric and term_count % 2 == 1)  # index of the next non-zero term
+    return Generating(polynomials, leading, following if term_count < plan.terms else None)
 
 
-def modified_formulas(compilation: Compilation, count: int, most: int | None) -> list[tuple[int, Formula]]:
+def modified_formulas(compilation: Compilation, count: int, max_terms: int | None) -> list[tuple[int, Formula]]:
     """Return pairs (j, H_j) of the first ``count`` terms h^j H_j of the modified Hamiltonian H̃ = H + h^p H_p + …
 
     A count of 0 selects the leading term if it is cheap. A larger count raises `SpecError` for a splitting, a
     composition and an approximate bi-realisation.
     """
     if not count:
-        leading = series_formulas(compilation.by_series(), most).leading if compilation.has_series else None
+        leading = series_formulas(compilation.by_series(), max_terms).leading if compilation.has_series else None
         return [] if leading is None else [(compilation.order.order, leading)]
     if not compilation.has_series:
         message = f"the modified Hamiltonian is not computed for a step by {compilation.label}"
@@ -76,5 +80,5 @@ def modified_formulas(compilation: Compilation, count: int, most: int | None) ->
     system, chart = compilation.system, compilation.by_series().realisation
     expect_modified(system, chart, len(compilation.program.fractions))
     series = corrections(system, chart, compilation.order, count, compilation.gauge)
-    listed = powers(compilation.order, count, symmetric=chart.symmetric)
-    return [(j, of_polynomial(series.tower, series.terms[j], most)) for j in listed]
+    exponents = powers(compilation.order, count, symmetric=chart.symmetric)
+    return [(j, of_polynomial(series.tower, series.terms[j], max_terms)) for j in exponents]

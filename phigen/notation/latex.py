@@ -48,10 +48,10 @@ def document(compilation: Compilation, modified: int = 0, most: int | None = SHO
         _flows,
         lambda gauss: [_COLLOCATION],
     )
-    if listed := modified_formulas(compilation, modified, most):
-        sums = ["<mi>H</mi>", *(_PLUS + _scaled("H", j) for j, _ in listed), _DOTS]
+    if modified_terms := modified_formulas(compilation, modified, most):
+        sums = ["<mi>H</mi>", *(_PLUS + _scaled("H", j) for j, _ in modified_terms), _DOTS]
         tilde = '<mover accent="true"><mi>H</mi><mo>~</mo></mover>'
-        blocks.append(aligned([(tilde, sums), *((_indexed("H", j), _pieces(f)) for j, f in listed)]))
+        blocks.append(aligned([(tilde, sums), *((_indexed("H", j), _pieces(f)) for j, f in modified_terms)]))
     head = f"% {compilation.spec.name}, order {compilation.order.order}; needs amsmath"
     return "\n".join([head, "\\begingroup\\allowdisplaybreaks", *blocks, "\\endgroup"])
 
@@ -68,8 +68,8 @@ def _tensor(system: System) -> str:
     """Return π as a matrix, or as brackets if the matrix is too wide."""
     names, n = system.coordinates, system.dimension
     cells = [[mathml.expression(e) for e in row] for row in system.poisson]
-    across = sum(max(width(row[j]) for row in cells) + _COLUMN for j in range(n))
-    if n <= _COLUMNS and across + _COLUMN + width("<mi>π</mi>", _EQUALS) <= LINE:
+    total_width = sum(max(width(row[j]) for row in cells) + _COLUMN for j in range(n))
+    if n <= _COLUMNS and total_width + _COLUMN + width("<mi>π</mi>", _EQUALS) <= LINE:
         body = " \\\\ ".join(" & ".join(latex(cell) for cell in row) for row in cells)
         return f"\\begin{{equation*}}\n  \\pi = \\begin{{pmatrix}} {body} \\end{{pmatrix}}\n\\end{{equation*}}"
     pairs = [(i, j) for i in range(n) for j in range(i + 1, n) if not system.poisson[i][j].is_zero]
@@ -86,11 +86,11 @@ def _flows(compilation: CompiledSplitting) -> list[str]:
 def _flow(compilation: CompiledSplitting, k: int) -> str:
     """Return a part of H, and the images after the time h of the coordinates that its flow changes."""
     flow = compilation.splitting.flows[k - 1]
-    moved = flows.images(compilation, flow)
+    new_values = flows.images(compilation, flow)
     pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"
     local = flows.definitions(flow, compilation.system.coordinates)
-    left = [*(mathml.component(flow.letter, k, c) for c, _ in local), *(pulled + mathml.name(c) for c in moved)]
-    return aligned(_equations(left, [*(e for _, e in local), *moved.values()]))
+    left = [*(mathml.component(flow.letter, k, c) for c, _ in local), *(pulled + mathml.name(c) for c in new_values)]
+    return aligned(_equations(left, [*(e for _, e in local), *new_values.values()]))
 
 
 def _exponential(number: str, matrix: MatrixExponential) -> str:
@@ -102,10 +102,10 @@ def _exponential(number: str, matrix: MatrixExponential) -> str:
 def _maps(compilation: CompiledSeries) -> Iterator[str]:
     """Return α and β, and φ if they contain it; for a path, the first terms of the series of α and β."""
     realisation, names = compilation.realisation, compilation.system.coordinates
-    more = [_DOTS] if realisation.path else []
+    continuation = [_DOTS] if realisation.path else []
     letters = {"α": realisation.alpha} if realisation.symmetric else {"α": realisation.alpha, "β": realisation.beta}
     for letter, maps in letters.items():
-        block = aligned(_equations([mathml.indexed(letter, c) for c in names], maps, more))
+        block = aligned(_equations([mathml.indexed(letter, c) for c in names], maps, continuation))
         yield block
         if "\\varphi" in block and letter == "α":
             yield _align([_PHI])
@@ -122,50 +122,52 @@ def _gauged(compilation: CompiledSeries) -> str:
     return f"<mi>H</mi>{subtracted}{_EQUALS}" if subtracted else ""
 
 
-def _series(compilation: CompiledSeries, most: int | None) -> Iterator[Equation]:
-    series = series_formulas(compilation, most)
-    listed = [_PLUS * (n > 0) + _scaled("S", i) for n, (i, _) in enumerate(series.listed)]
-    yield _indexed("S", "h"), [*listed, *([f"{_PLUS}<mo>…</mo>"] if series.beyond else [])]
+def _series(compilation: CompiledSeries, max_terms: int | None) -> Iterator[Equation]:
+    series = series_formulas(compilation, max_terms)
+    summands = [_PLUS * (n > 0) + _scaled("S", i) for n, (i, _) in enumerate(series.listed)]
+    yield _indexed("S", "h"), [*summands, *([f"{_PLUS}<mo>…</mo>"] if series.beyond else [])]
     for i, formula in series.listed:
-        first, *others = _pieces(formula)
-        yield _indexed("S", i), [_gauged(compilation) * (i == 1) + first, *others]
+        first, *remaining = _pieces(formula)
+        yield _indexed("S", i), [_gauged(compilation) * (i == 1) + first, *remaining]
 
 
 def _assigned(names: Sequence[str], expressions: Sequence[Expression]) -> list[Equation]:
     return _equations([mathml.name(n) for n in names], expressions)
 
 
-def _equations(left: Sequence[str], expressions: Sequence[Expression], more: Sequence[str] = ()) -> list[Equation]:
+def _equations(
+    left: Sequence[str], expressions: Sequence[Expression], continuation: Sequence[str] = ()
+) -> list[Equation]:
     """Return equations for expressions, followed by equations for named common subexpressions."""
     formulas = named_parts.readable(expressions)
-    listed = [(name, [*mathml.pieces(form), *more]) for name, form in zip(left, formulas.forms, strict=True)]
-    return [*listed, *((mathml.name(name), mathml.pieces(e)) for name, e in formulas.parts)]
+    equations = [(name, [*mathml.pieces(form), *continuation]) for name, form in zip(left, formulas.forms, strict=True)]
+    return [*equations, *((mathml.name(name), mathml.pieces(e)) for name, e in formulas.parts)]
 
 
 def _pieces(formula: Formula) -> list[str]:
     """Return a polynomial after its divisor; if terms are left out, the number of all terms follows."""
-    first, *others = mathml.pieces(replace(formula, divisor=1))
-    pieces = [first, *others]
+    first, *remaining = mathml.pieces(replace(formula, divisor=1))
+    all_terms = [first, *remaining]
     if formula.divisor != 1:
         scale = f"<mfrac><mn>1</mn><mn>{formula.divisor}</mn></mfrac>{_TIMES}"
-        pieces = [f"{scale}<mo>(</mo>{first}", *others]
-        pieces[-1] += "<mo>)</mo>"
-    return [*pieces, f"<mtext>({formula.size} terms)</mtext>"] if formula.hidden else pieces
+        all_terms = [f"{scale}<mo>(</mo>{first}", *remaining]
+        all_terms[-1] += "<mo>)</mo>"
+    return [*all_terms, f"<mtext>({formula.size} terms)</mtext>"] if formula.hidden else all_terms
 
 
 def aligned(equations: Sequence[Equation] | Iterator[Equation]) -> str:
     """Return equations below one another, with long equations broken into lines."""
-    listed = list(equations)
-    room = LINE - max(width(left) for left, _ in listed) - _RELATION
-    written = []
-    for left, right in listed:
-        first, *others = lines(right, room)
-        written += [f"  {latex(left)} &= {first}", *(f"    &{INDENT}{line}" for line in others)]
-    return _align(written)
+    equation_list = list(equations)
+    room = LINE - max(width(left) for left, _ in equation_list) - _RELATION
+    broken_lines = []
+    for left, right in equation_list:
+        first, *remaining = lines(right, room)
+        broken_lines += [f"  {latex(left)} &= {first}", *(f"    &{INDENT}{line}" for line in remaining)]
+    return _align(broken_lines)
 
 
-def _align(written: Sequence[str]) -> str:
-    return "\n".join(["\\begin{align*}", " \\\\\n".join(written), "\\end{align*}"])
+def _align(broken_lines: Sequence[str]) -> str:
+    return "\n".join(["\\begin{align*}", " \\\\\n".join(broken_lines), "\\end{align*}"])
 
 
 def _indexed(letter: str, index: int | str) -> str:

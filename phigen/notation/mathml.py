@@ -111,8 +111,8 @@ def terms_of_formula(formula: Formula) -> Sum:
     terms: list[FractionTerm] = []
     for c, monomial in formula.terms:
         terms += _times((FractionTerm(c),), *(_power(terms_of(base), exponent) for base, exponent in monomial))
-    shown = _positive_first(terms) if len(terms) <= FEW else tuple(terms)
-    return (*shown, *_one(Factor(_DOTS))) if formula.hidden else shown
+    ordered_terms = _positive_first(terms) if len(terms) <= FEW else tuple(terms)
+    return (*ordered_terms, *_one(Factor(_DOTS))) if formula.hidden else ordered_terms
 
 
 def expression(e: Expression) -> str:
@@ -124,10 +124,10 @@ def summed(terms: Sequence[FractionTerm]) -> str:
     """Return the markup of a sum."""
     if not terms:
         return number(Fraction(0))
-    first, *rest = terms
-    if not rest and first.coefficient > 0:
+    first, *remaining = terms
+    if not remaining and first.coefficient > 0:
         return first.magnitude
-    signed = "".join(f"<mo>{_sign(t)}</mo>{t.magnitude}" for t in rest)
+    signed = "".join(f"<mo>{_sign(t)}</mo>{t.magnitude}" for t in remaining)
     return _row(("<mo>−</mo>" if first.coefficient < 0 else "") + first.magnitude + signed)
 
 
@@ -167,8 +167,8 @@ def number(value: Fraction) -> str:
     if not _is_decimal(value):
         return f"<mfrac><mn>{value.numerator}</mn><mn>{value.denominator}</mn></mfrac>"
     digits = next(k for k in range(1, 1000) if (value * 10**k).denominator == 1)
-    written = str(int(value * 10**digits)).rjust(digits + 1, "0")
-    return f"<mn>{written[:-digits]}.{written[-digits:]}</mn>"
+    digit_string = str(int(value * 10**digits)).rjust(digits + 1, "0")
+    return f"<mn>{digit_string[:-digits]}.{digit_string[-digits:]}</mn>"
 
 
 def grouped(e: Expression) -> str:
@@ -245,8 +245,8 @@ def _power(base: Sum, exponent: Fraction) -> Sum:
     if exponent.numerator == 1:
         return _one(Factor(f"<mroot>{summed(base)}<mn>{exponent.denominator}</mn></mroot>"))
     top = f"<mn>{exponent.numerator}</mn>"
-    whole = exponent.denominator == 1
-    return _one(_base(base).power(top if whole else _row(f"{top}<mo>/</mo><mn>{exponent.denominator}</mn>")))
+    is_integer = exponent.denominator == 1
+    return _one(_base(base).power(top if is_integer else _row(f"{top}<mo>/</mo><mn>{exponent.denominator}</mn>")))
 
 
 def _times(*factors: Sum) -> Sum:
@@ -294,21 +294,21 @@ def _sorted(terms: Sum) -> Sum:
         sums[t.above, t.below] = sums.get((t.above, t.below), Fraction(0)) + t.coefficient
     constant = sums.pop(((), ()), Fraction(0))
     nonzero = [FractionTerm(c, above, below) for (above, below), c in sums.items() if c]
-    rest = sorted(nonzero, key=lambda t: _key((*t.above, *t.below)))
+    ordered = sorted(nonzero, key=lambda t: _key((*t.above, *t.below)))
     if constant > 0:
-        return _bounded((FractionTerm(constant), *rest))
-    return _bounded(_positive_first([*rest, FractionTerm(constant)] if constant else rest))
+        return _bounded((FractionTerm(constant), *ordered))
+    return _bounded(_positive_first([*ordered, FractionTerm(constant)] if constant else ordered))
 
 
 def _positive_first(terms: list[FractionTerm]) -> Sum:
     """Move the first positive term to the front: b − a rather than −a + b."""
-    place = next((i for i, t in enumerate(terms) if t.coefficient > 0), 0)
-    return (*terms[place : place + 1], *terms[:place], *terms[place + 1 :])
+    position = next((i for i, t in enumerate(terms) if t.coefficient > 0), 0)
+    return (*terms[position : position + 1], *terms[:position], *terms[position + 1 :])
 
 
 def _key(factors: Sequence[Factor]) -> tuple[Any, ...]:
-    plain = all(f.key for f in factors)
-    return not plain, tuple(f.key for f in factors if plain)
+    has_keys = all(f.key for f in factors)
+    return not has_keys, tuple(f.key for f in factors if has_keys)
 
 
 def _bounded(terms: Sum) -> Sum:
@@ -360,10 +360,10 @@ def _product(coefficient: Fraction, factors: Sequence[Factor]) -> str:
         return number(coefficient)
     if len(factors) == 1 and coefficient == 1:
         return factors[0].alone
-    joined = factors[0].markup if coefficient == 1 else f"{number(coefficient)}{_TIMES}{factors[0].markup}"
-    for before, after in pairwise(factors):
-        joined += (_DOT if before.word or after.word else _TIMES) + after.markup
-    return _row(joined)
+    product = factors[0].markup if coefficient == 1 else f"{number(coefficient)}{_TIMES}{factors[0].markup}"
+    for left_factor, right_factor in pairwise(factors):
+        product += (_DOT if left_factor.word or right_factor.word else _TIMES) + right_factor.markup
+    return _row(product)
 
 
 def _pieces(terms: Sum) -> list[str]:
@@ -386,11 +386,11 @@ def _sign(term: FractionTerm) -> str:
 
 def _is_decimal(value: Fraction) -> bool:
     """Return whether the value is a decimal of many digits: 0.6667 is hard to read as 6667/10000."""
-    rest = value.denominator
+    cofactor = value.denominator
     for prime in (2, 5):
-        while rest % prime == 0:
-            rest //= prime
-    return rest == 1 and value.denominator > 1000 and value.denominator % 5 == 0
+        while cofactor % prime == 0:
+            cofactor //= prime
+    return cofactor == 1 and value.denominator > 1000 and value.denominator % 5 == 0
 
 
 def _parentheses(markup: str) -> str:

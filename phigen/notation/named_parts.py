@@ -39,13 +39,15 @@ class Readable:
 
 def readable(expressions: Sequence[Expression]) -> Readable:
     """Return the shortest form of expressions: expanded, unchanged, or with names for common subexpressions."""
-    plain, named = _partly_named(expressions), _all_named(expressions)
-    return named if plain.size > SHORT and named.size < WORTH_NAMES * plain.size else plain
+    unnamed_form, named_form = _partly_named(expressions), _all_named(expressions)
+    return (
+        named_form if unnamed_form.size > SHORT and named_form.size < WORTH_NAMES * unnamed_form.size else unnamed_form
+    )
 
 
 def _all_named(expressions: Sequence[Expression]) -> Readable:
-    named, roots = with_names(expressions)
-    return Readable(named, tuple(roots), sum(map(leaves, [*roots, *(e for _, e in named)])))
+    definitions, roots = with_names(expressions)
+    return Readable(definitions, tuple(roots), sum(map(leaves, [*roots, *(e for _, e in definitions)])))
 
 
 def _partly_named(expressions: Sequence[Expression]) -> Readable:
@@ -57,50 +59,50 @@ def _partly_named(expressions: Sequence[Expression]) -> Readable:
             forms[i] = form
         elif trees[i] <= SHORT:
             forms[i] = e
-    long = [i for i in range(len(expressions)) if i not in forms]
-    parts, roots = with_names([expressions[i] for i in long])
-    forms |= dict(zip(long, roots, strict=True))
-    listed = tuple(forms[i] for i in range(len(expressions)))
-    return Readable(parts, listed, sum(map(leaves, [*listed, *(e for _, e in parts)])))
+    long_indices = [i for i in range(len(expressions)) if i not in forms]
+    parts, roots = with_names([expressions[i] for i in long_indices])
+    forms |= dict(zip(long_indices, roots, strict=True))
+    ordered_forms = tuple(forms[i] for i in range(len(expressions)))
+    return Readable(parts, ordered_forms, sum(map(leaves, [*ordered_forms, *(e for _, e in parts)])))
 
 
-def texts(named: Mapping[str, Expression], most: int | None) -> list[tuple[str, str]]:
-    """Return expressions as pairs of a name and a text of at most ``most`` terms, unchanged or expanded.
+def texts(named_expressions: Mapping[str, Expression], max_terms: int | None) -> list[tuple[str, str]]:
+    """Return expressions as pairs of a name and a text of at most ``max_terms`` terms, unchanged or expanded.
 
     Names σ_1, σ_2, … for common subexpressions are used if they shorten the texts; their definitions are at the end.
     """
-    expressions = [*named.values()]
-    plainly = as_text(expressions, most)
+    expressions = [*named_expressions.values()]
+    plainly = as_text(expressions, max_terms)
     if max(map(len, plainly), default=0) > LONGEST:
-        shared, roots = with_names(expressions)
-        names = [*named, *(plain(name) for name, _ in shared)]
-        shown = as_text([*roots, *(e for _, e in shared)], most, vanishing(shared))
-        named_texts = _met([*zip(names, shown, strict=True)], len(named))
+        subexpressions, roots = with_names(expressions)
+        names = [*named_expressions, *(plain(name) for name, _ in subexpressions)]
+        printed = as_text([*roots, *(e for _, e in subexpressions)], max_terms, vanishing(subexpressions))
+        named_texts = _met([*zip(names, printed, strict=True)], len(named_expressions))
         if sum(len(text) for _, text in named_texts) < WORTH_NAMES * sum(map(len, plainly)):
             return named_texts
-    return list(zip(named, plainly, strict=True))
+    return list(zip(named_expressions, plainly, strict=True))
 
 
-def vanishing(shared: Sequence[tuple[str, Expression]]) -> list[str]:
+def vanishing(subexpressions: Sequence[tuple[str, Expression]]) -> list[str]:
     """Return the names of the subexpressions that vanish where all covectors are 0."""
     zeros: dict[str, Expression] = {}
-    for name, part in shared:
+    for name, part in subexpressions:
         zeros |= {s: ZERO for s in symbols_of(part) if kind_of(s) == MOMENTUM}
         if substitute([part], zeros)[0].is_zero:
             zeros[name] = ZERO
-    return [name for name, _ in shared if name in zeros]
+    return [name for name, _ in subexpressions if name in zeros]
 
 
-def _met(listed: Sequence[tuple[str, str]], count: int) -> list[tuple[str, str]]:
+def _met(name_texts: Sequence[tuple[str, str]], count: int) -> list[tuple[str, str]]:
     """Return the first ``count`` texts, followed by the renumbered subexpressions on which they depend."""
-    met = {name for _, text in listed[:count] for name in _SHARED.findall(text)}
-    for name, text in reversed(listed[count:]):
+    met = {name for _, text in name_texts[:count] for name in _SHARED.findall(text)}
+    for name, text in reversed(name_texts[count:]):
         if name in met:
             met |= {*_SHARED.findall(text)}
-    used_names = [name for name, _ in listed[count:] if name in met]
+    used_names = [name for name, _ in name_texts[count:] if name in met]
     numbers = {name: plain(Symbol(PART, k)) for k, name in enumerate(used_names, 1)}
-    shown = [*listed[:count], *((name, text) for name, text in listed[count:] if name in met)]
-    return [(numbers.get(name, name), _SHARED.sub(lambda match: numbers[match[0]], text)) for name, text in shown]
+    reached = [*name_texts[:count], *((name, text) for name, text in name_texts[count:] if name in met)]
+    return [(numbers.get(name, name), _SHARED.sub(lambda match: numbers[match[0]], text)) for name, text in reached]
 
 
 def short(expressions: Sequence[Expression]) -> list[Formula | Expression]:

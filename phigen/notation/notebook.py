@@ -37,16 +37,16 @@ def system_html(system: System) -> str:
     rows += [(mathml.name(c), mathml.expression(e)) for c, e in {**system.casimirs, **system.invariants}.items()]
     lines = [_formula(left, right) for left, right in rows]
     values = ", ".join(f"{p.name} = {float(p.value):g}" for p in system.parameters)
-    about = f"in ({', '.join(names)})" + (f", with {values}" if values else "")
-    return f"<div><strong>{escape(system.name)}</strong> {escape(about)}{''.join(lines)}</div>"
+    caption = f"in ({', '.join(names)})" + (f", with {values}" if values else "")
+    return f"<div><strong>{escape(system.name)}</strong> {escape(caption)}{''.join(lines)}</div>"
 
 
 def compilation_html(compilation: Compilation) -> str:
     """Return the system and its method."""
     program = compilation.program
-    said = f"compiled to order {program.order}: {compilation.label}, {program.step.kind.manner}"
-    about = _cell_html(compilation.by_sweeps().cell) if compilation.spec.lattice else system_html(compilation.system)
-    return about.removesuffix("</div>") + f"<p>{escape(said)}</p></div>"
+    caption = f"compiled to order {program.order}: {compilation.label}, {program.step.kind.manner}"
+    body = _cell_html(compilation.by_sweeps().cell) if compilation.spec.lattice else system_html(compilation.system)
+    return body.removesuffix("</div>") + f"<p>{escape(caption)}</p></div>"
 
 
 def _cell_html(cell: Cell) -> str:
@@ -64,9 +64,9 @@ def trajectory_html(trajectory: Trajectory) -> str:
     body = [["start", *map(_number, table[0])], ["end", *map(_number, table[-1])]]
     blank = [""] * (1 + len(trajectory.coordinates))
     body.append(["spread", *blank, *(_spread(v) for v in (trajectory.energy, *trajectory.casimirs.values()))])
-    said = f"{trajectory.steps} steps of {trajectory.h!r}, {len(trajectory)} rows"
+    caption = f"{trajectory.steps} steps of {trajectory.h!r}, {len(trajectory)} rows"
     rows = "".join(_row("td", cells) for cells in body)
-    return f"<table><caption>{escape(said)}</caption>{_row('th', head)}{rows}</table>"
+    return f"<table><caption>{escape(caption)}</caption>{_row('th', head)}{rows}</table>"
 
 
 def lattice_trajectory_html(trajectory: LatticeTrajectory) -> str:
@@ -74,16 +74,16 @@ def lattice_trajectory_html(trajectory: LatticeTrajectory) -> str:
     changes = trajectory.changes()
     head = ["", "t", *(f"mean {c}" for c in trajectory.coordinates), "energy", *[*changes][1:]]
     body = []
-    for said, k in (("start", 0), ("end", -1)):
+    for label, k in (("start", 0), ("end", -1)):
         means = trajectory.x[k].reshape(len(trajectory.coordinates), -1).mean(axis=1)
         numbers = [trajectory.t[k], *means.tolist(), trajectory.energy[k]]
-        body.append([said, *map(_number, numbers), *[""] * (len(changes) - 1)])
+        body.append([label, *map(_number, numbers), *[""] * (len(changes) - 1)])
     blank = [""] * (1 + len(trajectory.coordinates))
     body.append(["largest change", *blank, *(f"{v.max():.2g}" for v in changes.values())])
     sizes = "×".join(map(str, trajectory.x.shape[2:]))
-    said = f"{sizes} sites, {trajectory.steps} steps of {trajectory.h!r}, {len(trajectory)} frames"
+    label = f"{sizes} sites, {trajectory.steps} steps of {trajectory.h!r}, {len(trajectory)} frames"
     rows = "".join(_row("td", cells) for cells in body)
-    return f"<table><caption>{escape(said)}</caption>{_row('th', head)}{rows}</table>"
+    return f"<table><caption>{escape(label)}</caption>{_row('th', head)}{rows}</table>"
 
 
 def _formula(left: str, right: str) -> str:

@@ -37,14 +37,20 @@ def _exponents(node: Expression, args: list[_Sum]) -> _Sum:
         case "neg":
             return {name: -u for name, u in parts[0].items()}
         case "mul" if set(parts[0]) == {None} or set(parts[1]) == {None}:
-            scale, other = (parts[0], parts[1]) if set(parts[0]) == {None} else (parts[1], parts[0])
-            return {name: scale[None] * u for name, u in other.items()}
+            scale, rest_part = (parts[0], parts[1]) if set(parts[0]) == {None} else (parts[1], parts[0])
+            return {name: scale[None] * u for name, u in rest_part.items()}
     return {None: node} if not any(set(p) - {None} for p in parts) else None
 
 
 def _power(name: str, exponent: Expression) -> str:
-    written = readable([exponent], None)[0]
-    if written == "1":
+    exponent_text = readable([exponent], None)[0]
+    if exponent_text == "1":
         return name
-    plain = written.isdigit() or (not symbols_of(exponent) and "/" not in written and "-" not in written)
-    return f"{name}**{written}" if plain or written.isidentifier() else f"{name}**({written})"
+    needs_no_parentheses = exponent_text.isdigit() or (
+        not symbols_of(exponent) and "/" not in exponent_text and "-" not in exponent_text
+    )
+    return (
+        f"{name}**{exponent_text}"
+        if needs_no_parentheses or exponent_text.isidentifier()
+        else f"{name}**({exponent_text})"
+    )

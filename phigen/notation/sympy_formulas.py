@@ -41,16 +41,21 @@ class Dictionary:
 
     def __init__(self, compilation: Compilation) -> None:
         system, gauge = compilation.system, compilation.gauge
-        known = symbols_in_sympy(system)
-        self.coordinates = tuple(known[c] for c in system.coordinates)
-        self.times = tuple(known[t] for t in system.times)
-        self.covector = tuple(free_symbols([f"p_{c}" for c in system.coordinates], known))
+        system_symbols = symbols_in_sympy(system)
+        self.coordinates = tuple(system_symbols[c] for c in system.coordinates)
+        self.times = tuple(system_symbols[t] for t in system.times)
+        self.covector = tuple(free_symbols([f"p_{c}" for c in system.coordinates], system_symbols))
         level = ["e"] * (gauge.monitor is not None)
         names = ["h", *(f"lambda_{c}" for c in gauge.free), *level]
-        self.step, *free = free_symbols(names, [*known, *self.covector])
-        self.gauge = dict(zip((*gauge.free, *level), free, strict=True))
+        self.step, *covector_symbols = free_symbols(names, [*system_symbols, *self.covector])
+        self.gauge = dict(zip((*gauge.free, *level), covector_symbols, strict=True))
         momenta = dict(zip(map(momentum, system.coordinates), self.covector, strict=True))
-        self._symbols = {**known, **momenta, **dict(zip(gauge.symbols, free, strict=True)), STEP: self.step}
+        self._symbols = {
+            **system_symbols,
+            **momenta,
+            **dict(zip(gauge.symbols, covector_symbols, strict=True)),
+            STEP: self.step,
+        }
 
     def expression(self, e: Expression, special: Callable[[int, Any], Any] = closed_function) -> Any:
         """Return the expression in sympy; ``special`` is an argument of `to_sympy`."""

@@ -63,9 +63,9 @@ def width(*markup: str) -> float:
 def lines(markup: Sequence[str], room: float) -> list[str]:
     """Return elements side by side as lines of LaTeX of the given width; `INDENTED` indents all but the first."""
     elements = _elements(markup)
-    whole = _atoms(elements, whole=True)
-    if _width(whole) <= room:
-        return [_joined(whole)]
+    unbroken = _atoms(elements, whole=True)
+    if _width(unbroken) <= room:
+        return [_joined(unbroken)]
     atoms, broken_lines, begin = _atoms(elements, whole=False), [], 0
     while begin < len(atoms):
         end = _end(atoms, begin, room - (INDENTED if begin else 0.0))
@@ -77,17 +77,17 @@ def lines(markup: Sequence[str], room: float) -> list[str]:
 
 def _end(atoms: Sequence[Atom], begin: int, room: float) -> int:
     """Return the end of the line that begins at an atom: the best break within the width, else the first after."""
-    used, best, least = 0.0, len(atoms), float("inf")
-    for place in range(begin, len(atoms)):
-        level = atoms[place].level
-        if level is not None and place > begin:
-            cost = (room - used) / room + _SHORTER * level
-            if used > room and best == len(atoms):
-                return place
-            if used <= room and cost <= least:
-                best, least = place, cost
-        used += atoms[place].width
-        if used > room and best < len(atoms):
+    width_used, best, least = 0.0, len(atoms), float("inf")
+    for position in range(begin, len(atoms)):
+        level = atoms[position].level
+        if level is not None and position > begin:
+            cost = (room - width_used) / room + _SHORTER * level
+            if width_used > room and best == len(atoms):
+                return position
+            if width_used <= room and cost <= least:
+                best, least = position, cost
+        width_used += atoms[position].width
+        if width_used > room and best < len(atoms):
             return best
     return len(atoms)
 
@@ -116,18 +116,18 @@ def _atoms(elements: Sequence[Element], depth: int = 0, *, whole: bool) -> list[
     """Return elements side by side as atoms; ``whole`` forbids breaks."""
     flat, listed_atoms, bars = list(_flattened(elements)), list[Atom](), 0
     tall = _tall_parentheses(flat)
-    for place, element in enumerate(flat):
-        text, before = element.text or "", flat[place - 1].text if place else "("
+    for position, element in enumerate(flat):
+        text, previous = element.text or "", flat[position - 1].text if position else "("
         if element.tag != "mo":
-            called = place + 1 < len(flat) and flat[place + 1].text == _APPLY
-            listed_atoms += _of_element(element, depth, called=called, whole=whole)
+            is_function = position + 1 < len(flat) and flat[position + 1].text == _APPLY
+            listed_atoms += _of_element(element, depth, called=is_function, whole=whole)
         elif text in ("(", ")"):
             depth += 1 if text == "(" else -1
-            listed_atoms.append(_parenthesis(text, tall=place in tall, whole=whole))
-        elif text == "−" and (before in ("(", ",", "=") or (before == "|" and bars % 2)):
+            listed_atoms.append(_parenthesis(text, tall=position in tall, whole=whole))
+        elif text == "−" and (previous in ("(", ",", "=") or (previous == "|" and bars % 2)):
             listed_atoms.append(Atom("-", 0.8))
         elif text in ("+", "−", "="):
-            listed_atoms.append(Atom(*_SIGNS[text], level=None if before == "(" else depth))
+            listed_atoms.append(Atom(*_SIGNS[text], level=None if previous == "(" else depth))
         elif text == _TIMES:
             listed_atoms.append(Atom(" ", 0.0, depth + _FACTORS))
         else:
@@ -145,14 +145,14 @@ def _parenthesis(text: str, *, tall: bool, whole: bool) -> Atom:
 
 def _tall_parentheses(flat: Sequence[Element]) -> set[int]:
     """Return the positions of parentheses with tall content."""
-    tall, opened = set(), list[int]()
-    for place, element in enumerate(flat):
+    tall, open_positions = set(), list[int]()
+    for position, element in enumerate(flat):
         if element.tag == "mo" and element.text == "(":
-            opened.append(place)
+            open_positions.append(position)
         elif element.tag == "mo" and element.text == ")":
-            begin = opened.pop()
-            if any(part.tag in _TALL for e in flat[begin:place] for part in e.iter()):
-                tall |= {begin, place}
+            begin = open_positions.pop()
+            if any(part.tag in _TALL for e in flat[begin:position] for part in e.iter()):
+                tall |= {begin, position}
     return tall
 
 
@@ -207,13 +207,13 @@ def _identifier(name: str, *, called: bool) -> Atom:
 def _scripts(kind: str, parts: Sequence[Element], depth: int, *, called: bool, whole: bool) -> list[Atom]:
     """Return a base with an index or an exponent; a sum in parentheses and exp of a long sum may be broken."""
     base, *scripts = parts
-    written = [_one([s]) for s in scripts]
-    if not whole and kind == "msup" and base.text == "e" and written[0].width > 0.75 * _WIDE * LINE:
+    script_atoms = [_one([s]) for s in scripts]
+    if not whole and kind == "msup" and base.text == "e" and script_atoms[0].width > 0.75 * _WIDE * LINE:
         return [Atom("\\exp ", 1.7), *_enclosed(scripts, depth)]
     signs = {"msub": "_", "msup": "^", "msubsup": "_^"}[kind]
-    text = "".join(f"{sign}{{{script.text}}}" for sign, script in zip(signs, written, strict=True))
+    text = "".join(f"{sign}{{{script.text}}}" for sign, script in zip(signs, script_atoms, strict=True))
     carrier = [_identifier(base.text or "", called=True)] if called else _atoms([base], depth, whole=whole)
-    return _raised(carrier, Atom(text, 0.75 * max(s.width for s in written) + 0.1), marks="")
+    return _raised(carrier, Atom(text, 0.75 * max(s.width for s in script_atoms) + 0.1), marks="")
 
 
 def _raised(atoms: list[Atom], script: Atom, marks: str = "^") -> list[Atom]:
@@ -233,11 +233,11 @@ def _fraction(parts: Sequence[Element], depth: int, *, whole: bool) -> list[Atom
 def _enclosed(elements: Sequence[Element], depth: int) -> list[Atom]:
     """Return elements in parentheses."""
     tall = any(part.tag in _TALL for e in elements for part in e.iter())
-    opened, closed = (_parenthesis(sign, tall=tall, whole=False) for sign in "()")
-    return [opened, *_atoms(elements, depth + 1, whole=False), closed]
+    left, right = (_parenthesis(sign, tall=tall, whole=False) for sign in "()")
+    return [left, *_atoms(elements, depth + 1, whole=False), right]
 
 
 def _factor(elements: Sequence[Element], depth: int) -> list[Atom]:
     """Return elements as a factor, with parentheses around a sum."""
-    plain = _atoms(elements, depth, whole=False)
-    return _enclosed(elements, depth) if any(a.level == depth for a in plain) else plain
+    atoms = _atoms(elements, depth, whole=False)
+    return _enclosed(elements, depth) if any(a.level == depth for a in atoms) else atoms
