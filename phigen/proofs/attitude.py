@@ -107,9 +107,9 @@ def _gauss_statements(attitude: Attitude, compilation: CompiledGauss) -> Iterato
     slopes = dict(zip(points.unknowns, substitute(vector_field(points, at_unknowns(points)), at_start), strict=True))
     rates = [total(substitute([e], at_start)[0] * slopes[z] for z, e in row.items())
              for row in sparse_derivatives(values, points.unknowns)]  # fmt: skip
-    turned = {i: 2 * rate for i, rate in zip(group.rotation, rates[1:4], strict=True)}
-    turned |= dict(zip(group.translation, rates[4:], strict=True))
-    slope = [turned.get(i, ZERO) for i in range(system.dimension)]
+    turning_rates = {i: 2 * rate for i, rate in zip(group.rotation, rates[1:4], strict=True)}
+    turning_rates |= dict(zip(group.translation, rates[4:], strict=True))
+    slope = [turning_rates.get(i, ZERO) for i in range(system.dimension)]
     yield rate_statement(system, attitude, slope, compilation.gauge.monitor)
 
 
@@ -122,13 +122,13 @@ def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: E
     if monitor:
         velocity = [monitor * w for w in velocity]
         slope = substitute(list(slope), {LEVEL: -system.hamiltonian})
-    whole = [w - s for w, s in zip(velocity, slope, strict=True)]
-    shown = whole if group.matrices else [whole[i] for i in (*group.rotation, *group.translation)]
-    put_back = attitude.rate.roots[: len(shown)] if attitude.rate else [ZERO] * len(shown)
-    where = "∇S_1" + " + ∇(λC)" * bool(attitude.rate)
-    residuals = [("", a - b) for a, b in zip(shown, put_back, strict=True)]
-    named = f"ġ is that of H: {where} = " + ("g∇H where K = 0" if monitor else "∇H")
-    return decide_zero(named, residuals, system.positive, "the attitude has the order of x")
+    differences = [w - s for w, s in zip(velocity, slope, strict=True)]
+    components = differences if group.matrices else [differences[i] for i in (*group.rotation, *group.translation)]
+    put_back = attitude.rate.roots[: len(components)] if attitude.rate else [ZERO] * len(components)
+    sum_name = "∇S_1" + " + ∇(λC)" * bool(attitude.rate)
+    residuals = [("", a - b) for a, b in zip(components, put_back, strict=True)]
+    title = f"ġ is that of H: {sum_name} = " + ("g∇H where K = 0" if monitor else "∇H")
+    return decide_zero(title, residuals, system.positive, "the attitude has the order of x")
 
 
 def path_statement(system: System, group: Group) -> Statement:
@@ -138,12 +138,16 @@ def path_statement(system: System, group: Group) -> Statement:
     r, t = [p[i] for i in group.rotation], [p[i] for i in group.translation]
     residuals = []
     for triple in (group.rotation, *group.vectors):
-        turned = cross([m[i] for i in triple], r)
+        rotated_momenta = cross([m[i] for i in triple], r)
         if triple == group.rotation and t:
-            turned = [a + b for a, b in zip(turned, cross([m[i] for i in group.translation], t), strict=True)]
+            rotated_momenta = [
+                a + b for a, b in zip(rotated_momenta, cross([m[i] for i in group.translation], t), strict=True)
+            ]
         if triple == group.rotation and group.vectors and not t:
             continue
-        residuals += [("", slope[i] + (a if group.spatial else -a)) for i, a in zip(triple, turned, strict=True)]
+        residuals += [
+            ("", slope[i] + (a if group.spatial else -a)) for i, a in zip(triple, rotated_momenta, strict=True)
+        ]
     name = "d/dt Ad*_g m = 0 for ṁ = π(m)p, ġ = " + ("p g" if group.spatial else "g p")
     return decide_zero(name, residuals, system.positive, "so τ = exp(p) for the path of p")
 
@@ -151,9 +155,9 @@ def path_statement(system: System, group: Group) -> Statement:
 def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) -> Iterator[Statement]:
     """Statements on the parts: the gradient of each is constant along its flow; their sum with Casimirs is H."""
     system, splitting, group = compilation.system, compilation.splitting, attitude.group
-    turned = turnings(compilation.discretised, group, splitting.flows, put_back=uniform(system))
+    elements = turnings(compilation.discretised, group, splitting.flows, put_back=uniform(system))
     order = "exp(t∇H_{k}) g₀" if group.spatial else "g₀ exp(t∇H_{k})"
-    for k, (turning, flow) in enumerate(zip(turned, splitting.flows, strict=True), 1):
+    for k, (turning, flow) in enumerate(zip(elements, splitting.flows, strict=True), 1):
         bodies = [body.hamiltonian for body in turning.bodies]
         parts = [e for e in (turning.left, *turning.factors, *bodies) if not e.is_zero]
         name = f"∇H_{k} is constant along the flow of H_{k}, hence g₁ = {order.format(k=k)}"
@@ -163,9 +167,9 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
             )
         residuals = [("sum", flow.hamiltonian - total(parts)), *_stays(system, turning)]
         stated = constancy(system, turning, name)
-        whole = decide_zero(name, residuals, system.positive)
-        if turning.factors or not bodies or not whole.holds:
-            yield stated if whole.holds else whole
+        statement = decide_zero(name, residuals, system.positive)
+        if turning.factors or not bodies or not statement.holds:
+            yield stated if statement.holds else statement
         if bodies:
             name = f"the element of the free body of H_{k} rotates with ∇H_{k}, hence g₁ = {order.format(k=k)}"
             yield decide_zero(name, [*_weights(turning, group), *free_bodies.identities()], system.positive)
@@ -176,11 +180,11 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
             start = [symbol(c) for c in system.coordinates]
             end = [a + b for a, b in zip(start, flow.increment, strict=True)]
             name = f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for the flow of H_{k}"
-            listed = _residuals(group, [ONE + step_element[0], *step_element[1:4]], step_element[4:], start, end)
-            yield decide_zero(name, listed, system.positive, "any g₀")
-    put_back = [turning.left for turning in turned if not turning.left.is_zero]
-    plain = substitute([f.hamiltonian for f in splitting.flows], {KICK: ZERO})
-    slope = gradient(total(plain) - total(put_back), system.coordinates)
+            differences = _residuals(group, [ONE + step_element[0], *step_element[1:4]], step_element[4:], start, end)
+            yield decide_zero(name, differences, system.positive, "any g₀")
+    put_back = [turning.left for turning in elements if not turning.left.is_zero]
+    hamiltonians = substitute([f.hamiltonian for f in splitting.flows], {KICK: ZERO})
+    slope = gradient(total(hamiltonians) - total(put_back), system.coordinates)
     yield rate_statement(system, attitude, slope)
 
 
@@ -188,8 +192,8 @@ def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]
     """Yield the rates of free rigid bodies along the other terms, which come first."""
     for factor in turning.factors if turning.bodies else ():
         rates = hamiltonian_vector_field(system.poisson, gradient(factor, system.coordinates))
-        of = dict(zip(system.coordinates, rates, strict=True))
-        yield from ((f"rate of {c}", of[c]) for body in turning.bodies for c in body.coordinates)
+        rate_of = dict(zip(system.coordinates, rates, strict=True))
+        yield from ((f"rate of {c}", rate_of[c]) for body in turning.bodies for c in body.coordinates)
 
 
 def _weights(turning: Turning, group: Group) -> Iterator[tuple[str, Expression]]:
@@ -245,9 +249,9 @@ def ends_statement(system: System, beta: Vector) -> Statement:
     """
     names, p = system.coordinates, covector_symbols(system.coordinates)
     twice = substitute(beta, dict(zip(names, beta, strict=True)))
-    moved = substitute(hamiltonian_vector_field(system.poisson, p), dict(zip(names, beta, strict=True)))
+    end_velocity = substitute(hamiltonian_vector_field(system.poisson, p), dict(zip(names, beta, strict=True)))
     scaled = [total(pi * d for pi, d in zip(p, gradient(b, covector_names(names)), strict=True)) for b in beta]
-    residuals = [(c, d - (b + m - t)) for c, d, b, m, t in zip(names, scaled, beta, moved, twice, strict=True)]
+    residuals = [(c, d - (b + m - t)) for c, d, b, m, t in zip(names, scaled, beta, end_velocity, twice, strict=True)]
     name = "p·∂β/∂p = β + π(β)p − β(β, p): α and β are ends of the path of p, hence τ = exp(p)"
     return decide_zero(name, residuals, system.positive)
 
@@ -265,11 +269,11 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
     for i in n:
         half = [total(sign * c * p[a] / 2 for a in n for m, c in algebra.bracket(a, i).items() if m == k) for k in n]
         square = [total(c * p[a] * p[b] / 4 for (j, a, b, m), c in terms.items() if (j, m) == (i, k)) for k in n]
-        ends = (beta, alpha) if group.spatial else (alpha, beta)
+        momenta = (beta, alpha) if group.spatial else (alpha, beta)
         # ⟨β, (1 + P/2) E_i (1 − P/2)⟩ = ⟨α, (1 − P/2) E_i (1 + P/2)⟩, where x are in space; else with −P.
-        more = [total((h - q) * x for h, q, x in zip(half, square, ends[0], strict=True)), ends[0][i]]
-        less = [total((-h - q) * x for h, q, x in zip(half, square, ends[1], strict=True)), ends[1][i]]
-        residuals.append((f"E_{i + 1}", total(more) - total(less)))
+        first_equation = [total((h - q) * x for h, q, x in zip(half, square, momenta[0], strict=True)), momenta[0][i]]
+        less = [total((-h - q) * x for h, q, x in zip(half, square, momenta[1], strict=True)), momenta[1][i]]
+        residuals.append((f"E_{i + 1}", total(first_equation) - total(less)))
     order = "τ g₀" if group.spatial else "g₀ τ"
     return decide_zero(f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for g₁ = {order}, τ = (1 + P/2)/(1 − P/2)", residuals, system.positive)
 
@@ -284,27 +288,27 @@ def element_statements(
     covectors = [p[i] for i in group.rotation], [p[i] for i in group.translation]
     increment = direction(*covectors, cayley=cayley)
     phi = ZERO if cayley else _doubled(dot(covectors[0], covectors[0]))
-    plain, factor = with_phi(*covectors, phi), increment.factor
-    listed = [("length", dot(increment.turn, increment.turn) - increment.length**2)]
-    listed += [
+    group_covectors, factor = with_phi(*covectors, phi), increment.factor
+    labelled = [("length", dot(increment.turn, increment.turn) - increment.length**2)]
+    labelled += [
         ("quaternion", increment.length * a - b)
         for a, b in zip([ONE + group_element[0], *group_element[1:4]], increment.turn, strict=True)
     ]
-    listed += [
+    labelled += [
         ("position", increment.length**2 * a - b) for a, b in zip(group_element[4:], increment.shift, strict=True)
     ]
-    listed += [("φ(s)", a - factor * b) for a, b in zip(increment.turn, plain.turn, strict=True)]
-    listed += [("φ(s)", a - factor**2 * b) for a, b in zip(increment.shift, plain.shift, strict=True)]
+    labelled += [("φ(s)", a - factor * b) for a, b in zip(increment.turn, group_covectors.turn, strict=True)]
+    labelled += [("φ(s)", a - factor**2 * b) for a, b in zip(increment.shift, group_covectors.shift, strict=True)]
     name = "τ = (1 + P/2)/(1 − P/2)" if cayley else "τ = exp(p)"
-    residuals = zip([label for label, _ in listed], _with_phi([e for _, e in listed], _quarter), strict=True)
+    residuals = zip([label for label, _ in labelled], _with_phi([e for _, e in labelled], _quarter), strict=True)
     yield decide_zero(f"the quaternion of {name} has length 1", residuals, positive)
     simple = with_phi(*covectors, ZERO if cayley else _any(ZERO))
     first, last = (_with_phi(part, _any) for part in (start, end))
     order = "τ g₀" if group.spatial else "g₀ τ"
-    where = "body" if group.spatial else "space"
+    frame = "body" if group.spatial else "space"
     conserved = _residuals(group, simple.turn, simple.shift, first, last)
     yield decide_zero(
-        f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for g₁ = {order}", conserved, positive, f"the momentum in {where}, any g₀"
+        f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for g₁ = {order}", conserved, positive, f"the momentum in {frame}, any g₀"
     )
 
 
@@ -313,12 +317,15 @@ def _residuals(
 ) -> Iterator[tuple[str, Expression]]:
     """Momenta after less those before, times |τ|², and |g₀|² for those of se(3)."""
     square = dot(turn, turn)
-    after = product(turn, BEFORE) if group.spatial else product(BEFORE, turn)
-    first, last = (_conjugate(q) if group.spatial else list(q) for q in (BEFORE, after))
+    product_after = product(turn, BEFORE) if group.spatial else product(BEFORE, turn)
+    first, last = (_conjugate(q) if group.spatial else list(q) for q in (BEFORE, product_after))
     triples = [("rotated vector", v) for v in group.vectors] or [("momentum", group.rotation)]
     for label, triple in triples:
-        old, new = rotated(first, [start[i] for i in triple]), rotated(last, [end[i] for i in triple])
-        yield from ((label, a - square * b) for a, b in zip(new, old, strict=True))
+        momentum_before, momentum_after = (
+            rotated(first, [start[i] for i in triple]),
+            rotated(last, [end[i] for i in triple]),
+        )
+        yield from ((label, a - square * b) for a, b in zip(momentum_after, momentum_before, strict=True))
     if group.translation:
         yield from (("momentum", e) for e in _screwed(group, turn, shift, start, end))
 
@@ -326,13 +333,20 @@ def _residuals(
 def _screwed(group: Group, turn: Vector, shift: Vector, start: Vector, end: Vector) -> list[Expression]:
     """The residual of the angular momentum of se(3) for g₀ = 1, where the product is the element itself."""
     square = dot(turn, turn)
-    (old, _), (new, force) = (([x[i] for i in group.rotation], [x[i] for i in group.translation]) for x in (start, end))
+    (momentum_before, _), (momentum_after, force) = (
+        ([x[i] for i in group.rotation], [x[i] for i in group.translation]) for x in (start, end)
+    )
     if group.spatial:
         pushed = cross(shift, force)
-        new = [square * a - b for a, b in zip(new, pushed, strict=True)]
-        return [a - square**2 * b for a, b in zip(rotated(_conjugate(turn), new), old, strict=True)]
+        momentum_after = [square * a - b for a, b in zip(momentum_after, pushed, strict=True)]
+        return [
+            a - square**2 * b for a, b in zip(rotated(_conjugate(turn), momentum_after), momentum_before, strict=True)
+        ]
     pushed = cross(shift, rotated(turn, force))
-    return [square * (a - square * b) + c for a, b, c in zip(rotated(turn, new), old, pushed, strict=True)]
+    return [
+        square * (a - square * b) + c
+        for a, b, c in zip(rotated(turn, momentum_after), momentum_before, pushed, strict=True)
+    ]
 
 
 def _with_phi(expressions: Sequence[Expression], value: Callable[[Expression], Expression]) -> list[Expression]:

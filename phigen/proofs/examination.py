@@ -63,9 +63,9 @@ class Examination:
         splitting, are about the same few formulas: the first failure shows the error.
         """
         mistakes = []
-        for group, listed in self.groups.items():
-            refuted = [(group, s) for s in listed if s.verdict == REFUTED]
-            mistakes += refuted if group in (DEFINEDNESS, CASIMIRS, INVARIANTS) else refuted[:1]
+        for group, statements in self.groups.items():
+            refuted_pairs = [(group, s) for s in statements if s.verdict == REFUTED]
+            mistakes += refuted_pairs if group in (DEFINEDNESS, CASIMIRS, INVARIANTS) else refuted_pairs[:1]
         return mistakes
 
 
@@ -76,11 +76,13 @@ def refuted(groups: Groups) -> list[Statement]:
 
 def refutation(examination: Examination) -> str:
     """The refuted statements for a message, each with its place in the spec."""
-    rest = f"not examined, because they depend on it: {examination.unexamined}" if examination.unexamined else ""
+    unexamined_note = (
+        f"not examined, because they depend on it: {examination.unexamined}" if examination.unexamined else ""
+    )
     return "\n".join(
         str(
             examination.spec.diagnostic(
-                _place(examination.spec, group, s), str(s), hint_of(examination.spec, group) or rest
+                _place(examination.spec, group, s), str(s), hint_of(examination.spec, group) or unexamined_note
             )
         )
         for group, s in examination.mistakes
@@ -104,22 +106,22 @@ def hint_of(spec: Spec, group: str) -> str:
 
 def doubts(examination: Examination) -> list[Diagnostic]:
     """Warnings of expressions that seem to be undefined everywhere, or at the start of a run, with their places."""
-    listed = [
+    messages = [
         examination.spec.diagnostic(_place(examination.spec, DEFINEDNESS, s), str(s))
         for s in examination.groups.get(DEFINEDNESS, ())
     ]
-    return [replace(d, severity="warning") for d in listed]
+    return [replace(d, severity="warning") for d in messages]
 
 
 def _place(spec: Spec, group: str, statement: Statement) -> tuple[str, ...]:
     """The path of keys to the subject of a statement."""
-    places: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
-    places |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
-    places |= {"H is defined": ("hamiltonian",), "the density of a pair is symmetric": ("hamiltonian", "pairs")}
-    places |= {f"{name} is defined": ("casimirs", name) for name in spec.casimirs}
-    places |= {f"{name} is defined": ("invariants", name) for name in spec.invariants}
-    places |= {start_is_defined(run): ("runs", run, "initial") for run in spec.runs}
-    return places.get(statement.name, _PLACES.get(group.partition(" (")[0], ("poisson",)))
+    key_paths: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
+    key_paths |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
+    key_paths |= {"H is defined": ("hamiltonian",), "the density of a pair is symmetric": ("hamiltonian", "pairs")}
+    key_paths |= {f"{name} is defined": ("casimirs", name) for name in spec.casimirs}
+    key_paths |= {f"{name} is defined": ("invariants", name) for name in spec.invariants}
+    key_paths |= {start_is_defined(run): ("runs", run, "initial") for run in spec.runs}
+    return key_paths.get(statement.name, _PLACES.get(group.partition(" (")[0], ("poisson",)))
 
 
 def located(error: SpecError, spec: Spec) -> SpecError:

@@ -62,8 +62,8 @@ class Agreement:
         """The statement with the seconds."""
         seconds = f"in {self.sympy:.2f} s"
         if self.compiler is not None:
-            what = "" if self.term == 1 else f"S_1 … S_{self.term} "
-            seconds = f"{what}in {self.sympy:.2f} s, by phigen in {self.compiler:.3f} s"
+            terms = "" if self.term == 1 else f"S_1 … S_{self.term} "
+            seconds = f"{terms}in {self.sympy:.2f} s, by phigen in {self.compiler:.3f} s"
         return replace(self.statement, detail="; ".join(filter(None, [self.statement.detail, seconds])))
 
 
@@ -100,8 +100,8 @@ def _steps(compilation: CompiledSeries, terms: int) -> list[str]:
 
 def _limit(compilation: CompiledSeries, step: str, reached: int, reason: str) -> LimitError:
     reason = reason or "the time limit was reached"
-    before = ["nothing was compared", "S_1 was compared", f"S_1 … S_{reached} were compared"][min(reached, 2)]
-    message = f"{compilation.spec.file}: {step} was not derived a second time: {reason}; {before}"
+    progress = ["nothing was compared", "S_1 was compared", f"S_1 … S_{reached} were compared"][min(reached, 2)]
+    message = f"{compilation.spec.file}: {step} was not derived a second time: {reason}; {progress}"
     hint = "--seconds sets a longer limit, --terms fewer S_i"
     return LimitError([Diagnostic(message, hint=hint)])
 
@@ -122,14 +122,14 @@ def time_limit(seconds: float) -> Iterator[None]:
         if lasting:
             raise OutOfTimeError
 
-    before = signal.signal(signal.SIGALRM, over)
+    previous_handler = signal.signal(signal.SIGALRM, over)
     signal.setitimer(signal.ITIMER_REAL, max(seconds, 1e-6), 1.0)
     try:
         yield
     finally:
         lasting = False
         signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGALRM, previous_handler)
 
 
 class _Derivation:
@@ -190,8 +190,8 @@ class _Derivation:
         hamilton_jacobi(compilation.discretised, compilation.realisation, i, compilation.gauge.symbols).polynomial(i)
         end = time.perf_counter()
         self._taken += middle - start
-        used = compilation.series.polynomial(i)
-        theirs, size = used.tower.expression(used.terms[i - 1]), len(used.terms[i - 1])
+        polynomial = compilation.series.polynomial(i)
+        theirs, size = polynomial.tower.expression(polynomial.terms[i - 1]), len(polynomial.terms[i - 1])
         pair = ("", self._dictionary.expression(theirs), mine)
         statement = decide(f"S_{i}", [pair], self._positive, f"{size} term{'s' * (size != 1)}")
         self._found.append(mine)
@@ -244,8 +244,8 @@ class _Derivation:
         pairs = self._at_origin()
         for name, compiled_map, end in (("α", self._alpha, 0), ("β", self._beta, 1)):
             for c, theirs, mine in zip(coordinates, compiled_map(d), self._path(end)(d), strict=True):
-                every = dict.fromkeys([*theirs, *mine])
-                pairs += [(f"{name}_{c}", theirs.get(mu, sympy.S.Zero), mine.get(mu, sympy.S.Zero)) for mu in every]
+                all_keys = dict.fromkeys([*theirs, *mine])
+                pairs += [(f"{name}_{c}", theirs.get(mu, sympy.S.Zero), mine.get(mu, sympy.S.Zero)) for mu in all_keys]
         name = f"α and β up to degree {d} in p"
         statement = decide(name, pairs, self._positive, "from the path ṁ = π(m)p about its mean")
         return Agreement(statement, None, time.perf_counter() - start)
@@ -254,8 +254,8 @@ class _Derivation:
         d, x, p = self._degree, self._dictionary.coordinates, self._dictionary.covector
         start = time.perf_counter()
         residuals = defects(self._poisson, self._alpha(d), self._beta(d), x, p, d)
-        rest = [*self._at_origin(), *((label, r, sympy.S.Zero) for label, r in residuals)]
-        statement = decide(f"axioms of α and β up to degree {d - 1} in p", rest, self._positive, "")
+        labelled_residuals = [*self._at_origin(), *((label, r, sympy.S.Zero) for label, r in residuals)]
+        statement = decide(f"axioms of α and β up to degree {d - 1} in p", labelled_residuals, self._positive, "")
         return Agreement(statement, None, time.perf_counter() - start)
 
 
@@ -268,14 +268,16 @@ def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: 
     fewest, open_pairs = POINTS, 0
     for label, theirs, mine in pairs:
         functions = Functions([theirs, mine])
-        rest = functions.element(theirs) - functions.element(mine)
-        if rest == 0 or functions.vanishes(rest):
+        difference = functions.element(theirs) - functions.element(mine)
+        if difference == 0 or functions.vanishes(difference):
             continue
         open_pairs += 1
         point_or_count = _tried([theirs, mine], positive)
         if isinstance(point_or_count, str):
-            where = f"{label}, " if label else ""
-            return Statement(name, REFUTED, f"{where}{point_or_count}", _cut(sympy.sstr(functions.expression(rest))))
+            prefix = f"{label}, " if label else ""
+            return Statement(
+                name, REFUTED, f"{prefix}{point_or_count}", _cut(sympy.sstr(functions.expression(difference)))
+            )
         fewest = min(fewest, point_or_count)
     if not open_pairs:
         return Statement(name, PROVED, detail)
@@ -292,9 +294,9 @@ def _tried(pair: Sequence[Any], positive: Collection[str]) -> str | int:
     for k in range(_ATTEMPTS):
         point = sample_point([str(s) for s in symbols], positive, k)
         with mpmath.workdps(DIGITS):
-            at = [mpmath.mpf(v.numerator) / v.denominator for v in point.values()]
+            coordinates_at_point = [mpmath.mpf(v.numerator) / v.denominator for v in point.values()]
             try:
-                theirs, mine = (mpmath.mpf(v) for v in values(*at))
+                theirs, mine = (mpmath.mpf(v) for v in values(*coordinates_at_point))
             except (ArithmeticError, TypeError, ValueError):  # a pole, a complex value, not in the domain
                 continue
             if not (mpmath.isfinite(theirs) and mpmath.isfinite(mine)):

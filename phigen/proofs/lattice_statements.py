@@ -23,7 +23,7 @@ def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
         INVARIANTS: tuple(proofs.invariants(cell)),
         "Hamiltonian": tuple(proofs.pair_symmetry(cell)),
     }
-    return groups | {group: listed for group, listed in statements.items() if listed}
+    return groups | {group: group_statements for group, group_statements in statements.items() if group_statements}
 
 
 def sweeps(compilation: CompiledLattice) -> dict[str, tuple[Statement, ...]]:

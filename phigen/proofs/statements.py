@@ -84,8 +84,8 @@ def _defaults(spec: Spec, *runs: Run) -> list[dict[str, float]]:
     rate = spec.forces.damping
     if rate is None or not set(symbols_of(rate)) <= numbers:
         return []
-    bare = Run("", (), Fraction(1), 1)
-    return [spec.parameters_of(run) for run in runs or (bare,)]
+    default_run = Run("", (), Fraction(1), 1)
+    return [spec.parameters_of(run) for run in runs or (default_run,)]
 
 
 def tensor(system: System) -> dict[str, tuple[Statement, ...]]:
@@ -124,8 +124,8 @@ def _method_by_splitting(compilation: CompiledSplitting) -> dict[str, tuple[Stat
 
 def _method_by_gauss(compilation: CompiledGauss) -> dict[str, tuple[Statement, ...]]:
     system, pace = compilation.system, compilation.gauge.pace(compilation.system)
-    proved = check_gauss(system, compilation.discretised, compilation.gauss, compilation.tableau, pace)
-    return {compilation.label: tuple(proved)}
+    gauss_statements = check_gauss(system, compilation.discretised, compilation.gauss, compilation.tableau, pace)
+    return {compilation.label: tuple(gauss_statements)}
 
 
 def _method_by_series(compilation: CompiledSeries) -> dict[str, tuple[Statement, ...]]:
@@ -143,22 +143,22 @@ def series_statements(compilation: CompiledSeries) -> Iterator[Statement]:
     name = f"{equation} for S_t = {sum_of_terms(plan.terms)}"
     try:
         series = compilation.series.polynomial(terms)
-        rest = residual(series, system.hamiltonian, compilation.series.alpha, system.coordinates, system.times)
+        coefficients = residual(series, system.hamiltonian, compilation.series.alpha, system.coordinates, system.times)
     except OverflowError:
         yield Statement(name, UNDECIDED, "too many terms to expand; the recursion itself is used, unexpanded")
         return
-    listed = [(f"coefficient of t^{i}", r) for i, r in enumerate(rest)]
-    yield decide_elements(name, series.tower, listed[: plan.terms], system.positive, f"up to t^{plan.terms - 1}")
+    residuals = [(f"coefficient of t^{i}", r) for i, r in enumerate(coefficients)]
+    yield decide_elements(name, series.tower, residuals[: plan.terms], system.positive, f"up to t^{plan.terms - 1}")
     if realisation.symmetric:
-        even = ", ".join(f"S_{i}" for i in range(2, terms + 1, 2))
-        even_terms = [entry for i, entry in enumerate(listed) if i % 2]
+        even_names = ", ".join(f"S_{i}" for i in range(2, terms + 1, 2))
+        even_terms = [entry for i, entry in enumerate(residuals) if i % 2]
         whose = "" if plan is compilation.order else " of each stage"
         yield decide_elements(
-            f"{even} = 0", series.tower, even_terms, system.positive, f"hence the order {plan.order}{whose}"
+            f"{even_names} = 0", series.tower, even_terms, system.positive, f"hence the order {plan.order}{whose}"
         )
 
 
 def sum_of_terms(terms: int) -> str:
     """``t S_1 + … + t^5 S_5``."""
-    shown = ["t S_1", *(f"t^{i} S_{i}" for i in range(2, terms + 1))]
-    return " + ".join(shown if terms < 4 else [shown[0], "…", shown[-1]])
+    summands = ["t S_1", *(f"t^{i} S_{i}" for i in range(2, terms + 1))]
+    return " + ".join(summands if terms < 4 else [summands[0], "…", summands[-1]])
