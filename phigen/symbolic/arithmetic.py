@@ -58,15 +58,15 @@ class Arithmetic(Generic[T]):
                 return self.power(args[0], node.value)
         return self.function(node.op, args)
 
-    def values(self, roots: Sequence[Expression], known: Mapping[int, T] = NOTHING) -> list[T]:
+    def values(self, roots: Sequence[Expression], computed: Mapping[int, T] = NOTHING) -> list[T]:
         """The values of expressions. A shared node is computed once; its value is dropped after its last use.
 
-        ``known`` maps the ``id`` of nodes to values that are known already: nodes below them are not visited.
+        ``computed`` maps the ``id`` of nodes to values that are known already: nodes below them are not visited.
         """
-        order = topological(roots, known)
+        order = topological(roots, computed)
         uses = Counter(id(a) for node in order for a in node.args)
         uses.update(map(id, roots))
-        values = {i: known[i] for i in uses if i in known} if known else {}
+        values = {i: computed[i] for i in uses if i in computed} if computed else {}
         for node in order:
             values[id(node)] = self.visit(node, [values[id(a)] for a in node.args])
             for a in node.args:

@@ -24,15 +24,15 @@ def economised(
 
 def _chebyshev(degree: int, twice: Sequence[int]) -> list[int]:
     """The coefficients of T_n(y) in u, where 2y = ``twice[0]`` + ``twice[1]`` u: on −1 ≤ y ≤ 1."""
-    before, last = [1], [twice[0] // 2, twice[1] // 2]
+    previous, last = [1], [twice[0] // 2, twice[1] // 2]
     if degree == 0:
-        return before
+        return previous
     for _ in range(degree - 1):
-        after = [0] * (len(last) + 1)
+        following = [0] * (len(last) + 1)
         for k, c in enumerate(last):
-            after[k] += twice[0] * c
-            after[k + 1] += twice[1] * c
-        for k, c in enumerate(before):
-            after[k] -= c
-        before, last = last, after
+            following[k] += twice[0] * c
+            following[k + 1] += twice[1] * c
+        for k, c in enumerate(previous):
+            following[k] -= c
+        previous, last = last, following
     return last

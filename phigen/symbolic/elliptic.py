@@ -57,8 +57,12 @@ def series() -> tuple[tuple[Fraction, ...], ...]:
                 for (i, j), c in _product(_product(terms[a], terms[b]), terms[n - 1 - a - b]).items():
                     following[i, j + 1] = following.get((i, j + 1), Fraction(0)) + 2 * c / divisor
         terms.append(following)
-    listed = {power: c for term in terms for power, c in term.items()}
-    return tuple(tuple(listed[i, j] for i in range(TERMS - 2 * j)) for j in range((TERMS + 1) // 2) if (0, j) in listed)
+    coefficients = {power: c for term in terms for power, c in term.items()}
+    return tuple(
+        tuple(coefficients[i, j] for i in range(TERMS - 2 * j))
+        for j in range((TERMS + 1) // 2)
+        if (0, j) in coefficients
+    )
 
 
 def _product(a: dict[tuple[int, int], Fraction], b: dict[tuple[int, int], Fraction]) -> dict[tuple[int, int], Fraction]:
@@ -82,10 +86,10 @@ def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, r: Any) -> tupl
     """The partial derivatives of κ along t, P and R."""
     z = p * kappa**2
     *_, square = functions_of(kappa, p, r)
-    along = (1 + z) * square ** Fraction(1, 2) / 4
+    along_t = (1 + z) * square ** Fraction(1, 2) / 4
     squares, ratios = call(SQUARES, t, p, r), call(RATIOS, t, p, r)
     explicit = kappa**3 * (5 - 2 * z + z**2) / (1 + z) ** 3
-    return along, along * squares / 2 - explicit, along * ratios / 2
+    return along_t, along_t * squares / 2 - explicit, along_t * ratios / 2
 
 
 def value(library: Any, t: Any, p: Any, r: Any) -> Any:
@@ -129,8 +133,8 @@ def _amplitude(library: Any, u: Any, k: Any) -> Any:
         a, b, c = (a + b) / 2, library.sqrt(a * b), (a - b) / 2
         quotients.append((c / a, (b / a) ** 2))
     phi = 2 ** len(quotients) * a * u
-    for quotient, rest in reversed(quotients):
-        cosine = library.sqrt(rest + (quotient * library.cos(phi)) ** 2)
+    for quotient, squared_ratio in reversed(quotients):
+        cosine = library.sqrt(squared_ratio + (quotient * library.cos(phi)) ** 2)
         phi = (phi + library.atan2(quotient * library.sin(phi), cosine)) / 2
     return phi
 
@@ -177,8 +181,8 @@ def _third_series(a: Any, b: Any, c: Any) -> Any:
     second = a * b + a * c + b * c - 3 * dd
     third_sum = product + 2 * second * d + 4 * dd * d
     fourth, fifth = (2 * product + second * d + 3 * dd * d) * d, product * dd
-    even = -3 * second / 14 + 9 * second**2 / 88 - 3 * fourth / 22
-    return 1 + even + third_sum / 6 - 9 * second * third_sum / 52 + 3 * fifth / 26
+    even_terms = -3 * second / 14 + 9 * second**2 / 88 - 3 * fourth / 22
+    return 1 + even_terms + third_sum / 6 - 9 * second * third_sum / 52 + 3 * fifth / 26
 
 
 def carlson(library: Any, x: Any, y: Any, z: Any) -> Any:

@@ -333,16 +333,16 @@ def sqrt(a: Expression) -> Expression:
 
 def call(function: str, *args: Expression) -> Expression:
     """function(args), for a name in `FUNCTIONS`; values that are rational at 0 and 1 are folded."""
-    known = FUNCTIONS[function]
-    if known.arity != len(args):
-        raise ValueError(f"{function} takes {known.arity} argument(s), not {len(args)}")
+    record = FUNCTIONS[function]
+    if record.arity != len(args):
+        raise ValueError(f"{function} takes {record.arity} argument(s), not {len(args)}")
     first = args[0]
-    if first.is_zero and known.at_zero is not None:
-        return number(known.at_zero)
+    if first.is_zero and record.at_zero is not None:
+        return number(record.at_zero)
     if function == "log" and first is ONE:
         return ZERO
-    if known.rational and known.value and all(a.is_number for a in args):
-        return number(known.value(None, *(a.value for a in args)))
+    if record.rational and record.value and all(a.is_number for a in args):
+        return number(record.value(None, *(a.value for a in args)))
     return _node(function, args)
 
 
@@ -356,9 +356,9 @@ def total_at(terms: Mapping[int, Expression]) -> Expression:
     items = dict(sorted(terms.items()))
     while len(items) > 1 or any(items):
         sums: dict[int, Expression] = {}
-        for place, e in items.items():
-            half = place // 2
-            sums[half] = add(sums[half], e) if half in sums else e
+        for position, e in items.items():
+            parent = position // 2
+            sums[parent] = add(sums[parent], e) if parent in sums else e
         items = sums
     return items.get(0, ZERO)
 
@@ -379,27 +379,27 @@ def _balanced(
     return items[0]
 
 
-def topological(roots: Iterable[Expression], known: Container[int] = ()) -> list[Expression]:
+def topological(roots: Iterable[Expression], excluded: Container[int] = ()) -> list[Expression]:
     """All nodes below the roots, arguments before the nodes that use them; the order depends on the content only.
 
-    Nodes whose ``id`` is in ``known`` are left out, with everything below them.
+    Nodes whose ``id`` is in ``excluded`` are left out, with everything below them.
     """
     order: list[Expression] = []
-    done: set[Expression] = set()
+    visited: set[Expression] = set()
     for root in roots:
-        stack = [] if root in done or (known and id(root) in known) else [root]
+        stack = [] if root in visited or (excluded and id(root) in excluded) else [root]
         while stack:
             for a in stack[-1].args:
-                if a in done or (known and id(a) in known):
+                if a in visited or (excluded and id(a) in excluded):
                     continue
                 if a.args:
                     stack.append(a)
                     break
-                done.add(a)
+                visited.add(a)
                 order.append(a)
             else:
                 node = stack.pop()
-                done.add(node)
+                visited.add(node)
                 order.append(node)
     return order
 
@@ -452,9 +452,9 @@ def familiar(roots: Sequence[Expression]) -> list[Expression]:
     """The roots with phigen's own functions replaced by well-known ones, for s > 0 if that matters."""
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
-        known = FUNCTIONS[node.op].known if node.op in FUNCTIONS else None
-        if known:
-            return familiar([known(call, *args)])[0]
+        known_values = FUNCTIONS[node.op].known if node.op in FUNCTIONS else None
+        if known_values:
+            return familiar([known_values(call, *args)])[0]
         same = all(a is b for a, b in zip(args, node.args, strict=True))
         return node if same else rebuild(node, args)
 
@@ -569,36 +569,36 @@ def text(e: Expression, longest: int = 2000) -> str:
     def visit(node: Expression, args: list[tuple[str, int]]) -> tuple[str, int]:
         match node.op:
             case "number":
-                whole = node.value.denominator == 1
-                return str(node.value), (4 if whole and node.value >= 0 else 2 if node.value > 0 else 1)
+                is_integer = node.value.denominator == 1
+                return str(node.value), (4 if is_integer and node.value >= 0 else 2 if node.value > 0 else 1)
             case "symbol":
                 return node.value, 4
             case "pi" | "E":
                 return node.op, 4
             case "add":
-                out = f"{wrap(args[0], 1)} + {wrap(args[1], 2)}", 1
+                written = f"{wrap(args[0], 1)} + {wrap(args[1], 2)}", 1
             case "sub":
-                out = f"{wrap(args[0], 1)} - {wrap(args[1], 2)}", 1
+                written = f"{wrap(args[0], 1)} - {wrap(args[1], 2)}", 1
             case "neg":
-                out = f"-{wrap(args[0], 2)}", 1
+                written = f"-{wrap(args[0], 2)}", 1
             case "mul":
                 if node.args[1].op == "pow" and node.args[1].value == -1:
-                    out = f"{wrap(args[0], 2)}/{args[1][0].removeprefix('1/')}", 2
+                    written = f"{wrap(args[0], 2)}/{args[1][0].removeprefix('1/')}", 2
                 else:
-                    out = f"{wrap(args[0], 2)}*{wrap(args[1], 3)}", 2
+                    written = f"{wrap(args[0], 2)}*{wrap(args[1], 3)}", 2
             case "pow":
                 if node.value == Fraction(1, 2):
-                    out = f"sqrt({args[0][0]})", 4
+                    written = f"sqrt({args[0][0]})", 4
                 elif node.value == -1:
-                    out = f"1/{wrap(args[0], 4)}", 2
+                    written = f"1/{wrap(args[0], 4)}", 2
                 elif node.value.denominator == 1 and node.value > 0:
-                    out = f"{wrap(args[0], 4)}**{node.value}", 3
+                    written = f"{wrap(args[0], 4)}**{node.value}", 3
                 else:
-                    out = f"{wrap(args[0], 4)}**({node.value})", 3
+                    written = f"{wrap(args[0], 4)}**({node.value})", 3
             case "power":
-                out = f"{wrap(args[0], 4)}**({args[1][0]})", 3
+                written = f"{wrap(args[0], 4)}**({args[1][0]})", 3
             case _:
-                out = f"{node.op}({', '.join(a for a, _ in args)})", 4
-        return (out[0], out[1]) if len(out[0]) <= longest else ("…", 4)
+                written = f"{node.op}({', '.join(a for a, _ in args)})", 4
+        return (written[0], written[1]) if len(written[0]) <= longest else ("…", 4)
 
     return fold([e], visit)[0][0]

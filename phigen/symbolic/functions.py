@@ -390,5 +390,5 @@ ROOTS = {"sqrt": _library("sqrt"), "cbrt": _library("cbrt")}
 
 def written_in(language: str) -> dict[str, str]:
     """The spelling of functions in a language, roots among them, without those that a generated file defines."""
-    listed = {f.name: f.written[language] for f in FUNCTIONS.values() if language in f.written}
-    return listed | {name: forms[language] for name, forms in ROOTS.items()}
+    spellings = {f.name: f.written[language] for f in FUNCTIONS.values() if language in f.written}
+    return spellings | {name: forms[language] for name, forms in ROOTS.items()}

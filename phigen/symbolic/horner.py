@@ -48,21 +48,21 @@ def _nested(terms: Mapping[Powers, Expression], variables: Sequence[Expression])
         return total(c * _monomial(m, variables) for m, c in ordered)
     exponents = {m: dict(m).get(best, 0) for m in terms}
     step = min(e for e in exponents.values() if e)
-    inside = {
+    with_variable = {
         tuple((i, e - step if i == best else e) for i, e in m if i != best or e > step): c
         for m, c in terms.items()
         if exponents[m]
     }
-    outside = {m: c for m, c in terms.items() if not exponents[m]}
-    nested = power(variables[best], step) * _nested(inside, variables)
-    return nested + _nested(outside, variables) if outside else nested
+    without_variable = {m: c for m, c in terms.items() if not exponents[m]}
+    nested = power(variables[best], step) * _nested(with_variable, variables)
+    return nested + _nested(without_variable, variables) if without_variable else nested
 
 
 def _common(terms: Iterable[Powers]) -> dict[int, int]:
     """The powers that divide all terms."""
-    first, *others = terms
+    first, *remaining = terms
     common = dict(first)
-    for m in others:
+    for m in remaining:
         exponents = dict(m)
         common = {i: min(e, exponents[i]) for i, e in common.items() if i in exponents}
         if not common:

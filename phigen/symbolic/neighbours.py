@@ -76,13 +76,15 @@ class Neighbours:
         """The expressions at the site with an offset on a grid."""
         if not any(offset):
             return list(expressions)
-        moved = {name: symbol(self.at(base, plus(o, offset))) for name, (base, o) in self.places(*expressions).items()}
-        return substitute(expressions, moved)
+        shifted_symbols = {
+            name: symbol(self.at(base, plus(o, offset))) for name, (base, o) in self.places(*expressions).items()
+        }
+        return substitute(expressions, shifted_symbols)
 
     def on(self, expression: Expression, end: str) -> Expression:
         """The density of a site at one end of a bond or a pair."""
-        moved = {name: symbol(self.at(base, (end,))) for name, (base, _) in self.places(expression).items()}
-        return substitute([expression], moved)[0]
+        symbols_at_end = {name: symbol(self.at(base, (end,))) for name, (base, _) in self.places(expression).items()}
+        return substitute([expression], symbols_at_end)[0]
 
 
 def steps(offset: Offset) -> tuple[int, ...]:

@@ -135,11 +135,11 @@ class Numbers(Arithmetic[Any]):
             return +getattr(self._expected(name), name.lower())
         if name == "power":
             return self._power(*args)
-        known = FUNCTIONS[name]
-        if known.rational and known.value:
-            return self._convert(known.value(None, *args))
+        record = FUNCTIONS[name]
+        if record.rational and record.value:
+            return self._convert(record.value(None, *args))
         library = self._expected(name)
-        return known.value(library, *args) if known.value else getattr(library, name)(*args)
+        return record.value(library, *args) if record.value else getattr(library, name)(*args)
 
     def _expected(self, name: str) -> Any:
         if self._library is None:

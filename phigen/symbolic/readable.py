@@ -72,17 +72,19 @@ class Formula:
 
     def __str__(self) -> str:
         signed = [(c < 0, _term(abs(c), _monomial(m))) for c, m in self.terms]
-        more = f" + … ({self.size} terms)" if self.hidden else ""
-        joined = (signed_sum(signed) if signed else "0") + more
+        ellipsis = f" + … ({self.size} terms)" if self.hidden else ""
+        printed_sum = (signed_sum(signed) if signed else "0") + ellipsis
         if self.divisor == 1:
-            return joined
-        return f"{joined}/{self.divisor}" if len(signed) == 1 and not more else f"({joined})/{self.divisor}"
+            return printed_sum
+        return (
+            f"{printed_sum}/{self.divisor}" if len(signed) == 1 and not ellipsis else f"({printed_sum})/{self.divisor}"
+        )
 
 
 def signed_sum(terms: Iterable[tuple[bool, str]]) -> str:
     """Terms joined by their signs, each given by whether it is negative."""
-    joined = "".join(f" {'-' if negative else '+'} {body}" for negative, body in terms)
-    return joined[3:] if joined.startswith(" + ") else f"-{joined[3:]}"
+    printed_sum = "".join(f" {'-' if negative else '+'} {body}" for negative, body in terms)
+    return printed_sum[3:] if printed_sum.startswith(" + ") else f"-{printed_sum[3:]}"
 
 
 def _term(coefficient: Fraction, monomial: str) -> str:
@@ -91,33 +93,37 @@ def _term(coefficient: Fraction, monomial: str) -> str:
     return monomial if coefficient == 1 else f"{coefficient}*{monomial}"
 
 
-def of_polynomial(tower: Tower, element: Poly, most: int | None = SHOWN, small: Collection[str] = ()) -> Formula:
-    """The formula of an element of a tower; ``most`` bounds the terms shown, None shows all.
+def of_polynomial(
+    tower: Tower, element: Poly, max_terms: int | None = SHOWN, small_symbols: Collection[str] = ()
+) -> Formula:
+    """The formula of an element of a tower; ``max_terms`` bounds the terms shown, None shows all.
 
-    If terms are left out, those of the lowest degree in the ``small`` symbols come first, so that they are shown.
+    If terms are left out, those of the lowest degree in the ``small_symbols`` come first, and are shown.
     """
     terms = [(rational(c), tuple(int(e) for e in m)) for m, c in element.to_dict().items()]
     divisor = lcm(*(c.denominator for c, _ in terms)) if terms else 1
     if len(terms) == 1 and terms[0][0].denominator == 1:
         divisor = 1
-    shown = terms
-    if most is not None and len(terms) > most + 1:
-        places = [i for i, name in enumerate(tower.symbols) if name in small]
-        shown = sorted(terms, key=lambda term: sum(term[1][i] for i in places))[:most]
+    shown_terms = terms
+    if max_terms is not None and len(terms) > max_terms + 1:
+        positions = [i for i, name in enumerate(tower.symbols) if name in small_symbols]
+        shown_terms = sorted(terms, key=lambda term: sum(term[1][i] for i in positions))[:max_terms]
     variables = with_plain_names([*(symbol(n) for n in tower.symbols), *(g.expression for g in tower.generators)])
-    listed = tuple((c * divisor, _factors(variables, exponents)) for c, exponents in shown)
-    return Formula(divisor, listed, len(terms) - len(shown))
+    printed_terms = tuple((c * divisor, _factors(variables, exponents)) for c, exponents in shown_terms)
+    return Formula(divisor, printed_terms, len(terms) - len(shown_terms))
 
 
-def readable(expressions: Sequence[Expression], most: int | None = SHOWN, small: Collection[str] = ()) -> list[str]:
+def readable(
+    expressions: Sequence[Expression], max_terms: int | None = SHOWN, small_symbols: Collection[str] = ()
+) -> list[str]:
     """The expressions as text, expanded where that is shorter; covectors are written ``p_NAME``.
 
-    Covectors, and the symbols in ``small``, count as small where terms are left out: see `of_polynomial`.
+    Covectors, and the symbols in ``small_symbols``, count as small where terms are left out: see `of_polynomial`.
     """
     covectors = (name for name in symbols_of(*expressions) if kind_of(name) == MOMENTUM)
-    shown = with_plain_names(expressions)
-    forms = expanded(shown, most, {plain(name) for name in (*covectors, *small)})
-    texts = [_written(e) for e in shown]
+    renamed = with_plain_names(expressions)
+    forms = expanded(renamed, max_terms, {plain(name) for name in (*covectors, *small_symbols)})
+    texts = [_written(e) for e in renamed]
     return [min((str(f), t), key=len) if f else t for f, t in zip(forms, texts, strict=True)]
 
 
@@ -162,8 +168,8 @@ def infix(e: Expression) -> str:
                 return f"{wrap(args[0], 4)}**{wrap(args[1], 4)}", 3
             case _ if node.args:
                 return f"{_GREEK.get(node.op, node.op)}({', '.join(a for a, _ in args)})", 4
-        written = text(node)
-        return written, 4 if node.op == "symbol" or written.isidentifier() else 3 if written.isdigit() else 2
+        printed = text(node)
+        return printed, 4 if node.op == "symbol" or printed.isidentifier() else 3 if printed.isdigit() else 2
 
     return fold([e], visit)[0][0]
 
@@ -185,9 +191,9 @@ def cut(text: str) -> str:
 
 
 def expanded(
-    expressions: Sequence[Expression], most: int | None, small: Collection[str] = ()
+    expressions: Sequence[Expression], max_terms: int | None, small_symbols: Collection[str] = ()
 ) -> Iterator[Formula | None]:
-    """The expressions multiplied out, common factors cancelled, with ``most`` terms shown; ``small`` as above.
+    """The expressions multiplied out, common factors cancelled, with ``max_terms`` terms shown; see `readable`.
 
     None for those that are too large to try.
     """
@@ -196,7 +202,7 @@ def expanded(
             yield None
             continue
         tower = Tower(symbols_of(e), [e])
-        yield of_polynomial(tower, tower.reduced(tower.convert(e)), most, small)
+        yield of_polynomial(tower, tower.reduced(tower.convert(e)), max_terms, small_symbols)
 
 
 def _factors(variables: Sequence[Expression], exponents: Sequence[int]) -> Monomial:
@@ -212,12 +218,12 @@ def _factors(variables: Sequence[Expression], exponents: Sequence[int]) -> Monom
 
 def _monomial(factors: Monomial) -> str:
     """A product as text, negative powers in one denominator."""
-    above = [_atom(power(b, e)) for b, e in factors if e > 0]
-    below = [_atom(power(b, -e)) for b, e in factors if e < 0]
-    top = "*".join(above) or "1"
-    if not below:
+    numerator = [_atom(power(b, e)) for b, e in factors if e > 0]
+    denominator = [_atom(power(b, -e)) for b, e in factors if e < 0]
+    top = "*".join(numerator) or "1"
+    if not denominator:
         return top
-    return f"{top}/{below[0]}" if len(below) == 1 else f"{top}/({'*'.join(below)})"
+    return f"{top}/{denominator[0]}" if len(denominator) == 1 else f"{top}/({'*'.join(denominator)})"
 
 
 def _atom(e: Expression) -> str:

@@ -34,22 +34,22 @@ def slopes(k: int) -> Callable[..., tuple[Any, ...]]:
     def rule(call: Callable[..., Any], f: Any, t: Any, *a: Any) -> tuple[Any, ...]:
         last = call(REMAINDERS[3], t, *a)
         vanishing = k == 0 or (k == 1 and getattr(a[0], "is_zero", a[0] == 0))  # F_0 is 0 with a_0
-        before = 0 if vanishing else call(REMAINDERS[k - 1], t, *a)
-        along = (before + 1 if k == 1 else before) + a[k] * last
+        previous = 0 if vanishing else call(REMAINDERS[k - 1], t, *a)
+        slope = (previous + 1 if k == 1 else previous) + a[k] * last
         quotient = [call(name, t, *a) for name in QUOTIENTS]
         partial = []
         for _ in range(4):
             partial.append(quotient[k])
             quotient = times_x(quotient, a)
-        return along, *partial
+        return slope, *partial
 
     return rule
 
 
 def times_x(coefficients: Any, a: Any) -> list[Any]:
     """Return x times a polynomial of degree 3 modulo p."""
-    *others, top = coefficients
-    return [c * top + e for c, e in zip(a, [0, *others], strict=True)]
+    *lower, top = coefficients
+    return [c * top + e for c, e in zip(a, [0, *lower], strict=True)]
 
 
 def value(k: int, library: Any, t: Any, *a: Any) -> Any:
@@ -64,10 +64,10 @@ def quotient(k: int, library: Any, t: Any, *a: Any) -> Any:
 
 def _coefficients(library: Any, t: Any, a: Any) -> tuple[list[Any], list[Any]]:
     """The F_k and the G_k."""
-    bound = max(abs(c * t ** (4 - j)) ** (1 / (4 - j) + 0 * t) for j, c in enumerate(a))
+    root_bound = max(abs(c * t ** (4 - j)) ** (1 / (4 - j) + 0 * t) for j, c in enumerate(a))
     halvings = 0
-    while bound > MAX_ROOT:
-        bound, halvings = bound / 2, halvings + 1
+    while root_bound > MAX_ROOT:
+        root_bound, halvings = root_bound / 2, halvings + 1
     u = t / 2**halvings
     c = [e * u ** (4 - j) for j, e in enumerate(a)]
     zero = 0 * t
@@ -80,9 +80,9 @@ def _coefficients(library: Any, t: Any, a: Any) -> tuple[list[Any], list[Any]]:
         g = [x + factor * y for x, y in zip(g, q, strict=True)]
     for _ in range(halvings):
         upper, square = _divided(_product(f, f), c)
-        _, mixed = _divided(_product(f, g), c)
+        _, remainder = _divided(_product(f, g), c)
         f = [2 * x + y for x, y in zip(f, square, strict=True)]
-        g = [2 * (x + y) + e for x, y, e in zip(g, mixed, [*upper, zero], strict=True)]
+        g = [2 * (x + y) + e for x, y, e in zip(g, remainder, [*upper, zero], strict=True)]
     return [e * u**k for k, e in enumerate(f)], [e * u ** (4 + k) for k, e in enumerate(g)]
 
 

@@ -61,11 +61,11 @@ def lane_coefficients(order: int) -> list[float]:
 @cache
 def rest_coefficients(order: int) -> list[float]:
     """Coefficients, for |s| < `MIDDLE`, of the derivative minus its pole 2·order!/(4π² − s)^{order+1}."""
-    rest = []
+    differences = []
     for n in range(MIDDLE_TERMS):
         factor = math.factorial(n + order) // math.factorial(n)
-        rest.append(float((_series(n + order) - 2 / (4 * _PI**2) ** (n + order + 1)) * factor))
-    return rest
+        differences.append(float((_series(n + order) - 2 / (4 * _PI**2) ** (n + order + 1)) * factor))
+    return differences
 
 
 def in_double(order: int, s: float) -> float:

@@ -102,11 +102,11 @@ def closure(roots: Sequence[Expression]) -> list[Expression]:
     closed = list(roots)
     while True:
         order = topological(closed)
-        present = {id(e) for e in order}
-        new = [d for e in order if _by_derivative(e) for d in partials(e) if id(d) not in present]
-        if not new:
+        known_ids = {id(e) for e in order}
+        missing_nodes = [d for e in order if _by_derivative(e) for d in partials(e) if id(d) not in known_ids]
+        if not missing_nodes:
             return order
-        closed += new
+        closed += missing_nodes
 
 
 def _by_derivative(e: Expression) -> bool:
@@ -134,13 +134,13 @@ class Taylor:
 
     def advance(self, inputs: dict[str, Any], running: progress.Stage | None = None) -> None:
         """Compute the next level of all nodes; ``inputs`` gives that of the moving symbols, ``running`` counts them."""
-        for done, e in enumerate(self.order, 1):
+        for count, e in enumerate(self.order, 1):
             coefficients = self.series[id(e)]
             coefficients.append(self._coefficient(e, len(coefficients), inputs))
             if e.op in ("add", "sub", "neg"):  # sums are stored too, and may be longer than all products
                 self._count(coefficients[-1])
             if running:
-                running.done = done
+                running.done = count
 
     def _product(self, a: Any, b: Any) -> Any:
         product = self.ring.product(a, b)
@@ -183,11 +183,11 @@ class Taylor:
     def _convolve(self, a: list[Any], b: list[Any], i: int) -> Any:
         zero = self.ring.vanishes
         if a is b:
-            two, present = self.ring.constant(2), (j for j in range((i + 1) // 2) if not zero(a[j]))
-            pairs = [self._product(a[j], a[i - j]) * two for j in present]
+            twice, indices = self.ring.constant(2), (j for j in range((i + 1) // 2) if not zero(a[j]))
+            pairs = [self._product(a[j], a[i - j]) * twice for j in indices]
             return self.ring.combine(pairs + ([self._product(a[i // 2], a[i // 2])] if i % 2 == 0 else []))
-        present = (j for j in range(i + 1) if not (zero(a[j]) or zero(b[i - j])))
-        return self.ring.combine([self._product(a[j], b[i - j]) for j in present])
+        indices = (j for j in range(i + 1) if not (zero(a[j]) or zero(b[i - j])))
+        return self.ring.combine([self._product(a[j], b[i - j]) for j in indices])
 
     def _power(self, e: Expression, a: list[Any], i: int) -> Any:
         exponent: Fraction = e.value

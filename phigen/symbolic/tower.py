@@ -155,8 +155,8 @@ class Tower(Arithmetic[Poly]):
 
     def _grow(self, missing: _MissingError) -> None:
         # The root of q, found after 1/q, replaces 1/q from now on: elements with 1/q are converted again.
-        late = missing.kind == "root" and missing.inverse
-        if late and any(g.kind == "reciprocal" for g in self.generators):
+        is_inverse_root = missing.kind == "root" and missing.inverse
+        if is_inverse_root and any(g.kind == "reciprocal" for g in self.generators):
             self._renamed = True
             self._forget()
         name = Symbol("g", len(self.generators))
@@ -185,17 +185,17 @@ class Tower(Arithmetic[Poly]):
 
     def _close(self, running: progress.Stage) -> None:
         """Add generators until the derivative of each is in the ring."""
-        done = size = 0
-        while done < len(self.generators):
-            (rules,) = sparse_derivatives([self.generators[done].expression], self.variables)
+        closed_count = size = 0
+        while closed_count < len(self.generators):
+            (rules,) = sparse_derivatives([self.generators[closed_count].expression], self.variables)
             for v in self.variables:
                 if v in rules:
                     value = self._absorb(rules[v])  # which may replace the generators by larger ones
-                    self.generators[done].derivative[v] = value
+                    self.generators[closed_count].derivative[v] = value
                     size += len(value) * self.bytes_per_term
                     if size > budgets.PRODUCT_BYTES:
                         raise OverflowError("derivatives with too many terms, of functions inside functions")
-            done += 1
+            closed_count += 1
             running.done += 1
 
     # -- conversion -------------------------------------------------------------------------------
@@ -225,17 +225,17 @@ class Tower(Arithmetic[Poly]):
             return self._entire(name, first)
         if name in SPECIAL:
             return self._special(order_of(name), first)
-        known = FUNCTIONS[name]
-        if known.known:
-            return known.known(lambda f, *a: self.function(f, list(a)), *args)
-        if known.at_zero is not None and first.is_constant() and first == 0:
-            return self.constant(known.at_zero)
+        record = FUNCTIONS[name]
+        if record.known:
+            return record.known(lambda f, *a: self.function(f, list(a)), *args)
+        if record.at_zero is not None and first.is_constant() and first == 0:
+            return self.constant(record.at_zero)
         if name == "log" and first == 1:
             return self.zero
-        if known.parity and rational(first.leading_coefficient()) < 0:
+        if record.parity and rational(first.leading_coefficient()) < 0:
             # One generator for f(q) and f(-q).
             mirrored = self._generator(name, [-first])
-            return mirrored if known.parity == "even" else -mirrored
+            return mirrored if record.parity == "even" else -mirrored
         if name == "exp":
             for g in self.generators:
                 ratio = _ratio(first, g.arguments[0]) if g.kind == "exp" else None
@@ -253,8 +253,8 @@ class Tower(Arithmetic[Poly]):
             return relative if name == "exprel" else (exp - relative) * inverse
         if name == "arcroot1":
             sine = self._entire("sinroot", s * self.constant(Fraction(1, 4)))
-            rest = sine**2 * self.constant(Fraction(1, 2)) - 3 * self._entire("arcroot", s)
-            return rest * self._reciprocal(s) * self.constant(Fraction(1, 2))
+            numerator = sine**2 * self.constant(Fraction(1, 2)) - 3 * self._entire("arcroot", s)
+            return numerator * self._reciprocal(s) * self.constant(Fraction(1, 2))
         if name == "arcroot":  # by half angles, in which flows with it are written
             quarter = s * self.constant(Fraction(1, 4))
             return (1 - self._entire("sinroot", quarter) * self._entire("cosroot", quarter)) * self._reciprocal(s)
@@ -486,9 +486,9 @@ class Tower(Arithmetic[Poly]):
 
     def _partner(self, g: Generator) -> Generator | None:
         """The root 1/w for w, or w for 1/w, if it came before."""
-        for other in self.generators[: self.generators.index(g)]:
-            if other.kind == "root" and other.degree == g.degree and other.arguments == g.arguments:
-                return other
+        for candidate in self.generators[: self.generators.index(g)]:
+            if candidate.kind == "root" and candidate.degree == g.degree and candidate.arguments == g.arguments:
+                return candidate
         return None
 
     def _eliminate(self, element: Poly, g: Generator) -> Poly:
@@ -504,17 +504,23 @@ class Tower(Arithmetic[Poly]):
         if g.kind == "sign":
             return self.combine(c * self.variable(g.name) ** (e % 2) for e, c in parts.items())
         if g.kind == "exp":
-            for other in self.generators:
-                if other is not g and other.kind == "exp" and other.arguments[0] == -g.arguments[0]:
-                    top, w = max(parts), self.variable(other.name)
+            for other_generator in self.generators:
+                if (
+                    other_generator is not g
+                    and other_generator.kind == "exp"
+                    and other_generator.arguments[0] == -g.arguments[0]
+                ):
+                    top, w = max(parts), self.variable(other_generator.name)
                     return self.combine(c * w ** (top - e) for e, c in parts.items())
         if g.kind == "cosroot":
             return self._eliminate_cosroot(parts, g)
         if partner:
-            for other in self.generators:
-                if other.kind == partner and other.arguments == g.arguments:
+            for other_generator in self.generators:
+                if other_generator.kind == partner and other_generator.arguments == g.arguments:
                     square = (
-                        1 - self.variable(other.name) ** 2 if g.kind == "sin" else 1 + self.variable(other.name) ** 2
+                        1 - self.variable(other_generator.name) ** 2
+                        if g.kind == "sin"
+                        else 1 + self.variable(other_generator.name) ** 2
                     )
                     generator = self.variable(g.name)
                     return self.combine(c * generator ** (e % 2) * square ** (e // 2) for e, c in parts.items())
@@ -528,9 +534,9 @@ class Tower(Arithmetic[Poly]):
 
     def _eliminate_root(self, parts: dict[int, Poly], g: Generator) -> Poly:
         base, n, generator = g.arguments[0], g.degree, self.variable(g.name)
-        if other := self._partner(g):
+        if partner := self._partner(g):
             # w·v = 1: multiplied by a power of the partner, g disappears.
-            top, w = max(parts), self.variable(other.name)
+            top, w = max(parts), self.variable(partner.name)
             return self.combine(c * w ** (top - e) for e, c in parts.items())
         if not g.inverse:
             return self.combine(c * generator ** (e % n) * base ** (e // n) for e, c in parts.items())
@@ -558,9 +564,9 @@ class Tower(Arithmetic[Poly]):
         if not pairs:
             return element
         for i, j in pairs:
-            one = self.gens[i] * self.gens[j]
+            product = self.gens[i] * self.gens[j]
             for k in reversed(range(min(int(degrees[i]), int(degrees[j])).bit_length())):
-                _, element = divmod(element, one ** (2**k) - 1)
+                _, element = divmod(element, product ** (2**k) - 1)
         return element
 
     def _inverse_pairs(self) -> list[tuple[int, int]]:

@@ -31,12 +31,12 @@ def slopes(
     """The partial derivatives along t, r, η, β and μ; |q × q̇|² only tells whether there is a value."""
     square = s**2
     z = beta * square
-    half, slope = call("sinroot", z / 4), call("sinroot1", z / 4)
-    g1, g2, g3 = s * call("sinroot", z), square * half**2 / 2, square * s * call("arcroot", z)
+    half_sine, slope = call("sinroot", z / 4), call("sinroot1", z / 4)
+    g1, g2, g3 = s * call("sinroot", z), square * half_sine**2 / 2, square * s * call("arcroot", z)
     inverse = 1 / (r * call("cosroot", z) + eta * g1 + mu * g2)
     # sinroot(z/4)²/2 has the derivative sinroot(z/4) sinroot1(z/4)/4 along z.
-    along = r * call("sinroot1", z) + eta * s * (half * slope / 4) + mu * square * call("arcroot1", z)
-    return inverse, -(g1 * inverse), -(g2 * inverse), -(square * s * along * inverse), -(g3 * inverse), 0
+    along_t = r * call("sinroot1", z) + eta * s * (half_sine * slope / 4) + mu * square * call("arcroot1", z)
+    return inverse, -(g1 * inverse), -(g2 * inverse), -(square * s * along_t * inverse), -(g3 * inverse), 0
 
 
 def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any) -> Any:
@@ -93,8 +93,8 @@ def _equation(library: Any, s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any
     from phigen.symbolic import entire
 
     z = beta * s**2
-    half, c3 = entire.value(library, "sinroot", z / 4), entire.value(library, "arcroot", z)
-    g1, g2, g3 = s * (1 - z * c3), s**2 * half**2 / 2, s**3 * c3
+    half_sine, c3 = entire.value(library, "sinroot", z / 4), entire.value(library, "arcroot", z)
+    g1, g2, g3 = s * (1 - z * c3), s**2 * half_sine**2 / 2, s**3 * c3
     g0 = 1 - beta * g2
     scale = t + abs(r * g1) + abs(eta * g2) + abs(mu * g3)
     return (

@@ -64,14 +64,14 @@ def decide_zero(
     ``residuals`` are pairs (label, expression); a label such as ``(x1, x2, x3)`` names the failing part in a
     refutation. ``positive`` names the symbols that take positive values only. ``detail`` is added to a proof.
     """
-    listed = [(label, e) for label, e in residuals if not e.is_zero]
+    nonzero = [(label, e) for label, e in residuals if not e.is_zero]
     try:
-        tower = Tower(symbols_of(*(e for _, e in listed)), [e for _, e in listed])
-        elements = tower.convert_all([e for _, e in listed])
+        tower = Tower(symbols_of(*(e for _, e in nonzero)), [e for _, e in nonzero])
+        elements = tower.convert_all([e for _, e in nonzero])
     except OverflowError:
-        return _at_points(name, listed, lambda k: str(listed[k][1]), positive)
+        return _at_points(name, nonzero, lambda k: str(nonzero[k][1]), positive)
     return decide_elements(
-        name, tower, [(label, f) for (label, _), f in zip(listed, elements, strict=True)], positive, detail
+        name, tower, [(label, f) for (label, _), f in zip(nonzero, elements, strict=True)], positive, detail
     )
 
 
@@ -91,29 +91,29 @@ def decide_elements(
 
 
 def _at_points(
-    name: str, pending: Sequence[tuple[str, Expression]], shown: Callable[[int], str], positive: Collection[str]
+    name: str, pending: Sequence[tuple[str, Expression]], describe: Callable[[int], str], positive: Collection[str]
 ) -> Statement:
     """The verdict on residuals that did not reduce to 0, or are too large to be tried: refuted at a point, or not."""
     fewest = POINTS
     for k, (label, expression) in enumerate(pending):
         point_or_count = _refuting_point(expression, positive)
         if isinstance(point_or_count, str):
-            where = f"{label}, " if label else ""
-            more = f"; {len(pending)} parts do not reduce to 0" if len(pending) > 1 else ""
-            failing = tuple((part, cut(shown(i))) for i, (part, _) in enumerate(pending[:MOST_LISTED]) if part)
-            return Statement(name, REFUTED, f"{where}{point_or_count}{more}", cut(shown(k)), failing)
+            prefix = f"{label}, " if label else ""
+            remaining_note = f"; {len(pending)} parts do not reduce to 0" if len(pending) > 1 else ""
+            failing = tuple((part, cut(describe(i))) for i, (part, _) in enumerate(pending[:MOST_LISTED]) if part)
+            return Statement(name, REFUTED, f"{prefix}{point_or_count}{remaining_note}", cut(describe(k)), failing)
         fewest = min(fewest, point_or_count)
     parts = ", ".join(label for label, _ in pending if label)
-    about = f" for {parts}" if parts and len(parts) <= LONGEST else ""
+    parts_note = f" for {parts}" if parts and len(parts) <= LONGEST else ""
     if fewest == 0:
-        return Statement(name, UNDECIDED, f"no proof{about}, and no point of the domain among {_ATTEMPTS} tried")
-    return Statement(name, CHECKED, f"{fewest} points, relative tolerance 1e-{ZERO_DIGITS}{about}")
+        return Statement(name, UNDECIDED, f"no proof{parts_note}, and no point of the domain among {_ATTEMPTS} tried")
+    return Statement(name, CHECKED, f"{fewest} points, relative tolerance 1e-{ZERO_DIGITS}{parts_note}")
 
 
 def _refuting_point(expression: Expression, positive: Collection[str]) -> str | int:
     """A point where the expression is not zero and its value, ``at x=11/7: -8.5``; else the number of points tried."""
     names = symbols_of(expression)
-    tried = 0
+    tried_points = 0
     for k in range(_ATTEMPTS):
         point = sample_point(names, positive, k)
         try:
@@ -122,10 +122,10 @@ def _refuting_point(expression: Expression, positive: Collection[str]) -> str | 
             continue
         if value:
             return refutation({plain(n): str(v) for n, v in point.items()}, k, value)
-        tried += 1
-        if tried == POINTS or not names:
+        tried_points += 1
+        if tried_points == POINTS or not names:
             break
-    return tried
+    return tried_points
 
 
 def refutation(point: Mapping[str, str], number: int, value: str) -> str:
