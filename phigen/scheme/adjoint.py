@@ -38,34 +38,36 @@ def pulled_back(
     kernel: Kernel,
     name: str,
     seeds: Mapping[str, Sequence[Expression]],
-    along: Mapping[str, Sequence[str]],
+    variables: Mapping[str, Sequence[str]],
     purpose: str,
 ) -> Kernel:
     """Return the derivatives of Σ cotangent · value by some inputs of a kernel, over the values that have ``seeds``.
 
-    A seed ``bar`` adds an input ``bar``: the cotangents of its values. An array x in ``along`` gives the output
+    A seed ``bar`` adds an input ``bar``: the cotangents of its values. An array x in ``variables`` gives the output
     ``x_bar``.
     """
     value = total(
         symbol(Symbol(seed, i)) * e for seed, values in seeds.items() for i, e in enumerate(values) if not e.is_zero
     )
-    plain_slopes = gradient(value, [s for symbols in along.values() for s in symbols])
+    plain_slopes = gradient(value, [s for symbols in variables.values() for s in symbols])
     slopes = iter(_without_cosines(plain_slopes, [e for values in seeds.values() for e in values]))
-    outputs = tuple(Output(f"{array}_bar", tuple(next(slopes) for _ in symbols)) for array, symbols in along.items())
+    outputs = tuple(
+        Output(f"{array}_bar", tuple(next(slopes) for _ in symbols)) for array, symbols in variables.items()
+    )
     inputs = {**kernel.inputs, **{seed: tuple(Symbol(seed, i) for i in range(len(v))) for seed, v in seeds.items()}}
     return Kernel(name, purpose, inputs, outputs)
 
 
 def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression]) -> list[Expression]:
     """Return the slopes with 1 - versin(a) for cos(a), if the values contain versin(a)."""
-    known = {e.args[0] for e in topological(values) if e.op == "versin"}
+    versine_arguments = {e.args[0] for e in topological(values) if e.op == "versin"}
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
-        if e.op == "cos" and e.args[0] in known:
+        if e.op == "cos" and e.args[0] in versine_arguments:
             return ONE - call("versin", *args)
         return rebuild(e, args)
 
-    return fold(slopes, visit) if known else list(slopes)
+    return fold(slopes, visit) if versine_arguments else list(slopes)
 
 
 def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
@@ -112,14 +114,15 @@ def gauss_adjoint(
         ("stage_start_adjoint", start, "cotangents of the start of the step and of the coefficients"),
     )
     kernels = [
-        pulled_back(field, name, seeds, along, f"{what}, from that of its increment") for name, along, what in at_stages
+        pulled_back(field, name, seeds, inputs, f"{description}, from that of its increment")
+        for name, inputs, description in at_stages
     ]
     purpose = (
         "cotangents of the start, of the sum of the stage increments and of the coefficients, from that of the change"
     )
-    along = {"x": tuple(coordinates), "z": change.inputs["z"], TABLE: coefficients.table}
+    inputs = {"x": tuple(coordinates), "z": change.inputs["z"], TABLE: coefficients.table}
     seeds = {"change_bar": change.outputs[0].values}
-    return [*kernels, pulled_back(change, "stage_change_adjoint", seeds, along, purpose)]
+    return [*kernels, pulled_back(change, "stage_change_adjoint", seeds, inputs, purpose)]
 
 
 def completed(
@@ -147,9 +150,9 @@ def completed(
 
 def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]]) -> Kernel:
     """Return the transpose of ``prepare``; cotangents of the arguments of matrix exponentials are a further input."""
-    stored = list(prepare.outputs[0].values)
-    exponents = [e for start, n in prepare.exponentials for e in stored[start : start + n * n]]
-    values = stored[: len(stored) - len(exponents)]
+    table_values = list(prepare.outputs[0].values)
+    exponents = [e for start, n in prepare.exponentials for e in table_values[start : start + n * n]]
+    values = table_values[: len(table_values) - len(exponents)]
     seeds = {"coef_bar": [*values, *[ZERO] * len(exponents)]}
     purpose = "cotangents of the parameters, from those of the coefficients"
     if {s for symbols in differentiated.values() for s in symbols}.isdisjoint(symbols_of(*exponents)):
@@ -183,8 +186,8 @@ def _without(kernel: Kernel, constant: Sequence[bool]) -> Kernel:
 
 def level_adjoint(system: System) -> Kernel:
     """Return the gradient of H along state and parameters, on which the energy level e = −H(x₀) depends."""
-    along = [*system.coordinates, *system.parameter_names]
-    slopes = gradient(system.hamiltonian, along)
+    variables = [*system.coordinates, *system.parameter_names]
+    slopes = gradient(system.hamiltonian, variables)
     n = system.dimension
     return Kernel(
         "level_adjoint",
@@ -208,12 +211,12 @@ def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, 
     nu = [symbol(momentum(cotangent(c))) for c in coordinates]
     flow = coefficients.hoist(hamiltonian_vector_field(system.poisson, p))
     power = total(e * f for e, f in zip(a, flow, strict=True))
-    used = used_by_path(system, coefficients)
-    sources = gradient(power, [*coordinates, *map(momentum, coordinates), *used])
+    used_coefficients = used_by_path(system, coefficients)
+    sources = gradient(power, [*coordinates, *map(momentum, coordinates), *used_coefficients])
     n = system.dimension
     rates = [*map(neg, flow), *(s + v for s, v in zip(sources[:n], nu, strict=True)), *sources[n:]]
     names = [*coordinates, *map(cotangent, coordinates), *(cotangent(momentum(c)) for c in coordinates)]
-    recurrences = path_of([*names, *map(cotangent, used)], rates)
+    recurrences = path_of([*names, *map(cotangent, used_coefficients)], rates)
     kernel = replace(curvature, inputs={**curvature.inputs, TABLE: coefficients.table})
     slope = pulled_back(
         kernel,
@@ -222,4 +225,6 @@ def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, 
         {TABLE: coefficients.table},
         "cotangents of the coefficients, from that of p = grad S_h(y)",
     )
-    return PathAdjoint(recurrences, tuple(coefficients.slots.index(s) for s in used), curvature, slope, slopes)
+    return PathAdjoint(
+        recurrences, tuple(coefficients.slots.index(s) for s in used_coefficients), curvature, slope, slopes
+    )

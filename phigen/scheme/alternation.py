@@ -43,8 +43,8 @@ def _partitioned(name: str, order: int, halves: tuple[str, str]) -> Alternation:
     """Return the method with the first halves of a_1, … and b_1, …, without their middles."""
     a, b = ([Fraction(v) for v in half.split()] for half in halves)
     a = [*a, 1 - 2 * sum(a, Fraction(0)), *reversed(a)]
-    rest = Fraction(1, 2) - sum(b, Fraction(0))
-    b = [*b, rest, rest, *reversed(b)]
+    remainder = Fraction(1, 2) - sum(b, Fraction(0))
+    b = [*b, remainder, remainder, *reversed(b)]
     times = [t for pair in zip(a, b, strict=False) for t in pair]
     alpha = [times[0]]
     for t in times[1:]:

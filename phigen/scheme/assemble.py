@@ -72,8 +72,8 @@ def build_program(
         attitude = stage_attitude(system, group, realisation, scheme.generating, gauge)
     lanes = solver.lanes and extras.offers("lanes", spec.profile)
     elapsed = elapsed_kernel(system, scheme.generating)
-    moved = replace(system, forces=gauged.system.forces)  # with a monitor, step sizes are in τ
-    step = _step(moved, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
+    gauged_system = replace(system, forces=gauged.system.forces)  # with a monitor, step sizes are in τ
+    step = _step(gauged_system, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
     attitude = scheme.generating.coefficients.settled(attitude)
     level = level_adjoint(system) if gauge.monitor and extras.adjoint else None
     modified, count = None, extras.modified_hamiltonian
@@ -215,6 +215,6 @@ def approximation(realisation: BiRealisation) -> list[str]:
     if realisation.exact:
         return []
     degree = realisation.degree
-    how = "" if degree is None else f": alpha and beta are cut off at degree {degree} in p"
+    degree_note = "" if degree is None else f": alpha and beta are cut off at degree {degree} in p"
     rate = "approximately" if degree is None else f"up to O(h^{degree + 1})"
-    return [f"approximate{how}; a step is guaranteed to be a Poisson map and to keep Casimirs {rate} only"]
+    return [f"approximate{degree_note}; a step is guaranteed to be a Poisson map and to keep Casimirs {rate} only"]

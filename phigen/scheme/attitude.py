@@ -51,11 +51,13 @@ def stage_attitude(
     if group.matrices and not cayley:
         purpose = f"{slope.rstrip(',')}, and {SIZE_OF_COVECTOR}"
     inputs = {"coef": coefficients.slots, "y": system.coordinates}
-    turn = Kernel("turn", purpose, inputs, (Output("turn", tuple(values)),))
-    along = _along(group, system) if realisation.path and not generating.free else None
+    turn_kernel = Kernel("turn", purpose, inputs, (Output("turn", tuple(values)),))
+    path_attitude = _along(group, system) if realisation.path and not generating.free else None
     rate = rate_kernel(system, group, gauge)
-    needed = group.matrices and (rate or not cayley)
-    return Attitude(group, cayley, turn, along, rate=rate, exponential=_exponential(group) if needed else None)
+    needs_algebra = group.matrices and (rate or not cayley)
+    return Attitude(
+        group, cayley, turn_kernel, path_attitude, rate=rate, exponential=_exponential(group) if needs_algebra else None
+    )
 
 
 def gauss_attitude(
@@ -78,8 +80,8 @@ def gauss_attitude(
         raise refused(system, "reconstruct: the group element of this algebra is not a quaternion", series)
     purpose = "the increment of a step, a quaternion minus 1" + ", and its translation" * bool(group.translation)
     inputs = {"coef": coefficients.slots, "z": points.unknowns}
-    turn = Kernel("turn", purpose, inputs, (Output("turn", tuple(coefficients.hoist(element_less_one))),))
-    return Attitude(group, False, turn, rate=rate_kernel(system, group, gauge))
+    turn_kernel = Kernel("turn", purpose, inputs, (Output("turn", tuple(coefficients.hoist(element_less_one))),))
+    return Attitude(group, False, turn_kernel, rate=rate_kernel(system, group, gauge))
 
 
 def _along(group: Group, system: System) -> Kernel:
@@ -123,8 +125,10 @@ def flow_attitude(
     times = [time_of(flow) if time_of else symbol(TIME) for flow in flows]
     names = [f"the noise {s.name}" for s in system.noise] + [f"{flow.letter}_{k}" for k, flow in enumerate(flows, 1)]
     kernels = []
-    listed = zip(increments, [*noise_rotations, *flow_rotations], [*driving_times(system), *times], strict=True)
-    for k, (increment, turning, time) in enumerate(listed, 1):
+    timed_increments = zip(
+        increments, [*noise_rotations, *flow_rotations], [*driving_times(system), *times], strict=True
+    )
+    for k, (increment, turning, time) in enumerate(timed_increments, 1):
         values = staged([*increment, *_carried(system, group, turning, time)], coefficients)
         parts = tuple(values[: len(increment)]), tuple(values[len(increment) :])
         inputs = {"coef": coefficients.slots, "state": system.coordinates, "element": _carrier(group)}
@@ -142,8 +146,8 @@ def _carrier(group: Group) -> tuple[Symbol, ...]:
 
 def _carried(system: System, group: Group, turning: Turning, time: Expression) -> list[Expression]:
     """Return the element minus 1 after one more flow."""
-    before, factors = [symbol(s) for s in _carrier(group)], factor_elements(system, group, turning, time)
-    return joined(group, [before, joined(group, factors)]) if factors else before
+    element_before, factors = [symbol(s) for s in _carrier(group)], factor_elements(system, group, turning, time)
+    return joined(group, [element_before, joined(group, factors)]) if factors else element_before
 
 
 def uniform(system: System) -> bool:
@@ -152,19 +156,21 @@ def uniform(system: System) -> bool:
     return not (system.forces or system.time or monitored)
 
 
-def rate_kernel(system: System, group: Group, gauge: Gauge, more: Sequence[Expression] = ()) -> Kernel | None:
-    """Return the gradient of the Casimirs that the gauge subtracts from H, and of ``more``; None without any.
+def rate_kernel(
+    system: System, group: Group, gauge: Gauge, further_gradients: Sequence[Expression] = ()
+) -> Kernel | None:
+    """Return the gradient of the Casimirs that the gauge subtracts from H, plus further gradients; None without any.
 
     With a monitor or forces the gauge must subtract none: the rotation would not be uniform.
     """
-    subtracted = [e for e in more if not e.is_zero]
+    subtracted = [e for e in further_gradients if not e.is_zero]
     subtracted += [symbol(s) * system.casimirs[c] for s, c in zip(gauge.multiples, gauge.free, strict=True)]
     subtracted += [value * system.casimirs[c] for c, value in gauge.fixed.items()]
     if not subtracted:
         return None
-    others = {"a monitor": gauge.monitor, "forces": system.forces}
-    for condition, present in others.items():
-        if present:
+    obstacles = {"a monitor": gauge.monitor, "forces": system.forces}
+    for condition, applies in obstacles.items():
+        if applies:
             message = f"reconstruct: with {condition} no Casimir is subtracted from H, since it would rotate the body"
             raise refused(system, message, "gauge: none")
     slope = gradient(total(subtracted), system.coordinates)

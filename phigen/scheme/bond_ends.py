@@ -19,11 +19,11 @@ def over_ends(gather: Gather) -> list[tuple[Ends, frozenset[str]]]:
     apart = [(e, frozenset[str]()) for e in gather.ends]
     if len(apart) != 2 or gather.ends[0].chosen != gather.ends[1].chosen:
         return apart
-    first, other = gather.ends
-    listed = [p for p in first.kernel.inputs.get("bonds", ()) if p in other.kernel.inputs.get("bonds", ())]
-    for opposite in (c for size in range(1, 1 + len(listed)) for c in combinations(listed, size)):
-        turned = substitute(other.kernel.roots, {p: -symbol(p) for p in opposite})
-        differences = [("", a - b) for a, b in zip(first.kernel.roots, turned, strict=True)]
+    first, other_end = gather.ends
+    bond_parameters = [p for p in first.kernel.inputs.get("bonds", ()) if p in other_end.kernel.inputs.get("bonds", ())]
+    for opposite in (c for size in range(1, 1 + len(bond_parameters)) for c in combinations(bond_parameters, size)):
+        values_at_other_end = substitute(other_end.kernel.roots, {p: -symbol(p) for p in opposite})
+        differences = [("", a - b) for a, b in zip(first.kernel.roots, values_at_other_end, strict=True)]
         if decide_zero("", differences).verdict == PROVED:
             name = first.kernel.name.removesuffix(f"_{first.end}")
             purpose = first.kernel.purpose.partition(", by bonds that ")[0]

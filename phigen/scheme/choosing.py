@@ -113,10 +113,10 @@ def with_carrier(choice: ScheduledMethod, time: str) -> ScheduledMethod:
         return replace(choice, carrier=0)  # e belongs to A, which does not depend on the time
     if not is_dated(flows[-1], time):
         return replace(choice, carrier=len(flows) - 1)
-    free = [flow for flow in flows if not is_dated(flow, time)]
-    if not free:
+    undated = [flow for flow in flows if not is_dated(flow, time)]
+    if not undated:
         return replace(choice, carrier=len(flows))
-    ordered = (free[0], *(flow for flow in flows if flow is not free[0]))
+    ordered = (undated[0], *(flow for flow in flows if flow is not undated[0]))
     return replace(choice, splitting=SplitHamiltonian(ordered), carrier=0)
 
 
@@ -129,26 +129,26 @@ def planned(
     system: Host, splitting: SplitHamiltonian, requested: int, composition: str, kicks_of: Callable[[], Sequence[Kick]]
 ) -> ScheduledMethod:
     """Return the method as `plan` does; ``kicks_of`` returns the parts that can be V."""
-    even = requested + requested % 2
-    note = "" if even == requested else f"order {requested} was asked for; a symmetric method has even order"
-    order = Order(even, 0, note)
-    near_method = near_integrable.find(composition, even)
+    even_order = requested + requested % 2
+    note = "" if even_order == requested else f"order {requested} was asked for; a symmetric method has even order"
+    order = Order(even_order, 0, note)
+    near_method = near_integrable.find(composition, even_order)
     if near_method and splitting.small is not None:
         return _near_integrable(splitting, order, near_method)
     if composition in near_integrable.NAMES and near_method:
         raise _nothing_small(system, splitting, composition)
     is_nystrom = composition in nystrom.NAMES
     if is_nystrom or composition == "auto":
-        applicable = list(_applicable(kicks_of, even, composition))
+        applicable = list(_applicable(kicks_of, even_order, composition))
         if applicable:
             method, kick = min(applicable, key=lambda pair: _price(splitting, *pair))
             return chosen(splitting, order, method, kick)
-    known = orders(composition)
-    if even not in known:
-        raise _no_order(system, composition, known, even)
+    offered_orders = orders(composition)
+    if even_order not in offered_orders:
+        raise _no_order(system, composition, offered_orders, even_order)
     if is_nystrom:
         raise _not_applicable(system, splitting, composition, kicks_of)
-    recommended = alternation.find(composition, even)
+    recommended = alternation.find(composition, even_order)
     assert recommended is not None
     return ScheduledMethod(order, recommended, arranged(splitting))
 
@@ -159,12 +159,12 @@ def _near_integrable(splitting: SplitHamiltonian, order: Order, method: NearInte
     Between correctors, which begin and end with a flow of A, a step is a flow of B and one of A.
     """
     assert splitting.small is not None
-    large, small = splitting.flows[1 - splitting.small], splitting.flows[splitting.small]
+    large_flow, small_flow = splitting.flows[1 - splitting.small], splitting.flows[splitting.small]
     if isinstance(method, Corrected):
-        why = f"H_1 is small, of size ε: errors {method.errors}"
-        return ScheduledMethod(order, method, SplitHamiltonian((small, large), small=0), why)
-    why = f"H_2 is small, of size ε: errors {method.errors}"
-    return ScheduledMethod(order, method, SplitHamiltonian((large, small), small=1), why)
+        reason = f"H_1 is small, of size ε: errors {method.errors}"
+        return ScheduledMethod(order, method, SplitHamiltonian((small_flow, large_flow), small=0), reason)
+    reason = f"H_2 is small, of size ε: errors {method.errors}"
+    return ScheduledMethod(order, method, SplitHamiltonian((large_flow, small_flow), small=1), reason)
 
 
 def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMethod:
@@ -172,13 +172,13 @@ def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMet
     method = choice.method
     if not isinstance(method, Corrected) or not method.multiple:
         return choice
-    small, large = choice.splitting.flows
-    modified = modified_kick(system, small, large)
+    small_flow, large_flow = choice.splitting.flows
+    modified = modified_kick(system, small_flow, large_flow)
     if modified is None:
         message = f"scheme splitting: composition {method.name} needs B and {{B, {{B, A}}}} in coordinates that commute"
         hint = "coordinates_from: jacobi has such a B, and composition: wisdom-holman-17 takes any"
         raise SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
-    return replace(choice, splitting=SplitHamiltonian((modified, large), kick=0, small=0))
+    return replace(choice, splitting=SplitHamiltonian((modified, large_flow), kick=0, small=0))
 
 
 def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) -> SpecError:
@@ -232,8 +232,8 @@ def _cost(flow: Flow) -> int:
 
 def _arranged(splitting: SplitHamiltonian, method: Nystrom, kick: Kick) -> SplitHamiltonian:
     """Return T and V in the order of the method."""
-    drift, plain = splitting.flows[1 - kick.part], splitting.flows[kick.part]
-    kicking = kick.modified if method.multiples and kick.modified else plain
+    drift, kick_flow = splitting.flows[1 - kick.part], splitting.flows[kick.part]
+    kicking = kick.modified if method.multiples and kick.modified else kick_flow
     return SplitHamiltonian((kicking, drift), 0) if method.kicks_first else SplitHamiltonian((drift, kicking), 1)
 
 
@@ -244,11 +244,11 @@ def _why(method: Nystrom) -> str:
     return f"{{{v}, {{{v}, {{{v}, {t}}}}}}} = 0{modified}"
 
 
-def _no_order(system: Host, composition: str, known: Sequence[int], order: int) -> SpecError:
+def _no_order(system: Host, composition: str, offered_orders: Sequence[int], order: int) -> SpecError:
     place = system.locations.get(("composition",)) or system.locations.get(("order",))
-    offered = ", ".join(map(str, known)) or "none"
-    who = "splittings offer" if composition == "auto" else f"composition {composition} offers"
-    message = f"scheme splitting: {who} the orders {offered}, not {order}"
+    offered = ", ".join(map(str, offered_orders)) or "none"
+    subject = "splittings offer" if composition == "auto" else f"composition {composition} offers"
+    message = f"scheme splitting: {subject} the orders {offered}, not {order}"
     return SpecError([Diagnostic(message, place, "scheme: series reaches order 16")])
 
 

@@ -71,8 +71,8 @@ def collect(
     def terms(element: Poly) -> Terms:
         groups: dict[Monomial, dict[Monomial, dict[Monomial, Expression]]] = {}
         for m, c in element.to_dict().items():
-            key, when, rest = (tuple(int(m[i]) for i in among) for among in (state, dated, static))
-            groups.setdefault(key, {}).setdefault(when, {})[rest] = number(rational(c))
+            key, when, static_powers = (tuple(int(m[i]) for i in among) for among in (state, dated, static))
+            groups.setdefault(key, {}).setdefault(when, {})[static_powers] = number(rational(c))
         return {key: in_time(parts) for key, parts in sorted(groups.items())}
 
     def in_time(parts: Mapping[Monomial, Mapping[Monomial, Expression]]) -> Expression:
@@ -89,14 +89,14 @@ def cells(tower: Tower, elements: Sequence[Poly]) -> int:
     return (sum(map(len, elements)) + rules) * len(tower.names)
 
 
-def exceeds(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], most: int) -> bool:
-    """Whether the collected elements have more than ``most`` monomials together; much faster than `collect`."""
+def exceeds(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], max_monomials: int) -> bool:
+    """Whether the collected elements have more than ``max_monomials`` monomials in all; much faster than `collect`."""
     state, count = _state(tower, coordinates), 0
-    if sum(map(len, elements)) <= most:
+    if sum(map(len, elements)) <= max_monomials:
         return False
     for element in elements:
         count += len({tuple(m[i] for i in state) for m in element.monoms()})
-        if count > most:
+        if count > max_monomials:
             return True
     return False
 

@@ -44,7 +44,7 @@ def formal_alpha(system: System, realisation: BiRealisation, terms: int) -> tupl
 
 
 def hamilton_jacobi(
-    system: System, realisation: BiRealisation, most: int, static: Sequence[str] = ()
+    system: System, realisation: BiRealisation, max_terms: int, static: Sequence[str] = ()
 ) -> HamiltonJacobi:
     """Return the series of a system; its tower contains the step size and other ``static`` symbols too.
 
@@ -55,7 +55,7 @@ def hamilton_jacobi(
         lambda terms: formal_alpha(system, realisation, terms),
         system.coordinates,
         [*system.parameter_names, *static, STEP],
-        most,
+        max_terms,
         symmetric=realisation.symmetric,
         times=system.times,
     )
@@ -257,9 +257,9 @@ def _expect_few(
         raise too_large(system, f"the matrices of a step would take more than {MOST_OPERATIONS} operations")
 
 
-def too_large(system: System, reason: str, other: str = _ALTERNATIVE) -> LimitError:
-    """Return the error for a program beyond the budget; ``other`` is an alternative to a lower order."""
-    hint = f"ask for a lower order, {other}or for fewer terms in H"
+def too_large(system: System, reason: str, alternative: str = _ALTERNATIVE) -> LimitError:
+    """Return the error for a program beyond the budget; ``alternative`` is an alternative to a lower order."""
+    hint = f"ask for a lower order, {alternative}or for fewer terms in H"
     return LimitError([Diagnostic(reason, system.locations.get(("order",)), hint)])
 
 

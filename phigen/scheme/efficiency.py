@@ -42,8 +42,8 @@ def cost(program: Program, grown: float = 1.0) -> float:
 
     ``grown`` multiplies the operations: it gives a lower bound for programs of a higher order.
     """
-    step, even = program.step, program.order + program.order % 2
-    return STEP_TIMES.get(step.kind, _explicit)(program, grown) / _steps(program)[even]
+    step, even_order = program.step, program.order + program.order % 2
+    return STEP_TIMES.get(step.kind, _explicit)(program, grown) / _steps(program)[even_order]
 
 
 def series_bound(program: Program, order: int) -> float:
@@ -77,8 +77,8 @@ def _explicit(program: Program, grown: float) -> float:
 def _newton(program: Program, grown: float) -> float:
     operations, functions = _operations(program)
     evaluated = grown * (operations + 2 * FUNCTION / OPERATION * functions)
-    far = UNCACHED_OPERATION * max(0.0, evaluated - CACHED_OPERATIONS)
-    return len(program.fractions) * (NEWTON_ENTRY * program.dimension**2 + NEWTON_OPERATION * evaluated + far)
+    cache_misses = UNCACHED_OPERATION * max(0.0, evaluated - CACHED_OPERATIONS)
+    return len(program.fractions) * (NEWTON_ENTRY * program.dimension**2 + NEWTON_OPERATION * evaluated + cache_misses)
 
 
 def _gauss(program: Program, grown: float) -> float:

@@ -39,11 +39,14 @@ def _pivots(pattern: Pattern) -> Iterator[tuple[int, int]]:
     while remaining:
         k = min(remaining, key=lambda k: (len(rows[k]) * len(columns[k]), k))
         remaining.remove(k)
-        below, right = len(columns[k]), len(rows[k])
+        column_length, row_length = len(columns[k]), len(rows[k])
         fill_in = sum(
             len(rows[k] - rows[i] - {i}) for i in columns[k]
         )  # an entry that was 0 costs a product and no difference
-        yield k, COST["reciprocal"] + below * (1 + 2 * right) - fill_in + 2 * (below + right) + 1
+        yield (
+            k,
+            COST["reciprocal"] + column_length * (1 + 2 * row_length) - fill_in + 2 * (column_length + row_length) + 1,
+        )
         for i in columns[k]:
             rows[i] = (rows[i] | rows[k]) - {i, k}
         for j in rows[k]:

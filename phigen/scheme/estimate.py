@@ -24,23 +24,23 @@ SparseRow = Mapping[int, Expression]
 
 
 def newton_operations(
-    realisation: BiRealisation, absent: Collection[str], hessian: Sequence[SparseRow], most: int
+    realisation: BiRealisation, absent: Collection[str], hessian: Sequence[SparseRow], limit: int
 ) -> int:
-    """Return the operations of the matrices of a Newton step, see `phigen.scheme.step`; ``most`` + 1 if there are more.
+    """Return the operations of the matrices of a Newton step (`phigen.scheme.step`); ``limit`` + 1 if there are more.
 
     ``absent`` are the coordinates that S_h does not depend on, so their momenta are 0. The count is a lower bound: it
     leaves out the computation of the Hessian, which is small where H is a polynomial of low degree. Small systems,
     whose matrices are below the limit in any case, count as 0.
     """
     names, momenta = realisation.coordinates, realisation.covector
-    if realisation.path or not may_have(len(names), most):
+    if realisation.path or not may_have(len(names), limit):
         return 0
     expressions = [*realisation.displacement, *realisation.increment]
     if absent:
         expressions = substitute(expressions, {momentum(c): ZERO for c in absent})
     index = {name: k for k, name in enumerate(momenta)}
     state = {*names, *momenta}
-    count = OperationCount(most, lambda name: name not in state)
+    count = OperationCount(limit, lambda name: name not in state)
     rows_so_far: list[SparseRow] = []
     try:
         while len(rows_so_far) < len(expressions):  # batches grow, so few rows of a huge matrix are counted
@@ -49,26 +49,26 @@ def newton_operations(
             rows_so_far += new_rows
             count.matrix(new_rows, hessian)
             entry_cost = cost([e for row in rows_so_far for e in row.values()])
-            if count.operations + entry_cost > most:
-                return most + 1
+            if count.operations + entry_cost > limit:
+                return limit + 1
     except TooManyError:
-        return most + 1
+        return limit + 1
     return count.operations + entry_cost
 
 
-def may_have(dimension: int, most: int) -> bool:
-    """Whether the dimension allows the matrices of a step more than ``most`` operations."""
-    return 4 * dimension**3 > most
+def may_have(dimension: int, limit: int) -> bool:
+    """Whether the dimension allows the matrices of a step more than ``limit`` operations."""
+    return 4 * dimension**3 > limit
 
 
-def path_operations(system: System, hessian: Sequence[SparseRow], most: int) -> int:
-    """Return the operations of Hess S_h · π, needed by a step along paths; ``most`` + 1 if there are more."""
+def path_operations(system: System, hessian: Sequence[SparseRow], limit: int) -> int:
+    """Return the operations of Hess S_h · π, needed by a step along paths; ``limit`` + 1 if there are more."""
     tensor = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in system.poisson]
-    count = OperationCount(most, lambda name: name not in system.coordinates)
+    count = OperationCount(limit, lambda name: name not in system.coordinates)
     try:
         return count.matrix(hessian, tensor)
     except TooManyError:
-        return most + 1
+        return limit + 1
 
 
 class TooManyError(Exception):
@@ -82,29 +82,29 @@ class OperationCount:
     there are more than ``most`` operations.
     """
 
-    def __init__(self, most: int, fixed: Callable[[str], bool]) -> None:
-        self.operations, self._most, self._is_fixed = 0, most, fixed
+    def __init__(self, limit: int, is_fixed: Callable[[str], bool]) -> None:
+        self.operations, self._most, self._is_fixed = 0, limit, is_fixed
         self._nodes: dict[tuple[int, int, int], int] = {}
         self._fixed: set[int] = set()
         self._leaves: dict[int, int] = {}
 
     def matrix(self, left: Sequence[SparseRow], right: Sequence[SparseRow]) -> int:
         """Return the operations of left · right beyond those counted before."""
-        before = self.operations
+        operations_before = self.operations
         self._know([e for row in (*left, *right) for e in row.values()])
         columns = self._different([{j: self._leaves[id(e)] for j, e in row.items()} for row in right])
         with progress.stage("operations of the Newton matrix", len(left)) as running:
             for row in left:
                 self._row(row, columns)
                 running.done += 1
-        return self.operations - before
+        return self.operations - operations_before
 
     def _row(self, row: SparseRow, columns: Sequence[Mapping[int, int]]) -> None:
         sums: dict[int, dict[int, int]] = {}
         for k, e in row.items():
             unit, factor = e.is_number and abs(e.value) == 1, self._leaves[id(e)]
-            for j, other in columns[k].items():
-                sums.setdefault(j, {})[k] = other if unit else self._node(0, factor, other)
+            for j, right_entry in columns[k].items():
+                sums.setdefault(j, {})[k] = right_entry if unit else self._node(0, factor, right_entry)
         for terms in sums.values():
             self._total(terms)
 
@@ -122,18 +122,18 @@ class OperationCount:
         def visit(node: Expression, args: list[bool]) -> bool:
             return self._is_fixed(node.value) if node.op == "symbol" else all(args)
 
-        new = list({id(e): e for e in leaves if id(e) not in self._leaves}.values())
-        for e, fixed in zip(new, fold(new, visit), strict=True):
+        new_leaves = list({id(e): e for e in leaves if id(e) not in self._leaves}.values())
+        for e, is_fixed in zip(new_leaves, fold(new_leaves, visit), strict=True):
             number = self._leaves[id(e)] = -len(self._leaves) - 1
-            if fixed:
+            if is_fixed:
                 self._fixed.add(number)
 
     def _total(self, terms: dict[int, int]) -> None:
         while len(terms) > 1:
             sums: dict[int, int] = {}
-            for place, node in terms.items():
-                half = place // 2
-                sums[half] = self._node(1, sums[half], node) if half in sums else node
+            for position, node in terms.items():
+                parent = position // 2
+                sums[parent] = self._node(1, sums[parent], node) if parent in sums else node
             terms = sums
 
     def _node(self, kind: int, a: int, b: int) -> int:

@@ -8,17 +8,17 @@ from phigen.geometry.system import System
 from phigen.symbolic.expression import Expression
 
 
-def force_facts(system: System, how: str) -> Iterator[str]:
-    """Yield the lines of a header; ``how`` says how forces enter the step, or is empty."""
-    yield from forced_lines(system.forces is not None, system.pushed, how)
+def force_facts(system: System, manner: str) -> Iterator[str]:
+    """Yield the lines of a header; ``manner`` says how forces enter the step, or is empty."""
+    yield from forced_lines(system.forces is not None, system.pushed, manner)
 
 
-def forced_lines(forced: bool, pushed: Sequence[str], how: str) -> Iterator[str]:
+def forced_lines(forced: bool, pushed: Sequence[str], manner: str) -> Iterator[str]:
     """Yield the lines of a header if the system is ``forced``, by forces that change the Casimirs ``pushed``."""
     if not forced:
         return
-    if how:
-        yield f"forces: {how}"
+    if manner:
+        yield f"forces: {manner}"
     effect = f"they change {', '.join(pushed)}" if pushed else "they conserve all Casimirs"
     yield f"with forces a step is not a Poisson map; {effect}"
 

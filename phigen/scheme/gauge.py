@@ -66,9 +66,9 @@ class Gauge:
     @property
     def facts(self) -> list[str]:
         """The lines of the header about the gauge."""
-        free = [f"gauge: the multiple of {', '.join(self.free)} is chosen at the start of each trajectory"]
-        fixed = ", ".join(f"({value}) {name}" for name, value in self.fixed.items())
-        return (free if self.free else []) + ([f"gauge: {self.letter} - {fixed}"] if fixed else []) + self.notes
+        lines = [f"gauge: the multiple of {', '.join(self.free)} is chosen at the start of each trajectory"]
+        terms = ", ".join(f"({value}) {name}" for name, value in self.fixed.items())
+        return (lines if self.free else []) + ([f"gauge: {self.letter} - {terms}"] if terms else []) + self.notes
 
     @property
     def notes(self) -> list[str]:
@@ -129,17 +129,17 @@ def choose(
     """
     if not isinstance(setting, str):
         return _gauged(system, realisation, replace(fixed_gauge(system, setting), monitor=monitor))
-    best = plain = _gauged(system, realisation, Gauge(monitor=monitor))
-    allowed = setting != "none" and realisation.exact and realisation.symmetric
-    if not allowed or system.driven or monitor:
-        return plain
+    best = ungauged = _gauged(system, realisation, Gauge(monitor=monitor))
+    may_gauge = setting != "none" and realisation.exact and realisation.symmetric
+    if not may_gauge or system.driven or monitor:
+        return ungauged
     omitted: dict[str, str] = {}
     for name in system.casimirs:
         candidate = _gauged(system, realisation, Gauge((*best.gauge.free, name)))
         reason = unaffordable(candidate.system)
         if reason:
             omitted[name] = reason
-        elif _worthwhile(plain, candidate, Symbol(GAUGE, name)):
+        elif _worthwhile(ungauged, candidate, Symbol(GAUGE, name)):
             best = candidate
     return replace(best, gauge=replace(best.gauge, omitted=omitted)) if omitted else best
 
@@ -192,12 +192,12 @@ def fixed_gauge_named(gauge: Gauge, system: System) -> Iterator[None]:
             raise
         diagnostics = error.diagnostics if isinstance(error, LimitError) else [Diagnostic(f"the spec needs {error}")]
         place = system.locations.get(("gauge",))
-        named = [Diagnostic(f"with this gauge {d.message}", place, _gauge_hint(d.hint)) for d in diagnostics]
-        raise LimitError(named) from error
+        explained = [Diagnostic(f"with this gauge {d.message}", place, _gauge_hint(d.hint)) for d in diagnostics]
+        raise LimitError(explained) from error
 
 
-def _gauge_hint(other: str) -> str:
-    return f"gauge: none, or {other}" if other else "gauge: none"
+def _gauge_hint(hint: str) -> str:
+    return f"gauge: none, or {hint}" if hint else "gauge: none"
 
 
 def _gauged(system: System, realisation: BiRealisation, gauge: Gauge) -> Gauged:
@@ -209,23 +209,25 @@ def fixed_gauge(system: System, values: Mapping[str, Expression]) -> Gauge:
     """Return the gauge with these multiples of Casimirs. Raises `SpecError` for names of other functions."""
     for name in values:
         if name not in system.casimirs:
-            known = ", ".join(system.casimirs) or "none"
+            casimir_names = ", ".join(system.casimirs) or "none"
             place = system.locations.get(("gauge", name)) or system.locations.get(("gauge",))
-            raise SpecError([Diagnostic(f"gauge: {name} is not a Casimir of this system", place, f"known: {known}")])
+            raise SpecError(
+                [Diagnostic(f"gauge: {name} is not a Casimir of this system", place, f"known: {casimir_names}")]
+            )
     return Gauge(fixed=values)
 
 
-def _worthwhile(plain: Gauged, gauged: Gauged, name: str) -> bool:
+def _worthwhile(ungauged: Gauged, gauged: Gauged, name: str) -> bool:
     try:
-        limit = MAX_TERM_RATIO * _state_terms(plain.series.polynomial(GUIDE), plain.system)
-        if _state_terms(_first_term(gauged), plain.system) > limit:
+        limit = MAX_TERM_RATIO * _state_terms(ungauged.series.polynomial(GUIDE), ungauged.system)
+        if _state_terms(_first_term(gauged), ungauged.system) > limit:
             return False  # without the series, which is slow for a long Casimir
         polynomial = gauged.series.polynomial(GUIDE)
     except OverflowError:
         return False
     if not polynomial.tower.depends_on(polynomial.terms[GUIDE - 1], [name]):
         return False
-    return _state_terms(polynomial, plain.system) <= limit
+    return _state_terms(polynomial, ungauged.system) <= limit
 
 
 def _first_term(gauged: Gauged) -> PolynomialSeries:

@@ -83,8 +83,8 @@ def realise_gauss(spec: Spec, system: System) -> Realisation:
         message = f"scheme gauss: no exact Poisson map is known for this bracket ({system.shape})"
         place = ("structure",) if ("structure",) in spec.locations else ("scheme",)
         raise SpecError([spec.diagnostic(place, message, _other_coordinates(system) + TRUNCATION_HINT)])
-    bound = [i for part in realisation.parts if not isinstance(part, Plain) for i in part.indices]
-    pushed = [system.coordinates[i] for i in bound if _is_pushed(system, i)]
+    structured_indices = [i for part in realisation.parts if not isinstance(part, Plain) for i in part.indices]
+    pushed = [system.coordinates[i] for i in structured_indices if _is_pushed(system, i)]
     if pushed:
         message = f"scheme gauss: a vector force on {', '.join(pushed)} leaves the symplectic leaves"
         raise SpecError([spec.diagnostic(("forces",), message, "structure: to truncation, or scheme: series")])
@@ -213,11 +213,11 @@ def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge,
     if not realisation.exact:
         yield "structure: to truncation; a step is not a Poisson map, and conserves Casimirs of degree 1 and 2 only"
     elif realisation.groups:
-        listed = "; ".join(", ".join(system.coordinates[i] for i in g.indices) for g in realisation.groups)
-        yield f"structure: exact; quadratic momentum maps for {listed}"
+        group_names = "; ".join(", ".join(system.coordinates[i] for i in g.indices) for g in realisation.groups)
+        yield f"structure: exact; quadratic momentum maps for {group_names}"
     elif realisation.logarithms:
-        listed = ", ".join(system.coordinates[i] for part in realisation.logarithms for i in part.indices)
-        yield f"structure: exact, as brackets are constant with the logarithms of {listed}"
+        group_names = ", ".join(system.coordinates[i] for part in realisation.logarithms for i in part.indices)
+        yield f"structure: exact, as brackets are constant with the logarithms of {group_names}"
     else:
         yield "structure: exact, as the brackets are constant"
     yield from gauge.facts

@@ -43,18 +43,18 @@ def _projected(vector: Sequence[Expression], basis: Sequence[Sequence[Fraction]]
     orthogonal: list[list[Fraction]] = []
     transform: list[list[Fraction]] = []  # coefficients of the orthogonal vectors in the basis
     for k, b in enumerate(basis):
-        rest, row = list(b), [Fraction(int(i == k)) for i in range(len(basis))]
+        residual, row = list(b), [Fraction(int(i == k)) for i in range(len(basis))]
         for o, t in zip(orthogonal, transform, strict=True):
             factor = _dot(o, b) / _dot(o, o)
-            rest = [r - factor * v for r, v in zip(rest, o, strict=True)]
+            residual = [r - factor * v for r, v in zip(residual, o, strict=True)]
             row = [r - factor * v for r, v in zip(row, t, strict=True)]
-        if any(rest):
-            orthogonal.append(rest)
+        if any(residual):
+            orthogonal.append(residual)
             transform.append(row)
     sums = [ZERO] * len(basis)
     for o, t in zip(orthogonal, transform, strict=True):
-        along = total(number(a / _dot(o, o)) * v for a, v in zip(o, vector, strict=True) if a)
-        sums = [s + number(f) * along for s, f in zip(sums, t, strict=True)]
+        component = total(number(a / _dot(o, o)) * v for a, v in zip(o, vector, strict=True) if a)
+        sums = [s + number(f) * component for s, f in zip(sums, t, strict=True)]
     return [_rounded(s) for s in sums]
 
 

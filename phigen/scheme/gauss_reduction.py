@@ -35,9 +35,9 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
     reads = [{k for k, z in enumerate(points.unknowns) if z in names} for names in map(symbols_of, rates)]
     rows = sparse_derivatives(rates, points.unknowns)
     linear = [k for k, row in enumerate(rows) if all(coefficients.is_static(slope) for slope in row.values())]
-    needed = _needed(reads)
-    followers = [k for k in _followers(linear, reads) if k in needed]
-    iterated = [k for k in needed if k not in followers]
+    required = _needed(reads)
+    followers = [k for k in _followers(linear, reads) if k in required]
+    iterated = [k for k in required if k not in followers]
     integrated = sorted({k for f in followers for k in reads[f]})
     if not integrated or any(not reads[i] <= set(followers) for i in iterated):
         return None
@@ -46,19 +46,19 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
     symbols = [Symbol(READ, k) for k in range(len(integrated))]
     integrals = {points.unknowns[k]: symbol(s) for k, s in zip(integrated, symbols, strict=True)}
     offsets = [_followed(rates[f], rows[f], integrals) for f in followers]
-    at = dict(zip((points.unknowns[f] for f in followers), offsets, strict=True))
-    values = [symbol(WEIGHT) * value for value in substitute([rates[i] for i in iterated], at)]
-    read = {"coef": coefficients.slots, "x": points.start, "u": tuple(symbols)}
+    follower_offsets = dict(zip((points.unknowns[f] for f in followers), offsets, strict=True))
+    values = [symbol(WEIGHT) * value for value in substitute([rates[i] for i in iterated], follower_offsets)]
+    inputs = {"coef": coefficients.slots, "x": points.start, "u": tuple(symbols)}
     slope = Kernel(
         "reduced_field",
         "w times the derivatives of the iterated unknowns of a stage, by integrals u of increments",
-        {**read, "w": (WEIGHT,), "time": (TIME, LENGTH)},
+        {**inputs, "w": (WEIGHT,), "time": (TIME, LENGTH)},
         (Output("move", tuple(coefficients.hoist(values))),),
     )
     follow = Kernel(
         "followers",
         "the unknowns of a stage that follow from others, by integrals u of their increments",
-        {**read, "time": (TIME, LENGTH)},
+        {**inputs, "time": (TIME, LENGTH)},
         (Output("offsets", tuple(coefficients.hoist(offsets))),),
     )
     return ReducedSweeps(slope, follow, tuple(iterated), tuple(followers), tuple(integrated))
@@ -67,27 +67,27 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
 def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequence[int]) -> bool:
     """Whether these are all unknowns but the time, and only brackets of one kind with the other are not zero."""
     places = [{points.moved[k] for k in group if k < len(points.moved)} for group in (iterated, followers)]
-    within = ((i, j) for group in places for i in group for j in group)
+    index_pairs = ((i, j) for group in places for i in group for j in group)
     complete = sum(map(len, places)) == len(points.moved)
-    return complete and all(points.system.poisson[i][j].is_zero for i, j in within)
+    return complete and all(points.system.poisson[i][j].is_zero for i, j in index_pairs)
 
 
 def _needed(reads: Sequence[set[int]]) -> list[int]:
     """Return the unknowns that others depend on, directly or through others, or that depend on themselves."""
-    needed = set(range(len(reads)))
+    required = set(range(len(reads)))
     while True:
-        read = {k for i in needed for k in reads[i]}
-        if needed <= read:
-            return sorted(needed)
-        needed &= read
+        read_unknowns = {k for i in required for k in reads[i]}
+        if required <= read_unknowns:
+            return sorted(required)
+        required &= read_unknowns
 
 
 def _followers(linear: Sequence[int], reads: Sequence[set[int]]) -> list[int]:
     """Return unknowns among the linear ones of which none depends on itself or on another."""
     followers: list[int] = []
     for k in linear:
-        others = {*followers, k}
-        if not reads[k] & others and all(k not in reads[f] for f in followers):
+        candidates = {*followers, k}
+        if not reads[k] & candidates and all(k not in reads[f] for f in followers):
             followers.append(k)
     return followers
 

@@ -50,8 +50,11 @@ class Role(Enum):
     @property
     def is_stage(self) -> bool:
         """Whether a kernel belongs to the equation of a stage."""
-        others = self.is_sweep or self.is_observable
-        return self in (Role.RELAX, Role.ADVANCE, Role.OWN_SLOPE, *_OF_STARTS, *_OF_VARIATIONS) and not others
+        is_sweep_or_observable = self.is_sweep or self.is_observable
+        return (
+            self in (Role.RELAX, Role.ADVANCE, Role.OWN_SLOPE, *_OF_STARTS, *_OF_VARIATIONS)
+            and not is_sweep_or_observable
+        )
 
     @property
     def is_observable(self) -> bool:

@@ -41,8 +41,8 @@ def ends(system: System, realisation: BiRealisation) -> tuple[Sequence[Expressio
     """
     if system.forces is None:
         return realisation.displacement, realisation.increment
-    impulse, half = [symbol(STEP) * f for f in system.forces.vector], number(Fraction(1, 2))
-    displacement = [a - half * f for a, f in zip(realisation.displacement, impulse, strict=True)]
+    impulse, one_half = [symbol(STEP) * f for f in system.forces.vector], number(Fraction(1, 2))
+    displacement = [a - one_half * f for a, f in zip(realisation.displacement, impulse, strict=True)]
     return displacement, [d + f for d, f in zip(realisation.increment, impulse, strict=True)]
 
 
@@ -90,14 +90,14 @@ def linearise_kernel(
     flat = coefficients.hoist(flat)
     sizes = (n, n, n * n, n * n)
     outputs = _outputs(flat, ("displacement", "increment", "jacobian", "increment_jacobian"), sizes)
-    named = tuple((momentum(c), e) for c, e in zip(coordinates, flat[sum(sizes) :], strict=True))
+    equations = tuple((momentum(c), e) for c, e in zip(coordinates, flat[sum(sizes) :], strict=True))
     return Kernel(
         "linearise",
         "at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the "
         "increment, all with the momenta p = grad S_h(y)",
         {"coef": coefficients.slots, "y": coordinates},
         outputs,
-        named,
+        equations,
     )
 
 
@@ -160,9 +160,9 @@ def _entries(name: str, n: int) -> tuple[str, ...]:
 
 def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
     """Return elimination in two parts, for many right-hand sides, and the product of each solution with the slope."""
-    n, named = len(slope), factors.named("f")
+    n, factor_symbols = len(slope), factors.named("f")
     side = tuple(Symbol("r", i) for i in range(n))
-    solution = named.solved([symbol(s) for s in side])
+    solution = factor_symbols.solved([symbol(s) for s in side])
     product = [total(symbol(Symbol("K", i, j)) * solution[j] for j in range(n) if slope[i][j]) for i in range(n)]
     return Factorisation(
         Kernel(
@@ -174,7 +174,7 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
         Kernel(
             "substitute",
             "the solution for a right-hand side, from the factors, and the slope times it",
-            {"factor": tuple(e.value for e in named.values), "slope": _entries("K", n), "side": side},
+            {"factor": tuple(e.value for e in factor_symbols.values), "slope": _entries("K", n), "side": side},
             (Output("solution", tuple(solution)), Output("product", tuple(product))),
         ),
     )
@@ -255,12 +255,16 @@ def noise_fields(system: System) -> Kernel:
 def observables(system: System) -> Observables:
     """Return the kernels of H, the Casimirs, the vector field and the observables of the spec."""
     inputs, timeless = system_inputs(system), {"params": system.parameter_names, "x": system.coordinates}
-    field, listed = system.vector_field(), tuple(system.observables.values())
-    named = Kernel("observables", "the observables", inputs, (Output("out", listed),)) if listed else None
+    field, observable_values = system.vector_field(), tuple(system.observables.values())
+    observable_kernel = (
+        Kernel("observables", "the observables", inputs, (Output("out", observable_values),))
+        if observable_values
+        else None
+    )
     casimirs = tuple(system.casimirs.values())
     return Observables(
         Kernel("energy", "the Hamiltonian", inputs, (Output("energy", (system.hamiltonian,)),)),
         Kernel("casimirs", "the Casimirs", timeless, (Output("out", casimirs),), role=Role.CASIMIRS),
         Kernel("vector_field", "pi(x) grad H(x)", inputs, (Output("out", field),)),
-        named,
+        observable_kernel,
     )

@@ -56,9 +56,9 @@ def _power(base: Expression, exponent: Fraction) -> Expression:
     root = _root(base, exponent.denominator)
     if root is None:
         return raw("pow", (base,), exponent)
-    whole, rest = divmod(exponent.numerator, exponent.denominator)
-    part = _integer_power(root, rest)
-    return part if whole == 0 else raw("mul", (_integer_power(base, whole), part))
+    quotient, remainder = divmod(exponent.numerator, exponent.denominator)
+    part = _integer_power(root, remainder)
+    return part if quotient == 0 else raw("mul", (_integer_power(base, quotient), part))
 
 
 def _root(base: Expression, degree: int) -> Expression | None:
@@ -109,13 +109,15 @@ def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
     """
     scaled = [e for e in topological(roots) if e.op == "mul" and e.args[0].is_number and e.args[1].op == "mul"]
     counts = Counter((e.args[0], factor) for e in scaled for factor in e.args[1].args)
-    chosen = {e: int(counts[e.args[0], e.args[1].args[1]] > counts[e.args[0], e.args[1].args[0]]) for e in scaled}
+    chosen_factor = {
+        e: int(counts[e.args[0], e.args[1].args[1]] > counts[e.args[0], e.args[1].args[0]]) for e in scaled
+    }
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
-        if e not in chosen or counts[e.args[0], e.args[1].args[chosen[e]]] == 1:
+        if e not in chosen_factor or counts[e.args[0], e.args[1].args[chosen_factor[e]]] == 1:
             return raw(e.op, tuple(args), e.value) if e.args else e
-        factor, other = args[1].args if chosen[e] == 0 else args[1].args[::-1]
-        return raw("mul", (raw("mul", (args[0], factor)), other))
+        factor, cofactor = args[1].args if chosen_factor[e] == 0 else args[1].args[::-1]
+        return raw("mul", (raw("mul", (args[0], factor)), cofactor))
 
     return fold(roots, visit)
 
@@ -136,15 +138,15 @@ def operation_counts(roots: Sequence[Expression]) -> dict[str, int]:
 
 
 def assign(
-    roots: Sequence[Expression], named: Mapping[int, str] | None = None
+    roots: Sequence[Expression], temporaries: Mapping[int, str] | None = None
 ) -> tuple[list[Assignment], list[Expression]]:
     """Return assignments of temporaries, and the roots as trees over them.
 
-    These values get a temporary: values used more than once, values with a name in ``named`` (by ``id`` of the node
+    These values get a temporary: values used more than once, values named in ``temporaries`` (by ``id`` of the node
     in the graph of ``roots``), operands of squares, and values whose tree would exceed `MAX_STATEMENT_OPERATIONS`
     operations. The roots must have passed `expand_powers`.
     """
-    named = named or {}
+    temporaries = temporaries or {}
     order = topological(roots)
     uses: dict[int, int] = {}
     for e in order:
@@ -164,9 +166,9 @@ def assign(
         tree = raw(e.op, tuple(args), e.value)
         size = 1 + sum(sizes[id(a)] for a in e.args)
         cheap = e.op == "neg" and not args[0].args
-        if id(e) in named or (uses[id(e)] > 1 and not cheap) or size > MAX_STATEMENT_OPERATIONS:
-            if id(e) in named:
-                target = named[id(e)]
+        if id(e) in temporaries or (uses[id(e)] > 1 and not cheap) or size > MAX_STATEMENT_OPERATIONS:
+            if id(e) in temporaries:
+                target = temporaries[id(e)]
             else:
                 count += 1
                 target = Symbol(TEMPORARY, count)

@@ -29,13 +29,15 @@ def along_mean(n: int) -> Kernel:
     start, difference = [a - b for a, b in zip(even, odd, strict=True)], [2 * b for b in odd]
     inverse, reciprocals = _inverse(_matrix(mean, n, 2 * n, 0))
     follows = _times(inverse, _plus(_identity(n), _times(_matrix(mean, n, 2 * n, n), hessian), -1))
-    fixed, along = [], []
+    path_rows, mean_rows = [], []
     for value in (start, difference):
         by_m, by_p = _matrix(value, n, 2 * n, 0), _matrix(value, n, 2 * n, n)
-        fixed.append(_times(by_m, inverse))
-        along.append(_plus(_times(by_m, follows), _times(by_p, hessian)))
-    named = zip(("alpha_y", "increment_y", "jacobian", "increment_jacobian"), (*fixed, *along), strict=True)
-    outputs = [Output(name, tuple(e for row in matrix for e in row)) for name, matrix in named]
+        path_rows.append(_times(by_m, inverse))
+        mean_rows.append(_plus(_times(by_m, follows), _times(by_p, hessian)))
+    named_rows = zip(
+        ("alpha_y", "increment_y", "jacobian", "increment_jacobian"), (*path_rows, *mean_rows), strict=True
+    )
+    outputs = [Output(name, tuple(e for row in matrix for e in row)) for name, matrix in named_rows]
     purpose = "derivatives along the mean of a path"
     return Kernel("along_mean", purpose, inputs, (*outputs, Output("reciprocal", tuple(reciprocals))))
 
@@ -60,5 +62,5 @@ def _inverse(a: Matrix) -> tuple[Matrix, list[Expression]]:
     n = len(a)
     inverse, reciprocals = inversion([[True] * n] * n)
     values: dict[str, Expression] = {Symbol("J", i, j): a[i][j] for i in range(n) for j in range(n)}
-    done = substitute([*inverse, *reciprocals], values)
-    return _matrix(done, n, n, 0), done[n * n :]
+    substituted = substitute([*inverse, *reciprocals], values)
+    return _matrix(substituted, n, n, 0), substituted[n * n :]

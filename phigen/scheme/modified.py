@@ -74,10 +74,10 @@ def modified_hamiltonian(
 def expect_modified(system: System, realisation: BiRealisation, stages: int) -> None:
     """Raise `SpecError` for compositions, forces and approximate bi-realisations, for which H̃_h is not computed."""
     if stages > 1 or not realisation.exact or system.forces:
-        why = "a composition" if stages > 1 else "a system with forces"
-        why = why if realisation.exact else "an approximate bi-realisation"
+        obstacle = "a composition" if stages > 1 else "a system with forces"
+        obstacle = obstacle if realisation.exact else "an approximate bi-realisation"
         place = system.locations.get(("modified_hamiltonian",))
-        raise SpecError([Diagnostic(f"modified_hamiltonian is not offered for {why}", place)])
+        raise SpecError([Diagnostic(f"modified_hamiltonian is not offered for {obstacle}", place)])
 
 
 def modified_of(

@@ -62,8 +62,8 @@ def monitor_of(spec: Spec) -> Expression | None:
     """Return g of a spec whose step is that of a series. Raises `SpecError` where g does not apply."""
     if spec.monitor is None:
         return None
-    others = {"time:": spec.time, "lattice:": spec.lattice}
-    for key, value in others.items():
+    obstacles = {"time:": spec.time, "lattice:": spec.lattice}
+    for key, value in obstacles.items():
         if value:
             message = f"monitor: not together with {key} e = -H(x0) would not be constant, or nothing would adapt"
             raise SpecError([spec.diagnostic(("monitor",), message, EXTENDED_SYSTEM_HINT if spec.time else "")])

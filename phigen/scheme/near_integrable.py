@@ -115,15 +115,15 @@ def _listed(name: str, generalised: tuple[int, ...], stages: int, halves: tuple[
 
 def _mirrored(half: list[Fraction], count: int) -> list[Fraction]:
     """Return all ``count`` fractions; the last one of the first half is adjusted so that the sum is exact."""
-    others, odd = half[:-1], count % 2
-    last = 1 - 2 * sum(others, Fraction(0)) if odd else Fraction(1, 2) - sum(others, Fraction(0))
-    return [*others, last, *([] if odd else [last]), *reversed(others)]
+    outer, odd = half[:-1], count % 2
+    last = 1 - 2 * sum(outer, Fraction(0)) if odd else Fraction(1, 2) - sum(outer, Fraction(0))
+    return [*outer, last, *([] if odd else [last]), *reversed(outer)]
 
 
 def _quadrature(stages: int) -> NearIntegrable:
     """Return the method of Laskar and Robutel with ``stages`` flows of B: nodes and weights of Gauss."""
     nodes = [Fraction(0), *gauss_nodes(stages), Fraction(1)]
-    a = [after - before for before, after in pairwise(nodes)]
+    a = [next_node - node for node, next_node in pairwise(nodes)]
     b = [_weight(nodes[1:-1], i) for i in range(stages)]
     a, b = (_mirrored(f[: (len(f) + 1) // 2], len(f)) for f in (a, b))
     return _method(f"saba-{2 * stages}-2", (2 * stages, 2), a, b)
@@ -139,9 +139,9 @@ def _weight(nodes: list[Fraction], i: int) -> Fraction:
 
 def _modified(order: int) -> Corrected:
     """Return the method with a modified flow of B and the corrector of an order: without errors of ε² h²."""
-    plain = _wisdom_holman(order)
+    unmodified = _wisdom_holman(order)
     return replace(
-        plain,
+        unmodified,
         name=f"wisdom-holman-modified-{order}",
         order=4,
         generalised=(order + 1, 4),

@@ -26,7 +26,7 @@ _CHOSEN = {"": "", "here": "there", "there": "here"}
 
 
 def transposed_at_ends(
-    places: Mapping[str, tuple[str, str]], ends: Ends, opposite: Collection[str], back: Kernel, *, summed: bool
+    places: Mapping[str, tuple[str, str]], ends: Ends, opposite: Collection[str], transpose: Kernel, *, summed: bool
 ) -> list[tuple[str, Ends, Kernel]]:
     """Return the ends at which a site is, with the bonds or pairs of the loop for that end, and the kernels.
 
@@ -36,12 +36,14 @@ def transposed_at_ends(
     end a.
     """
     if ends.of_all:
-        whole = paired(places, ends.kernel, back, opposite)
+        combined = paired(places, ends.kernel, transpose, opposite)
         sums = [o for o in ends.kernel.outputs if summed]
-        transposes = [("a", ends, replace(whole, outputs=(*whole.outputs, *sums)))]
+        transposes = [("a", ends, replace(combined, outputs=(*combined.outputs, *sums)))]
     else:
-        turned = replace(ends, end=_OPPOSITE[ends.end], chosen=_CHOSEN[ends.chosen])
-        transposes = [(end, bonds, _at_end(places, back, end)) for end, bonds in (("b", turned), ("a", ends))]
+        reversed_ends = replace(ends, end=_OPPOSITE[ends.end], chosen=_CHOSEN[ends.chosen])
+        transposes = [
+            (end, bonds, _at_end(places, transpose, end)) for end, bonds in (("b", reversed_ends), ("a", ends))
+        ]
     return [(end, bonds, kernel) for end, bonds, kernel in transposes if any(not e.is_zero for e in kernel.roots)]
 
 
@@ -57,7 +59,9 @@ def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Ke
     return replace(kernel, outputs=tuple(outputs))
 
 
-def paired(ends: Mapping[str, tuple[str, str]], kernel: Kernel, back: Kernel, opposite: Collection[str] = ()) -> Kernel:
+def paired(
+    ends: Mapping[str, tuple[str, str]], kernel: Kernel, transpose: Kernel, opposite: Collection[str] = ()
+) -> Kernel:
     """Return the transpose of a kernel of bonds or pairs with all contributions to a site, as a, from one bond or pair.
 
     ``ends`` maps each symbol to the field, or parameter, and the end. Parameters at bonds that are ``opposite`` have
@@ -67,32 +71,37 @@ def paired(ends: Mapping[str, tuple[str, str]], kernel: Kernel, back: Kernel, op
     names = {place: s for s, place in ends.items()}
     exchanged = {s: symbol(names[base, _OTHER[end]]) for s, (base, end) in ends.items()}
     exchanged |= {p: -symbol(p) for p in opposite}
-    at_b_seeds = {s: symbol(Symbol(THERE, k)) for k, s in enumerate(back.inputs[HERE])}
-    along = dict(back.along("site"))
-    fields = dict.fromkeys(ends[s][0] for s, e in along.items() if not e.is_zero)
-    at_a, at_b = ([along.get(names[f, end], ZERO) for f in fields] for end in "ab")
-    rest = [o for o in back.outputs if o.name != "site_bar"]
+    at_b_seeds = {s: symbol(Symbol(THERE, k)) for k, s in enumerate(transpose.inputs[HERE])}
+    cotangents = dict(transpose.along("site"))
+    fields = dict.fromkeys(ends[s][0] for s, e in cotangents.items() if not e.is_zero)
+    at_a, at_b = ([cotangents.get(names[f, end], ZERO) for f in fields] for end in "ab")
+    remaining_outputs = [o for o in transpose.outputs if o.name != "site_bar"]
     signs = _signs(kernel.roots, exchanged)
     if signs:
         combined = {s: symbol(s) + sign * e for (s, e), sign in zip(at_b_seeds.items(), signs, strict=True)}
         contributions = substitute(at_a, combined)
-        rest = [replace(o, values=tuple(Fraction(1, 2) * e for e in substitute(o.values, combined))) for o in rest]
+        remaining_outputs = [
+            replace(o, values=tuple(Fraction(1, 2) * e for e in substitute(o.values, combined)))
+            for o in remaining_outputs
+        ]
     else:
-        contributions = [e + other for e, other in zip(at_a, substitute(at_b, exchanged | at_b_seeds), strict=True)]
+        contributions = [
+            e + other_value for e, other_value in zip(at_a, substitute(at_b, exchanged | at_b_seeds), strict=True)
+        ]
     site = [names[f, "a"] for f in fields]
     values = [*contributions, *[ZERO] * (len(ends) - len(site))]
     site += [s for s in ends if s not in site]
     return replace(
-        back,
-        inputs={**back.inputs, "site": tuple(site), THERE: tuple(e.value for e in at_b_seeds.values())},
-        outputs=(Output("site_bar", tuple(values)), *rest),
+        transpose,
+        inputs={**transpose.inputs, "site": tuple(site), THERE: tuple(e.value for e in at_b_seeds.values())},
+        outputs=(Output("site_bar", tuple(values)), *remaining_outputs),
     )
 
 
 def _signs(sums: Sequence[Expression], exchanged: Mapping[str, Expression]) -> list[int]:
     """Return the factors, 1 or -1, from the sums of a to those of b if proved for all of them, else an empty list."""
     signs = []
-    for value, other in zip(sums, substitute(sums, exchanged), strict=True):
-        proved = (sign for sign in (-1, 1) if decide_zero("", [("", value - sign * other)]).verdict == PROVED)
-        signs.append(next(proved, 0))
+    for value, other_sum in zip(sums, substitute(sums, exchanged), strict=True):
+        proved_signs = (sign for sign in (-1, 1) if decide_zero("", [("", value - sign * other_sum)]).verdict == PROVED)
+        signs.append(next(proved_signs, 0))
     return signs if all(signs) else []

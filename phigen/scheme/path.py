@@ -89,21 +89,21 @@ def build_path(system: System, coefficients: Coefficients) -> Recurrences:
     return path_of(system.coordinates, _flow(system, coefficients))
 
 
-def build_slopes(system: System, coefficients: Coefficients, along: Sequence[str] = ()) -> PathSlopes:
+def build_slopes(system: System, coefficients: Coefficients, variables: Sequence[str] = ()) -> PathSlopes:
     """Return the further recurrences for derivatives of the path of `build_path`, also along some coefficients."""
     n, flow = system.dimension, _flow(system, coefficients)
     columns = [derivatives(flow, c) for c in system.coordinates]
     jacobian = [columns[j][i] for i in range(n) for j in range(n)]
     tensor = coefficients.hoist([e for row in system.poisson for e in row])
-    by_coefficient = [derivatives(flow, c) for c in along]
-    sources = [by_coefficient[u][i] for i in range(n) for u in range(len(along))]
+    by_coefficient = [derivatives(flow, c) for c in variables]
+    sources = [by_coefficient[u][i] for i in range(n) for u in range(len(variables))]
     return _PathBuilder(system.coordinates).slopes(_chains([*flow, *jacobian, *tensor, *sources]))
 
 
 def used_by_path(system: System, coefficients: Coefficients) -> list[str]:
     """Return the coefficients that π(m)p depends on."""
-    present = set(symbols_of(*_flow(system, coefficients)))
-    return [s for s in coefficients.slots if s in present]
+    symbols = set(symbols_of(*_flow(system, coefficients)))
+    return [s for s in coefficients.slots if s in symbols]
 
 
 def _flow(system: System, coefficients: Coefficients) -> list[Expression]:
@@ -202,12 +202,12 @@ class _PathBuilder:
         values = [self._value(a) for a in e.args]
         first = raw(e.op, tuple(values), e.value)
         moving = [(k, self._series_of[id(a)]) for k, a in enumerate(e.args) if id(a) in self._in_motion]
-        one, minus = raw("number", (), Fraction(1)), raw("number", (), Fraction(-1))
+        unit, minus = raw("number", (), Fraction(1)), raw("number", (), Fraction(-1))
         match e.op:
             case "add":
-                return NodeSeries(first, tuple((s, one) for _, s in moving))
+                return NodeSeries(first, tuple((s, unit) for _, s in moving))
             case "sub":
-                return NodeSeries(first, tuple((s, minus if k else one) for k, s in moving))
+                return NodeSeries(first, tuple((s, minus if k else unit) for k, s in moving))
             case "neg":
                 return NodeSeries(first, ((moving[0][1], minus),))
             case "mul" if len(moving) == 1:

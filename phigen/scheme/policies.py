@@ -25,18 +25,18 @@ class Policy:
 
     def constants(self) -> Iterator[PolicyConstant]:
         """Yield the numbers, with their names in generated code."""
-        for each in fields(self):
-            yield PolicyConstant(each.name.upper(), getattr(self, each.name), each.metadata["about"])
+        for constant in fields(self):
+            yield PolicyConstant(constant.name.upper(), getattr(self, constant.name), constant.metadata["about"])
 
 
-def number(value: float, about: str) -> float:
+def number(value: float, description: str) -> float:
     """Return the default of a field of a policy that is a real number."""
-    return field(default=float(value), metadata={"about": about})
+    return field(default=float(value), metadata={"about": description})
 
 
-def count(value: int, about: str) -> int:
+def count(value: int, description: str) -> int:
     """Return the default of a field of a policy that is a whole number."""
-    return field(default=value, metadata={"about": about})
+    return field(default=value, metadata={"about": description})
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,10 @@ class About:
     @property
     def counts(self) -> str:
         """The operations in words."""
-        named = ((n, what.removesuffix("s") if n == 1 else what) for what, n in self.operations.items())
-        return ", ".join(f"{n} {what}" for n, what in named if n)
+        worded_counts = (
+            (n, operation.removesuffix("s") if n == 1 else operation) for operation, n in self.operations.items()
+        )
+        return ", ".join(f"{n} {operation}" for n, operation in worded_counts if n)
 
 
 @dataclass(frozen=True)
@@ -227,8 +229,8 @@ class Program:
     @property
     def midpoints(self) -> tuple[float, ...]:
         """The middles of the stages, as fractions of the step."""
-        ends = [Fraction(0), *accumulate(Fraction(f) for f in self.fractions)]
-        return tuple(float((a + b) / 2) for a, b in pairwise(ends))
+        stage_ends = [Fraction(0), *accumulate(Fraction(f) for f in self.fractions)]
+        return tuple(float((a + b) / 2) for a, b in pairwise(stage_ends))
 
     @property
     def is_monitored(self) -> bool:
@@ -245,6 +247,14 @@ class Program:
         """All kernels, each once."""
         modified = (self.modified.kernel,) if self.modified else ()
         timed = [k for k in (self.monitor.elapsed, self.monitor.rate, self.monitor.level) if k] if self.monitor else []
-        turned = self.attitude.kernels if self.attitude else ()
+        attitude_kernels = self.attitude.kernels if self.attitude else ()
         noisy = (self.noise.fields,) if self.noise and self.noise.fields else ()
-        return (*self.step.kernels, *turned, *timed, *modified, *self.observables.kernels, *noisy, *self.choice)
+        return (
+            *self.step.kernels,
+            *attitude_kernels,
+            *timed,
+            *modified,
+            *self.observables.kernels,
+            *noisy,
+            *self.choice,
+        )

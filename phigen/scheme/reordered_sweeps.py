@@ -55,8 +55,8 @@ def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str
         names = dict(zip(order, original, strict=True))
         for side in sides:
             if (order, side) != (original, 1.0):
-                changed = tuple(replace(e, kernel=_signed(_renamed(e.kernel, names), side)) for e in gather.ends)
-                yield replace(gather, ends=changed), () if order == original else order, side
+                reordered_ends = tuple(replace(e, kernel=_signed(_renamed(e.kernel, names), side)) for e in gather.ends)
+                yield replace(gather, ends=reordered_ends), () if order == original else order, side
 
 
 def _signed(kernel: Kernel, sign: float) -> Kernel:
@@ -72,38 +72,38 @@ def turned(sites: Sites, fields: Sequence[str], order: Sequence[str], sweep: Swe
     None if the result would read neighbours that no sweep reads.
     """
     into = dict(zip(order, fields, strict=True))
-    into |= {there: here for here, there in turned_increments(sites, fields, order).items()}
-    known = {place: name for name, place in (*sites.places.items(), *sites.ends.items())}
+    into |= {old_symbol: new_symbol for new_symbol, old_symbol in turned_increments(sites, fields, order).items()}
+    symbol_of_place = {place: name for name, place in (*sites.places.items(), *sites.ends.items())}
     kernels = [sweep.kernel, *(sweep.gather.kernels if sweep.gather else ())]
     names: dict[str, str] = {}
     for s in (s for kernel in kernels for s in (*kernel.inputs.get("site", ()), *kernel.inputs.get("gathered", ()))):
         if isinstance(s, Symbol) and s.kind == GATHERED:
             names[s] = Symbol(GATHERED, into[str(s.key[0])])
             continue
-        field, where = sites.ends[s] if s in sites.ends else sites.places[s]
-        name = known.get((into.get(field, field), where))
+        field, site = sites.ends[s] if s in sites.ends else sites.places[s]
+        name = symbol_of_place.get((into.get(field, field), site))
         if name is None:
             return None
         names[s] = name
-    moved = [fields.index(into[fields[i]]) for i in sweep.moved]
-    places = sorted(range(len(moved)), key=moved.__getitem__)
+    new_order = [fields.index(into[fields[i]]) for i in sweep.moved]
+    value_order = sorted(range(len(new_order)), key=new_order.__getitem__)
     gather = sweep.gather and replace(
         sweep.gather,
         ends=tuple(replace(e, kernel=_renamed(e.kernel, names)) for e in sweep.gather.ends),
         names=tuple(names.get(n, n) for n in sweep.gather.names),
     )
-    kernel = _renamed(sweep.kernel, names, places)
-    return replace(sweep, kernel=kernel, moved=tuple(sorted(moved)), gather=gather, tangent=None)
+    kernel = _renamed(sweep.kernel, names, value_order)
+    return replace(sweep, kernel=kernel, moved=tuple(sorted(new_order)), gather=gather, tangent=None)
 
 
 def _renamed(kernel: Kernel, names: Mapping[str, str], places: Sequence[int] = ()) -> Kernel:
     """Return the kernel with other symbols, and its values in the order of ``places``."""
-    values = substitute(kernel.roots, {old: symbol(new) for old, new in names.items()})
+    values = substitute(kernel.roots, {old_name: symbol(new_name) for old_name, new_name in names.items()})
     inputs = {
         key: tuple(sorted((names.get(s, s) for s in symbols), key=natural_key))
         if key in ("site", "gathered", "bonds")
         else symbols
         for key, symbols in kernel.inputs.items()
     }
-    chosen = tuple(values[i] for i in places or range(len(values)))
-    return replace(kernel, inputs=inputs, outputs=(Output(kernel.outputs[0].name, chosen),))
+    ordered_values = tuple(values[i] for i in places or range(len(values)))
+    return replace(kernel, inputs=inputs, outputs=(Output(kernel.outputs[0].name, ordered_values),))

@@ -42,7 +42,7 @@ def of_coefficients(step: Splitting | Sweeps) -> dict[str, int]:
 
 def over_negative_time(values: Sequence[Expression], parities: Mapping[str, int]) -> list[Expression]:
     """Return the values over the time −h."""
-    return [turned for _, turned in _parities(values, parities)]
+    return [reversed_value for _, reversed_value in _parities(values, parities)]
 
 
 def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> list[Expression]:
@@ -54,7 +54,7 @@ def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> l
     previous = {s: symbol(s) + change for s, change in changes.items()}
 
     def visit(node: Expression, args: list[tuple[Expression, Form | None]]) -> tuple[Expression, Form | None]:
-        form = _form(node, [of for _, of in args])
+        form = _form(node, [argument_form for _, argument_form in args])
         if form and _stays(form, changes):
             return node, form
         return previous.get(node.value, node) if node.op == "symbol" else rebuild(node, [e for e, _ in args]), form
@@ -64,8 +64,8 @@ def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> l
     # with several functions the proof is slow
     invariants = {
         e: symbol(Symbol("invariant", k))
-        for k, (e, (other, _)) in enumerate(zip(candidates, fold(candidates, visit), strict=True))
-        if len(_called_in(other)) < 2 and decide_zero("", [("", other - e)]).verdict == PROVED
+        for k, (e, (reversed_value, _)) in enumerate(zip(candidates, fold(candidates, visit), strict=True))
+        if len(_called_in(reversed_value)) < 2 and decide_zero("", [("", reversed_value - e)]).verdict == PROVED
     }
     values_of = {value.value: e for e, value in invariants.items()}
     with_symbols = fold(values, lambda e, args: invariants.get(e) or rebuild(e, args))

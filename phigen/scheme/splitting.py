@@ -54,8 +54,10 @@ def build_splitting(
     if sources:
         expect_no_adjoint(system, extras.adjoint)
     flows = [*sources, *choice.splitting.flows]
-    fixed = (LEVEL,) if monitor else ()
-    coefficients = Coefficients([*system.parameter_names, *fixed, TIME, KICK], [*system.times, *system.increments[:1]])
+    constant_symbols = (LEVEL,) if monitor else ()
+    coefficients = Coefficients(
+        [*system.parameter_names, *constant_symbols, TIME, KICK], [*system.times, *system.increments[:1]]
+    )
     _expect_steady(system, flows, monitor)
     coefficients.include(e for flow in flows for e in flow.exponentials)
     kernels = tuple(_flow_kernel(system, flow, k, coefficients, monitor) for k, flow in enumerate(flows, 1))
@@ -68,7 +70,9 @@ def build_splitting(
         time_of = monitor.time if monitor else None
         attitude = flow_attitude(system, group, choice.splitting.flows, increments, gauge, coefficients, time_of)
     schedule = with_noise(choice.schedule(), len(sources)) if sources else choice.schedule()
-    step = _step(system, kernels, schedule, coefficients, fixed, choice.method.name, tangents, adjoint=extras.adjoint)
+    step = _step(
+        system, kernels, schedule, coefficients, constant_symbols, choice.method.name, tangents, adjoint=extras.adjoint
+    )
     for kernel in step.kernels:
         expect_few(system, kernel, other="")
     level = level_adjoint(system) if monitor and extras.adjoint else None
@@ -118,7 +122,7 @@ def _step(
     flows: tuple[Kernel, ...],
     schedule: Schedule,
     coefficients: Coefficients,
-    fixed: tuple[str, ...],
+    constant_symbols: tuple[str, ...],
     method: str,
     tangents: tuple[Kernel, ...],
     *,
@@ -127,7 +131,7 @@ def _step(
     """Return the step; the coefficients are all known except those that are computed anew in each flow."""
     renewed_inputs = {"t": system.times, "dw": system.increments[:1]}
     refresh = coefficients.refresh(**{name: symbols for name, symbols in renewed_inputs.items() if symbols})
-    inputs = {"gauge": fixed, "h": (TIME,), "kick": (KICK,) if schedule.multiples else ()}
+    inputs = {"gauge": constant_symbols, "h": (TIME,), "kick": (KICK,) if schedule.multiples else ()}
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters and the time of a flow only",
@@ -151,10 +155,10 @@ def facts(choice: ScheduledMethod, step: Splitting, sources: int = 0) -> list[st
         return ["scheme: the exact flow of H, which is elementary", f"step: {step.kind.manner}"]
     names = [(f"{flow.letter}_{k}", flow.force) for k, flow in enumerate(choice.splitting.flows, 1)]
     parts, forces = (" + ".join(n for n, force in names if bool(force) == acting) for acting in (False, True))
-    why = f", since {choice.why}" if choice.why else ""
+    reason = f", since {choice.why}" if choice.why else ""
     return [
         f"scheme: splitting, H = {parts}" + f", forces {forces}" * bool(forces) + ", with the exact flow of each",
-        f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{further}{why}",
+        f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{further}{reason}",
         f"step: {step.kind.manner}",
     ]
 
@@ -165,8 +169,8 @@ def _clock(choice: ScheduledMethod) -> str:
         return ""
     flows = choice.splitting.flows
     with_part = choice.carrier < len(flows)
-    how = f"with {flows[choice.carrier].letter}_{choice.carrier + 1}" if with_part else "between the flows"
-    return f"time: advances {how}, and stands still in {'all other' if with_part else 'all'} flows"
+    manner = f"with {flows[choice.carrier].letter}_{choice.carrier + 1}" if with_part else "between the flows"
+    return f"time: advances {manner}, and stands still in {'all other' if with_part else 'all'} flows"
 
 
 def _named(system: System, flow: Flow, k: int) -> str:
@@ -182,11 +186,11 @@ def _named(system: System, flow: Flow, k: int) -> str:
 def _operations(step: Splitting) -> dict[str, int]:
     """Return the operations of a step, without those of compensated summation."""
     times = Counter(part for part, _ in step.schedule.flows)
-    counted: Counter[str] = Counter()
+    totals: Counter[str] = Counter()
     for part, kernel in enumerate(step.flows):
-        for what, number in operation_counts(kernel.roots).items():
-            counted[what] += number * times[part]
-    return dict(counted)
+        for operation, number in operation_counts(kernel.roots).items():
+            totals[operation] += number * times[part]
+    return dict(totals)
 
 
 def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic | None) -> None:
@@ -211,8 +215,8 @@ def _expect_correctable(system: System, spec: Spec, method: Corrected) -> None:
         "monitor": (spec.monitor is not None, "the corrector takes equal steps of the physical time"),
         "reconstruct": (bool(spec.reconstruct), "attitudes are those of single steps"),
     }
-    for key, (present, reason) in refused.items():
-        if present:
+    for key, (is_present, reason) in refused.items():
+        if is_present:
             message = f"scheme splitting: composition {method.name} is not offered together with {key}: {reason}"
             place = system.locations.get(("composition",)) or system.locations.get((key,))
             hint = "composition: saba-8-2 at order 2 or aba-10-6-4 at order 4, which need no corrector"

@@ -67,11 +67,11 @@ class Coefficients:
     @property
     def blocks(self) -> tuple[tuple[int, int], ...]:
         """The places of the matrices tA in the table, with their sizes."""
-        places, start = [], len(self.values)
+        blocks, start = [], len(self.values)
         for exponential in self.exponentials:
-            places.append((start, exponential.size))
+            blocks.append((start, exponential.size))
             start += exponential.size**2
-        return tuple(places)
+        return tuple(blocks)
 
     def include(self, exponentials: Iterable[MatrixExponential]) -> None:
         """Add matrix exponentials to the table, each once."""
@@ -88,21 +88,21 @@ class Coefficients:
         """
         return self._hoisted(roots, lambda name: self._is_fixed(name) or self._is_new(name))
 
-    def _hoisted(self, roots: Sequence[Expression], early: Callable[[str], bool]) -> list[Expression]:
-        fixed: dict[int, bool] = {}
+    def _hoisted(self, roots: Sequence[Expression], is_hoisted: Callable[[str], bool]) -> list[Expression]:
+        hoisted: dict[int, bool] = {}
         for e in topological(roots):
-            fixed[id(e)] = early(e.value) if e.op == "symbol" else all(fixed[id(a)] for a in e.args)
+            hoisted[id(e)] = is_hoisted(e.value) if e.op == "symbol" else all(hoisted[id(a)] for a in e.args)
 
         def visit(e: Expression, args: list[Expression]) -> Expression:
-            if fixed[id(e)]:
+            if hoisted[id(e)]:
                 return e
             arguments = [
-                self.slot(self._written_out(a)) if fixed[id(a)] else b for a, b in zip(e.args, args, strict=True)
+                self.slot(self._written_out(a)) if hoisted[id(a)] else b for a, b in zip(e.args, args, strict=True)
             ]
             return rebuild(e, arguments)
 
         replaced = fold(roots, visit)
-        return [self.slot(self._written_out(r)) if fixed[id(r)] else d for r, d in zip(roots, replaced, strict=True)]
+        return [self.slot(self._written_out(r)) if hoisted[id(r)] else d for r, d in zip(roots, replaced, strict=True)]
 
     def is_static(self, e: Expression) -> bool:
         """Whether an expression does not depend on the state."""
@@ -141,7 +141,7 @@ class Coefficients:
             (Output(NOW, values),),
         )
 
-    def settled(self, built: T) -> T:
+    def settled(self, unsettled: T) -> T:
         """Return an object built with this full table, with the final positions of the coefficients.
 
         The object consists of kernels, recurrences and other frozen dataclasses and tuples. Coefficients that are
@@ -149,12 +149,14 @@ class Coefficients:
         """
         provisional = self.table[len(self.values) :]
         if not provisional:
-            return built
-        places = [coefficient(len(self.values) + k) for k in range(len(provisional))]
-        names: dict[str, Expression] = {name: symbol(place) for name, place in zip(provisional, places, strict=True)}
-        listed = list(_expressions(built))
-        renamed = {id(e): r for e, r in zip(listed, substitute(listed, names), strict=True)}
-        settled: T = _rebuilt(built, renamed, (*self.slots, *places))
+            return unsettled
+        final_symbols = [coefficient(len(self.values) + k) for k in range(len(provisional))]
+        names: dict[str, Expression] = {
+            name: symbol(place) for name, place in zip(provisional, final_symbols, strict=True)
+        }
+        expressions = list(_expressions(unsettled))
+        renamed = {id(e): r for e, r in zip(expressions, substitute(expressions, names), strict=True)}
+        settled: T = _rebuilt(unsettled, renamed, (*self.slots, *final_symbols))
         return settled
 
     def _is_fixed(self, name: str) -> bool:
@@ -165,32 +167,36 @@ class Coefficients:
 
     def _written_out(self, e: Expression) -> Expression:
         """Return the expression with its coefficients replaced by their expressions."""
-        used = [n for n in symbols_of(e) if isinstance(n, Symbol) and n.kind in (COEFFICIENT, RENEWED)]
+        coefficient_symbols = [n for n in symbols_of(e) if isinstance(n, Symbol) and n.kind in (COEFFICIENT, RENEWED)]
         tables = {COEFFICIENT: self.values, RENEWED: self.renewed}
-        return substitute([e], {n: tables[n.kind][int(n.key[0])] for n in used})[0] if used else e
+        return (
+            substitute([e], {n: tables[n.kind][int(n.key[0])] for n in coefficient_symbols})[0]
+            if coefficient_symbols
+            else e
+        )
 
 
-def _expressions(built: Any) -> Iterable[Expression]:
+def _expressions(tree: Any) -> Iterable[Expression]:
     """Yield all expressions inside tuples and dataclasses."""
-    if isinstance(built, Expression):
-        yield built
-    elif isinstance(built, tuple):
-        for part in built:
+    if isinstance(tree, Expression):
+        yield tree
+    elif isinstance(tree, tuple):
+        for part in tree:
             yield from _expressions(part)
-    elif is_dataclass(built):
-        for f in fields(built):
-            yield from _expressions(getattr(built, f.name))
+    elif is_dataclass(tree):
+        for f in fields(tree):
+            yield from _expressions(getattr(tree, f.name))
 
 
-def _rebuilt(built: Any, renamed: dict[int, Expression], slots: tuple[str, ...]) -> Any:
+def _rebuilt(tree: Any, renamed: dict[int, Expression], slots: tuple[str, ...]) -> Any:
     """Return the object with other expressions; kernels that read the table receive all of its ``slots``."""
-    if isinstance(built, Expression):
-        return renamed[id(built)]
-    if isinstance(built, tuple):
-        return tuple(_rebuilt(part, renamed, slots) for part in built)
-    if not is_dataclass(built) or isinstance(built, type):
-        return built
-    parts: dict[str, Any] = {f.name: _rebuilt(getattr(built, f.name), renamed, slots) for f in fields(built)}
-    if isinstance(built, Kernel) and TABLE in built.inputs and built.outputs[0].name != NOW:
-        parts["inputs"] = {**built.inputs, TABLE: slots}
-    return replace(built, **parts)
+    if isinstance(tree, Expression):
+        return renamed[id(tree)]
+    if isinstance(tree, tuple):
+        return tuple(_rebuilt(part, renamed, slots) for part in tree)
+    if not is_dataclass(tree) or isinstance(tree, type):
+        return tree
+    parts: dict[str, Any] = {f.name: _rebuilt(getattr(tree, f.name), renamed, slots) for f in fields(tree)}
+    if isinstance(tree, Kernel) and TABLE in tree.inputs and tree.outputs[0].name != NOW:
+        parts["inputs"] = {**tree.inputs, TABLE: slots}
+    return replace(tree, **parts)

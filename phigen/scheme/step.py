@@ -112,8 +112,8 @@ def explicit_increment(
     order: Sequence[int],
 ) -> list[Expression]:
     """Return the increment as a function of x, by solving the equation for y in the given order."""
-    solved: dict[str, Expression] = {}
+    solutions: dict[str, Expression] = {}
     for i in order:
-        (shift,) = substitute([displacement[i]], solved)
-        solved[coordinates[i]] = symbol(coordinates[i]) - shift
-    return substitute(increment, solved)
+        (shift,) = substitute([displacement[i]], solutions)
+        solutions[coordinates[i]] = symbol(coordinates[i]) - shift
+    return substitute(increment, solutions)

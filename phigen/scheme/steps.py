@@ -657,8 +657,12 @@ class Sweeps(_Scheduled):
         Noise is drawn with the sweep that reads it, so no sweep may read that of neighbours. A seam lies at the end
         of the lattice, which a caller with a part of the lattice does not have.
         """
-        beside = any(base in self.sites.increments and any(offset) for base, offset in self.sites.places.values())
-        return self.partners is None and self.equation is None and not beside and not self.sites.seams
+        reads_neighbour_increments = any(
+            base in self.sites.increments and any(offset) for base, offset in self.sites.places.values()
+        )
+        return (
+            self.partners is None and self.equation is None and not reads_neighbour_increments and not self.sites.seams
+        )
 
     def stage(self, part: int, fields: Sequence[str]) -> tuple[int, int, int, int]:
         """Return the access of a part on a grid: its extent behind and ahead along the first axis, and two sets.

@@ -20,39 +20,45 @@ from phigen.symbolic.symbols import AROUND, Symbol
 STORED_VALUE_COST = 10
 
 
-def collecting(fields: Sequence[str], step: Sweeps, sweep: Sweep, back: Kernel) -> Kernel | None:
+def collecting(fields: Sequence[str], step: Sweeps, sweep: Sweep, transpose: Kernel) -> Kernel | None:
     """Return the transpose of a sweep that collects; None if nothing is stored for neighbours, or that is cheaper."""
-    sites, along = step.sites, back.along("site")
-    stored = [(name, value) for name, value in along if any(sites.places[name][1]) and not value.is_zero]
-    if not stored or any(sites.open) or step.partners or sites.colours > 1:
+    sites, contributions = step.sites, transpose.along("site")
+    neighbour_terms = [
+        (name, value) for name, value in contributions if any(sites.places[name][1]) and not value.is_zero
+    ]
+    if not neighbour_terms or any(sites.open) or step.partners or sites.colours > 1:
         return None
     updated = {fields[f] for f in sweep.moved}
     names = {place: name for name, place in sites.places.items()}
     sums: dict[str, list[Expression]] = {}
-    for name, value in stored:
+    for name, value in neighbour_terms:
         field, offset = sites.places[name]
         contribution = _from_receiver(sites, names, updated, offset, value)
         if contribution is None or field in updated:
             return None
         sums.setdefault(field, []).append(contribution)
-    cotangents = dict.fromkeys(sums, ZERO) | dict(along)
+    cotangents = dict.fromkeys(sums, ZERO) | dict(contributions)
     if any(not cotangents[field].is_zero for field in updated if field in cotangents):
         return None
     collected_sums = {field: _by_cotangents(total([cotangents[field], *terms])) for field, terms in sums.items()}
-    neighbour_names = {name for name, _ in stored}
-    values = [collected_sums.pop(name, ZERO if name in neighbour_names else value) for name, value in along]
-    read = {s for s in symbols_of(*values, *collected_sums.values()) if s in sites.places}
-    collected_sums |= dict.fromkeys(sorted(read.difference(back.inputs["site"], collected_sums)), ZERO)
+    neighbour_names = {name for name, _ in neighbour_terms}
+    values = [collected_sums.pop(name, ZERO if name in neighbour_names else value) for name, value in contributions]
+    read_symbols = {s for s in symbols_of(*values, *collected_sums.values()) if s in sites.places}
+    collected_sums |= dict.fromkeys(sorted(read_symbols.difference(transpose.inputs["site"], collected_sums)), ZERO)
     outputs = [
-        replace(o, values=(*values, *collected_sums.values())) if o.name == "site_bar" else o for o in back.outputs
+        replace(o, values=(*values, *collected_sums.values())) if o.name == "site_bar" else o for o in transpose.outputs
     ]
     collected = replace(
-        back, inputs={**back.inputs, "site": (*back.inputs["site"], *collected_sums)}, outputs=tuple(outputs)
+        transpose,
+        inputs={**transpose.inputs, "site": (*transpose.inputs["site"], *collected_sums)},
+        outputs=tuple(outputs),
     )
-    if _cost(collected.roots) > _cost(back.roots) + STORED_VALUE_COST * len({value for _, value in stored}):
+    if _cost(collected.roots) > _cost(transpose.roots) + STORED_VALUE_COST * len(
+        {value for _, value in neighbour_terms}
+    ):
         return None
-    around = tuple(s for s in symbols_of(*collected.roots) if isinstance(s, Symbol) and s.kind == AROUND)
-    return replace(collected, inputs={**collected.inputs, AROUND: around})
+    neighbour_symbols = tuple(s for s in symbols_of(*collected.roots) if isinstance(s, Symbol) and s.kind == AROUND)
+    return replace(collected, inputs={**collected.inputs, AROUND: neighbour_symbols})
 
 
 def _from_receiver(
@@ -72,10 +78,10 @@ def _from_receiver(
             renamed[s] = symbol(Symbol(AROUND, *s.key, *(-o for o in offset)))
         elif s in sites.places:
             field, place = sites.places[s]
-            other = names.get((field, tuple(p - o for p, o in zip(place, offset, strict=True))))
-            if other is None or field in updated:
+            name_at_receiver = names.get((field, tuple(p - o for p, o in zip(place, offset, strict=True))))
+            if name_at_receiver is None or field in updated:
                 return None
-            renamed[s] = symbol(other)
+            renamed[s] = symbol(name_at_receiver)
         elif isinstance(s, Symbol) and s.kind == "present":
             return None
     return substitute([value], renamed)[0]

@@ -57,8 +57,8 @@ def site_blocks(program: Program, step: Sweeps) -> bool:
 
 def waves(program: Program, step: Sweeps) -> bool:
     """Whether wavefront blocking applies: for grids, whose flows read neighbours only."""
-    split = step.equation is None and step.partners is None and not step.sites.seams
-    return split and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
+    is_splitting = step.equation is None and step.partners is None and not step.sites.seams
+    return is_splitting and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
 
 
 @once
@@ -67,13 +67,13 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
     passes: list[bool] = []
     if step.equation and step.adjoint:
         kernels = [kernel for kernel in step.adjoint.steps if "sums_bar" not in kernel.inputs]
-        read = [pair for kernel in kernels for pair in kernel.along("site")]
+        cotangents = [pair for kernel in kernels for pair in kernel.along("site")]
         summed = any(kernel.inputs["gathered"] for kernel in kernels)
-        return [summed or any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)]
+        return [summed or any(any(step.sites.places[s][1]) and not e.is_zero for s, e in cotangents)]
     for part, kernels in zip(step.parts, transposes(program, step), strict=False):
-        read = [(s, e) for kernel in kernels for s, e in kernel.along("site")]
-        beside = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)
-        passes.append(beside or any(sweep.gather for sweep in part))
+        cotangents = [(s, e) for kernel in kernels for s, e in kernel.along("site")]
+        passes_on = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in cotangents)
+        passes.append(passes_on or any(sweep.gather for sweep in part))
     return passes
 
 
@@ -99,8 +99,8 @@ def ways(step: Sweeps) -> list[tuple[int, int]]:
 
     The first flow is listed once more, for where it is merged with the last flow of the step before."""
     parts = [part for part, _ in step.schedule.flows]
-    after = [*parts[1:], parts[1 % len(parts)]]
-    return [*zip(parts, after, strict=True), (parts[0], parts[1 % len(parts)])]
+    next_parts = [*parts[1:], parts[1 % len(parts)]]
+    return [*zip(parts, next_parts, strict=True), (parts[0], parts[1 % len(parts)])]
 
 
 def shares(step: Sweeps) -> bool:
@@ -108,7 +108,7 @@ def shares(step: Sweeps) -> bool:
     kernels = step.adjoint.steps if step.adjoint else ()
     kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)
     summed = [kernel.along(array) for kernel in kernels for array in (TABLE, "params") if array in kernel.inputs]
-    return any(not e.is_zero for along in summed for _, e in along)
+    return any(not e.is_zero for slopes in summed for _, e in slopes)
 
 
 def givers(step: Sweeps) -> bool:

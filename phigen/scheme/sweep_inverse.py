@@ -87,8 +87,8 @@ def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
         return rebuild(value, [_without_factors(e, offset) for e in value.args])
     if value.op != "symbol" or not isinstance(value.value, Symbol) or value.value.kind != PRESENT:
         return value
-    ends = [int(k) for k in value.value.key]
-    pairs = zip(ends[::2], ends[1::2], offset, strict=True)
+    positions = [int(k) for k in value.value.key]
+    pairs = zip(positions[::2], positions[1::2], offset, strict=True)
     return ONE if all(low >= min(0, o) and high <= max(0, o) for low, high, o in pairs) else value
 
 
@@ -120,10 +120,10 @@ def _divided(field: str, updated: Sequence[str], change: Expression) -> Expressi
 
     None where the increment is of another form.
     """
-    (factor,), (rest,) = gradient(change, [field]), substitute([change], {field: ZERO})
-    if not {*updated}.isdisjoint(symbols_of(factor, rest)):
+    (factor,), (constant_part,) = gradient(change, [field]), substitute([change], {field: ZERO})
+    if not {*updated}.isdisjoint(symbols_of(factor, constant_part)):
         return None
-    return -(factor * symbol(field) + rest) * (ONE / (ONE + factor))
+    return -(factor * symbol(field) + constant_part) * (ONE / (ONE + factor))
 
 
 def apart(transpose: Kernel) -> tuple[Kernel, Kernel] | None:
@@ -134,8 +134,8 @@ def apart(transpose: Kernel) -> tuple[Kernel, Kernel] | None:
     """
     cotangent_outputs = tuple(o for o in transpose.outputs if o.name != STATE_BEFORE)
     state_outputs = tuple(o for o in transpose.outputs if o.name == STATE_BEFORE)
-    read = symbols_of(*(e for o in cotangent_outputs for e in o.values))
-    if not state_outputs or not {*transpose.inputs["gathered"]}.isdisjoint(read):
+    read_symbols = symbols_of(*(e for o in cotangent_outputs for e in o.values))
+    if not state_outputs or not {*transpose.inputs["gathered"]}.isdisjoint(read_symbols):
         return None
     purpose = "the fields before the sweep, from sums over bonds or pairs"
     name = transpose.name.removesuffix(BACK) + "_inverse"
