@@ -27,10 +27,10 @@ def draw_against_step(axes: Any, constancy: Constancy) -> None:
         changes = constancy.changes[:, m]
         axes.plot(constancy.sizes, np.where(changes > 0, changes, np.nan), linewidth=1.0, marker="osD"[m % 3],
                   markersize=3, markeredgewidth=0, **_style(m), label=_label(m, constancy))  # fmt: skip
-        good = np.flatnonzero(changes > 30 * ROUNDING)
-        if len(good) > 1:
-            ends = constancy.sizes[good[[0, -1]]]
-            axes.plot(ends, 2.0 * changes[good[-1]] * (ends / ends[-1]) ** power,
+        measurable = np.flatnonzero(changes > 30 * ROUNDING)
+        if len(measurable) > 1:
+            step_range = constancy.sizes[measurable[[0, -1]]]
+            axes.plot(step_range, 2.0 * changes[measurable[-1]] * (step_range / step_range[-1]) ** power,
                       color=SERIES[m], linewidth=0.6, alpha=0.7, zorder=1)  # fmt: skip
     axes.set(xlabel="step h", xscale="log", yscale="log", title=f"largest change up to t = {constancy.end:.4g}")
     _finish(axes)

@@ -26,16 +26,16 @@ def figure(comparison: Comparison, title: str) -> Figure:
     panels = [("energy error", [entry.error for entry in entries])]
     if any(entry.orbit for entry in entries):
         panels.append(("orbit error", [entry.orbit or float("nan") for entry in entries]))
-    drawn = Figure(figsize=(4.6 * len(panels) + 2.2, 3.8), layout="constrained")
-    for axes, (label, errors) in zip(drawn.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
-        for place, (entry, error) in enumerate(zip(entries, errors, strict=True)):
-            colour = SERIES[place % len(SERIES)] if entry.poisson else PALETTE["ink"]
+    canvas = Figure(figsize=(4.6 * len(panels) + 2.2, 3.8), layout="constrained")
+    for axes, (label, errors) in zip(canvas.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+        for index, (entry, error) in enumerate(zip(entries, errors, strict=True)):
+            colour = SERIES[index % len(SERIES)] if entry.poisson else PALETTE["ink"]
             axes.plot(
-                1e3 * entry.seconds, error, _MARKERS[place % len(_MARKERS)], color=colour,
+                1e3 * entry.seconds, error, _MARKERS[index % len(_MARKERS)], color=colour,
                 markerfacecolor=colour if entry.poisson else "none", label=entry.title,
             )  # fmt: skip
         axes.set(xscale="log", yscale="log", xlabel="CPU time of the run, ms", ylabel=label)
         axes.grid(True)
-    drawn.suptitle(title)
-    drawn.legend(*axes.get_legend_handles_labels(), loc="outside right upper", fontsize="small")
-    return drawn
+    canvas.suptitle(title)
+    canvas.legend(*axes.get_legend_handles_labels(), loc="outside right upper", fontsize="small")
+    return canvas

@@ -39,8 +39,8 @@ def windowed_maxima(t: Floats, values: Floats, windows: int = WINDOWS) -> tuple[
         return t, np.where(np.isfinite(values), values, np.nan)
     parts = np.array_split(np.arange(len(t)), windows)
     finite = np.where(np.isfinite(values), values, np.inf)
-    at = np.array([part[np.argmax(finite[part])] for part in parts])
-    return t[at], np.where(np.isfinite(values[at]), values[at], np.nan)
+    peak_rows = np.array([part[np.argmax(finite[part])] for part in parts])
+    return t[peak_rows], np.where(np.isfinite(values[peak_rows]), values[peak_rows], np.nan)
 
 
 def grid(methods: Mapping[str, Trajectory]) -> tuple[int, int]:
@@ -68,37 +68,37 @@ def draw_errors(
     first = next(iter(methods.values()))
     panels = [ENERGY, *first.casimirs]
     rows, columns = grid(methods)
-    shared: Any = None
+    shared_axis: Any = None
     for index, name in enumerate(panels, start=1):
-        axes = figure.add_subplot(rows, columns, index, sharex=shared)
-        shared = shared or axes
+        axes = figure.add_subplot(rows, columns, index, sharex=shared_axis)
+        shared_axis = shared_axis or axes
         values = {label: t.energy if index == 1 else t.casimirs[name] for label, t in methods.items()}
         unit = (units or {}).get(name) or unit_of(float(next(iter(values.values()))[0]), 0.0)
         if units is None:
             unit = replace(unit, moves=name in first.moving)
-        what = "energy" if index == 1 else f"Casimir {name}"
+        quantity = "energy" if index == 1 else f"Casimir {name}"
         if unit.moves:
             _draw_values(axes, {label: (methods[label].t, column) for label, column in values.items()})
-            axes.set_title(f"change of the energy, {HAMILTONIAN}" if index == 1 else f"change of the {what}")
+            axes.set_title(f"change of the energy, {HAMILTONIAN}" if index == 1 else f"change of the {quantity}")
         else:
             curves = {
                 label: windowed_maxima(methods[label].t, unit.errors(column, float(column[0])))
                 for label, column in values.items()
             }
             _draw_panel(axes, curves)
-            axes.set_title(f"{unit.adjective} error{' of the' if columns < 3 else ':'} {what}")
+            axes.set_title(f"{unit.adjective} error{' of the' if columns < 3 else ':'} {quantity}")
         if index > len(panels) - columns:
             axes.set_xlabel("t")
     if len(methods) > 1:
-        handles, labels = shared.get_legend_handles_labels()
+        handles, labels = shared_axis.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(methods))
 
 
 def _draw_values(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
     axes.grid(True)
-    for place, (label, (t, values)) in enumerate(curves.items()):
-        style: dict[str, Any] = {"color": SERIES[place % len(SERIES)], "zorder": 3 - 0.1 * place}
-        axes.plot(t, values, linestyle=LINES[place % len(LINES)], linewidth=1.0, label=label, **style)
+    for index, (label, (t, values)) in enumerate(curves.items()):
+        style: dict[str, Any] = {"color": SERIES[index % len(SERIES)], "zorder": 3 - 0.1 * index}
+        axes.plot(t, values, linestyle=LINES[index % len(LINES)], linewidth=1.0, label=label, **style)
 
 
 def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
@@ -112,20 +112,20 @@ def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
     _set_ticks(axes, lowest, highest, zero if zeros else None)
     axes.grid(True)
     axes.axhline(ROUNDING, **MARK)
-    for place, (label, (t, values)) in enumerate(curves.items()):
-        style: dict[str, Any] = {"color": SERIES[place % len(SERIES)], "zorder": 3 - 0.1 * place}
-        line = LINES[place % len(LINES)]
+    for index, (label, (t, values)) in enumerate(curves.items()):
+        style: dict[str, Any] = {"color": SERIES[index % len(SERIES)], "zorder": 3 - 0.1 * index}
+        line = LINES[index % len(LINES)]
         axes.plot(t, np.where(values > 0, values, np.nan), linestyle=line, linewidth=1.0, label=label, **style)
         none = t[values == 0]
         axes.plot(none, np.full(len(none), zero), ".", markersize=2.5, markeredgewidth=0, **style)
-        if len(lost := np.flatnonzero(np.isnan(values))) and lost[0] > 0:
-            last = lost[0] - 1
+        if len(undefined_rows := np.flatnonzero(np.isnan(values))) and undefined_rows[0] > 0:
+            last = undefined_rows[0] - 1
             axes.plot(t[last], max(values[last], zero), "x", markersize=6, markeredgewidth=1.5, **style)
 
 
 def _set_ticks(axes: Any, lowest: int, highest: int, zero: float | None) -> None:
     """Set at most six ticks at powers of ten, and a tick 0 where zeros are drawn."""
     powers = range(highest, lowest - 1, -max(1, math.ceil((highest - lowest) / 5)))
-    places, labels = [10.0**p for p in powers], [f"$10^{{{p}}}$" for p in powers]
-    axes.set_yticks([*places, zero] if zero else places, [*labels, "0"] if zero else labels)
+    positions, labels = [10.0**p for p in powers], [f"$10^{{{p}}}$" for p in powers]
+    axes.set_yticks([*positions, zero] if zero else positions, [*labels, "0"] if zero else labels)
     axes.tick_params(axis="y", which="minor", length=0)

@@ -22,8 +22,8 @@ def draw_exponents(axes: Any, spectrum: Spectrum) -> None:
         axes.plot(spectrum.times, values, color=PALETTE["leaf"], linewidth=0.9, zorder=2)
     axes.plot(spectrum.times, spectrum.history[:, 0], color=SERIES[0], linewidth=1.4, zorder=3)
     # The first values are transients, which would compress the scale of the rest of the curves.
-    late = np.abs(spectrum.history[spectrum.times >= spectrum.t / 100])
-    height = 1.2 * float(np.max(late)) or 1.0
+    late_values = np.abs(spectrum.history[spectrum.times >= spectrum.t / 100])
+    height = 1.2 * float(np.max(late_values)) or 1.0
     axes.set(xlim=(spectrum.t / 1000, 1.1 * spectrum.t), ylim=(-height, height))
     axes.set(xscale="log", xlabel=spectrum.clock, title=f"Lyapunov exponents; the largest is {spectrum.largest:.3g}")
     axes.grid(True)

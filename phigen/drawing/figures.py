@@ -112,9 +112,9 @@ def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
 def constancy_figure(constancy: Constancy) -> Figure:
     """Return a figure of changes of H and H̃: along a trajectory, and against the step size."""
     figure = _figure(_SQUARE)
-    along, against = figure.subplots(1, 2)
-    backward_curves.draw_along(along, constancy)
-    backward_curves.draw_against_step(against, constancy)
+    time_panel, step_panel = figure.subplots(1, 2)
+    backward_curves.draw_along(time_panel, constancy)
+    backward_curves.draw_against_step(step_panel, constancy)
     return figure
 
 
@@ -157,10 +157,12 @@ def run_figure(
     figure = _figure(sum(heights))
     if title:
         figure.suptitle(title, fontsize=11)
-    places = figure.subfigures(len(rows), 1, height_ratios=heights, squeeze=False)[:, 0]
-    for place, (_, parts) in zip(places, rows, strict=True):
+    subfigures = figure.subfigures(len(rows), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for subfigure, (_, parts) in zip(subfigures, rows, strict=True):
         for part, draw in zip(
-            place.subfigures(1, len(parts), width_ratios=[1.1, 1][: len(parts)], squeeze=False)[0], parts, strict=True
+            subfigure.subfigures(1, len(parts), width_ratios=[1.1, 1][: len(parts)], squeeze=False)[0],
+            parts,
+            strict=True,
         ):
             draw(part)
     move_apart(figure)

@@ -33,16 +33,16 @@ def film(run: LatticeTrajectory, title: str, path: Path, origin: str = "") -> No
     names = run.coordinates[:MOST_PANELS]
     figure = Figure(figsize=(3.0 * len(names), 3.0), layout="constrained")
     panels = np.atleast_1d(figure.subplots(1, len(names)))
-    if (places := places_of(run)) is not None:
-        shown = [_graph(axes, name, run, places) for axes, name in zip(panels, names, strict=True)]
+    if (positions := places_of(run)) is not None:
+        updates = [_graph(axes, name, run, positions) for axes, name in zip(panels, names, strict=True)]
     else:
-        shown = [_shown(axes, name, run.column(name)) for axes, name in zip(panels, names, strict=True)]
+        updates = [_shown(axes, name, run.column(name)) for axes, name in zip(panels, names, strict=True)]
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
         with writer.saving(figure, str(part), DOTS):
             for k in np.unique(np.linspace(0, len(run) - 1, min(len(run), MOST_PICTURES)).astype(int)).tolist():
                 figure.suptitle(f"{title}, t = {run.t[k]:.4g}", fontsize=10)
-                for change, name in zip(shown, names, strict=True):
+                for change, name in zip(updates, names, strict=True):
                     change(_flat(run.column(name)[k]))
                 writer.grab_frame()
         if is_gif:
@@ -72,10 +72,10 @@ def _flat(values: Floats) -> Floats:
     return values if values.ndim < 3 else values[values.shape[0] // 2]
 
 
-def _graph(axes: Any, name: str, run: LatticeTrajectory, places: Floats) -> Any:
+def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> Any:
     """Draw a coordinate on a graph; return the function that updates the picture."""
     values = run.column(name)
-    picture = draw_sites(axes, run.parameters["bonds"], places, values[0], shades_of(values))
+    picture = draw_sites(axes, run.parameters["bonds"], positions, values[0], shades_of(values))
     axes.set_title(name)
     return picture.set_array
 

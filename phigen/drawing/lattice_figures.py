@@ -65,20 +65,22 @@ def lattice_figure(
     transforms = [2.6] * (run.structure_factor is not None) + [1.8] * (run.correlated is not None)
     moving = not {BALANCE, CHANGE}.isdisjoint(errors)
     errors = {name: error for name, error in errors.items() if name not in (BALANCE, CHANGE)}
-    below = [1.4] * (len(observed) + moving) + [1.8] * bool(errors) + transforms + [1.8] * (spectrum is not None)
+    lower_heights = (
+        [1.4] * (len(observed) + moving) + [1.8] * bool(errors) + transforms + [1.8] * (spectrum is not None)
+    )
     height = ORBITS_HEIGHT if orbits else 2.2
-    figure = Figure(figsize=(8.2, height * len(names) + 0.6 + sum(below)), layout="constrained")
+    figure = Figure(figsize=(8.2, height * len(names) + 0.6 + sum(lower_heights)), layout="constrained")
     if title:
         figure.suptitle(title, fontsize=10)
-    heights = [height] * len(names) + below
+    heights = [height] * len(names) + lower_heights
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights)
     if orbits:
         _draw_orbits(parts[0].add_subplot(), run, site_names)
-    places = places_of(run)
+    positions = places_of(run)
     for part, name in zip(parts, () if orbits else names, strict=False):
         values = run.column(name)
-        if places is not None:
-            _draw_graph(part, name, run, values, places, site_names)
+        if positions is not None:
+            _draw_graph(part, name, run, values, positions, site_names)
         elif values.ndim == 2:
             _draw_diagram(part, name, run, values, dots, site_names)
         else:
@@ -123,8 +125,8 @@ def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
     figure = Figure(figsize=(8.2, 2.6 + 2.0 * bool(local)), layout="constrained")
     heights = [2.4, 2.0] if local else [2.4]
     parts: Any = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
-    if (places := places_of(run)) is not None:
-        _draw_graph(parts[0], "energy", run, energies, places)
+    if (positions := places_of(run)) is not None:
+        _draw_graph(parts[0], "energy", run, energies, positions)
     else:
         draw = _draw_diagram if energies.ndim == 2 else _draw_snapshots
         draw(parts[0], "energy", run, energies)
@@ -132,9 +134,9 @@ def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
         axes = parts[1].add_subplot()
         for (name, values), colour in zip(local.items(), [*SERIES] * len(local), strict=False):
             change = np.abs(values - values[0]).reshape(len(run), -1)
-            for said, errors, style in (("farthest", change.max(axis=1), "-"), ("spread", change.std(axis=1), "--")):
-                shown = np.where(errors > 0, errors, np.nan)
-                axes.plot(run.t, shown, style, color=colour, label=f"{name}, {said}", linewidth=1.0)
+            for label, errors, style in (("farthest", change.max(axis=1), "-"), ("spread", change.std(axis=1), "--")):
+                positive_errors = np.where(errors > 0, errors, np.nan)
+                axes.plot(run.t, positive_errors, style, color=colour, label=f"{name}, {label}", linewidth=1.0)
         axes.set_yscale("log")
         axes.set_xlabel("t")
         axes.set_ylabel("change at the sites")
@@ -169,7 +171,7 @@ def _draw_diagram(
     """Draw one coordinate of a chain: sites upwards, time to the right."""
     axes = part.add_subplot()
     times = _shown_frames(run, dots)
-    shown = axes.imshow(
+    image = axes.imshow(
         values[times].T, aspect="auto", origin="lower", interpolation="none",
         extent=(run.t[0], run.t[-1], -0.5, values.shape[1] - 0.5), **shades_of(values, LEVELS),
     )  # fmt: skip
@@ -178,7 +180,7 @@ def _draw_diagram(
         axes.set_yticks(range(len(site_names)), site_names, fontsize=7)
     else:
         axes.set_ylabel(run.axes[0])
-    part.colorbar(shown, ax=axes, pad=0.02, label=name)
+    part.colorbar(image, ax=axes, pad=0.02, label=name)
 
 
 def _shown_frames(run: LatticeTrajectory, dots: int) -> Any:
@@ -199,33 +201,35 @@ def places_of(run: LatticeTrajectory) -> Floats | None:
 
 
 def _draw_graph(
-    part: Any, name: str, run: LatticeTrajectory, values: Floats, places: Floats, site_names: Sequence[str] = ()
+    part: Any, name: str, run: LatticeTrajectory, values: Floats, positions: Floats, site_names: Sequence[str] = ()
 ) -> None:
     """Draw one coordinate of a graph at some times."""
     frames, shades = _snapshots(run), shades_of(values, LEVELS)
     panels = np.atleast_1d(part.subplots(1, len(frames)))
     for axes, k in zip(panels, frames.tolist(), strict=True):
-        shown = draw_sites(axes, run.parameters["bonds"], places, values[k], shades)
-        for place, text in zip(places.tolist(), site_names if len(site_names) <= MOST_NAMED else (), strict=False):
-            axes.annotate(text, place, xytext=(4, 3), textcoords="offset points", fontsize=7)
+        markers = draw_sites(axes, run.parameters["bonds"], positions, values[k], shades)
+        for position, text in zip(
+            positions.tolist(), site_names if len(site_names) <= MOST_NAMED else (), strict=False
+        ):
+            axes.annotate(text, position, xytext=(4, 3), textcoords="offset points", fontsize=7)
         axes.set_title(f"t = {run.t[k]:.4g}")
-    part.colorbar(shown, ax=list(panels), pad=0.02, label=name)
+    part.colorbar(markers, ax=list(panels), pad=0.02, label=name)
 
 
-def draw_sites(axes: Any, bonds: Any, places: Floats, values: Floats, shades: Mapping[str, Any]) -> Any:
+def draw_sites(axes: Any, bonds: Any, positions: Floats, values: Floats, shades: Mapping[str, Any]) -> Any:
     """Draw the sites and bonds of a graph; the sites have the colours of `shades_of` for the values (sites,)."""
     from matplotlib.collections import LineCollection
 
-    lines = places[np.asarray(bonds).reshape(-1, 2)]
+    lines = positions[np.asarray(bonds).reshape(-1, 2)]
     axes.add_collection(LineCollection(lines, colors="0.6", linewidths=0.5, zorder=1))
-    shown = axes.scatter(
-        *places.T, c=values, s=min(max(2500 / len(places), 5.0), 60.0), edgecolors="0.3", linewidths=0.3, zorder=2,
-        **shades,
+    markers = axes.scatter(
+        *positions.T, c=values, s=min(max(2500 / len(positions), 5.0), 60.0), edgecolors="0.3", linewidths=0.3,
+        zorder=2, **shades,
     )  # fmt: skip
     axes.set_aspect("equal")
     axes.margins(0.08)
     axes.set_axis_off()
-    return shown
+    return markers
 
 
 def _snapshots(run: LatticeTrajectory) -> Any:
@@ -240,11 +244,11 @@ def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats
     shades = shades_of(planes, LEVELS)
     panels = np.atleast_1d(part.subplots(1, len(frames)))
     for axes, k in zip(panels, frames.tolist(), strict=True):
-        shown = axes.imshow(planes[k].T, origin="lower", interpolation="none", aspect="equal", **shades)
+        image = axes.imshow(planes[k].T, origin="lower", interpolation="none", aspect="equal", **shades)
         axes.set_title(f"t = {run.t[k]:.4g}")
         axes.set_xlabel(run.axes[-2])
     panels[0].set_ylabel(run.axes[-1])
-    part.colorbar(shown, ax=list(panels), pad=0.02, label=name)
+    part.colorbar(image, ax=list(panels), pad=0.02, label=name)
 
 
 def _draw_errors(axes: Any, run: LatticeTrajectory, errors: Mapping[str, Floats]) -> None:

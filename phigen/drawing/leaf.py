@@ -39,8 +39,8 @@ def leaf_of(
 ) -> Leaf | None:
     """Return the leaf through ``start`` of the first Casimir of three names only; None if there is none."""
     for casimir in casimirs.values():
-        used = set(symbols_of(casimir)) & set(start)
-        if len(names) == 3 and used and used <= set(names):
+        used_names = set(symbols_of(casimir)) & set(start)
+        if len(names) == 3 and used_names and used_names <= set(names):
             level = float(evaluate([casimir], {**parameters, **start})[0])
             return Leaf(casimir, tuple(names), parameters, level) if np.isfinite(level) else None
     return None
@@ -48,16 +48,16 @@ def leaf_of(
 
 def around(leaf: Leaf, box: Floats) -> Floats:
     """Return the box (2, 3) around a closed leaf if it is not much larger than the given box, else the given box."""
-    middle, half = box.mean(axis=0), float(np.max(box[1] - box[0]))
-    large = np.stack([middle - half, middle + half])
-    lines = net(leaf, large)
+    middle, half_width = box.mean(axis=0), float(np.max(box[1] - box[0]))
+    large_box = np.stack([middle - half_width, middle + half_width])
+    lines = net(leaf, large_box)
     if not lines:
         return box
     points = np.concatenate(lines)
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.04 * (high - low)
-    inside = (low > large[0] + margin).all() and (high < large[1] - margin).all()
-    return np.stack([np.minimum(box[0], low - margin), np.maximum(box[1], high + margin)]) if inside else box
+    is_closed = (low > large_box[0] + margin).all() and (high < large_box[1] - margin).all()
+    return np.stack([np.minimum(box[0], low - margin), np.maximum(box[1], high + margin)]) if is_closed else box
 
 
 def net(leaf: Leaf, box: Floats) -> list[Floats]:
@@ -65,34 +65,36 @@ def net(leaf: Leaf, box: Floats) -> list[Floats]:
     lines = []
     cell = (box[1] - box[0]) / (GRID - 1)
     for axis in range(3):
-        for place in np.linspace(box[0, axis], box[1, axis], CUTS + 2)[1:-1]:
-            for line in _cut(leaf, box, axis, float(place)):
+        for level in np.linspace(box[0, axis], box[1, axis], CUTS + 2)[1:-1]:
+            for line in _cut(leaf, box, axis, float(level)):
                 lines += _on_surface(leaf, line, axis, cell)
     return lines
 
 
-def _cut(leaf: Leaf, box: Floats, axis: int, place: float) -> list[Floats]:
+def _cut(leaf: Leaf, box: Floats, axis: int, level: float) -> list[Floats]:
     """Return lines of the leaf in the plane x_axis = place, linearly interpolated on a grid."""
     from contourpy import contour_generator
 
     u, v = (np.linspace(box[0, i], box[1, i], GRID) for i in range(3) if i != axis)
-    grid = np.insert(np.stack(np.meshgrid(u, v), axis=-1), axis, place, axis=-1)
+    grid = np.insert(np.stack(np.meshgrid(u, v), axis=-1), axis, level, axis=-1)
     values, _ = leaf.value_and_gradient(grid)
     # Grid cells where C is undefined contain no leaf.
     lines = contour_generator(u, v, np.ma.masked_invalid(values)).lines(0.0)
-    return [np.insert(np.asarray(line, dtype=np.float64), axis, place, axis=-1) for line in lines]
+    return [np.insert(np.asarray(line, dtype=np.float64), axis, level, axis=-1) for line in lines]
 
 
 def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Floats]:
     """Return the line moved onto the surface within its plane, split where Newton fails, as at a pole of C."""
-    moved = line.copy()
+    points = line.copy()
     with np.errstate(all="ignore"):
         for _ in range(NEWTON_STEPS):
-            value, slope = leaf.value_and_gradient(moved)
+            value, slope = leaf.value_and_gradient(points)
             slope[:, axis] = 0.0
             change = (value / np.sum(slope**2, axis=-1))[:, None] * slope
-            moved = moved - change
-        good = (np.abs(change) < 1e-3 * cell).all(axis=-1) & (np.abs(moved - line) < cell).all(axis=-1)
-    pieces = np.split(moved, np.flatnonzero(good[1:] != good[:-1]) + 1)
-    starts = np.r_[True, good[1:] != good[:-1]]
-    return [piece for piece, is_good in zip(pieces, good[starts], strict=True) if is_good and len(piece) > 1]
+            points = points - change
+        converged = (np.abs(change) < 1e-3 * cell).all(axis=-1) & (np.abs(points - line) < cell).all(axis=-1)
+    segments = np.split(points, np.flatnonzero(converged[1:] != converged[:-1]) + 1)
+    starts = np.r_[True, converged[1:] != converged[:-1]]
+    return [
+        segment for segment, is_good in zip(segments, converged[starts], strict=True) if is_good and len(segment) > 1
+    ]

@@ -19,10 +19,10 @@ PAD, MOST_MOVES, GAP = 3.0, 20, 3.5
 _SUPERSCRIPTS = str.maketrans("−-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def letter(axes: Any, names: tuple[str, ...], box: Floats, most: int) -> None:
-    """Label axes in space over a box (2, 3), with about ``most`` ticks; names contain the power of ten of ticks."""
+def letter(axes: Any, names: tuple[str, ...], box: Floats, max_ticks: int) -> None:
+    """Label axes in space over a box (2, 3), with about ``max_ticks`` ticks; names contain their power of ten."""
     for axis, name, (low, high) in zip(_axes(axes), names, box.T.tolist(), strict=True):
-        ticks = _ticks(low, high, most)
+        ticks = _ticks(low, high, max_ticks)
         axis.set_ticks(ticks)
         formatter = axis.get_major_formatter()
         formatter.set_locs(ticks)
@@ -35,11 +35,11 @@ def letter(axes: Any, names: tuple[str, ...], box: Floats, most: int) -> None:
     axes.zaxis.set_tick_params(pad=-1 + WIDTH * max(0, longest - LETTERS))
 
 
-def _ticks(low: float, high: float, most: int) -> list[float]:
+def _ticks(low: float, high: float, max_ticks: int) -> list[float]:
     from matplotlib.ticker import MaxNLocator
 
     corner = CORNER * (high - low)
-    ticks = [float(v) for v in MaxNLocator(most).tick_values(low, high)]
+    ticks = [float(v) for v in MaxNLocator(max_ticks).tick_values(low, high)]
     return [v for v in ticks if low + corner <= v <= high - corner]
 
 
@@ -52,9 +52,9 @@ def move_apart(figure: Figure) -> None:
         names = [axis.label.get_window_extent() for axes in spaces for axis in _axes(axes)]
         meeting = [axis for axes in spaces for axis in _meeting(axes)]
         # Layouts reserve space for ticks, but not for names.
-        outside = min(name.x0 for name in names), max(name.x1 for name in names) - figure.bbox.x1
-        left, right = max(left, left - outside[0]), max(right, right + outside[1])
-        if not meeting and outside[0] >= 0 and outside[1] <= 0:
+        overhang = min(name.x0 for name in names), max(name.x1 for name in names) - figure.bbox.x1
+        left, right = max(left, left - overhang[0]), max(right, right + overhang[1])
+        if not meeting and overhang[0] >= 0 and overhang[1] <= 0:
             return
         for axis in meeting:
             axis.labelpad += PAD

@@ -90,8 +90,8 @@ def require_matplotlib() -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
-        what = "is not installed" if error.name == "matplotlib" else f"cannot be imported: {error}"
-        raise MissingPackageError(f"figures need matplotlib, which {what}\n  hint: {INSTALLED_BY}") from error
+        problem = "is not installed" if error.name == "matplotlib" else f"cannot be imported: {error}"
+        raise MissingPackageError(f"figures need matplotlib, which {problem}\n  hint: {INSTALLED_BY}") from error
 
 
 @contextmanager

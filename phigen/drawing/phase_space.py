@@ -51,8 +51,8 @@ def height(coordinates: tuple[str, ...]) -> float:
 
 def draw_trajectory(figure: FigureBase, trajectory: Trajectory, casimirs: Mapping[str, Expression]) -> None:
     """Draw all panels of a trajectory; non-finite rows are left out."""
-    good = np.isfinite(trajectory.x).all(axis=1)
-    t, x, names = trajectory.t[good], trajectory.x[good], trajectory.coordinates
+    finite = np.isfinite(trajectory.x).all(axis=1)
+    t, x, names = trajectory.t[finite], trajectory.x[finite], trajectory.coordinates
     if len(names) > MOST_COORDINATES:
         _draw_image(figure, names, t, x)
         return
@@ -131,7 +131,7 @@ def _azimuth(centred: Floats) -> float:
 
 def _draw_faded(
     axes: Any, box: Floats, towards: Floats, points: Floats, colour: str, width: float,
-    alphas: tuple[float, float], order: float, joined: bool = True,
+    alphas: tuple[float, float], order: float, as_curve: bool = True,
 ) -> None:  # fmt: skip
     """Draw points (rows, 3) as a curve, in bands by their distance from the viewer."""
     centred = (points - box.mean(axis=0)) / (box[1] - box[0])
@@ -139,17 +139,19 @@ def _draw_faded(
     band = np.where(np.isfinite(depth), np.floor(depth * BANDS), -1)
     for level in range(BANDS):
         # A band also contains the point after its last one, so that bands join without gaps.
-        inside = band == level
-        shown = inside | np.r_[False, inside[:-1]] if joined else inside
+        in_band = band == level
+        band_rows = in_band | np.r_[False, in_band[:-1]] if as_curve else in_band
         alpha = alphas[0] + (alphas[1] - alphas[0]) * level / (BANDS - 1)
-        if inside.any():
-            visible = np.where(shown[:, None], points, np.nan)
-            _draw_curve(axes, visible, colour, alpha, order + 10 * (level >= BANDS / 2), width, joined)
+        if in_band.any():
+            visible = np.where(band_rows[:, None], points, np.nan)
+            _draw_curve(axes, visible, colour, alpha, order + 10 * (level >= BANDS / 2), width, as_curve)
 
 
-def _draw_curve(axes: Any, points: Floats, colour: str, alpha: float, order: float, width: float, joined: bool) -> None:
+def _draw_curve(
+    axes: Any, points: Floats, colour: str, alpha: float, order: float, width: float, as_curve: bool
+) -> None:
     """Draw a line, or dots where the rows are too far apart for a line."""
-    if joined:
+    if as_curve:
         axes.plot(*points.T, "-", color=colour, linewidth=width, alpha=alpha, zorder=order)
         return
     size = float(np.clip(3.0 - 0.8 * math.log10(max(len(points), 1) / 100), 0.8, 3.0))
@@ -170,38 +172,38 @@ def joins(points: Floats) -> bool:
     size = np.ptp(points, axis=0) if len(points) else np.zeros(points.shape[1])
     chords = np.diff(points / np.where(size > 0, size, 1.0), axis=0)
     lengths = np.linalg.norm(chords, axis=1)
-    moved = lengths > 1e-12
-    chords, lengths = chords[moved], lengths[moved]
+    is_long = lengths > 1e-12
+    chords, lengths = chords[is_long], lengths[is_long]
     if len(chords) < 3:
         return True
     cosines = np.sum(chords[1:] * chords[:-1], axis=1) / (lengths[1:] * lengths[:-1])
-    turn = float(np.median(np.arccos(np.clip(cosines, -1, 1))))
-    return turn < (TURN if np.sum(lengths) < LONG else FINE_TURN)
+    median_turn = float(np.median(np.arccos(np.clip(cosines, -1, 1))))
+    return median_turn < (TURN if np.sum(lengths) < LONG else FINE_TURN)
 
 
 def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
     """Draw all coordinates over time, as colours."""
     axes = figure.add_subplot()
     times = np.linspace(0, len(t) - 1, min(len(t), 800)).astype(int)
-    shown = axes.imshow(
+    image = axes.imshow(
         x[times].T, aspect="auto", origin="lower", interpolation="nearest",
         extent=(t[0], t[-1], 0.5, x.shape[1] + 0.5), **shades_of(x),
     )  # fmt: skip
-    named = range(0, len(names), -(-len(names) // 10))
-    axes.set_yticks([1.0 + i for i in named], [names[i] for i in named])
+    labelled_rows = range(0, len(names), -(-len(names) // 10))
+    axes.set_yticks([1.0 + i for i in labelled_rows], [names[i] for i in labelled_rows])
     axes.set_xlabel("t")
-    figure.colorbar(shown, ax=axes, pad=0.02)
+    figure.colorbar(image, ax=axes, pad=0.02)
 
 
 def box_of(points: Floats) -> Floats:
     """Return bounds (2, 3) around points with a margin; no direction is too flat, unless it has its own scale."""
-    low, high, most = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
+    low, high, largest = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
     size = high - low
-    alike = most > 0.01 * most.max()
-    half = np.maximum(0.53 * size, np.where(alike, 0.2 * size.max(), 0.05 * most))
-    half[half == 0] = 0.2 * size.max() or 0.5
+    comparable = largest > 0.01 * largest.max()
+    half_sizes = np.maximum(0.53 * size, np.where(comparable, 0.2 * size.max(), 0.05 * largest))
+    half_sizes[half_sizes == 0] = 0.2 * size.max() or 0.5
     middle = (low + high) / 2
-    return np.stack([middle - half, middle + half])
+    return np.stack([middle - half_sizes, middle + half_sizes])
 
 
 def _length(points: Floats) -> float:

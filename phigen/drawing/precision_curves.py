@@ -15,9 +15,9 @@ _MARKERS = "osD^vX"
 
 def draw_convergence(axes: Any, study: Study) -> None:
     """Draw errors against step size with the observed orders, and a thin line of the order of the first method."""
-    for place, curve in enumerate(study.curves):
+    for index, curve in enumerate(study.curves):
         slope = f"slope {curve.slope:.2f}" if math.isfinite(curve.slope) else "slope unknown"
-        _draw(axes, place, [p.step for p in curve.points], [p.error for p in curve.points], f"{label(curve)}: {slope}")
+        _draw(axes, index, [p.step for p in curve.points], [p.error for p in curve.points], f"{label(curve)}: {slope}")
     _draw_slope(axes, study.curves[0])
     axes.set(xlabel="step h", ylabel=f"relative error at {study.clock} = {study.time:.4g}")
     _finish(axes, study.floor)
@@ -25,16 +25,16 @@ def draw_convergence(axes: Any, study: Study) -> None:
 
 def draw_work(axes: Any, study: Study) -> None:
     """Draw errors of the solution against the seconds of a run."""
-    for place, curve in enumerate(study.curves):
-        _draw(axes, place, [p.seconds for p in curve.points], [p.error for p in curve.points], label(curve))
+    for index, curve in enumerate(study.curves):
+        _draw(axes, index, [p.seconds for p in curve.points], [p.error for p in curve.points], label(curve))
     axes.set(xlabel="seconds of the run", title=f"relative error of the solution at {study.clock} = {study.time:.4g}")
     _finish(axes, study.floor)
 
 
 def draw_conserved(axes: Any, study: Study) -> None:
     """Draw the largest error of a Casimir against the seconds of a run."""
-    for place, curve in enumerate(study.curves):
-        _draw(axes, place, [p.seconds for p in curve.points], [p.casimirs for p in curve.points], label(curve))
+    for index, curve in enumerate(study.curves):
+        _draw(axes, index, [p.seconds for p in curve.points], [p.casimirs for p in curve.points], label(curve))
     axes.set(xlabel="seconds of the run", title=f"relative error of the Casimirs at {study.clock} = {study.time:.4g}")
     _finish(axes)
 
@@ -44,18 +44,25 @@ def label(curve: PrecisionCurve) -> str:
     return f"{curve.label} (order {curve.order})"
 
 
-def _draw(axes: Any, place: int, x: Sequence[float], y: Sequence[float], text: str) -> None:
+def _draw(axes: Any, index: int, x: Sequence[float], y: Sequence[float], text: str) -> None:
     axes.plot(
-        x, y, linestyle=LINES[place % len(LINES)], color=SERIES[place % len(SERIES)], label=text, linewidth=1.0,
-        marker=_MARKERS[place % len(_MARKERS)], markersize=3, markeredgewidth=0, zorder=3 - 0.1 * place,
+        x, y, linestyle=LINES[index % len(LINES)], color=SERIES[index % len(SERIES)], label=text, linewidth=1.0,
+        marker=_MARKERS[index % len(_MARKERS)], markersize=3, markeredgewidth=0, zorder=3 - 0.1 * index,
     )  # fmt: skip
 
 
 def _draw_slope(axes: Any, curve: PrecisionCurve) -> None:
-    good = [p for p in curve.points if 1e-12 < p.error < 1e-2]
-    if len(good) > 1 and math.isfinite(curve.slope):
-        ends, scale = [good[0].step, good[-1].step], 2.0 * good[-1].error / good[-1].step ** curve.order
-        axes.plot(ends, [scale * h**curve.order for h in ends], color=SERIES[0], linewidth=0.6, alpha=0.7, zorder=1)
+    fitted = [p for p in curve.points if 1e-12 < p.error < 1e-2]
+    if len(fitted) > 1 and math.isfinite(curve.slope):
+        step_range, scale = [fitted[0].step, fitted[-1].step], 2.0 * fitted[-1].error / fitted[-1].step ** curve.order
+        axes.plot(
+            step_range,
+            [scale * h**curve.order for h in step_range],
+            color=SERIES[0],
+            linewidth=0.6,
+            alpha=0.7,
+            zorder=1,
+        )
 
 
 def _finish(axes: Any, floor: float | None = None) -> None:

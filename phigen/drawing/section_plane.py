@@ -21,13 +21,13 @@ def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
     """Return the two columns (rows, names) to draw: if possible a conjugate pair without constant coordinates."""
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
-    varying = [name for name, fixed in zip(names, constant, strict=True) if not fixed]
+    varying = [name for name, is_constant in zip(names, constant, strict=True) if not is_constant]
     pairs = [moving for group in phase_planes(names) if len(moving := [n for n in group if n in varying]) >= 2]
     # A closed orbit gives a single point; there a coordinate that is zero is probably the one fixed by the section.
     sizes = np.max(np.abs(points), axis=0, initial=0.0)
-    rest = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])
-    chosen = (pairs[0] if pairs else [*varying, *rest])[:2]
-    first, second = sorted(map(list(names).index, chosen))
+    by_size = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])
+    columns = (pairs[0] if pairs else [*varying, *by_size])[:2]
+    first, second = sorted(map(list(names).index, columns))
     return first, second
 
 
@@ -35,9 +35,9 @@ def draw_section(axes: Any, sections: Mapping[str, Floats], names: Sequence[str]
     """Draw each point (rows, names) of each section as a dot."""
     point_sets = [points for points in sections.values() if len(points)]
     i, j = plane_of(names, np.concatenate(point_sets) if point_sets else np.empty((0, len(names))))
-    for place, (label, points) in enumerate(sections.items()):
+    for index, (label, points) in enumerate(sections.items()):
         size = float(np.clip(4.0 - 1.1 * math.log10(max(len(points), 1) / 30), 0.8, 4.0))
-        draw_dots(axes, points[:, [i, j]], SERIES[place % len(SERIES)], size, 2.0, label)
+        draw_dots(axes, points[:, [i, j]], SERIES[index % len(SERIES)], size, 2.0, label)
     axes.set(xlabel=names[i], ylabel=names[j])
     axes.grid(True)
     axes.locator_params(axis="x", nbins=6)
@@ -54,7 +54,7 @@ def _widen(axes: Any) -> None:
     """Widen the axes if all points agree up to rounding, so that rounding errors are not shown as a cloud."""
     for kind in "xy":
         low, high = getattr(axes, f"get_{kind}lim")()
-        middle, half = (low + high) / 2, (high - low) / 2
+        middle, half_width = (low + high) / 2, (high - low) / 2
         least = 0.05 * max(abs(middle), 1e-9)
-        if half < 1e-2 * least:
+        if half_width < 1e-2 * least:
             getattr(axes, f"set_{kind}lim")(middle - least, middle + least)

@@ -14,11 +14,11 @@ DIVERGING, SEQUENTIAL = "RdBu_r", "viridis"
 
 def bounds_of(values: Floats) -> tuple[float, float]:
     """Return the ends of a scale of values, symmetric about 0 if the values have both signs."""
-    least, most = float(np.min(values)), float(np.max(values))
-    if least < 0 < most:
-        return -max(-least, most), max(-least, most)
-    around = 0.0 if least < most else abs(least) / 2 or 0.5
-    return least - around, most + around
+    least, largest = float(np.min(values)), float(np.max(values))
+    if least < 0 < largest:
+        return -max(-least, largest), max(-least, largest)
+    margin = 0.0 if least < largest else abs(least) / 2 or 0.5
+    return least - margin, largest + margin
 
 
 def shades_of(values: Floats, levels: int = 256) -> dict[str, Any]:

@@ -45,10 +45,10 @@ def draw_spectrum(figure: Any, spectrum: DynamicSpectrum, title: str = "") -> No
     while values.ndim > 2:
         values = values[:, values.shape[1] // 2]
     upper = spectrum.omega >= 0
-    shown, most = values[:, upper].T, float(values.max()) or 1.0
+    image_values, largest = values[:, upper].T, float(values.max()) or 1.0
     axes = figure.subplots()
-    least = most * 10.0**-DECADES
-    floor, norm = np.maximum(shown, least), LogNorm(least, most)
+    least = largest * 10.0**-DECADES
+    floor, norm = np.maximum(image_values, least), LogNorm(least, largest)
     image = axes.pcolormesh(spectrum.q[0], spectrum.omega[upper], floor, norm=norm, rasterized=True)
     axes.set(xlabel=f"q along {spectrum.axes[0]}", ylabel="ω", title=title)
     figure.colorbar(image, ax=axes, label=f"S(q, ω) of {', '.join(spectrum.of)}")

@@ -28,7 +28,7 @@ _PANELS, _COLUMNS = 6, 3
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 
 
-def draw(store: Path, path: Path, shown: str | None = None, origin: str = "") -> None:
+def draw(store: Path, path: Path, requested: str | None = None, origin: str = "") -> None:
     """Draw a variable of a store into a file; by default all kept observables, else the first other variable.
 
     The text ``origin`` goes into its metadata. Raises `FileError` if the store has no variable with this name.
@@ -40,13 +40,15 @@ def draw(store: Path, path: Path, shown: str | None = None, origin: str = "") ->
     with xarray.open_zarr(str(store), decode_cf=False) as data:
         plan = open_job(str(store)).plan
         observed = [word for word in plan.keep if word not in KEPT]
-        known = [name for name in (*observed, *_FIRST) if name in data]
-        if not known:
+        drawable = [name for name in (*observed, *_FIRST) if name in data]
+        if not drawable:
             hint = f"keep one of {', '.join(_FIRST)}, or observables, in the sweep"
             raise FileError(f"{store} has nothing that can be drawn over the members\n  hint: {hint}")
-        if shown and shown not in known:
-            raise FileError(f"{store} has no {shown!r} to draw; it has {', '.join(known)}")
-        names = [shown] if shown else [n for n in observed if not n.startswith(("std(", "error("))] or known[:1]
+        if requested and requested not in drawable:
+            raise FileError(f"{store} has no {requested!r} to draw; it has {', '.join(drawable)}")
+        names = (
+            [requested] if requested else [n for n in observed if not n.startswith(("std(", "error("))] or drawable[:1]
+        )
         logarithmic = {axis.name for axis in plan.axes if axis.scale == "log"}
         varied = {axis.name for axis in plan.drawn} | {*plan.listed}
         save(_figure(data, names[:_PANELS], logarithmic, varied), path, origin)
@@ -66,16 +68,16 @@ def _figure(data: Any, names: Sequence[str], logarithmic: Set[str], varied: Set[
     figure = Figure(figsize=(4.6 * columns, 3.8 * rows), layout="constrained")
     for axes, (title, values, errors) in zip(figure.subplots(rows, columns, squeeze=False).flat, panels, strict=False):
         observed = values.name not in _FIRST
-        said = ""
+        subtitle = ""
         if values.dims == ("member",):
             _scatter(figure, axes, data, values, [n for n in data.data_vars if n in varied])
         else:
-            said = _over_grid(figure, axes, values, logarithmic, errors, observed=observed)
+            subtitle = _over_grid(figure, axes, values, logarithmic, errors, observed=observed)
         if axes.get_xlabel() in logarithmic:
             axes.set_xscale("log")
         if axes.get_ylabel() in logarithmic:
             axes.set_yscale("log")
-        axes.set_title(f"{title}{said}")
+        axes.set_title(f"{title}{subtitle}")
     for unused in figure.axes[len(panels) : rows * columns]:
         unused.set_axis_off()
     return figure
@@ -85,16 +87,16 @@ def _panels(data: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
     """Yield title, values and standard errors, or None, of each panel of a variable."""
     values = data[name]
     if "coordinate" not in values.dims:
-        of, opened, rest = name.partition("(")
-        errors = f"error({rest}"
-        yield name, values, data[errors] if of == "mean" and opened and errors in data else None
+        statistic, bracket, argument = name.partition("(")
+        errors = f"error({argument}"
+        yield name, values, data[errors] if statistic == "mean" and bracket and errors in data else None
         return
-    said = ""
+    subtitle = ""
     if sites := values.dims[values.dims.index("coordinate") + 1 :]:  # fields of lattices are averaged over the sites
-        values, said = values.mean(dim=sites).rename(name), ", mean over the sites"
+        values, subtitle = values.mean(dim=sites).rename(name), ", mean over the sites"
     for k, coordinate in enumerate(values["coordinate"].values):
         title = f"{name}: {coordinate}" if values.sizes["coordinate"] > 1 else name
-        yield f"{title}{said}", values.isel(coordinate=k), None
+        yield f"{title}{subtitle}", values.isel(coordinate=k), None
 
 
 def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors: Any, *, observed: bool) -> str:
@@ -104,23 +106,23 @@ def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors
     standard errors over the draws. All other variables over two dimensions are maps, as are larger ones. The median is
     taken over further dimensions, draws first.
     """
-    said = " ± standard error" if errors is not None else ""
+    note = " ± standard error" if errors is not None else ""
     if observed and panel.sizes.get("seed", 1) > 1 and len(panel.dims) > 1:
         draws, panel = panel, panel.mean(dim="seed", skipna=True)
         errors = draws.std(dim="seed", ddof=1, skipna=True) / np.sqrt(draws.notnull().sum(dim="seed"))
-        said = f", mean of {draws.sizes['seed']} draws ± standard error"
+        note = f", mean of {draws.sizes['seed']} draws ± standard error"
     dims = [d for d in panel.dims if d != "seed"] or [*panel.dims]
-    if more := [d for d in panel.dims if d not in dims[:2]]:
-        panel, errors, said = panel.median(dim=more, skipna=True), None, f", median over {', '.join(more)}"
-    few = min(dims[:2], key=lambda d: panel.sizes[d])
+    if fixed_dims := [d for d in panel.dims if d not in dims[:2]]:
+        panel, errors, note = panel.median(dim=fixed_dims, skipna=True), None, f", median over {', '.join(fixed_dims)}"
+    legend_dim = min(dims[:2], key=lambda d: panel.sizes[d])
     if len(dims) == 1:
         _curve(axes, dims[0], panel, errors, SERIES[0], "o")
-    elif observed and panel.sizes[few] <= len(SERIES):
-        (along,) = (d for d in dims[:2] if d != few)
-        for k, (colour, marker) in enumerate(zip(SERIES[: panel.sizes[few]], _MARKERS, strict=False)):
-            label = f"{few} = {float(panel[few][k]):g}"
-            bars = None if errors is None else errors.isel({few: k})
-            _curve(axes, along, panel.isel({few: k}), bars, colour, marker, label)
+    elif observed and panel.sizes[legend_dim] <= len(SERIES):
+        (axis_dim,) = (d for d in dims[:2] if d != legend_dim)
+        for k, (colour, marker) in enumerate(zip(SERIES[: panel.sizes[legend_dim]], _MARKERS, strict=False)):
+            label = f"{legend_dim} = {float(panel[legend_dim][k]):g}"
+            bars = None if errors is None else errors.isel({legend_dim: k})
+            _curve(axes, axis_dim, panel.isel({legend_dim: k}), bars, colour, marker, label)
         axes.legend()
     else:
         y, x = dims[:2]
@@ -128,31 +130,31 @@ def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors
         image = axes.pcolormesh(*edges, panel.transpose(y, x), rasterized=True, **_colours(panel))
         axes.set(xlabel=x, ylabel=y)
         figure.colorbar(image, ax=axes)
-        return said if more else ""
+        return note if fixed_dims else ""
     if errors is None and _is_wide(_positive(panel)):
         axes.set_yscale("log")
-    return said
+    return note
 
 
-def _curve(axes: Any, along: str, values: Any, errors: Any, colour: str, marker: str, label: str = "") -> None:
+def _curve(axes: Any, axis_dim: str, values: Any, errors: Any, colour: str, marker: str, label: str = "") -> None:
     """Draw values over one dimension, with error bars if there are ``errors``."""
     style = {"color": colour, "linewidth": 1.2, "label": label or None}
     if errors is None:
-        axes.plot(values[along], values, **style)
+        axes.plot(values[axis_dim], values, **style)
     else:
-        axes.errorbar(values[along], values, errors, capsize=2.5, marker=marker, markersize=3, **style)
-    axes.set(xlabel=along)
+        axes.errorbar(values[axis_dim], values, errors, capsize=2.5, marker=marker, markersize=3, **style)
+    axes.set(xlabel=axis_dim)
     axes.grid(True)
 
 
 def _edges(values: Any, *, logarithmic: bool) -> Any:
     """Return the edges of cells around values: midpoints, or geometric midpoints on a logarithmic axis."""
-    places = np.log(values) if logarithmic else values
-    if len(places) == 1:
-        edges = places[0] + np.array([-0.5, 0.5])
+    positions = np.log(values) if logarithmic else values
+    if len(positions) == 1:
+        edges = positions[0] + np.array([-0.5, 0.5])
     else:
-        middles = (places[1:] + places[:-1]) / 2
-        edges = np.concatenate([[2 * places[0] - middles[0]], middles, [2 * places[-1] - middles[-1]]])
+        middles = (positions[1:] + positions[:-1]) / 2
+        edges = np.concatenate([[2 * positions[0] - middles[0]], middles, [2 * positions[-1] - middles[-1]]])
     return np.exp(edges) if logarithmic else edges
 
 
@@ -171,15 +173,15 @@ def _colours(panel: Any) -> dict[str, Any]:
     """Return the colour scale: logarithmic where values are positive and span a wide range. NaN is left out."""
     from matplotlib.colors import LogNorm
 
-    good = _positive(panel)
-    return {"cmap": "viridis"} | ({"norm": LogNorm(good.min(), good.max())} if _is_wide(good) else {})
+    positive = _positive(panel)
+    return {"cmap": "viridis"} | ({"norm": LogNorm(positive.min(), positive.max())} if _is_wide(positive) else {})
 
 
 def _positive(panel: Any) -> Any:
     """Return the non-zero values if all of them are positive; else an empty array."""
     values = np.asarray(panel)
-    good = values[np.isfinite(values) & (values != 0)]
-    return good if good.size and good.min() > 0 else good[:0]
+    finite = values[np.isfinite(values) & (values != 0)]
+    return finite if finite.size and finite.min() > 0 else finite[:0]
 
 
 def _is_wide(positive: Any) -> bool:

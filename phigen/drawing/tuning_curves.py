@@ -18,29 +18,29 @@ _MARKERS = "osD^vX"
 
 def draw_tuning(axes: Any, tuning: Tuning) -> None:
     """Draw finalists and classical methods in colour, other candidates pale, and confirmed proposals as stars."""
-    chosen = [f.curve for f in (*tuning.finalists, *tuning.peers)]
-    others = [c for c in tuning.curves if c not in chosen and c.points]
-    for curve in others:
+    coloured = [f.curve for f in (*tuning.finalists, *tuning.peers)]
+    pale = [c for c in tuning.curves if c not in coloured and c.points]
+    for curve in pale:
         axes.plot(*_coordinates(curve, tuning.horizon), color=PALETTE["grid"], linewidth=0.8, zorder=1)
     finalist_count = len(tuning.finalists)
-    for place, finalist in enumerate((*tuning.finalists, *tuning.peers)):
-        colour = SERIES[place % len(SERIES)] if place < finalist_count else PALETTE["ink"]
+    for index, finalist in enumerate((*tuning.finalists, *tuning.peers)):
+        colour = SERIES[index % len(SERIES)] if index < finalist_count else PALETTE["ink"]
         axes.plot(
-            *_coordinates(finalist.curve, tuning.horizon), color=colour, linestyle=LINES[place % len(LINES)],
-            linewidth=1.0, marker=_MARKERS[place % len(_MARKERS)], markersize=3, markeredgewidth=0,
-            zorder=3 - 0.1 * place, label=finalist.curve.title,
+            *_coordinates(finalist.curve, tuning.horizon), color=colour, linestyle=LINES[index % len(LINES)],
+            linewidth=1.0, marker=_MARKERS[index % len(_MARKERS)], markersize=3, markeredgewidth=0,
+            zorder=3 - 0.1 * index, label=finalist.curve.title,
         )  # fmt: skip
         axes.plot(
             1e3 * finalist.cost * tuning.horizon, finalist.point.error, "*", color=colour, markersize=11,
             markeredgewidth=0, zorder=4,
         )  # fmt: skip
-    if others:
+    if pale:
         axes.plot([], [], color=PALETTE["grid"], linewidth=0.8, label="other candidates")
     axes.axhline(tuning.accuracy, **MARK)
-    what = "energy error" if tuning.measure == "energy" else "error of the orbit"
+    error_name = "energy error" if tuning.measure == "energy" else "error of the orbit"
     axes.set(
         xscale="log", yscale="log", xlabel="CPU time of the run, ms",
-        ylabel=f"{what} up to {tuning.clock} = {tuning.horizon:.4g}", title=_basis(tuning),
+        ylabel=f"{error_name} up to {tuning.clock} = {tuning.horizon:.4g}", title=_basis(tuning),
     )  # fmt: skip
     axes.grid(True)
     axes.minorticks_off()
@@ -48,8 +48,8 @@ def draw_tuning(axes: Any, tuning: Tuning) -> None:
 
 
 def _coordinates(curve: Curve, horizon: float) -> tuple[list[float], list[float]]:
-    shown = [p for p in curve.points if p.error < _MOST]
-    return [1e-6 * p.cost * horizon for p in shown], [p.error for p in shown]
+    points = [p for p in curve.points if p.error < _MOST]
+    return [1e-6 * p.cost * horizon for p in points], [p.error for p in points]
 
 
 def _basis(tuning: Tuning) -> str:
@@ -58,5 +58,5 @@ def _basis(tuning: Tuning) -> str:
         return "measured over all of it"
     best = tuning.winner
     farther = best is not None and best.point.time > 1.01 * tuning.piece
-    over = f"; stars: measured to {tuning.clock} = {best.point.time:.4g}" if best and farther else ""
-    return f"measured to {tuning.clock} = {tuning.piece:.4g} and extrapolated{over}"
+    star_note = f"; stars: measured to {tuning.clock} = {best.point.time:.4g}" if best and farther else ""
+    return f"measured to {tuning.clock} = {tuning.piece:.4g} and extrapolated{star_note}"
