@@ -120,13 +120,13 @@ def build_all(
                 theirs.close()
                 running[ours] = (setting, process, time.perf_counter())
             if time.perf_counter() >= deadline:
-                late = [*waiting, *(setting for setting, _, _ in running.values())]
-                yield from ((setting, Refusal(LATE)) for setting in late)
+                unfinished = [*waiting, *(setting for setting, _, _ in running.values())]
+                yield from ((setting, Refusal(LATE)) for setting in unfinished)
                 return
-            for ready in wait(list(running), max(0.0, deadline - time.perf_counter())):
-                assert isinstance(ready, Connection)
-                setting, process, start = running.pop(ready)
-                outcome = _received(ready, time.perf_counter() - start)
+            for future in wait(list(running), max(0.0, deadline - time.perf_counter())):
+                assert isinstance(future, Connection)
+                setting, process, start = running.pop(future)
+                outcome = _received(future, time.perf_counter() - start)
                 process.join(_GRACE)
                 yield setting, outcome
     finally:

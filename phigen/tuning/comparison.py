@@ -173,10 +173,10 @@ def _measured(
         return replace(unmeasured, step=h, steps=steps, refusal=f"the run cannot be made with h = {h:.4g}")
     energies = problem.energies(states)
     stride, count = marks(problem.horizon, h)
-    listed = candidate.method.rows(h, stride * count, stride) if exact is not None else None
+    rows = candidate.method.rows(h, stride * count, stride) if exact is not None else None
     orbit = None
-    if listed is not None and exact is not None and len(listed) > MARKS // 8:
-        orbit = orbit_error(listed, stride * h, exact, problem.step, seconds)
+    if rows is not None and exact is not None and len(rows) > MARKS // 8:
+        orbit = orbit_error(rows, stride * h, exact, problem.step, seconds)
     return replace(
         unmeasured,
         step=h,
@@ -193,5 +193,5 @@ def _defect(step: Step | None, problem: Problem, states: Floats, h: float) -> fl
     """Return the largest Poisson defect at some states of the run; None if the step cannot be differentiated."""
     if step is None:
         return None
-    chosen = states[np.linspace(0, len(states) - 1, STATES, dtype=int)]
-    return problem.defect(step, chosen, h)
+    sampled_states = states[np.linspace(0, len(states) - 1, STATES, dtype=int)]
+    return problem.defect(step, sampled_states, h)

@@ -137,10 +137,10 @@ class LatticeProblem(Problem):
         """The first settings: splittings, and the series with each bi-realisation that might apply at a site."""
         local = self.cell.is_local
         kinds = [k for k in BIREALISATIONS if k not in (*FORMULAS, *CHOICES, "karasev")] if local else ["auto"]
-        split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
+        splittings = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
         first = [replace(current, order=order, composition=direct(current)) for order in (2, 4)]
-        others = [*split, *(Setting(kind, 4, OWN, "auto") for kind in kinds)]
-        return [s for s in (*first, *(s for s in others if s.chart != current.chart)) if s != current]
+        all_settings = [*splittings, *(Setting(kind, 4, OWN, "auto") for kind in kinds)]
+        return [s for s in (*first, *(s for s in all_settings if s.chart != current.chart)) if s != current]
 
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
         """Classical methods in NumPy, on the vector field of the solver."""
@@ -171,13 +171,13 @@ def lattice_problem(
     spec, cell = compilation.spec, compilation.by_sweeps().cell
     solver = lattice_solver_of(compilation)
     start = start_of(spec, run)
-    about = solver.interface
-    few = _fewer(start.sizes, about.least, about.periods) if cell.relation == GRID else start.sizes
-    begun = start if few == start.sizes else _begun(spec, run, few) or start
-    flat = FlatLattice(solver.backend, begun.state.shape)
-    values = solver.values({**begun.arguments, **settings}, {}, begun.sizes)
+    interface = solver.interface
+    sizes = _fewer(start.sizes, interface.least, interface.periods) if cell.relation == GRID else start.sizes
+    reduced_start = start if sizes == start.sizes else _begun(spec, run, sizes) or start
+    flat = FlatLattice(solver.backend, reduced_start.state.shape)
+    values = solver.values({**reduced_start.arguments, **settings}, {}, reduced_start.sizes)
     return LatticeProblem(
-        begun.state.reshape(-1), values, step, span, direction, begun.sizes,
+        reduced_start.state.reshape(-1), values, step, span, direction, reduced_start.sizes,
         cell=cell, whole=start.sizes, seer=flat,
     )  # fmt: skip
 
@@ -187,10 +187,10 @@ def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -
     reduced = list(sizes)
     while np.prod(reduced) > MOST_SITES:
         axis = int(np.argmax(reduced))
-        half = -(-reduced[axis] // 2 // periods[axis]) * periods[axis]
-        if half < max(least[axis], 4) or half >= reduced[axis]:
+        halved = -(-reduced[axis] // 2 // periods[axis]) * periods[axis]
+        if halved < max(least[axis], 4) or halved >= reduced[axis]:
             break
-        reduced[axis] = half
+        reduced[axis] = halved
     return tuple(reduced)
 
 

@@ -97,8 +97,8 @@ def candidates(system: System, parameters: Mapping[str, float], states: Floats) 
 
 
 def _is_short(monitor: Expression) -> bool:
-    written = str(monitor)  # very long expressions are cut there
-    return len(written) <= MOST_LETTERS and "…" not in written
+    printed = str(monitor)  # very long expressions are cut there
+    return len(printed) <= MOST_LETTERS and "…" not in printed
 
 
 def _candidates(system: System, parameters: Mapping[str, float], states: Floats) -> Iterator[Expression]:
@@ -116,8 +116,8 @@ def _candidates(system: System, parameters: Mapping[str, float], states: Floats)
     (speeds,) = evaluate([speed], columns)
     scale = float(np.median(np.broadcast_to(speeds, len(states))))
     if math.isfinite(scale) and scale > 0:
-        near = number(Fraction(f"{scale:.1e}"))
-        yield from (power(ONE + speed / near, number(Fraction(-k, 4))) for k in OF_SPEED)
+        distance = number(Fraction(f"{scale:.1e}"))
+        yield from (power(ONE + speed / distance, number(Fraction(-k, 4))) for k in OF_SPEED)
 
 
 def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expression]:
@@ -190,13 +190,13 @@ def compare(
     """
     building = deadline - MEASURING * max(deadline - time.perf_counter(), 0.0)
     outcomes = dict(build_all(spec, system, requested, building))
-    plain, *others = requested
-    plain_build = outcomes.get(plain)
+    without_monitor, *monitors = requested
+    plain_build = outcomes.get(without_monitor)
     if not isinstance(plain_build, Built):
         return None
     first = _trial(plain_build, problem, states, span, accuracy, span / problem.step, deadline)
     trials, refused = [], {}
-    for setting in others:
+    for setting in monitors:
         outcome = outcomes.get(setting)
         if isinstance(outcome, Built):
             trials.append(_trial(outcome, problem, states, span, accuracy, first.steps, deadline))
@@ -207,26 +207,26 @@ def compare(
 
 
 def _trial(
-    built: Built, problem: Problem, states: Floats, span: float, accuracy: float, most: float, deadline: float
+    candidate: Built, problem: Problem, states: Floats, span: float, accuracy: float, max_steps: float, deadline: float
 ) -> Trial:
     """Find the fewest steps with that error: their number is doubled until the error is reached, then interpolated by
     the order.
     """
-    solver = Solver(built.solver(), built.interface)
-    h, before = _largest(solver, problem, states), (math.nan, math.inf)
+    solver = Solver(candidate.solver(), candidate.interface)
+    h, previous = _largest(solver, problem, states), (math.nan, math.inf)
     for _ in range(HALVINGS):
-        run = _run(solver, problem, span, h, MOST * max(most, FEWEST))
-        if run.error <= accuracy and math.isfinite(before[1]):
-            gained = math.log(before[1] / accuracy) / math.log(before[1] / max(run.error, ROUNDING))
-            finer = before[0] * math.pow(h / before[0], min(1.02 * gained, 1.0))
-            between = _run(solver, problem, span, finer, math.inf)
-            run = between if between.error <= accuracy else run
+        run = _run(solver, problem, span, h, MOST * max(max_steps, FEWEST))
+        if run.error <= accuracy and math.isfinite(previous[1]):
+            gained = math.log(previous[1] / accuracy) / math.log(previous[1] / max(run.error, ROUNDING))
+            finer = previous[0] * math.pow(h / previous[0], min(1.02 * gained, 1.0))
+            finer_run = _run(solver, problem, span, finer, math.inf)
+            run = finer_run if finer_run.error <= accuracy else run
         if run.error <= accuracy:
-            return Trial(built.setting, built.kind, built.order, run.h, run.steps, run.error, run.seconds)
+            return Trial(candidate.setting, candidate.kind, candidate.order, run.h, run.steps, run.error, run.seconds)
         if run.seconds >= SECONDS or time.perf_counter() > deadline:
             break
-        before, h = (h, run.error), h / 2
-    return Trial(built.setting, built.kind, built.order, math.nan, math.inf, math.inf, 0.0)
+        previous, h = (h, run.error), h / 2
+    return Trial(candidate.setting, candidate.kind, candidate.order, math.nan, math.inf, math.inf, 0.0)
 
 
 def _largest(solver: Solver, problem: Problem, states: Floats) -> float:
@@ -245,21 +245,21 @@ class _Run:
     seconds: float
 
 
-def _run(solver: Solver, problem: Problem, span: float, h: float, most: float) -> _Run:
-    """Make a run to the end of the span; None if it needs more than ``most`` steps, or takes too long."""
-    begun, states = time.thread_time(), [problem.start]
-    session, done, passed = solver.backend.start(problem.start, problem.parameters), 0, 0.0
+def _run(solver: Solver, problem: Problem, span: float, h: float, max_steps: float) -> _Run:
+    """Make a run to the end of the span; None if it needs more than ``max_steps`` steps, or takes too long."""
+    started_at, states = time.thread_time(), [problem.start]
+    session, steps_done, time_passed = solver.backend.start(problem.start, problem.parameters), 0, 0.0
     try:
-        while passed < span:
-            many = 1 + done // ROWS if solver.interface.monitored else max(1, int(span / h / ROWS))
-            session.advance(problem.direction * h, many)
-            done += many
-            passed = abs(session.time()) if solver.interface.monitored else done * h
+        while time_passed < span:
+            block = 1 + steps_done // ROWS if solver.interface.monitored else max(1, int(span / h / ROWS))
+            session.advance(problem.direction * h, block)
+            steps_done += block
+            time_passed = abs(session.time()) if solver.interface.monitored else steps_done * h
             states.append(session.state())
-            if done > most or time.thread_time() - begun > SECONDS:
+            if steps_done > max_steps or time.thread_time() - started_at > SECONDS:
                 return _Run(h, math.inf, math.inf, SECONDS)
     except BackendError:
-        return _Run(h, 0, math.inf, time.thread_time() - begun)
-    seconds, energies = time.thread_time() - begun, problem.energies(np.array(states))
+        return _Run(h, 0, math.inf, time.thread_time() - started_at)
+    seconds, energies = time.thread_time() - started_at, problem.energies(np.array(states))
     error = float(np.max(problem.unit.errors(energies, float(energies[0]))))
-    return _Run(h, done * span / passed, error if math.isfinite(error) else math.inf, seconds)
+    return _Run(h, steps_done * span / time_passed, error if math.isfinite(error) else math.inf, seconds)

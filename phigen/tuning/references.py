@@ -67,11 +67,11 @@ def agreed(
         if converged is None:
             raise CheckError(f"no reference solution: a method fails before {clock} = {span:.6g}")
         orbits.append(converged)
-    (states, h, _), (others, _, _) = orbits
-    difference = distance(states, others)
+    (states, h, _), (second_states, _, _) = orbits
+    difference = distance(states, second_states)
     if difference > AGREED * accuracy:
-        size = float(np.max(np.abs(others))) or 1.0
-        apart = np.max(np.abs(states - others), axis=1) > AGREED * accuracy * size
+        size = float(np.max(np.abs(second_states))) or 1.0
+        apart = np.max(np.abs(states - second_states), axis=1) > AGREED * accuracy * size
         raise CheckError(
             f"no reference solution for the orbit: an error of {accuracy:.1e} is to be measured, but two methods at "
             f"small steps agree to that only up to {clock} = {spacing * int(np.argmax(apart)):.4g} of {span:.6g}\n"
@@ -81,22 +81,24 @@ def agreed(
     return Reference(first, h, difference, clock)
 
 
-def orbit_error(states: Floats, spacing: float, other: CompiledMethod, step: float, seconds: float) -> float | None:
+def orbit_error(
+    states: Floats, spacing: float, reference_method: CompiledMethod, step: float, seconds: float
+) -> float | None:
     """The distance of states (rows, DIM) at multiples of a spacing from those of another method at small steps.
 
     Relative to the largest coordinate; None if the other method does not reach this accuracy in ``seconds``.
     """
     count, until = len(states) - 1, time.perf_counter() + seconds
-    orbit = _converged(other, min(step, spacing), spacing, count, KNOWN, until)
+    orbit = _converged(reference_method, min(step, spacing), spacing, count, KNOWN, until)
     if orbit is None:
         return None
     error = distance(states, orbit[0])
     return error if orbit[2] < max(AGREED * error, KNOWN) else None
 
 
-def distance(states: Floats, others: Floats) -> float:
+def distance(states: Floats, reference_states: Floats) -> float:
     """The largest difference of states (rows, DIM), relative to the largest coordinate."""
-    return float(np.max(np.abs(states - others))) / (float(np.max(np.abs(others))) or 1.0)
+    return float(np.max(np.abs(states - reference_states))) / (float(np.max(np.abs(reference_states))) or 1.0)
 
 
 def _converged(
@@ -112,8 +114,8 @@ def _converged(
         if states is None:
             continue
         if last is not None:
-            before, change = change, distance(last, states)
-            if change > before and best is not None:
+            previous, change = change, distance(last, states)
+            if change > previous and best is not None:
                 break
         best, last = (states, spacing / stride, change), states
         if change <= CONVERGED * accuracy or time.perf_counter() > until:

@@ -26,11 +26,11 @@ DENSE, SETTLING, FOLLOWED = 256, 8, 16
 def scales(problem: Problem, method: Candidate) -> tuple[float, float]:
     """Return the time over which candidates are scanned, and the largest step that resolves the motion."""
     h = problem.step
-    few = steps_in(min(problem.horizon, 500 * h), h)
-    states = method.rows(h, few, max(1, few // 16))
+    scan_steps = steps_in(min(problem.horizon, 500 * h), h)
+    states = method.rows(h, scan_steps, max(1, scan_steps // 16))
     if states is None:
         return problem.horizon, problem.horizon / LEAST_STEPS
-    nanoseconds = nanoseconds_per_step(method, h, few)
+    nanoseconds = nanoseconds_per_step(method, h, scan_steps)
     steps = min(max(1e9 * PIECE_SECONDS / nanoseconds, 500), PIECE_STEPS)
     rate = fastest_rate(motion(method.solver, problem.parameters, monitored=problem.clock == "τ"), states)
     return min(problem.horizon, steps * h), min(MOST_TURN / max(rate, 1e-300), problem.horizon / LEAST_STEPS)
@@ -65,8 +65,8 @@ def _growth(field: Callable[[Floats], Floats], x: Floats, width: float) -> float
     """About the largest absolute eigenvalue at a state (DIM,), by powers of the derivative."""
     v, log = np.random.default_rng(0).normal(size=len(x)), 0.0
     for k in range(FOLLOWED):
-        moved = width * v / np.max(np.abs(v))
-        ahead, behind = field(np.array([x + moved, x - moved]))
+        displacement = width * v / np.max(np.abs(v))
+        ahead, behind = field(np.array([x + displacement, x - displacement]))
         w = (ahead - behind) / (2 * width)
         size = float(np.linalg.norm(w)) / float(np.linalg.norm(v / np.max(np.abs(v))))
         if not np.isfinite(size) or size == 0:

@@ -82,8 +82,8 @@ def at_floor(points: Sequence[Point]) -> bool:
         return True
     if len(points) < 3:
         return False
-    before, last = points[-3], points[-1]
-    return before.error < GAIN * last.error and before.measured < 1e-9
+    coarser, last = points[-3], points[-1]
+    return coarser.error < GAIN * last.error and coarser.measured < 1e-9
 
 
 def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | None:
@@ -139,29 +139,29 @@ def _between(coarse: Point, fine: Point, accuracy: float) -> float:
 
 def nanoseconds_at(points: Sequence[Point], step: float) -> float:
     """The time of one step: interpolated between measured steps, that of the nearest one outside them."""
-    listed = sorted(points, key=lambda p: p.step)
-    for low, high in pairwise(listed):
+    by_step = sorted(points, key=lambda p: p.step)
+    for low, high in pairwise(by_step):
         if low.step <= step <= high.step:
             share = math.log(step / low.step) / math.log(high.step / low.step)
             return low.nanoseconds * math.pow(high.nanoseconds / low.nanoseconds, share)
-    return min(listed, key=lambda p: abs(math.log(p.step / step))).nanoseconds
+    return min(by_step, key=lambda p: abs(math.log(p.step / step))).nanoseconds
 
 
 def scan(
     measure: Callable[[float], Point | None],
     first: float,
-    most: float,
+    largest_step: float,
     accuracy: float,
     order: int,
     worth: float = math.inf,
     patience: Callable[[], bool] = lambda: True,
 ) -> tuple[Point, ...]:
-    """Measure points from the largest possible step, at most ``most``, down to the accuracy and to the cheapest step.
+    """Measure points from the largest possible step down to the accuracy and to the cheapest step.
 
-    Ends early where the accuracy would cost more than ``worth`` nanoseconds per unit of time, where rounding is all
-    that is left, and when ``patience`` is gone.
+    The first step is at most ``largest_step``. The scan ends early if the accuracy would cost more than ``worth``
+    nanoseconds per unit of time, if only rounding errors are left, and if ``patience`` returns False.
     """
-    points = _coarsest(measure, min(first, most), most, patience)
+    points = _coarsest(measure, min(first, largest_step), largest_step, patience)
     while points and len(points) < MOST_POINTS and patience():
         if _enough(points, accuracy) or _hopeless(points, accuracy, order, worth):
             break
@@ -202,7 +202,7 @@ def _refined(
 
 
 def _coarsest(
-    measure: Callable[[float], Point | None], first: float, most: float, patience: Callable[[], bool]
+    measure: Callable[[float], Point | None], first: float, largest_step: float, patience: Callable[[], bool]
 ) -> list[Point]:
     """Find the largest possible step, to a factor `FINER`, from a first guess; empty if there is none near it."""
     step, point = first, measure(first)
@@ -214,8 +214,8 @@ def _coarsest(
     if point is None:
         return []
     points = [point]
-    while points[0].step < 0.97 * most and step == first:
-        coarser = measure(min(points[0].step * FINER, most))
+    while points[0].step < 0.97 * largest_step and step == first:
+        coarser = measure(min(points[0].step * FINER, largest_step))
         if coarser is None:
             break
         points.insert(0, coarser)
@@ -234,13 +234,13 @@ def _hopeless(points: Sequence[Point], accuracy: float, order: int, worth: float
     return last.nanoseconds / step > worth
 
 
-def proposals(tried: Mapping[Setting, Curve], refused: Sequence[Setting], accuracy: float) -> list[Setting]:
+def proposals(tried_curves: Mapping[Setting, Curve], refused: Sequence[Setting], accuracy: float) -> list[Setting]:
     """Return the settings to try next, the most promising first; empty if none is promising.
 
     A bi-realisation whose cost is near the best is tried at the next higher order while that pays, then at the next
     lower one; the best is also tried without gauge and as a composition.
     """
-    costs = {setting: curve.cost(accuracy) for setting, curve in tried.items()}
+    costs = {setting: curve.cost(accuracy) for setting, curve in tried_curves.items()}
     families: dict[Setting, dict[int, float]] = {}
     for setting, cost in costs.items():
         families.setdefault(setting.family, {})[setting.order] = cost
@@ -252,27 +252,38 @@ def proposals(tried: Mapping[Setting, Curve], refused: Sequence[Setting], accura
         best = min(orders, key=lambda order: (orders[order], -order))
         if orders[best] > KEEP * least:
             continue
-        setting = next(s for s in tried if s.family == family and s.order == best)
+        setting = next(s for s in tried_curves if s.family == family and s.order == best)
         proposed += _neighbours(setting, orders, refused)
         if family == ranked[0] and family.composition == direct(family):
-            curve = tried[setting]
-            known = {(s.chart, s.composition, s.gauge * (s.composition == "none")) for s in (*tried, *refused)}
+            curve = tried_curves[setting]
+            known_families = {
+                (s.chart, s.composition, s.gauge * (s.composition == "none")) for s in (*tried_curves, *refused)
+            }
             proposed += [
                 v for v in variants(setting, curve.gauged, curve.symmetric)
-                if (v.chart, v.composition, v.gauge * (v.composition == "none")) not in known
+                if (v.chart, v.composition, v.gauge * (v.composition == "none")) not in known_families
             ]  # fmt: skip
     return list(dict.fromkeys(proposed))
 
 
 def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Setting]) -> list[Setting]:
     """Return the next higher order if it was neither tried nor refused, else the next lower one."""
-    above = [k for k in best.orders if k > best.order]
-    below = [k for k in best.orders if k < best.order]
+    higher_orders = [k for k in best.orders if k > best.order]
+    lower_orders = [k for k in best.orders if k < best.order]
     closed = {s.order for s in refused if s.family == best.family}
-    if above and above[0] not in orders and not any(k <= above[0] for k in closed if k > best.order):
-        return [replace(best, order=above[0])]
-    if below and below[-1] not in orders and below[-1] not in closed and math.isfinite(orders[best.order]):
-        return [replace(best, order=below[-1])]
+    if (
+        higher_orders
+        and higher_orders[0] not in orders
+        and not any(k <= higher_orders[0] for k in closed if k > best.order)
+    ):
+        return [replace(best, order=higher_orders[0])]
+    if (
+        lower_orders
+        and lower_orders[-1] not in orders
+        and lower_orders[-1] not in closed
+        and math.isfinite(orders[best.order])
+    ):
+        return [replace(best, order=lower_orders[-1])]
     return []
 
 

@@ -88,10 +88,10 @@ class Setting:
 
     def described(self, kind: str = "") -> str:
         """The setting in words: ``exponential, order 8, without gauge, kahan-li``; ``kind`` is that of the build."""
-        named = self.kind if self.of == "auto" else f"{self.kind} of {self.of}"
-        words = [kind or named, f"order {self.order}"]
-        words += ["without gauge"] if self.gauge == "none" and self.scheme == "series" else []
-        return ", ".join([*words, self.composition] if self.composition not in ("none", "auto") else words)
+        chart_name = self.kind if self.of == "auto" else f"{self.kind} of {self.of}"
+        attributes = [kind or chart_name, f"order {self.order}"]
+        attributes += ["without gauge"] if self.gauge == "none" and self.scheme == "series" else []
+        return ", ".join([*attributes, self.composition] if self.composition not in ("none", "auto") else attributes)
 
     @property
     def is_splitting(self) -> bool:
@@ -111,9 +111,9 @@ class Setting:
     def lines(self) -> list[str]:
         """The top-level lines of a spec that request the setting; `OWN` leaves the lines of the spec as they are."""
         kind = "auto" if self.scheme != "series" else self.kind
-        named = kind if self.of == "auto" else f"{{kind: {kind}, of: {self.of}}}"
+        chart_value = kind if self.of == "auto" else f"{{kind: {kind}, of: {self.of}}}"
         lines = [f"scheme: {self.scheme}"]
-        lines += [] if kind == OWN else [f"birealisation: {named}"]
+        lines += [] if kind == OWN else [f"birealisation: {chart_value}"]
         lines += [f"order: {self.order}", f"composition: {self.composition}"]
         lines += [f"monitor: {self.monitor}"] if self.monitor else []
         return lines if self.gauge == OWN else [*lines, f"gauge: {self.gauge}"]
@@ -130,14 +130,14 @@ class Setting:
         )  # fmt: skip
 
 
-def monitor_of(written: str, spec: Spec) -> str | Expression:
+def monitor_of(expression_text: str, spec: Spec) -> str | Expression:
     """The monitor that a text denotes: ``log``, or a function of coordinates and parameters."""
-    if written == LOGARITHMIC:
+    if expression_text == LOGARITHMIC:
         return LOGARITHMIC
     names = (*spec.coordinates, *(p.name for p in spec.parameters))
-    expression = parse(written, AllowedNames({n: symbol(n) for n in names}), lambda *_, **__: None)
+    expression = parse(expression_text, AllowedNames({n: symbol(n) for n in names}), lambda *_, **__: None)
     if expression is None:
-        raise ValueError(f"{written!r} is no monitor")
+        raise ValueError(f"{expression_text!r} is no monitor")
     return expression
 
 
@@ -148,8 +148,8 @@ def own_setting(compilation: Compilation) -> Setting:
     if compilation.scheme_name != "series":
         return Setting(compilation.kind, order, gauge, spec.composition if compilation.is_composed else "none")
     choice = spec.birealisation
-    plain = choice == BirealisationChoice(choice.kind, order=choice.order) and choice.kind not in FORMULAS
-    kind = compilation.kind if plain else OWN
+    is_plain = choice == BirealisationChoice(choice.kind, order=choice.order) and choice.kind not in FORMULAS
+    kind = compilation.kind if is_plain else OWN
     if spec.lattice:  # its series has order 2 and is composed for higher orders
         composition = "auto" if spec.composition == "none" else spec.composition
         return Setting(kind if compilation.birealisation else "auto", order, OWN, composition)
@@ -164,18 +164,20 @@ def charts(system: System, current: Setting) -> list[Setting]:
     maps have closed forms. Building the others shows which of them apply. Splittings and Gauss steps come first.
     """
     linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
-    plain = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]
-    named = [Setting(kind, 4) for kind in plain if not (kind == "karasev" and linear)]
-    nested = [Setting(kind, 4, of=of) for kind, of in _NESTED]
+    plain_kinds = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]
+    plain_settings = [Setting(kind, 4) for kind in plain_kinds if not (kind == "karasev" and linear)]
+    nested = [Setting(kind, 4, of=inner_kind) for kind, inner_kind in _NESTED]
     # The other side is the adjoint, with the same errors in reversed time.
     euler = [Setting("canonical-euler", order) for order in (1, 4)]
     composed = _near_integrable(system)
-    split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
-    split += [Setting(GAUSS, order, "none") for order in (8, 16)]
+    splittings = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
+    splittings += [Setting(GAUSS, order, "none") for order in (8, 16)]
     first = [replace(current, order=order, composition=direct(current)) for order in (4, 8)]
-    quick = [s for s in split if s.chart != current.chart]  # seconds to build, where series of order 8 may take minutes
-    others = [s for s in (*named, *nested, *euler) if s.chart != current.chart]
-    return [s for s in (*quick, *first, *composed, *others) if s != current]
+    quick = [
+        s for s in splittings if s.chart != current.chart
+    ]  # seconds to build, where series of order 8 may take minutes
+    candidates = [s for s in (*plain_settings, *nested, *euler) if s.chart != current.chart]
+    return [s for s in (*quick, *first, *composed, *candidates) if s != current]
 
 
 def _near_integrable(system: System) -> list[Setting]:

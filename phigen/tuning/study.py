@@ -94,8 +94,8 @@ class Tuning:
     @property
     def closest(self) -> tuple[Curve, Point]:
         """The smallest error that was measured."""
-        listed = [(c, p) for c in self.curves for p in c.points if c.setting]
-        return min(listed, key=lambda pair: pair[1].error)
+        measured_points = [(c, p) for c in self.curves for p in c.points if c.setting]
+        return min(measured_points, key=lambda pair: pair[1].error)
 
 
 def tune(
@@ -114,15 +114,15 @@ def tune(
     finished = tuner.search(current)
     classical = tuner.peers()
     finalists = final(tuner, current)
-    present = _present(tuner, current)
+    current_run = _present(tuner, current)
     peers = [Finalist(c, p) for c in classical if (p := confirmed(tuner, c))]
-    timed = time_all([*finalists, *peers, *([present] if present else [])], tuner)
+    timed = time_all([*finalists, *peers, *([current_run] if current_run else [])], tuner)
     ranked, peers = ranking(timed[: len(finalists)]), timed[len(finalists) :][: len(peers)]
     look = ranked and measure == "energy"
     return Tuning(
         measure, accuracy, problem.horizon, tuner.piece, (*tuner.tried.values(), *classical), tuple(ranked),
-        next((f for f in ranked if f.curve is current), None), timed[-1] if present else None, tuple(peers),
-        {s: why for s, why in tuner.refused.items() if why}, finished,
+        next((f for f in ranked if f.curve is current), None), timed[-1] if current_run else None, tuple(peers),
+        {s: reason for s, reason in tuner.refused.items() if reason}, finished,
         tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None, problem.unit,
         monitored(tuner, current), problem.sizes, problem.clock, automatic(tuner.compilation, ranked),
     )  # fmt: skip
@@ -153,10 +153,10 @@ def automatic(compilation: Compilation, ranked: Sequence[Finalist]) -> str:
         return ""
     setting = replace(ranked[0].curve.setting or own_setting(compilation), kind=AUTO, composition="auto", gauge="auto")
     try:
-        chosen = compile_spec(setting.applied(compilation.spec), system=compilation.known_system)
+        automatic_compilation = compile_spec(setting.applied(compilation.spec), system=compilation.known_system)
     except SpecError:
         return ""
-    return chosen.scheme_name
+    return automatic_compilation.scheme_name
 
 
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
@@ -230,8 +230,8 @@ def time_all(finalists: Sequence[Finalist], tuner: Tuner) -> list[Finalist]:
     """Time all methods in turn, in several rounds, so that disturbances affect all of them alike."""
     seconds: list[list[float]] = [[] for _ in finalists]
     for _ in range(ROUNDS):
-        for finalist, listed in zip(finalists, seconds, strict=True):
+        for finalist, rounds in zip(finalists, seconds, strict=True):
             h = finalist.point.step
             steps = steps_in(tuner.problem.horizon, h)
-            listed.append(1e-9 * nanoseconds_per_step(tuner.methods[finalist.curve.key], h, steps) / h)
-    return [replace(f, seconds=tuple(listed)) for f, listed in zip(finalists, seconds, strict=True)]
+            rounds.append(1e-9 * nanoseconds_per_step(tuner.methods[finalist.curve.key], h, steps) / h)
+    return [replace(f, seconds=tuple(rounds)) for f, rounds in zip(finalists, seconds, strict=True)]

@@ -40,14 +40,14 @@ def _run_seconds(walk: Callable[[int], object], steps: int) -> tuple[float, floa
     Long runs are timed in part, until their steps are as fast as the rest will be: a solver in C first fits its
     predictor, then goes on in blocks of steps, several times as fast.
     """
-    seconds, done, part = 0.0, 0, min(FEW_STEPS, steps)
+    seconds, steps_done, part = 0.0, 0, min(FEW_STEPS, steps)
     while True:
         last = _seconds(walk, part)
-        seconds, done = seconds + last, done + part
-        if done >= min(steps, TIMED_STEPS) or last >= LEAST_SECONDS:
-            return seconds, seconds + last * (steps - done) / part
+        seconds, steps_done = seconds + last, steps_done + part
+        if steps_done >= min(steps, TIMED_STEPS) or last >= LEAST_SECONDS:
+            return seconds, seconds + last * (steps - steps_done) / part
         lasting = int(part * LEAST_SECONDS / last)
-        part = min(max(done, min(lasting, PART_STEPS)), steps - done)
+        part = min(max(steps_done, min(lasting, PART_STEPS)), steps - steps_done)
 
 
 def _seconds(walk: Callable[[int], object], steps: int) -> float:

@@ -81,8 +81,8 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
         growth = _growth(errors)
         ratio = max(problem.horizon / time, 1.0)
         rounding = ROUNDING * math.sqrt(steps * ratio)
-        more = rounding - ROUNDING * math.sqrt(steps)
-        error = largest + more if bounded else largest * math.pow(ratio, growth if growth > 0.3 else 0.0) + more
+        excess = rounding - ROUNDING * math.sqrt(steps)
+        error = largest + excess if bounded else largest * math.pow(ratio, growth if growth > 0.3 else 0.0) + excess
         cost = nanoseconds_per_step(method, h, steps_in(problem.horizon, h))
         return Point(h, error, largest, time, cost, growth, rounding) if math.isfinite(cost) else None
 
@@ -118,6 +118,6 @@ def _growth(errors: Floats) -> float:
     """The power of time with which errors at equidistant times grow, from their maxima over the halves of the run."""
     if len(errors) < 5:
         return math.nan
-    half = len(errors) // 2 + 1
-    early, late = float(np.max(errors[:half])), float(np.max(errors))
-    return math.log2(late / early) if early > 10 * ROUNDING else math.nan
+    half_count = len(errors) // 2 + 1
+    early_maximum, late_maximum = float(np.max(errors[:half_count])), float(np.max(errors))
+    return math.log2(late_maximum / early_maximum) if early_maximum > 10 * ROUNDING else math.nan

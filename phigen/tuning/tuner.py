@@ -180,9 +180,9 @@ class Tuner:
 
     def _scanned(self, method: CompiledMethod, order: int, worth: float, *, bounded: bool) -> tuple[Point, ...]:
         until = time.perf_counter() + min(SCANNING * self.clock.budget, max(self.clock.left(0.9), 0.0))
-        measure, piece = self.measures[bounded], self.piece
+        measure, span = self.measures[bounded], self.piece
         return search.scan(
-            lambda h: measure(method, h, piece), self.problem.step, self.most, self.accuracy, order, worth,
+            lambda h: measure(method, h, span), self.problem.step, self.most, self.accuracy, order, worth,
             lambda: time.perf_counter() < until,
         )  # fmt: skip
 
@@ -200,15 +200,15 @@ class Tuner:
         """Measure orbit errors from now on, against a solver of higher order if there is one, confirmed by DOP853."""
         problem, until = self.problem, time.perf_counter() + BUILDING * self.clock.budget
         high = replace(setting, order=max(setting.order, 8), composition=direct(setting))
-        others = [s for s in (Setting(SPLITTING, 8, "none", "auto"), high) if s != setting]
+        candidates = [s for s in (Setting(SPLITTING, 8, "none", "auto"), high) if s != setting]
         if high != setting:
-            outcomes = build_all(self.compilation.spec, self.compilation.known_system, others, until)
+            outcomes = build_all(self.compilation.spec, self.compilation.known_system, candidates, until)
             self._made |= {s: outcome for s, outcome in outcomes if isinstance(outcome, Built)}
-            known = [self._made[s] for s in others if s in self._made]
-            method = problem.method(known[-1].solver()) if known else method
+            built_candidates = [self._made[s] for s in candidates if s in self._made]
+            method = problem.method(built_candidates[-1].solver()) if built_candidates else method
         reference = self._reference(method)
-        over = f"{problem.clock} = 0 … {self.piece:.6g}"
-        self.note(f"reference: two methods agree to {reference.uncertainty:.1e} over {over}")
+        interval = f"{problem.clock} = 0 … {self.piece:.6g}"
+        self.note(f"reference: two methods agree to {reference.uncertainty:.1e} over {interval}")
         self.referring = True
         self.measures = {
             is_bounded: orbit_measure(problem, reference, bounded=is_bounded) for is_bounded in (True, False)
@@ -218,12 +218,12 @@ class Tuner:
 
     def _reference(self, method: CompiledMethod) -> Reference:
         """Compute the reference over the piece, which is shortened if rounding or chaos prevent it."""
-        problem, other, seconds = self.problem, self._classical("dop853"), REFERRING * self.clock.budget
+        problem, second, seconds = self.problem, self._classical("dop853"), REFERRING * self.clock.budget
         step, clock = problem.step, problem.clock
         for shorter in (1, 4, 16):
             span = self.piece / shorter
             try:
-                reference = agreed(method, other, step, span, self.accuracy * span / problem.horizon, seconds, clock)
+                reference = agreed(method, second, step, span, self.accuracy * span / problem.horizon, seconds, clock)
             except CheckError as error:
                 failure = error
                 continue
@@ -244,33 +244,33 @@ def _unreachable(method: Candidate, problem: Problem) -> StepError:
     )  # fmt: skip
 
 
-def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, piece: float) -> None:
+def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, span: float) -> None:
     """Raise CheckError if the orbit error grows too fast to be extrapolated to a longer run."""
     h, clock = problem.step, problem.clock
     for _ in range(12):
-        point = measure(method, h, piece)
+        point = measure(method, h, span)
         if point and 1e-11 < point.measured < 1e-3:
             if point.growth > LINEAR:
                 raise CheckError(
                     f"the error of the orbit grows like {clock}^{point.growth:.1f}: the motion is chaotic, and what is "
-                    f"measured over {clock} = 0 … {piece:.6g} is no evidence for a longer run\n"
-                    f"  hint: --horizon {piece:.6g}, or --measure energy"
+                    f"measured over {clock} = 0 … {span:.6g} is no evidence for a longer run\n"
+                    f"  hint: --horizon {span:.6g}, or --measure energy"
                 )
             return
         h = h / 2 if point is None or point.measured > 1e-3 else 2 * h
 
 
-def expected_seconds(setting: Setting, tried: Iterable[Curve]) -> float:
+def expected_seconds(setting: Setting, tried_curves: Iterable[Curve]) -> float:
     """Estimated seconds of building, from lower orders of the same family, by a power of the order; else 0.
 
     The code of compositions has the same length at all orders, apart from the table of stages.
     """
-    known = sorted((c.order, c.seconds) for c in tried if c.setting and c.setting.family == setting.family)
-    below = [(order, seconds) for order, seconds in known if order < setting.order]
-    if not below:
+    timings = sorted((c.order, c.seconds) for c in tried_curves if c.setting and c.setting.family == setting.family)
+    lower_timings = [(order, seconds) for order, seconds in timings if order < setting.order]
+    if not lower_timings:
         return 0.0
-    order, seconds = below[-1]
+    order, seconds = lower_timings[-1]
     growth = 2.0 if setting.composition == "none" else 1.0
-    if len(below) > 1 and growth > 1:
-        growth = min(max((seconds / below[-2][1]) ** (2 / (order - below[-2][0])), 1.5), 8.0)
+    if len(lower_timings) > 1 and growth > 1:
+        growth = min(max((seconds / lower_timings[-2][1]) ** (2 / (order - lower_timings[-2][0])), 1.5), 8.0)
     return seconds * math.pow(growth, (setting.order - order) / 2)
