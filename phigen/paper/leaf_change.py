@@ -46,9 +46,9 @@ def printed_field(state: Floats) -> Floats:
 
 def _rows(state: Floats, h: float, steps: int, stride: int) -> Floats:
     rows = [state]
-    for done in range(1, steps + 1):
+    for step_number in range(1, steps + 1):
         state = printed_map(state, h)
-        if done % stride == 0:
+        if step_number % stride == 0:
             rows.append(state)
     return np.array(rows)
 
@@ -69,9 +69,9 @@ def leaf_change_plate() -> Plate:
 
 def _findings(compilation: Compilation, trajectory: Trajectory, start: Floats) -> tuple[Finding, ...]:
     method = Method("printed", printed_map, _rows)
-    turn = _rows(start, PAPER_STEP, round(PERIOD / PAPER_STEP), 10)
-    label, (x, y, z) = turn @ (-1, 1, 1), trajectory.x.T
-    off = [float(np.max(np.abs(_rows(start, 1 / n, n, n)[-1] - _flow(start, 1.0)))) for n in (1000, 2000)]
+    period_rows = _rows(start, PAPER_STEP, round(PERIOD / PAPER_STEP), 10)
+    label, (x, y, z) = period_rows @ (-1, 1, 1), trajectory.x.T
+    final_errors = [float(np.max(np.abs(_rows(start, 1 / n, n, n)[-1] - _flow(start, 1.0)))) for n in (1000, 2000)]
     point = np.array(ELSEWHERE)
     slopes = evaluate(
         gradient(compilation.system.hamiltonian, trajectory.coordinates), dict(zip("xyz", point, strict=True))
@@ -80,7 +80,7 @@ def _findings(compilation: Compilation, trajectory: Trajectory, start: Floats) -
         Finding("printed equations: dH/dt at (1, 2, 4)", "0, Hamiltonian", float(printed_field(point) @ slopes)),
         Finding("printed map: defect of DΦ π DΦᵀ = π∘Φ, step 0.05", "it is Poisson",
                 poisson_defect(compilation.system, {}, method, start, STEP)),
-        Finding("printed map with k = 2: observed order", "2", math.log2(off[0] / off[1])),
+        Finding("printed map with k = 2: observed order", "2", math.log2(final_errors[0] / final_errors[1])),
         Finding("printed map: −x + y + z after one turn, relative change, step 0.0001", "leaves the leaf",
                 float(label[-1] / label[0] - 1)),
         Finding("phigen: −x + y + z, largest relative change", "constant",

@@ -47,8 +47,8 @@ class Approach:
 
     def errors(self, label: str) -> Floats:
         """Return the errors (rows,) of the solution, relative to its largest coordinate."""
-        off = np.max(np.abs(self.trajectories[label].x - self.exact), axis=1)
-        errors: Floats = off / np.max(np.abs(self.exact), axis=1)
+        distance = np.max(np.abs(self.trajectories[label].x - self.exact), axis=1)
+        errors: Floats = distance / np.max(np.abs(self.exact), axis=1)
         return errors
 
 
@@ -75,14 +75,14 @@ def errors_plate() -> Plate:
     """Return the figure of the errors of the solution, the Casimir and the energy."""
     course = approach()
     row = int(np.searchsorted(course.trajectories[PHI].t, TIME - 1e-9))
-    off = {label: float(course.errors(label)[row]) for label in COLOURS}
+    final_errors = {label: float(course.errors(label)[row]) for label in COLOURS}
     casimir = {label: float(np.max(relative(t.casimirs["C"]))) for label, t in course.trajectories.items()}
     energy = {label: float(np.max(relative(t.energy))) for label, t in course.trajectories.items()}
     findings = (
-        Finding("error of PHI-1 at t = 0.254", "much smaller than of RK-2", off[PHI]),
-        Finding("error of RK2 at t = 0.254", "goes off the solution early", off[RK2]),
-        Finding("error of RK4 at t = 0.254", "larger than of PHI-1, for larger t", off[RK4]),
-        Finding("error of phigen at order 8 at t = 0.254", "–", off["phigen, order 8"]),
+        Finding("error of PHI-1 at t = 0.254", "much smaller than of RK-2", final_errors[PHI]),
+        Finding("error of RK2 at t = 0.254", "goes off the solution early", final_errors[RK2]),
+        Finding("error of RK4 at t = 0.254", "larger than of PHI-1, for larger t", final_errors[RK4]),
+        Finding("error of phigen at order 8 at t = 0.254", "–", final_errors["phigen, order 8"]),
         Finding("order of PHI-1, from steps of 0.001 and 0.0005", "1", _order(course)),
         Finding("Casimir, PHI-1: largest error", "machine precision", casimir[PHI]),
         Finding("Casimir, RK2: largest error", "not preserved", casimir[RK2]),
@@ -114,8 +114,8 @@ def _draw_errors(course: Approach) -> Figure:
             left = course.end - trajectory.t[1:]
             axes.loglog(left, np.maximum(errors[1:], ROUNDING / 4), color=COLOURS[label], linewidth=1.2, label=label,
                         zorder=4 if label == PHI else 3)  # fmt: skip
-    for axes, what in zip(panels, ("solution", "Casimir", "energy"), strict=True):
-        axes.set(title=f"relative error of the {what}", xlabel="time left to the singularity", ylim=(2e-17, 2))
+    for axes, quantity in zip(panels, ("solution", "Casimir", "energy"), strict=True):
+        axes.set(title=f"relative error of the {quantity}", xlabel="time left to the singularity", ylim=(2e-17, 2))
         axes.axhline(ROUNDING, **MARK)
         axes.grid(True)
     panels[0].invert_xaxis()
@@ -131,18 +131,18 @@ def singularity_plate() -> Plate:
     x0, steps = [float(v) for v in course.run.initial], round(END / COARSE)
     orbit, stopped = _until_it_fails(course.solver, x0, COARSE, steps)
     _, fine = _until_it_fails(course.solver, x0, COARSE / 10, 10 * steps)
-    other = classical.integrate("rk2", field_of(course.solver, {}), np.array(x0), COARSE, steps)
-    passed = int(course.end / COARSE) + 1
-    finite = np.flatnonzero(np.isfinite(other).all(axis=1))[-1]
+    rk2_rows = classical.integrate("rk2", field_of(course.solver, {}), np.array(x0), COARSE, steps)
+    passing = int(course.end / COARSE) + 1
+    finite = np.flatnonzero(np.isfinite(rk2_rows).all(axis=1))[-1]
     findings = (
         Finding("T_sing", "≃ 0.23", course.end),
         Finding("PHI-1, step 0.001: last step, in steps before T_sing", "the last step before", _left(course, stopped)),
         Finding("PHI-1, step 0.0001: last step, in steps before T_sing", "the last step before",
                 (course.end - fine) / (COARSE / 10)),
-        Finding("RK2, step 0.001: x1 after T_sing is passed", "misses the singularity", float(other[passed, 0])),
+        Finding("RK2, step 0.001: x1 after T_sing is passed", "misses the singularity", float(rk2_rows[passing, 0])),
         Finding("RK2, step 0.001: overflow, in steps after T_sing", "–", -_left(course, finite * COARSE) + 1),
     )  # fmt: skip
-    return Plate("Lotka–Volterra: at the singularity", _draw_singularity(course, orbit, other), findings)
+    return Plate("Lotka–Volterra: at the singularity", _draw_singularity(course, orbit, rk2_rows), findings)
 
 
 def _left(course: Approach, t: float) -> float:
@@ -159,7 +159,7 @@ def _until_it_fails(solver: Solver, x0: list[float], h: float, steps: int) -> tu
 
 
 @styled
-def _draw_singularity(course: Approach, orbit: Trajectory, other: Floats) -> Figure:
+def _draw_singularity(course: Approach, orbit: Trajectory, runge_kutta_rows: Floats) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.6, 3.4), layout="constrained")
@@ -171,8 +171,10 @@ def _draw_singularity(course: Approach, orbit: Trajectory, other: Floats) -> Fig
     axes.axvline(course.end, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (4, 3)))
     axes.annotate("singularity", (course.end, 1e5), (5, 0), textcoords="offset points", color=PALETTE["muted"])
     axes.semilogy(orbit.t, -orbit.x[:, 0], "o", color=COLOURS[PHI], markersize=3.5, label=f"{PHI}, until it stops")
-    shown = np.where(np.abs(other[:, 0]) < 1e8, -other[:, 0], np.nan)
-    axes.semilogy(COARSE * np.arange(len(other)), shown, "s", color=COLOURS[RK2], markersize=3, label=RK2)
+    visible_values = np.where(np.abs(runge_kutta_rows[:, 0]) < 1e8, -runge_kutta_rows[:, 0], np.nan)
+    axes.semilogy(
+        COARSE * np.arange(len(runge_kutta_rows)), visible_values, "s", color=COLOURS[RK2], markersize=3, label=RK2
+    )
     axes.set(xlim=(0.242, END), ylim=(40, 1e6), xlabel="t", ylabel="−x1", title="steps of 0.001")
     axes.grid(True)
     axes.legend(loc="upper left")

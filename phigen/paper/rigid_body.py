@@ -82,9 +82,9 @@ def _early_findings(body: Bodies) -> tuple[Finding, ...]:
         solver.integrate(body.x0, factor * body.h, EARLY // factor, stride)
         for solver, factor in ((body.solver, 1), (body.solver, 2), (body.better, 1))
     )
-    other = _runge_kutta(body, body.h, EARLY, stride)
+    runge_kutta_run = _runge_kutta(body, body.h, EARLY, stride)
     amplitude = float(np.max(relative(poisson.energy)))
-    drift = float(relative(other.energy)[-1])
+    drift = float(relative(runge_kutta_run.energy)[-1])
     return (
         Finding("energy, PHI-2: largest error up to t = 100", "small oscillation", amplitude),
         Finding("energy, PHI-2: factor when the step is doubled", "4",
@@ -93,7 +93,7 @@ def _early_findings(body: Bodies) -> tuple[Finding, ...]:
         Finding("time after which RK4 has the larger energy error", "–", 100 * amplitude / drift),
         Finding("energy, phigen at order 4: largest error up to t = 100", "–", float(np.max(relative(better.energy)))),
         Finding("Casimir, PHI-2: largest error up to t = 100", "machine precision", _casimir_error(poisson)),
-        Finding("Casimir, RK4: error at t = 100", "grows linearly", _casimir_error(other)),
+        Finding("Casimir, RK4: error at t = 100", "grows linearly", _casimir_error(runge_kutta_run)),
     )  # fmt: skip
 
 
@@ -116,9 +116,9 @@ def _draw_errors(methods: dict[str, Trajectory], zoom: Trajectory) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 4.8), layout="constrained")
-    above, below = np.ravel(figure.subfigures(2, 1, height_ratios=[2.7, 2], squeeze=False))
-    draw_errors(above, methods)
-    axes = below.add_subplot()
+    upper_part, lower_part = np.ravel(figure.subfigures(2, 1, height_ratios=[2.7, 2], squeeze=False))
+    draw_errors(upper_part, methods)
+    axes = lower_part.add_subplot()
     axes.plot(zoom.t, 1e7 * (zoom.energy / zoom.energy[0] - 1), color=SERIES[0], linewidth=1.2)
     axes.set(xlabel="t", title=f"the beginning: relative error of the energy · 10⁷, {PHI}")
     axes.grid(True)
@@ -136,19 +136,19 @@ def section_plate() -> Plate:
     course = started("rk4", body.compilation, body.x0, body.parameters)
     finder = CrossingFinder[ClassicalCourse](height, COARSE)
     blocks = finder.follow(course, SECTION_STEPS, lambda: course.advance(COARSE, 1))
-    other = np.array([x for _, crossings in blocks for _, x in crossings])
+    runge_kutta_points = np.array([x for _, crossings in blocks for _, x in crossings])
     course.advance(COARSE, _REST)
-    rest, orbit = course.state(), body.solver.integrate(body.x0, body.h, 700)
+    end_state, orbit = course.state(), body.solver.integrate(body.x0, body.h, 700)
     findings = (
         Finding("PHI-2, step 0.004: diameter of its crossings", "one point", _diameter(poisson_crossings)),
         Finding("RK4, step 0.004: distance of its last crossing from the first", "moves away",
-                float(np.linalg.norm(other[-1] - other[0]))),
-        Finding("RK4, step 0.004: |x| in the end", "0", float(np.linalg.norm(rest))),
-        Finding("RK4, step 0.004: |π∇H| in the end", "0", float(np.linalg.norm(body.solver.vector_field(rest)))),
+                float(np.linalg.norm(runge_kutta_points[-1] - runge_kutta_points[0]))),
+        Finding("RK4, step 0.004: |x| in the end", "0", float(np.linalg.norm(end_state))),
+        Finding("RK4, step 0.004: |π∇H| in the end", "0", float(np.linalg.norm(body.solver.vector_field(end_state)))),
     )  # fmt: skip
     return Plate(
         "Rigid body: trajectory and Poincaré section",
-        _draw_section(body, orbit, poisson_crossings, other, rest),
+        _draw_section(body, orbit, poisson_crossings, runge_kutta_points, end_state),
         findings,
     )
 
@@ -158,7 +158,9 @@ def _diameter(points: Floats) -> float:
 
 
 @styled
-def _draw_section(body: Bodies, orbit: Trajectory, crossings: Floats, other: Floats, rest: Floats) -> Figure:
+def _draw_section(
+    body: Bodies, orbit: Trajectory, crossings: Floats, runge_kutta_points: Floats, phigen_points: Floats
+) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.6, 3.8), layout="constrained")
@@ -171,12 +173,14 @@ def _draw_section(body: Bodies, orbit: Trajectory, crossings: Floats, other: Flo
     space.plot_surface(side, np.zeros((2, 2)), side.T, color=SERIES[2], alpha=0.25, shade=False)
     space.set_title("trajectory on its leaf, and the plane x2 = 0")
     axes = right.add_subplot()
-    draw_dots(axes, other[:: len(other) // _DOTS, [0, 2]], SERIES[1], 2.0, 2.0, "RK4")
+    draw_dots(axes, runge_kutta_points[:: len(runge_kutta_points) // _DOTS, [0, 2]], SERIES[1], 2.0, 2.0, "RK4")
     draw_dots(axes, crossings[:1, [0, 2]], SERIES[0], 7.0, 3.0, f"{PHI}: all {len(crossings)} crossings")
     exact = body.better.section(body.x0, body.h, 700, lambda x: x[:, 1]).x[0]
     axes.plot(exact[0], exact[2], "o", color=PALETTE["ink"], markersize=7, fillstyle="none", label="exact", zorder=4)
-    axes.plot(rest[0], rest[2], "+", color=PALETTE["ink"], markersize=10, zorder=4)
-    axes.annotate("where RK4 comes to rest", (rest[0], rest[2]), (-4, -16), textcoords="offset points")
+    axes.plot(phigen_points[0], phigen_points[2], "+", color=PALETTE["ink"], markersize=10, zorder=4)
+    axes.annotate(
+        "where RK4 comes to rest", (phigen_points[0], phigen_points[2]), (-4, -16), textcoords="offset points"
+    )
     axes.set(xlabel="x1", ylabel="x3", title="x2 = 0, rising; steps of 0.004", ylim=(0.994, 1.018))
     axes.grid(True)
     axes.legend(loc="upper left")

@@ -42,5 +42,5 @@ class ClassicalCourse:
 
 def started(method: str, compilation: Compilation, x0: Floats, parameters: Mapping[str, float]) -> ClassicalCourse:
     """Return the course of a method from x0 (DIM,). Raises `ToolchainError`."""
-    place = np.array(x0, dtype=np.float64)
-    return ClassicalCourse(race.compiled(compilation, [method], place, parameters).runners[method], place, place.copy())
+    state = np.array(x0, dtype=np.float64)
+    return ClassicalCourse(race.compiled(compilation, [method], state, parameters).runners[method], state, state.copy())
