@@ -48,9 +48,9 @@ def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
     phi, u = call("phi0", s / 4), s / 16
     c = ONE - s / 4 * phi
     square = c**2
-    turn = (square - u, *(c / 2 * pi for pi in p))
+    quaternion = (square - u, *(c / 2 * pi for pi in p))
     factors = (c * (square - u), square / 2, (c + 2 * square + u - 4 * c * square * phi) / 16)
-    return Direction(turn, _shift(p, t, factors), square + u, c)
+    return Direction(quaternion, _shift(p, t, factors), square + u, c)
 
 
 def with_phi(p: Vector, t: Vector, phi: Expression) -> Direction:
@@ -64,8 +64,8 @@ def _shift(p: Vector, t: Vector, factors: Vector) -> tuple[Expression, ...]:
     """The combination of t, p×t and p (p·t)."""
     if not t:
         return ()
-    a, b, along = factors[0], factors[1], factors[2] * dot(p, t)
-    return tuple(a * u + b * v + along * w for u, v, w in zip(t, cross(p, t), p, strict=True))
+    a, b, axial = factors[0], factors[1], factors[2] * dot(p, t)
+    return tuple(a * u + b * v + axial * w for u, v, w in zip(t, cross(p, t), p, strict=True))
 
 
 def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
@@ -89,16 +89,16 @@ def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
         tangent = call("tanhalf", call("sin", turning[0]), call("versin", turning[0]))
         return (ZERO, *(ri if ri.is_zero else tangent for ri in r))
     if len(turning) == 1:
-        half = turning[0] / 2
-        rotation = (-ONE * call("versin", half), *(ri if ri.is_zero else call("sin", half) for ri in r))
+        half_angle = turning[0] / 2
+        rotation = (-ONE * call("versin", half_angle), *(ri if ri.is_zero else call("sin", half_angle) for ri in r))
     else:
         sine, cosine = call("sinroot", s / 16), call("cosroot", s / 16)
         rotation = (-(s / 8) * sine**2, *(_HALF * (sine * cosine) * ri for ri in r))
     if not t:
         return rotation
     once = cross(r, t)
-    versine, rest = _HALF * call("sinroot", s / 4) ** 2, call("arcroot", s)
-    return (*rotation, *(a + versine * b + rest * c for a, b, c in zip(t, once, cross(r, once), strict=True)))
+    versine, arc_factor = _HALF * call("sinroot", s / 4) ** 2, call("arcroot", s)
+    return (*rotation, *(a + versine * b + arc_factor * c for a, b, c in zip(t, once, cross(r, once), strict=True)))
 
 
 def dot(a: Vector, b: Vector) -> Expression:
@@ -113,15 +113,15 @@ def cross(a: Vector, b: Vector) -> list[Expression]:
 
 def product(a: Vector, b: Vector) -> list[Expression]:
     """The product of two quaternions."""
-    turned = cross(a[1:], b[1:])
+    cross_product = cross(a[1:], b[1:])
     return [
         a[0] * b[0] - dot(a[1:], b[1:]),
-        *(a[0] * y + b[0] * x + z for x, y, z in zip(a[1:], b[1:], turned, strict=True)),
+        *(a[0] * y + b[0] * x + z for x, y, z in zip(a[1:], b[1:], cross_product, strict=True)),
     ]
 
 
 def rotated(q: Vector, v: Vector) -> list[Expression]:
     """q v q̄: the vector rotated, and scaled by |q|²."""
     w, u = q[0], q[1:]
-    along, size, once = dot(u, v), w**2 - dot(u, u), cross(u, v)
-    return [size * a + 2 * along * b + 2 * w * c for a, b, c in zip(v, u, once, strict=True)]
+    axial, size, once = dot(u, v), w**2 - dot(u, u), cross(u, v)
+    return [size * a + 2 * axial * b + 2 * w * c for a, b, c in zip(v, u, once, strict=True)]

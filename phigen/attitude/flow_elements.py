@@ -69,8 +69,8 @@ class Turning:
 
 def by_angles(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> tuple[Flow, ...]:
     """The flows written with functions of half the angles, which their group elements need in any case."""
-    turned = turnings(system, group, flows, put_back=put_back)
-    return tuple(_by_angles(system, group, flow, turning) for flow, turning in zip(flows, turned, strict=True))
+    turning_parts = turnings(system, group, flows, put_back=put_back)
+    return tuple(_by_angles(system, group, flow, turning) for flow, turning in zip(flows, turning_parts, strict=True))
 
 
 def _by_angles(system: System, group: Group, flow: Flow, turning: Turning) -> Flow:
@@ -113,11 +113,11 @@ def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: b
 
 def _turning(system: System, group: Group, flow: Flow, name: str, *, put_back: bool) -> Turning:
     """Return a part in this form, the terms that commute with free rigid bodies first."""
-    pieces = flow.pieces or (flow,)
-    bodies = tuple(piece.motion for piece in pieces if isinstance(piece.motion, EulerMotion))
-    others = [piece.hamiltonian for piece in pieces if not isinstance(piece.motion, EulerMotion)]
-    h = total(others) if bodies else flow.hamiltonian
-    pieces_of_h = others if bodies or flow.pieces else []
+    summands = flow.pieces or (flow,)
+    bodies = tuple(summand.motion for summand in summands if isinstance(summand.motion, EulerMotion))
+    remaining = [summand.hamiltonian for summand in summands if not isinstance(summand.motion, EulerMotion)]
+    h = total(remaining) if bodies else flow.hamiltonian
+    pieces_of_h = remaining if bodies or flow.pieces else []
     return replace(turning_of(system, group, h, name, pieces_of_h, put_back=put_back), bodies=bodies)
 
 
@@ -150,14 +150,18 @@ def _candidates(system: System, group: Group, h: Expression) -> Iterator[Turning
 
 def _curvatures(system: System, h: Expression, q: Expression) -> Iterator[Expression]:
     """The c for which h − c q has no second derivative along some coordinate."""
-    seen: list[Expression] = []
+    curvatures: list[Expression] = []
     for name in system.coordinates:
-        above, below = (derivative(derivative(e, name), name) for e in (h, q))
-        if below.is_zero or above.is_zero or any(s in system.coordinates for s in symbols_of(above, below)):
+        numerator, denominator = (derivative(derivative(e, name), name) for e in (h, q))
+        if (
+            denominator.is_zero
+            or numerator.is_zero
+            or any(s in system.coordinates for s in symbols_of(numerator, denominator))
+        ):
             continue
-        if all(above / below is not s for s in seen):
-            seen.append(above / below)
-            yield above / below
+        if all(numerator / denominator is not s for s in curvatures):
+            curvatures.append(numerator / denominator)
+            yield numerator / denominator
 
 
 def constancy(system: System, turning: Turning, name: str) -> Statement:
@@ -166,8 +170,10 @@ def constancy(system: System, turning: Turning, name: str) -> Statement:
     fields = [hamiltonian_vector_field(system.poisson, gradient(f, names)) for f in turning.factors]
     for k, factor in enumerate(turning.factors):
         for c, slope in zip(names, gradient(factor, names), strict=True):
-            by = gradient(slope, names)
-            residuals += [(f"along {c}", total(a * b for a, b in zip(by, f, strict=True))) for f in fields[: k + 1]]
+            gradients = gradient(slope, names)
+            residuals += [
+                (f"along {c}", total(a * b for a, b in zip(gradients, f, strict=True))) for f in fields[: k + 1]
+            ]
     return decide_zero(name, residuals, system.positive)
 
 
@@ -184,8 +190,8 @@ def factor_elements(
         if group.matrices:
             exponential = flow_exponential(group, p, system.positive)
             if exponential is None:
-                what = f"reconstruct: exp(t∇H) has no closed form that phigen knows for the part {shortened(factor)}"
-                raise refused(system, what, "scheme: series applies to every H")
+                message = f"reconstruct: exp(t∇H) has no closed form that phigen knows for the part {shortened(factor)}"
+                raise refused(system, message, "scheme: series applies to every H")
             elements.append(exponential)
         else:
             r, shift = [p[i] for i in group.rotation], [p[i] for i in group.translation]
@@ -196,14 +202,17 @@ def factor_elements(
 
 def joined(group: Group, elements: Sequence[Sequence[Expression]]) -> list[Expression]:
     """The element of the factors, one after the other, minus 1."""
-    leading, *others = elements
+    leading, *following = elements
     result = list(leading)
-    for later in others:
+    for later in following:
         first, second = (later, result) if group.spatial else (result, later)
         if group.matrices:
             result = product_less_1(first, second)
             continue
         q = [ONE + first[0], *first[1:4]]
-        turn = [a + b + c for a, b, c in zip(first[:4], second[:4], product(first[:4], second[:4]), strict=True)]
-        result = [*turn, *(a + b for a, b in zip(first[4:], rotated(q, second[4:]) if second[4:] else [], strict=True))]
+        rotation = [a + b + c for a, b, c in zip(first[:4], second[:4], product(first[:4], second[:4]), strict=True)]
+        result = [
+            *rotation,
+            *(a + b for a, b in zip(first[4:], rotated(q, second[4:]) if second[4:] else [], strict=True)),
+        ]
     return result

@@ -55,18 +55,18 @@ def elements(motion: EulerMotion, group: Group, t: Expression) -> list[list[Expr
     z = addition.p * addition.kappa**2
     stretched = (4 * addition.kappa * power(1 + z, -1)) ** 2
     d = sqrt(c**2 + addition.r * s**2)
-    across, along = axes.point(addition.p - addition.r, ONE, stretched, s, c, d)
+    perpendicular, axial = axes.point(addition.p - addition.r, ONE, stretched, s, c, d)
     length = sqrt(axes.square)
-    chi = call("atan2", length * along, across) * call("inv0", length)
+    chi = call("atan2", length * axial, perpendicular) * call("inv0", length)
     rate, factor = axes.linear
     theta = t * rate + factor * call(THIRD, t, addition.p, addition.r, axes.n) + chi
     inverse = call("inv0", 2 * axes.square + dot(x, changes))
     shortest = [ZERO, *(inverse * e for e in cross(changes, x))]
-    both = [list(rotation_by([theta * e for e in x], ())), shortest]
-    both = [[q[0], *(-e for e in q[1:])] for q in both] if group.spatial else both
+    rotations = [list(rotation_by([theta * e for e in x], ())), shortest]
+    rotations = [[q[0], *(-e for e in q[1:])] for q in rotations] if group.spatial else rotations
     if group.matrices:
-        return [_matrix(group, q) for q in both]
-    return [[*q, *(ZERO for _ in group.translation)] for q in both]
+        return [_matrix(group, q) for q in rotations]
+    return [[*q, *(ZERO for _ in group.translation)] for q in rotations]
 
 
 def _matrix(group: Group, q: Vector) -> list[Expression]:
@@ -146,8 +146,8 @@ def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
     square = dot(m, m)
     yield from (("M x' = x", a - square * b) for a, b in zip(rotated(m, end), x, strict=True))
     theta = dot(omega, [a + b for a, b in zip(x, end, strict=True)])
-    turned = product([m[0], *(-e for e in m[1:])], slope)[1:]
-    for a, o, e in zip(turned, omega, end, strict=True):
+    rotated_slope = product([m[0], *(-e for e in m[1:])], slope)[1:]
+    for a, o, e in zip(rotated_slope, omega, end, strict=True):
         yield "dM/dt", 2 * m[0] * a - square * (m[0] * o - theta * e)
 
 
@@ -162,11 +162,11 @@ def _angle(order: Sequence[int]) -> Iterator[tuple[str, Expression]]:
     sigma = [dict(zip(order, (c, d, ONE), strict=True))[i] for i in range(3)]
     end = moved(x, factors, sigma, s, 1 - high * s**2)
     axes = _SortedAxes([x[i] for i in order], [w[i] for i in order], dot(x, x), power(dot(x, x), -1))
-    across, along = axes.point(high - middle, (1 + c) / 2, s**2, s, c, d)
-    slopes = [c * d * e for e in derivatives([across, along], name)]
-    turning = (across * slopes[1] - along * slopes[0]) * power(across**2 + axes.square * along**2, -1)
+    perpendicular, axial = axes.point(high - middle, (1 + c) / 2, s**2, s, c, d)
+    slopes = [c * d * e for e in derivatives([perpendicular, axial], name)]
+    turning = (perpendicular * slopes[1] - axial * slopes[0]) * power(perpendicular**2 + axes.square * axial**2, -1)
     rate, factor = axes.linear
     theta = turning + rate + factor * s**2 * power(1 - axes.n * s**2, -1)
     omega = [a * b for a, b in zip(w, end, strict=True)]
-    both = [a + b for a, b in zip(x, end, strict=True)]
-    yield "rate of θ", theta * (axes.square + dot(x, end)) - dot(omega, both)
+    bisector = [a + b for a, b in zip(x, end, strict=True)]
+    yield "rate of θ", theta * (axes.square + dot(x, end)) - dot(omega, bisector)

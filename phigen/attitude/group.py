@@ -97,11 +97,11 @@ def _rotations(system: System, algebra: LieAlgebra) -> Group:
     """Three coordinates of so(3); with three of its vectors, and nothing else, se(3)."""
     triples = [(r, s) for r in combinations(range(algebra.dimension), 3) if (s := _sign(algebra, r))]
     if len(triples) != 1:
-        many = "there are several" if triples else "there are none"
+        count_text = "there are several" if triples else "there are none"
         raise refused(
             system,
             f"reconstruct: quaternion needs three coordinates with the brackets of so(3), {{a, b}} = ±c and cyclic, "
-            f"and all others together an ideal; {many} in {algebra.name}",
+            f"and all others together an ideal; {count_text} in {algebra.name}",
             "reconstruct: matrix works for every algebra with known matrices, with scheme: series or splitting",
         )
     rotation, sign = triples[0]
@@ -115,7 +115,7 @@ def _sign(algebra: LieAlgebra, triple: tuple[int, ...]) -> int:
         signs = {(0, 1): sign, (1, 2): sign, (0, 2): -sign}
         if all(
             _components(algebra, i, j, triple)
-            == ({products[at]: signs[at]} if (at := (_place(triple, i), _place(triple, j))) in products else {})
+            == ({products[pair]: signs[pair]} if (pair := (_place(triple, i), _place(triple, j))) in products else {})
             for i, j in combinations(range(algebra.dimension), 2)
         ):
             return sign
@@ -156,8 +156,8 @@ def _is_vector(algebra: LieAlgebra, rotation: Triple, translation: Sequence[int]
     for a in range(3):
         for b in range(3):
             c = 3 - a - b
-            turned = {} if a == b else {c: sign if (b - a) % 3 == 1 else -sign}
-            if _numbers(algebra.bracket(rotation[a], translation[b]), translation) != turned:
+            expected = {} if a == b else {c: sign if (b - a) % 3 == 1 else -sign}
+            if _numbers(algebra.bracket(rotation[a], translation[b]), translation) != expected:
                 return False
     return True
 

@@ -117,8 +117,8 @@ def flow_exponential(group: Group, p: Sequence[Expression], positive: Sequence[s
     if all(r is not None for r in ratios) and all(_commute(a, b) for (_, a), (_, b) in combinations(basis, 2)):
         exponentials = [_of_constant(pi, m, r) for (pi, m), r in zip(basis, ratios, strict=True) if r is not None]
     else:
-        whole = _of_plane(group.generator(p), positive)
-        exponentials = [] if whole is None else [whole]
+        plane_exponential = _of_plane(group.generator(p), positive)
+        exponentials = [] if plane_exponential is None else [plane_exponential]
     result: Flat | None = None
     for e in exponentials:
         result = e if result is None else product_less_1(result, e)
@@ -152,11 +152,11 @@ def _of_constant(p: Expression, matrix: Dense, s: Fraction) -> Flat:
     root = Fraction(isqrt(s.numerator), isqrt(s.denominator)) if s > 0 else Fraction(0)
     if s > 0 and root**2 == s:
         angle = number(root) * p
-        along, across = call("sin", angle) / number(root), call("versin", angle) / number(s)
+        sine_factor, versine_factor = call("sin", angle) / number(root), call("versin", angle) / number(s)
     else:
-        along, across = _along_and_across(number(s) * p**2)
-        along, across = along * p, across * p**2
-    return [along * a + across * b for a, b in zip(e, multiplied(e, e), strict=True)]
+        sine_factor, versine_factor = _along_and_across(number(s) * p**2)
+        sine_factor, versine_factor = sine_factor * p, versine_factor * p**2
+    return [sine_factor * a + versine_factor * b for a, b in zip(e, multiplied(e, e), strict=True)]
 
 
 def _of_plane(generator: Flat, positive: Sequence[str]) -> Flat | None:
@@ -166,8 +166,8 @@ def _of_plane(generator: Flat, positive: Sequence[str]) -> Flat | None:
     for s in (-_HALF * trace, -ONE * trace, ZERO):
         residuals = [("", a + s * b) for a, b in zip(cube, generator, strict=True)]
         if decide_zero("", residuals, positive).verdict == PROVED:
-            along, across = _along_and_across(s)
-            return [along * a + across * b for a, b in zip(generator, square, strict=True)]
+            sine_factor, versine_factor = _along_and_across(s)
+            return [sine_factor * a + versine_factor * b for a, b in zip(generator, square, strict=True)]
     return None
 
 
