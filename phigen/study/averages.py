@@ -84,8 +84,8 @@ class Averages:
 
     def see(self, t: Floats, rows: Floats) -> None:
         """Accumulate rows (rows, width) at the times t (rows,), in the order of the run."""
-        used = self._sign * t >= self._sign * self._after if math.isfinite(self._after) else np.full(len(t), True)
-        t, rows = t[used], rows[used]
+        selected = self._sign * t >= self._sign * self._after if math.isfinite(self._after) else np.full(len(t), True)
+        t, rows = t[selected], rows[selected]
         if not len(rows) or not rows.shape[1]:
             return
         self._moments(rows)
@@ -95,28 +95,28 @@ class Averages:
 
     def _moments(self, rows: Floats) -> None:
         """Merge mean and variance of new rows into the accumulated ones (Chan, Golub and LeVeque, 1979)."""
-        state, before = self.state, self.count
-        after = before + len(rows)
+        state, count_before = self.state, self.count
+        count_after = count_before + len(rows)
         mean = rows.mean(axis=0)
         delta = mean - state["mean"]
-        squares = ((rows - mean) ** 2).sum(axis=0) + delta**2 * (before * len(rows) / after)
+        squares = ((rows - mean) ** 2).sum(axis=0) + delta**2 * (count_before * len(rows) / count_after)
         self.state |= {
-            "count": np.asarray(after),
-            "mean": state["mean"] + delta * (len(rows) / after),
+            "count": np.asarray(count_after),
+            "mean": state["mean"] + delta * (len(rows) / count_after),
             "squares": state["squares"] + squares,
             "least": np.minimum(state["least"], rows.min(axis=0)),
             "largest": np.maximum(state["largest"], rows.max(axis=0)),
         }
 
-    def _block(self, rows: Floats, before: int) -> None:
-        """Add rows to the blocks, which already contain ``before`` rows."""
+    def _block(self, rows: Floats, count_before: int) -> None:
+        """Add rows to the blocks, which already contain ``count_before`` rows."""
         while len(rows):
             size = int(self.state["size"])
-            room = size - before % size
-            piece, rows = rows[:room], rows[room:]
-            self.state["open"] = self.state["open"] + piece.sum(axis=0)
-            before += len(piece)
-            if before % size == 0:
+            room = size - count_before % size
+            block_rows, rows = rows[:room], rows[room:]
+            self.state["open"] = self.state["open"] + block_rows.sum(axis=0)
+            count_before += len(block_rows)
+            if count_before % size == 0:
                 self.state["sums"] = np.vstack([self.state["sums"], self.state["open"]])
                 self.state["open"] = np.zeros_like(self.state["open"])
             if len(self.state["sums"]) == 2 * self._blocks:
@@ -155,8 +155,8 @@ def averages(
     They are those that ``phigen run`` prints and sweeps store: over the rows from the time ``after`` on, with standard
     errors from at least ``blocks`` blocks. Fields of lattices, with a value at each site, are left out.
     """
-    listed = trajectory.columns if isinstance(trajectory, LatticeSeries) else trajectory.observables
-    columns = {name: values for name, values in listed.items() if np.ndim(values) == 1}
+    column_values = trajectory.columns if isinstance(trajectory, LatticeSeries) else trajectory.observables
+    columns = {name: values for name, values in column_values.items() if np.ndim(values) == 1}
     running = Averages(len(columns), after=after, backwards=trajectory.h < 0, blocks=blocks)
     running.see(trajectory.t, np.reshape([*columns.values()], (len(columns), -1)).T)
     return dict(zip(columns, running.results(), strict=True))
@@ -165,5 +165,5 @@ def averages(
 def averages_of(run: Run, width: int) -> Averages:
     """Return empty averages of ``width`` observables, over the rows that the run selects."""
     choice = run.average
-    after = None if choice.after is None else float(choice.after)
-    return Averages(width, after=after, backwards=run.step < 0, blocks=choice.blocks)
+    start_time = None if choice.after is None else float(choice.after)
+    return Averages(width, after=start_time, backwards=run.step < 0, blocks=choice.blocks)

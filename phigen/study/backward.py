@@ -91,9 +91,9 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
     # Numerical parameters give fewer terms, but the series may not be able to represent their roots.
     chart = compilation.by_series().realisation
     exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
-    for known in (exact, {}):
+    for exact_values in (exact, {}):
         try:
-            series = corrections(system, chart, order, CORRECTIONS, compilation.gauge, known)
+            series = corrections(system, chart, order, CORRECTIONS, compilation.gauge, exact_values)
             break
         except (LimitError, ArithmeticError):
             continue
@@ -128,9 +128,9 @@ def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats,
             break
         if fine[0] <= rounding:
             continue  # an exactly conserved energy shows no order
-        for m, (large, small) in enumerate(zip(coarse.tolist(), fine.tolist(), strict=True)):
-            if math.isinf(observed[m]) and small > rounding:
-                observed[m] = math.log2(large / small)
+        for m, (coarse_change, fine_change) in enumerate(zip(coarse.tolist(), fine.tolist(), strict=True)):
+            if math.isinf(observed[m]) and fine_change > rounding:
+                observed[m] = math.log2(coarse_change / fine_change)
     return observed
 
 
@@ -173,12 +173,19 @@ def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: fl
     changes = np.array([hamiltonian.changes(method, x, size, STEPS * 2**k) for k, size in enumerate(sizes.tolist())])
     # The finest step at which the change of H̃ with all corrections still exceeds the rounding errors.
     telling = np.flatnonzero(changes[:, -1] > rounding)
-    shown = float(sizes[telling[-1] if len(telling) else 0])
-    rows = method.rows(x, shown, round(STEPS * largest / shown), 1)
-    times: Floats = shown * np.arange(len(rows), dtype=np.float64)
+    shown_step = float(sizes[telling[-1] if len(telling) else 0])
+    rows = method.rows(x, shown_step, round(STEPS * largest / shown_step), 1)
+    times: Floats = shown_step * np.arange(len(rows), dtype=np.float64)
     observed = tuple(observed_powers(hamiltonian, method, x, h))
     return Constancy(
-        hamiltonian.powers, observed, shown, times, hamiltonian.errors(rows, shown), STEPS * largest, sizes, changes
+        hamiltonian.powers,
+        observed,
+        shown_step,
+        times,
+        hamiltonian.errors(rows, shown_step),
+        STEPS * largest,
+        sizes,
+        changes,
     )
 
 

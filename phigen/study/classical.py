@@ -86,9 +86,9 @@ def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, strid
     NaN.
     """
     rows = row_steps(steps, stride)
-    pieces = [x for _, x in pieces_of(method, field, x0, h, rows.tolist())]
+    row_parts = [x for _, x in pieces_of(method, field, x0, h, rows.tolist())]
     states = np.full((len(rows), len(x0)), np.nan)
-    computed = np.concatenate(pieces)
+    computed = np.concatenate(row_parts)
     states[: len(computed)] = computed
     return states
 
@@ -106,25 +106,25 @@ def pieces_of(
     carry = np.zeros_like(x)
     numbers: list[float] = []
     states: list[Floats] = []
-    done = 0
+    steps_done = 0
     for number in rows:
-        whole = round(number) if abs(number - round(number)) <= 1e-12 * max(1.0, number) else int(number)
-        while done < whole:
+        whole_steps = round(number) if abs(number - round(number)) <= 1e-12 * max(1.0, number) else int(number)
+        while steps_done < whole_steps:
             with np.errstate(all="ignore"):
                 # Compensated summation, as in phigen's solvers, so that the comparison concerns the methods only.
                 change = (step(field, x, h) - x) + carry
                 following = x + change
                 carry = change - (following - x)
                 x = following
-            done += 1
-            if done % _PIECE == 0 and states:
+            steps_done += 1
+            if steps_done % _PIECE == 0 and states:
                 yield np.array(numbers), np.array(states)
                 numbers, states = [], []
         with np.errstate(all="ignore"):
-            here = x if number <= whole else step(field, x, (number - whole) * h)
-        if not np.isfinite(here).all():
+            row_state = x if number <= whole_steps else step(field, x, (number - whole_steps) * h)
+        if not np.isfinite(row_state).all():
             break
         numbers.append(float(number))
-        states.append(here)
+        states.append(row_state)
     if states:
         yield np.array(numbers), np.array(states)

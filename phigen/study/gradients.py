@@ -56,8 +56,8 @@ class GradedRun:
 
     def __post_init__(self) -> None:
         """Draw the cotangents of all rows, the same for all targets."""
-        drawn = np.random.default_rng(1).normal(size=(len(row_steps(STEPS, STRIDE)), len(self.x)))
-        object.__setattr__(self, "bars", drawn / self.units)
+        random_bars = np.random.default_rng(1).normal(size=(len(row_steps(STEPS, STRIDE)), len(self.x)))
+        object.__setattr__(self, "bars", random_bars / self.units)
 
 
 def of_solver(
@@ -88,37 +88,38 @@ def of_lattice(
     solver: LatticeSolver, x: Floats, units: Floats, h: float, parameters: Mapping[str, Any], t0: float | None
 ) -> GradedRun:
     """Return a run of a lattice from ``x`` (coordinates, *sizes); ``units`` are typical magnitudes in this order."""
-    about: dict[str, Any] = {"t0": t0}
+    arguments: dict[str, Any] = {"t0": t0}
 
     def carried(vectors: Floats) -> Floats:
         shaped = vectors.reshape(len(vectors), *x.shape)
-        each = solver.tangents(x, h, STEPS, shaped, STRIDE, parameters=parameters, **about)
-        return np.array([vectors.reshape(len(vectors), -1) for _, vectors in each])
+        propagated = solver.tangents(x, h, STEPS, shaped, STRIDE, parameters=parameters, **arguments)
+        return np.array([vectors.reshape(len(vectors), -1) for _, vectors in propagated])
 
     def pullback(bars: Floats) -> tuple[Floats, Mapping[str, Any]]:
         shaped = bars.reshape(-1, *x.shape)
-        gradients = solver.pullback(x, h, STEPS, shaped, STRIDE, parameters=parameters, **about)
+        gradients = solver.pullback(x, h, STEPS, shaped, STRIDE, parameters=parameters, **arguments)
         return gradients.x0_bar.reshape(-1), gradients.parameters_bar
 
     def rows(start: Floats, values: Mapping[str, Any]) -> Floats:
-        trajectory = solver.integrate(start.reshape(x.shape), h, STEPS, STRIDE, parameters=values, **about)
+        trajectory = solver.integrate(start.reshape(x.shape), h, STEPS, STRIDE, parameters=values, **arguments)
         return np.asarray(trajectory.x).reshape(len(trajectory.x), -1)
 
     return GradedRun(x.reshape(-1), units, parameters, rows, pullback, carried)
 
 
-def measured(held: Sequence[GradedRun], free: Sequence[GradedRun], where: str = "") -> Iterator[Measured]:
-    """Yield the differences of gradients from tangent maps and from finite differences, for one or more runs of each
-    target.
+def measured(
+    fixed_level_runs: Sequence[GradedRun], free_level_runs: Sequence[GradedRun], place: str = ""
+) -> Iterator[Measured]:
+    """Yield the errors of gradients of runs, against tangent maps and against finite differences.
 
-    The runs ``held`` keep constant the quantities that tangent maps keep constant; the gradient of the runs ``free``
-    covers the whole run.
+    ``fixed_level_runs`` have a fixed energy level e, as tangent maps do. The gradients of ``free_level_runs`` include
+    the dependence of e on the initial state and on the parameters.
     """
-    apart = _largest(held, transposition_error)
+    apart = _largest(fixed_level_runs, transposition_error)
     reason = f"the gradient is not the transpose of the tangent maps, {apart:.1e} off"
-    yield f"gradient against tangent maps{where}", apart, TRANSPOSED, reason
-    slip = _largest(free, difference_error)
-    yield f"gradient against differences{where}", slip, DIFFERENCES, f"the gradient is {slip:.1e} off"
+    yield f"gradient against tangent maps{place}", apart, TRANSPOSED, reason
+    slip = _largest(free_level_runs, difference_error)
+    yield f"gradient against differences{place}", slip, DIFFERENCES, f"the gradient is {slip:.1e} off"
 
 
 def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> float:
@@ -140,13 +141,13 @@ def transposition_error(run: GradedRun) -> float:
     """
     count = len(run.x)
     vectors = run.units * (np.eye(count) if count <= _MOST_COLUMNS else _directions(count, _DIRECTIONS))
-    carried = run.carried(vectors)
-    terms = run.bars[1:, None, :] * carried
+    tangent_image = run.carried(vectors)
+    terms = run.bars[1:, None, :] * tangent_image
     forward = terms.sum(axis=(0, 2)) + vectors @ run.bars[0]
     size = np.abs(terms).sum(axis=(0, 2)) + np.abs(vectors) @ np.abs(run.bars[0])
     size = np.maximum(size, _LEAST * np.max(size))
-    back = vectors @ run.pullback(run.bars)[0]
-    return float(np.max(np.abs(forward - back) / size))
+    backward = vectors @ run.pullback(run.bars)[0]
+    return float(np.max(np.abs(forward - backward) / size))
 
 
 def difference_error(run: GradedRun) -> float:
@@ -159,8 +160,8 @@ def difference_error(run: GradedRun) -> float:
     x_bar, parameters_bar = run.pullback(run.bars)
     least = _LEAST * float(np.sum(np.abs(run.bars * run.rows(run.x, run.parameters))))
     worst = 0.0
-    for exact, moved in _derivatives(run, x_bar, parameters_bar):
-        apart = [abs(exact - d) / max(abs(exact), abs(d), least) for d in _differences(run, moved)]
+    for exact, difference in _derivatives(run, x_bar, parameters_bar):
+        apart = [abs(exact - d) / max(abs(exact), abs(d), least) for d in _differences(run, difference)]
         worst = max(worst, min(apart, default=math.inf))
     return worst
 
@@ -186,7 +187,7 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
         )
 
 
-def _differences(run: GradedRun, moved: _Moved) -> Iterator[float]:
+def _differences(run: GradedRun, displaced: _Moved) -> Iterator[float]:
     """Yield the derivative along a displacement by finite differences, for each distance at which all runs succeed.
 
     Differences are central, or one-sided where runs on the other side fail.
@@ -195,7 +196,7 @@ def _differences(run: GradedRun, moved: _Moved) -> Iterator[float]:
     for apart in _DISTANCES:
         for weights in (_WEIGHTS, _FORWARD_WEIGHTS):
             try:
-                changes = [(w, run.rows(*moved(k * apart)) - middle) for k, w in weights]
+                changes = [(w, run.rows(*displaced(k * apart)) - middle) for k, w in weights]
             except (StepError, ValueError):  # beyond a singularity or the bound of a parameter
                 continue
             yield float(sum(w * np.sum(run.bars * change) for w, change in changes)) / apart
@@ -206,11 +207,13 @@ def members_error(
     solver: Solver, states: Floats, units: Floats, h: float, parameters: Mapping[str, float], t0: float
 ) -> float:
     """Return the relative difference between gradients of members run as one batch and gradients of single runs."""
-    about: dict[str, Any] = {"t0": t0 if solver.interface.time else None, "parameters": parameters}
+    arguments: dict[str, Any] = {"t0": t0 if solver.interface.time else None, "parameters": parameters}
     bars = _directions(states.shape[1], len(states)) / units
     try:
-        together = solver.pullback(states, h, STEPS, bars, **about).x0_bar * units
-        alone = [solver.pullback(x, h, STEPS, bar, **about).x0_bar * units for x, bar in zip(states, bars, strict=True)]
+        together = solver.pullback(states, h, STEPS, bars, **arguments).x0_bar * units
+        alone = [
+            solver.pullback(x, h, STEPS, bar, **arguments).x0_bar * units for x, bar in zip(states, bars, strict=True)
+        ]
     except StepError:
         return math.inf
     return float(np.max(np.abs(together - alone)) / (np.max(np.abs(together)) or 1.0))

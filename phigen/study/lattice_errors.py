@@ -95,5 +95,5 @@ def _term(cell: Cell, term: Expression, x: Floats, parameters: Mapping[str, Any]
     for name, (base, offset) in cell.places(term).items():
         array = x[cell.fields.index(base)] if base in cell.fields else np.broadcast_to(parameters[base], sizes)
         values[name] = shifted(array, offset)
-    inside = inside_ends(cell, cell.extent(term), sizes)
-    return np.where(inside, np.broadcast_to(evaluate([term], values)[0], sizes), 0.0)
+    is_inside = inside_ends(cell, cell.extent(term), sizes)
+    return np.where(is_inside, np.broadcast_to(evaluate([term], values)[0], sizes), 0.0)

@@ -51,8 +51,8 @@ def strong_order(
         path = random.normal(size=(finest * parts, kinds, *x0.shape[1:])) * size
         end = _along_lines(solver, fields, x0, parameters, t0, h * STEPS / finest, path, parts)
         for level in range(LEVELS):
-            many = STEPS << level
-            coarse = path.reshape(many, parts, -1, *path.shape[1:]).sum(axis=2)
+            step_count = STEPS << level
+            coarse = path.reshape(step_count, parts, -1, *path.shape[1:]).sum(axis=2)
             session = _session(solver, x0, parameters, t0)
             try:
                 session.advance_along(h / 2**level, coarse)
@@ -105,8 +105,10 @@ def _along_lines(
     begin = t0 or 0.0
     for k, dw in enumerate(path.reshape(-1, parts, *path.shape[1:]).sum(axis=1)):
 
-        def push(at: Floats, t: float, dw: Floats = dw) -> Floats:
-            return np.asarray(h * drift(at, t) + sum(w * field(at, t) for w, field in zip(dw, spread, strict=True)))
+        def push(state: Floats, t: float, dw: Floats = dw) -> Floats:
+            return np.asarray(
+                h * drift(state, t) + sum(w * field(state, t) for w, field in zip(dw, spread, strict=True))
+            )
 
         t = begin + k * h
         first = push(x, t)
@@ -122,8 +124,8 @@ def _slope(
     """Return the vector field of a NumPy solver as a function that skips the argument checks of the public method."""
     session = _session(solver, x, parameters, t0)
 
-    def slope(at: Floats, t: float) -> Floats:
-        session.place(at)
+    def slope(state: Floats, t: float) -> Floats:
+        session.place(state)
         session._sites.t = t
         field: Floats = session.vector_field()
         return field

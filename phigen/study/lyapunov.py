@@ -63,8 +63,8 @@ class Spectrum:
     @property
     def uncertainty(self) -> float:
         """The largest change of an exponent in the second half of the time; exponents converge like 1/t at best."""
-        late = self.history[self.times >= self.t / 2]
-        return float(np.max(np.ptp(late, axis=0)))
+        late_values = self.history[self.times >= self.t / 2]
+        return float(np.max(np.ptp(late_values, axis=0)))
 
 
 class FrameGrowth:
@@ -94,10 +94,10 @@ class FrameGrowth:
         """Propagate the frame through one step with the given tangent map."""
         self.take(tangent @ self.frame)
 
-    def take(self, carried: Floats, steps: int = 1) -> None:
+    def take(self, propagated: Floats, steps: int = 1) -> None:
         """Accept the columns of the frame propagated through some steps, and make them orthonormal."""
         state = self.state
-        state["frame"], r = np.linalg.qr(carried)
+        state["frame"], r = np.linalg.qr(propagated)
         state["logs"] = state["logs"] + np.log(np.abs(np.diagonal(r)))
         state["steps"] = state["steps"] + steps
         if state["steps"] >= _SPACING ** len(state["times"]):
@@ -146,14 +146,14 @@ def lattice_spectrum(
     steps: int,
     count: int = 1,
     parameters: Mapping[str, Any] | None = None,
-    every: int = 10,
+    interval: int = 10,
     t0: float | None = None,
     progress: Progress | None = None,
     **draws: int | None,
 ) -> Spectrum:
     """Return the ``count`` largest Lyapunov exponents of a lattice along a run from ``x0`` (coordinates, *sizes).
 
-    The initial tangent vectors are random; they are made orthonormal after each ``every`` steps. ``solver`` must be
+    The initial tangent vectors are random; they are made orthonormal after each ``interval`` steps. ``solver`` must be
     compiled with ``tangent=True``, else `TypeError`. Raises `StepError`, and `ValueError` for wrong arguments.
     ``draws`` are those of noise: seed, step0.
     """
@@ -164,13 +164,13 @@ def lattice_spectrum(
     frame = np.linalg.qr(np.random.default_rng(0).normal(size=(x.size, count)))[0]
     growth = FrameGrowth(x.size, h, frame)
     options: Any = {"t0": t0, "parameters": parameters, **draws}
-    carry = solver.tangents(x, h, steps, frame.T.reshape(count, *x.shape), every, **options)
-    following, done = None, 0
-    while done < steps:
-        _, carried = carry.send(following)
-        advanced = min(every, steps - done)
-        growth.take(carried.reshape(count, -1).T, advanced)
-        following, done = growth.frame.T.reshape(carried.shape), done + advanced
+    carry = solver.tangents(x, h, steps, frame.T.reshape(count, *x.shape), interval, **options)
+    following, steps_done = None, 0
+    while steps_done < steps:
+        _, propagated = carry.send(following)
+        advanced = min(interval, steps - steps_done)
+        growth.take(propagated.reshape(count, -1).T, advanced)
+        following, steps_done = growth.frame.T.reshape(propagated.shape), steps_done + advanced
         if progress:
-            progress(done)
+            progress(steps_done)
     return growth.spectrum()

@@ -162,7 +162,7 @@ MEANINGS = (
 
 def meaning_of(check: str) -> Meaning:
     """Return the meaning of the check with this name."""
-    kind, colon, rest = check.partition(": ")
+    kind, colon, suffix = check.partition(": ")
     noun = kind.partition(" ")[0]
-    name = f"{noun}: {rest}" if colon and noun in ("Casimir", "invariant") else check
+    name = f"{noun}: {suffix}" if colon and noun in ("Casimir", "invariant") else check
     return next(m for m in MEANINGS if name.startswith(m.row))

@@ -67,8 +67,10 @@ def observed_order(method: Method, reference: Callable[[float], tuple[Floats, fl
 
 def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -> Floats:
     """Return π(x), (DIM, DIM)."""
-    at = {**parameters, **dict(zip(system.coordinates, x, strict=True))}
-    return np.array([float(e) for e in evaluate([e for row in system.poisson for e in row], at)]).reshape((len(x),) * 2)
+    values = {**parameters, **dict(zip(system.coordinates, x, strict=True))}
+    return np.array([float(e) for e in evaluate([e for row in system.poisson for e in row], values)]).reshape(
+        (len(x),) * 2
+    )
 
 
 def poisson_defect(system: System, parameters: Mapping[str, float], method: Method, x: Floats, h: float) -> float:
@@ -78,11 +80,16 @@ def poisson_defect(system: System, parameters: Mapping[str, float], method: Meth
     Σ |x_i ∂_i π|.
     """
     tangent, image = method.tangent(x, h) if method.tangent else by_differences(method, x, h), method.step(x, h)
-    before, after = (poisson_matrix(system, parameters, state) for state in (x, image))
-    moved = (poisson_matrix(system, parameters, image + _SHARE * part) for part in np.diag(image))
-    felt = sum((np.abs(there - after) for there in moved), np.zeros_like(after)) / _SHARE
-    size = max(float(np.max(np.abs(tangent) @ np.abs(before) @ np.abs(tangent).T)), float(np.max(felt)))
-    return float(np.max(np.abs(tangent @ before @ tangent.T - after))) / (size or 1.0)
+    start_tensor, end_tensor = (poisson_matrix(system, parameters, state) for state in (x, image))
+    displaced_tensors = (poisson_matrix(system, parameters, image + _SHARE * part) for part in np.diag(image))
+    felt = (
+        sum(
+            (np.abs(displaced_tensor - end_tensor) for displaced_tensor in displaced_tensors), np.zeros_like(end_tensor)
+        )
+        / _SHARE
+    )
+    size = max(float(np.max(np.abs(tangent) @ np.abs(start_tensor) @ np.abs(tangent).T)), float(np.max(felt)))
+    return float(np.max(np.abs(tangent @ start_tensor @ tangent.T - end_tensor))) / (size or 1.0)
 
 
 def tangent_error(method: Method, x: Floats, h: float) -> float:
@@ -105,7 +112,7 @@ def reversal(method: Method, x: Floats, h: float) -> float:
     return float(np.max(np.abs(method.after(h).step(method.step(x, h), -h) - x))) / float(np.max(np.abs(x)))
 
 
-def largest_step(method: Method, states: Sequence[Floats], h: float, most: float = 256.0) -> float:
+def largest_step(method: Method, states: Sequence[Floats], h: float, max_factor: float = 256.0) -> float:
     """Return the largest factor f, to 5 %, for which a step of size f·h succeeds from all states; 0 if a step h/64
     fails.
     """
@@ -122,9 +129,9 @@ def largest_step(method: Method, states: Sequence[Floats], h: float, most: float
     if not works(low):
         return 0.0
     high = 2 * low
-    while high <= most and works(high):
+    while high <= max_factor and works(high):
         low, high = high, 2 * high
-    if high > most:
+    if high > max_factor:
         return low
     while high / low > 1.05:
         middle = math.sqrt(low * high)

@@ -44,17 +44,17 @@ class Method:
 
 def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | None = None, t0: float = 0.0) -> Method:
     """Return the method of a generated solver; a ``gauge`` makes all steps the same map, for any initial state."""
-    fixed = solver if gauge is None else Solver(solver.backend.with_gauge(gauge), solver.interface)
+    fixed_gauge = solver if gauge is None else Solver(solver.backend.with_gauge(gauge), solver.interface)
     begin = t0 if solver.interface.time else None
 
     def together(states: Floats, h: float) -> Floats:
-        return fixed.ensemble(states, h, 1, t0=begin, parameters=parameters)
+        return fixed_gauge.ensemble(states, h, 1, t0=begin, parameters=parameters)
 
     return Method(
         solver.target,
-        lambda x, h: fixed.step(x, h, t0=begin, parameters=parameters),
-        lambda x, h, steps, stride: fixed.integrate(x, h, steps, stride, t0=begin, parameters=parameters).x,
-        lambda x, h: fixed.step_tangent(x, h, t0=begin, parameters=parameters)[1],
+        lambda x, h: fixed_gauge.step(x, h, t0=begin, parameters=parameters),
+        lambda x, h, steps, stride: fixed_gauge.integrate(x, h, steps, stride, t0=begin, parameters=parameters).x,
+        lambda x, h: fixed_gauge.step_tangent(x, h, t0=begin, parameters=parameters)[1],
         (lambda h: of_solver(solver, parameters, gauge, t0 + h)) if solver.interface.time else None,
         # members of an ensemble draw their own noise
         together if solver.target == "numpy" and not solver.interface.noise else None,
@@ -66,8 +66,8 @@ def without_noise(solver: Solver, parameters: Mapping[str, float], t0: float = 0
     begin, draws = t0 if solver.interface.time else None, solver.interface.draws
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
-        still = np.zeros((steps, draws))
-        return solver.integrate(x, h, steps, stride, t0=begin, increments=still, parameters=parameters).x
+        zero_increments = np.zeros((steps, draws))
+        return solver.integrate(x, h, steps, stride, t0=begin, increments=zero_increments, parameters=parameters).x
 
     return Method(solver.target, lambda x, h: rows(x, h, 1, 1)[-1], rows)
 

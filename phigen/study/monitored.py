@@ -28,10 +28,10 @@ def field_in_tau(solver: Solver, parameters: Mapping[str, float]) -> Callable[[F
 
 def with_time(solver: Solver, parameters: Mapping[str, float], gauge: Floats) -> Method:
     """Return the method of a solver with fixed e and with the time as last coordinate of its rows."""
-    fixed = Solver(solver.backend.with_gauge(gauge), solver.interface)
+    fixed_gauge = Solver(solver.backend.with_gauge(gauge), solver.interface)
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
-        trajectory = fixed.integrate(x[:-1], h, steps, stride, parameters=parameters)
+        trajectory = fixed_gauge.integrate(x[:-1], h, steps, stride, parameters=parameters)
         return np.column_stack([trajectory.x, trajectory.t])
 
     return Method(solver.target, lambda x, h: rows(x, h, 1, 1)[-1], rows)

@@ -135,7 +135,7 @@ def _states(run: Runner, end: float, span: int, target: Floats, floor: float) ->
     long.
     """
     states: dict[int, Floats] = {}
-    least, done = math.inf, 0
+    least, count = math.inf, 0
     for n in sorted({round(span * f * 2.0**k) for k in range(-COARSER, FINER + 1) for f in (1.0, 1.5)} - {0}):
         start = time.perf_counter()
         state = run(end / n, n, 1)
@@ -143,9 +143,9 @@ def _states(run: Runner, end: float, span: int, target: Floats, floor: float) ->
         if state is None or not (error := error_of(state, target)) < 1:
             continue
         states[n] = state
-        done += error <= 2 * floor or 2 * error > least < SMALL
+        count += error <= 2 * floor or 2 * error > least < SMALL
         least = min(least, error)
-        if done > 1 or time.perf_counter() - start > MOST_SECONDS:
+        if count > 1 or time.perf_counter() - start > MOST_SECONDS:
             break
     return states
 

@@ -77,10 +77,10 @@ def compiled(
     length, begin = getattr(library, f"{name}_race_size"), getattr(library, f"{name}_race_start")
     length.restype, length.argtypes = size, ()
     begin.restype, begin.argtypes = ctypes.c_int, (pointer, pointer, size, pointer)
-    begun = np.zeros(-(-length() // 8))
+    scratch = np.zeros(-(-length() // 8))
 
     def set_up(repeats: int) -> int:
-        return int(begin(packed.ctypes.data, start.ctypes.data, repeats, begun.ctypes.data))
+        return int(begin(packed.ctypes.data, start.ctypes.data, repeats, scratch.ctypes.data))
 
     def runner(method: str, packed_start: Floats) -> Runner:
         function = getattr(library, f"{name}_race_{method}")
@@ -93,7 +93,7 @@ def compiled(
 
         return run
 
-    solver_runner = runner(OWN, begun) if set_up(1) == 0 else lambda h, steps, repeats: None
+    solver_runner = runner(OWN, scratch) if set_up(1) == 0 else lambda h, steps, repeats: None
     return Race(
         {OWN: solver_runner, **{m: runner(m, packed) for m in explicit}}, set_up, "C", "τ" if monitored else "t"
     )

@@ -25,8 +25,8 @@ class Thinned:
     The choice depends only on the number of rows. ``state`` is the complete state, as arrays.
     """
 
-    def __init__(self, width: int, most: int) -> None:
-        self._most = most
+    def __init__(self, width: int, max_rows: int) -> None:
+        self._most = max_rows
         self.state: dict[str, Any] = {
             "rows": np.empty((0, width)),
             "every": np.ones((), dtype=np.int64),
@@ -46,11 +46,11 @@ class Thinned:
 
     def see(self, rows: Floats) -> None:
         """Accept the next rows (rows, width)."""
-        every, seen = int(self.state["every"]), self.seen
-        thinned = np.concatenate([self.rows, rows[-seen % every :: every]])
+        interval, row_count = int(self.state["every"]), self.seen
+        thinned = np.concatenate([self.rows, rows[-row_count % interval :: interval]])
         while len(thinned) > self._most:
-            every, thinned = 2 * every, thinned[::2]
-        self.state |= {"rows": thinned, "every": np.asarray(every), "seen": np.asarray(seen + len(rows))}
+            interval, thinned = 2 * interval, thinned[::2]
+        self.state |= {"rows": thinned, "every": np.asarray(interval), "seen": np.asarray(row_count + len(rows))}
 
 
 class Sketch:
@@ -116,11 +116,11 @@ class Sketch:
     ) -> Trajectory:
         """Return the stored rows in order; if the run is ``broken`` off, a row of NaN follows."""
         peaks = self._peaks["peaks"].reshape(-1, self._peaks["peaks"].shape[-1])
-        stored = np.concatenate(
+        stored_rows = np.concatenate(
             [self._thinned.rows, peaks[self._peaks["errors"].ravel() >= 0], self._peaks["last"][None]]
         )
-        _, places = np.unique(stored[:, 0], return_index=True)
-        rows = stored[places][:, 1:]
+        _, row_indices = np.unique(stored_rows[:, 0], return_index=True)
+        rows = stored_rows[row_indices][:, 1:]
         if broken:
             rows = np.vstack([rows, np.full(rows.shape[1], np.nan)])
             rows[-1, 0] = rows[-2, 0] + h

@@ -32,14 +32,16 @@ def strong_order(
     random = np.random.default_rng(SEED)
     sources = len(solver.interface.noise)
     fine = random.normal(size=(paths, finest, draws)) * np.sqrt(abs(h) * steps / finest * sources / draws)
-    ends = _along_lines(solver, np.tile(x0, (paths, 1)), parameters, t0, h * steps / finest, fine)
+    fine_ends = _along_lines(solver, np.tile(x0, (paths, 1)), parameters, t0, h * steps / finest, fine)
     errors = np.zeros(LEVELS)
     for level in range(LEVELS):
-        many = steps << level
-        for path, end in zip(fine, ends, strict=True):
-            coarse = path.reshape(many, draws // sources, -1, sources).sum(axis=2).reshape(many, draws)
-            about: dict[str, Any] = {"t0": begin, "increments": coarse, "parameters": parameters}
-            errors[level] += np.sum((solver.integrate(x0, h / 2**level, many, many, **about).x[-1] - end) ** 2)
+        step_count = steps << level
+        for path, end in zip(fine, fine_ends, strict=True):
+            coarse = path.reshape(step_count, draws // sources, -1, sources).sum(axis=2).reshape(step_count, draws)
+            arguments: dict[str, Any] = {"t0": begin, "increments": coarse, "parameters": parameters}
+            errors[level] += np.sum(
+                (solver.integrate(x0, h / 2**level, step_count, step_count, **arguments).x[-1] - end) ** 2
+            )
     return float(-np.polyfit(np.arange(LEVELS), np.log2(errors) / 2, 1)[0]) if errors.all() else np.inf
 
 
@@ -50,11 +52,11 @@ def _along_lines(
     backend, timed = solver.backend, bool(solver.interface.time)
     sources = len(solver.interface.noise)
 
-    def push(at: Floats, dw: Floats, t: float) -> Floats:
-        when = np.full(len(at), t) if timed else None
-        spread = np.einsum("ps,psd->pd", dw, backend.noise_fields(at, parameters, when))
-        moved: Floats = h * backend.vector_field(at, parameters, when) + spread
-        return moved
+    def push(state: Floats, dw: Floats, t: float) -> Floats:
+        when = np.full(len(state), t) if timed else None
+        spread = np.einsum("ps,psd->pd", dw, backend.noise_fields(state, parameters, when))
+        displacement: Floats = h * backend.vector_field(state, parameters, when) + spread
+        return displacement
 
     for k in range(increments.shape[1]):
         dw, t = increments[:, k].reshape(len(x), -1, sources).sum(axis=1), t0 + k * h

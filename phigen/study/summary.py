@@ -139,7 +139,7 @@ class Watch:
         """Accept the next rows, times (rows,) and states (rows, DIM); rows from the first non-finite one on are
         ignored.
         """
-        state, good = self.state, int(self.state["good"])
+        state, good_rows = self.state, int(self.state["good"])
         finite = np.isfinite(x).all(axis=1)
         count = 0 if state["broken"] else len(x) if finite.all() else int(np.argmin(finite))
         state["broken"] = np.asarray(state["broken"] or count < len(x))
@@ -149,15 +149,15 @@ class Watch:
         if "since" in state and not self.begun:
             state["since"] = np.asarray(t[0])
         columns = {c: x[:, i] for i, c in enumerate(self._system.coordinates)} | dict.fromkeys(self._system.times, t)
-        known = {**self._parameters, **columns}
-        values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, known)]
+        evaluation_point = {**self._parameters, **columns}
+        values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, evaluation_point)]
         if self._powers:
-            work = self._work(t, [np.broadcast_to(a, t.shape) for a in evaluate(self._powers, known)])
+            work = self._work(t, [np.broadcast_to(a, t.shape) for a in evaluate(self._powers, evaluation_point)])
             energies, values[0] = values[0], values[0] - work
-        if good == 0:
+        if good_rows == 0:
             state |= {"first": x[0].copy(), "start": np.array([v[0] for v in values])}
-        state["good"] = np.asarray(good + count)
-        windows = _windows(np.arange(good, good + count), self._about[1])
+        state["good"] = np.asarray(good_rows + count)
+        windows = _windows(np.arange(good_rows, good_rows + count), self._about[1])
         for k, (v, unit) in enumerate(zip(values, self._units(), strict=True)):
             with np.errstate(invalid="ignore"):  # errors are undefined where the initial value is
                 np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
@@ -166,8 +166,8 @@ class Watch:
             state["change"] = np.maximum(state["change"], np.max(changes))
         self._see_turns(x, windows)
         if self._run and self._run.exact:
-            off = _against_exact(self._system, self._run, self._parameters, state["first"], t, x)
-            state["exact"] = np.asarray(max(off, float(state["exact"])))
+            exact_error = _against_exact(self._system, self._run, self._parameters, state["first"], t, x)
+            state["exact"] = np.asarray(max(exact_error, float(state["exact"])))
         state["final"] = x[-1].copy()
 
     def _work(self, t: Floats, slopes: Sequence[Floats]) -> Floats:
@@ -178,9 +178,9 @@ class Watch:
         if not self.begun:
             state["instant"] = np.array([t[0], *(f[0] for f in slopes)])
         rows = np.concatenate([state["instant"][:, np.newaxis], np.array([t, *slopes])], axis=1)
-        parts, off = works(rows[0], rows[1:])
+        parts, work_error = works(rows[0], rows[1:])
         sums: Floats = state["work"][0] + np.cumsum(parts)
-        state["work"] = np.array([sums[-1], state["work"][1] + np.sum(off)])
+        state["work"] = np.array([sums[-1], state["work"][1] + np.sum(work_error)])
         state["instant"] = rows[:, -1].copy()
         return sums
 
@@ -193,12 +193,12 @@ class Watch:
         maxima = np.full_like(state["maxima"], math.inf) if failed else state["maxima"]
         drifts = [_drift(m, unit, steps, telling) for m, unit in zip(maxima, self._units(), strict=True)]
         drift_of = iter(drifts)
-        named = {kind: {name: next(drift_of) for name in group} for kind, group in self._groups.items()}
+        drifts_by_kind = {kind: {name: next(drift_of) for name in group} for kind, group in self._groups.items()}
         return Summary(
             method=method,
-            energy=named[ENERGY]["H"],
-            casimirs=named["casimirs"],
-            invariants=named["invariants"],
+            energy=drifts_by_kind[ENERGY]["H"],
+            casimirs=drifts_by_kind["casimirs"],
+            invariants=drifts_by_kind["invariants"],
             exact=Drift(math.inf if failed else float(state["exact"]), Unit(kind=RELATIVE))
             if self._run and self._run.exact
             else None,
@@ -206,29 +206,29 @@ class Watch:
             good=int(state["good"]),
             rows=rows,
             work=float(state["work"][0]) if self._powers else 0.0,
-            change=Drift(math.inf if failed else float(state["change"]), named[ENERGY]["H"].unit)
+            change=Drift(math.inf if failed else float(state["change"]), drifts_by_kind[ENERGY]["H"].unit)
             if self._powers
             else None,
-            off=float(state["work"][1]) / named[ENERGY]["H"].unit.size if self._powers else math.nan,
+            off=float(state["work"][1]) / drifts_by_kind[ENERGY]["H"].unit.size if self._powers else math.nan,
         )
 
     def _units(self) -> Sequence[Unit]:
         if not self._found and self.begun:
-            known = {**self._parameters, **{t: float(self.state["since"]) for t in self._system.times}}
-            unit_list = units(self._formulas, self._system.coordinates, known, self.state["first"])
-            names, moved = [ENERGY, *self._groups["casimirs"], *self._groups["invariants"]], moving(self._system)
-            self._found = [replace(unit, moves=name in moved) for name, unit in zip(names, unit_list, strict=True)]
+            values = {**self._parameters, **{t: float(self.state["since"]) for t in self._system.times}}
+            unit_list = units(self._formulas, self._system.coordinates, values, self.state["first"])
+            names, changing = [ENERGY, *self._groups["casimirs"], *self._groups["invariants"]], moving(self._system)
+            self._found = [replace(unit, moves=name in changing) for name, unit in zip(names, unit_list, strict=True)]
         return self._found or [Unit()] * len(self._formulas)
 
     def _see_turns(self, x: Floats, windows: NDArray[np.int64]) -> None:
         """Count the turning points of each coordinate: in the first window, and in the whole run."""
         state = self.state
-        before = state["final"] if np.isfinite(state["final"]).all() else x[0]
-        for i, moves in enumerate(np.diff(x, axis=0, prepend=before[None]).T):
+        previous = state["final"] if np.isfinite(state["final"]).all() else x[0]
+        for i, moves in enumerate(np.diff(x, axis=0, prepend=previous[None]).T):
             moving = np.flatnonzero(moves)
             signs = np.concatenate([[state["heading"][i]], np.sign(moves[moving])])
-            turned = windows[moving[signs[1:] * signs[:-1] < 0]]
-            state["turns"][:, i] += (int((turned == 0).sum()), len(turned))
+            turn_windows = windows[moving[signs[1:] * signs[:-1] < 0]]
+            state["turns"][:, i] += (int((turn_windows == 0).sum()), len(turn_windows))
             state["heading"][i] = signs[-1]
 
 
@@ -238,13 +238,13 @@ def _is_telling(turns: NDArray[np.int64]) -> bool:
     return bool(turning.any() and (turns[0, turning] >= _TURNS).all())
 
 
-def _windows(rows: NDArray[np.int64], of: int) -> NDArray[np.int64]:
-    """Return the window of each row of a run of ``of`` rows: one of `WINDOWS` parts, or an extra window for the first
+def _windows(rows: NDArray[np.int64], row_count: int) -> NDArray[np.int64]:
+    """Return the window of each row of a run of ``row_count`` rows: one of `WINDOWS` parts, or an extra window for the first
     row.
     """
-    share, rest = divmod(of - 1, WINDOWS)
-    ends = np.cumsum([share + (k < rest) for k in range(WINDOWS)])
-    return np.where(rows == 0, WINDOWS, np.searchsorted(ends, rows - 1, side="right"))
+    share, remainder = divmod(row_count - 1, WINDOWS)
+    window_ends = np.cumsum([share + (k < remainder) for k in range(WINDOWS)])
+    return np.where(rows == 0, WINDOWS, np.searchsorted(window_ends, rows - 1, side="right"))
 
 
 def _drift(maxima: Floats, unit: Unit, steps: int, telling: bool) -> Drift:

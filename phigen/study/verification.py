@@ -155,9 +155,9 @@ def verify(
     solver = next(iter(solvers.values()))
     field = field_in_tau(solver, parameters) if compilation.program.monitor else field_of(solver, parameters)
     noisy = bool(compilation.system.noise)
-    others = {name: of_classical(name, solver, parameters, t0, field) for name in (() if noisy else compare)}
+    classical = {name: of_classical(name, solver, parameters, t0, field) for name in (() if noisy else compare)}
     step_count = min(steps, FEW_STEPS if quick else MOST_STEPS)
-    subject = Subject(compilation, solvers, methods, others, parameters, x, h, step_count, t0, field)
+    subject = Subject(compilation, solvers, methods, classical, parameters, x, h, step_count, t0, field)
     rows = subject.main.rows(x, h, step_count, 1)
     # With noise, trajectories may start where relative errors of single steps have no scale: at rest, at the origin.
     first = step_count // STATES if noisy else 0
@@ -170,7 +170,7 @@ def verify(
         h,
         step_count,
         tuple(methods),
-        tuple(others),
+        tuple(classical),
         _measured(
             compilation.spec.name,
             {
@@ -208,16 +208,16 @@ def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float
         return None
     from phigen.api import solver_of
 
-    chosen: Floats = solver_of(compilation, "numpy").backend.module.gauge(x, **parameters)  # type: ignore[attr-defined]
-    return chosen
+    gauge: Floats = solver_of(compilation, "numpy").backend.module.gauge(x, **parameters)  # type: ignore[attr-defined]
+    return gauge
 
 
 def order_check(subject: Subject, state: Floats, *, quick: bool = False) -> Check:
     """Return the check of the observed order; systems with noise are measured without it, from a state of the run."""
     if not subject.compilation.system.noise:
         return _order_check("observed order", subject, quick=quick)
-    still = without_noise(subject.solver, subject.parameters, subject.t0)
-    quiet = replace(subject, own={still.name: still}, others={}, start=state)
+    noiseless = without_noise(subject.solver, subject.parameters, subject.t0)
+    quiet = replace(subject, own={noiseless.name: noiseless}, others={}, start=state)
     return _order_check("observed order, without the noise", quiet, quick=quick)
 
 
@@ -227,8 +227,8 @@ def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
     if not system.noise:
         return
     stated = 1.0 if commuting(system) else 0.5
-    about = subject.solver, subject.start, subject.parameters, subject.t0
-    observed_order = strong_order(*about, subject.h, min(subject.steps, 8))
+    arguments = subject.solver, subject.start, subject.parameters, subject.t0
+    observed_order = strong_order(*arguments, subject.h, min(subject.steps, 8))
     reason, limit = (
         f"{observed_order:.2f} instead of {stated:g}",
         order_limit(stated, STRONG_SLACK),
@@ -259,27 +259,29 @@ def _order_check(title: str, subject: Subject, *, quick: bool) -> Check:
         if observation.exact or observation.order >= stated - ORDER_SLACK:
             break
     limit = order_limit(stated)
-    others = {
+    other_orders = {
         name: measures.observed_order(m, reference, subject.start, length * subject.h).order
         for name, m in subject.others.items()
     }
     if observation.exact:
-        return Check(f"{title} (errors at round-off)", math.inf, limit, True, "", others)
+        return Check(f"{title} (errors at round-off)", math.inf, limit, True, "", other_orders)
     if math.isnan(observation.order):
         reason = "no two steps have errors between round-off and 2 %"
         worst = max((e for _, e in observation.pairs), default=math.inf)
-        return Check(title, math.nan, limit, worst < 1e-6, reason, others)
-    passed = observation.order >= stated - ORDER_SLACK
-    return Check(title, observation.order, limit, passed, f"{observation.order:.2f} instead of {stated}", others)
+        return Check(title, math.nan, limit, worst < 1e-6, reason, other_orders)
+    is_passed = observation.order >= stated - ORDER_SLACK
+    return Check(
+        title, observation.order, limit, is_passed, f"{observation.order:.2f} instead of {stated}", other_orders
+    )
 
 
 def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
     """Return the solution at a time with its uncertainty, by DOP853 with halved steps until two results agree."""
     solver = of_classical("dop853", subject.solver, subject.parameters, subject.t0, subject.field)
-    known: dict[float, tuple[Floats, float]] = {}
+    solutions: dict[float, tuple[Floats, float]] = {}
 
     def reference(t: float) -> tuple[Floats, float]:
-        if t not in known:
+        if t not in solutions:
             best: tuple[Floats, float] | None = None
             last: Floats | None = None
             for n in (128, 256, 512, 1024, 2048):
@@ -295,8 +297,8 @@ def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
                     if error <= 4 * measures.ROUNDING:
                         break
                 last = state
-            known[t] = best or (np.full_like(subject.start, np.nan), math.inf)
-        return known[t]
+            solutions[t] = best or (np.full_like(subject.start, np.nan), math.inf)
+        return solutions[t]
 
     return reference
 
@@ -310,27 +312,27 @@ def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
         trajectory = subject.solver.integrate(subject.start, subject.h, len(rows) - 1, 1, parameters=subject.parameters)
         times, compared = trajectory.t, {}
     summary = _summary(subject, subject.main.name, rows, times)
-    others = {name: _summary_of(subject, m, times) for name, m in compared.items()}
+    other_summaries = {name: _summary_of(subject, m, times) for name, m in compared.items()}
     for name, drift in summary.casimirs.items():
-        bound = rounding(steps) * _terms(subject, system.casimirs[name], rows) / drift.unit.size
+        allowed_error = rounding(steps) * _terms(subject, system.casimirs[name], rows) / drift.unit.size
         judged = subject.exact and system.forced_rate_of_casimir(system.casimirs[name]).is_zero
-        limit = f"at most {bound:.1e}" if judged else ""
-        passed = drift.error <= bound or not judged
+        limit = f"at most {allowed_error:.1e}" if judged else ""
+        is_passed = drift.error <= allowed_error or not judged
         reason = f"changed by {drift.error:.1e} in {steps} steps"
-        drifts = {m: s.casimirs[name] if s else None for m, s in others.items()}
-        yield Check(f"Casimir {name}: largest error", drift.error, limit, passed, reason, _errors(drifts))
+        drifts = {m: s.casimirs[name] if s else None for m, s in other_summaries.items()}
+        yield Check(f"Casimir {name}: largest error", drift.error, limit, is_passed, reason, _errors(drifts))
         yield Check(f"Casimir {name}: last/first window", drift.growth, others=_growths(drifts))
-    energy, drifts = summary.energy, {m: s.energy if s else None for m, s in others.items()}
+    energy, drifts = summary.energy, {m: s.energy if s else None for m, s in other_summaries.items()}
     if system.noise:
         yield Check("energy: largest change", energy.error)
         return
-    what = "energy balance" if system.driven else "energy"
-    yield Check(f"{what}: largest error", energy.error, others=_errors(drifts))
+    quantity = "energy balance" if system.driven else "energy"
+    yield Check(f"{quantity}: largest error", energy.error, others=_errors(drifts))
     judged = math.isfinite(energy.growth) and subject.compilation.poisson and _recurrent(rows)
-    passed = not judged or energy.growth <= GROWTH
+    is_passed = not judged or energy.growth <= GROWTH
     reason = f"the error of the last tenth is {energy.growth:.1f} times that of the first"
     limit = f"at most {GROWTH:g}" if judged else ""
-    yield Check(f"{what}: last/first window", energy.growth, limit, passed, reason, _growths(drifts))
+    yield Check(f"{quantity}: last/first window", energy.growth, limit, is_passed, reason, _growths(drifts))
 
 
 def _errors(drifts: Mapping[str, Drift | None]) -> dict[str, float]:
@@ -362,10 +364,10 @@ def _recurrent(rows: Floats) -> bool:
     """Return whether the second half of the states stays within the range of the first, plus 20 %: windows are
     comparable.
     """
-    half = len(rows) // 2
-    low, high = rows[:half].min(axis=0), rows[:half].max(axis=0)
+    half_count = len(rows) // 2
+    low, high = rows[:half_count].min(axis=0), rows[:half_count].max(axis=0)
     margin = 0.2 * np.max(high - low)
-    return bool(((rows[half:] >= low - margin) & (rows[half:] <= high + margin)).all())
+    return bool(((rows[half_count:] >= low - margin) & (rows[half_count:] <= high + margin)).all())
 
 
 def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
@@ -382,23 +384,23 @@ def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Chec
     largest = max(worst(defect, m) for m in subject.own.values())
     compared = {name: worst(defect, m) for name, m in subject.others.items()}
     if system.forces:
-        limit, passed, reason = "", True, ""
+        limit, is_passed, reason = "", True, ""
     elif subject.exact:
-        limit, passed, reason = f"at most {ONE_STEP:g}", largest <= ONE_STEP, f"{largest:.1e} is not round-off"
+        limit, is_passed, reason = f"at most {ONE_STEP:g}", largest <= ONE_STEP, f"{largest:.1e} is not round-off"
     else:
-        limit, passed, reason = _approximate(subject, states, defect, largest)
-    yield Check("Poisson defect, exact tangent", largest, limit, passed, reason, compared)
+        limit, is_passed, reason = _approximate(subject, states, defect, largest)
+    yield Check("Poisson defect, exact tangent", largest, limit, is_passed, reason, compared)
     slip = max(worst(measures.tangent_error, m) for m in subject.own.values())
     reason = f"the tangent map is not the derivative of the step, {slip:.1e} off"
     yield Check("tangent map against differences", slip, f"at most {DIFFERENCES:g}", slip <= DIFFERENCES, reason)
-    back = max(worst(measures.reversal, m) for m in subject.own.values())
+    reversal_error = max(worst(measures.reversal, m) for m in subject.own.values())
     symmetric = subject.compilation.symmetric
     yield Check(
         "reversibility: a step there and back",
-        back,
+        reversal_error,
         f"at most {ONE_STEP:g}" if symmetric else "",
-        back <= ONE_STEP or not symmetric,
-        f"a step back misses by {back:.1e}",
+        reversal_error <= ONE_STEP or not symmetric,
+        f"a step back misses by {reversal_error:.1e}",
         {name: worst(measures.reversal, m) for name, m in subject.others.items()},
     )
 
@@ -415,18 +417,18 @@ def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Flo
         return
     size = np.max(np.abs(states), axis=0)
     units = np.maximum(size, 0.1 * (float(np.max(size)) or 1.0))
-    about = units, subject.h, subject.parameters, subject.t0
+    arguments = units, subject.h, subject.parameters, subject.t0
     solvers = list(subject.solvers.values())
-    fixed = [s if gauge is None else Solver(s.backend.with_gauge(gauge), s.interface) for s in solvers]
-    held, free = (
-        [gradients.of_solver(s, x, *about) for s in each for x in (states[0], states[-1])]
-        for each in (fixed, solvers if program.monitor else fixed)
+    fixed_solvers = [s if gauge is None else Solver(s.backend.with_gauge(gauge), s.interface) for s in solvers]
+    fixed_level_runs, free_level_runs = (
+        [gradients.of_solver(s, x, *arguments) for s in solver_group for x in (states[0], states[-1])]
+        for solver_group in (fixed_solvers, solvers if program.monitor else fixed_solvers)
     )
-    apart = max(gradients.members_error(s, np.array(states), *about) for s in fixed)
+    apart = max(gradients.members_error(s, np.array(states), *arguments) for s in fixed_solvers)
     reason = f"gradients of members differ from those of single runs by {apart:.1e}"
     members = "gradients of members against single runs", apart, gradients.TRANSPOSED, reason
-    for name, value, most, why in (*gradients.measured(held, free), members):
-        yield Check(name, value, f"at most {most:g}", value <= most, why)
+    for name, value, limit, refusal in (*gradients.measured(fixed_level_runs, free_level_runs), members):
+        yield Check(name, value, f"at most {limit:g}", value <= limit, refusal)
 
 
 def _approximate(
@@ -439,8 +441,8 @@ def _approximate(
     fine = max(_or_infinite(defect, subject.main, x, subject.h / 2) for x in states)
     coarse = max(_or_infinite(defect, subject.main, x, subject.h) for x in states)
     power = math.log2(coarse / fine) if fine > 0 else math.inf
-    passed = largest <= ONE_STEP or fine <= ONE_STEP or power >= degree + 1 - 2 * ORDER_SLACK
-    return f"O(h^{degree + 1}): approximate", passed, f"shrinks like h^{power:.1f} instead of h^{degree + 1}"
+    is_passed = largest <= ONE_STEP or fine <= ONE_STEP or power >= degree + 1 - 2 * ORDER_SLACK
+    return f"O(h^{degree + 1}): approximate", is_passed, f"shrinks like h^{power:.1f} instead of h^{degree + 1}"
 
 
 def _or_infinite(measure: Callable[[Method, Floats, float], float], method: Method, x: Floats, h: float) -> float:
@@ -460,8 +462,10 @@ def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
         images = [m.step(x, subject.h) for m in subject.own.values()]
         size = float(np.max(np.abs(images[0])))
         difference = max(difference, *(float(np.max(np.abs(i - images[0]))) / size for i in images[1:]))
-    passed = difference <= ONE_STEP
-    return Check(name, difference, f"at most {ONE_STEP:g}", passed, f"they differ by {difference:.1e} after one step")
+    is_passed = difference <= ONE_STEP
+    return Check(
+        name, difference, f"at most {ONE_STEP:g}", is_passed, f"they differ by {difference:.1e} after one step"
+    )
 
 
 def single_checks(
@@ -472,10 +476,10 @@ def single_checks(
         return
     method = of_solver(solver, subject.parameters, gauge, subject.t0)
     numbers = subject.start, subject.h, subject.steps, subject.parameters, subject.t0
-    for name, value, most in single_precision.measured(
+    for name, value, limit in single_precision.measured(
         subject.compilation.system, method, subject.main, states, *numbers
     ):
-        yield Check(name, value, f"at most {most:.1e}", value <= most, f"{value:.1e} is more than rounding")
+        yield Check(name, value, f"at most {limit:.1e}", value <= limit, f"{value:.1e} is more than rounding")
 
 
 def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
@@ -485,12 +489,12 @@ def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
     except backward.NotOfferedError:
         return
     observed = backward.observed_powers(series, subject.main, subject.start, subject.h)
-    for m, (power, shown) in enumerate(zip(series.powers[1:], observed[1:], strict=True), 1):
+    for m, (power, observed_power) in enumerate(zip(series.powers[1:], observed[1:], strict=True), 1):
         # With a wrong correction, the power is that without the correction.
         limit = power - MODIFIED_SLACK * (power - series.powers[m - 1])
-        reason = f"shrinks like h^{shown:.2f} instead of h^{power}"
+        reason = f"shrinks like h^{observed_power:.2f} instead of h^{power}"
         name = f"modified H, {m} correction{'s' * (m > 1)}: order"
-        yield Check(name, shown, order_limit(power, power - limit), shown >= limit, reason)
+        yield Check(name, observed_power, order_limit(power, power - limit), observed_power >= limit, reason)
 
 
 def step_check(subject: Subject, states: Sequence[Floats]) -> Check:
