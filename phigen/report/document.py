@@ -68,15 +68,15 @@ def _run(material: Material) -> Iterator[Markup]:
         return
     last = int(np.flatnonzero(np.isfinite(first.x).all(axis=1))[-1])
     start, end = (_values(dict(zip(first.coordinates, first.x[row].tolist(), strict=True))) for row in (0, last))
-    stored = "all stored" if run.stride == 1 else f"one in {run.stride} stored"
-    stored = stored if run.every is None else f"states stored at times {float(run.every):.9g} apart"
-    stored = f"states stored at {len(run.at)} given times" if run.at else stored
+    storage_note = "all stored" if run.stride == 1 else f"one in {run.stride} stored"
+    storage_note = storage_note if run.every is None else f"states stored at times {float(run.every):.9g} apart"
+    storage_note = f"states stored at {len(run.at)} given times" if run.at else storage_note
     pairs = [("run", run.name), ("start", start)]
     if run.description:
         pairs.insert(1, ("description", run.description))
     if first.parameters:
         pairs.append(("parameters", _values(first.parameters)))
-    pairs += [("integrated", f"{material.steps}, {stored}"), (f"t = {first.t[last]:.9g}", end)]
+    pairs += [("integrated", f"{material.steps}, {storage_note}"), (f"t = {first.t[last]:.9g}", end)]
     yield page.facts(pairs)
     yield evidence.summary_table(material.summaries)
     if material.spectrum:
@@ -99,8 +99,10 @@ def _run(material: Material) -> Iterator[Markup]:
 
 def _values(values: Mapping[str, float]) -> Markup:
     """Return names with their values: ``x_1 = 0.5, x_2 = 1``."""
-    written = (Markup("{} = {}").format(Markup(math(name(n))), f"{v:.9g}".replace("-", "−")) for n, v in values.items())
-    return Markup(", ").join(written)
+    equations = (
+        Markup("{} = {}").format(Markup(math(name(n))), f"{v:.9g}".replace("-", "−")) for n, v in values.items()
+    )
+    return Markup(", ").join(equations)
 
 
 def provenance(material: Material) -> Iterator[Markup]:

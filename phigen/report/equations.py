@@ -21,21 +21,21 @@ MOST_TERMS = 150
 
 def equation(left: str, form: Formula | Expression, sign: str = "=") -> list[str]:
     """Return the parts of one equation, between which lines may break."""
-    first, *rest = mathml.pieces(form)
-    return [mathml.math(f"{left}<mo>{sign}</mo>{first}"), *map(mathml.math, rest)]
+    first, *remaining = mathml.pieces(form)
+    return [mathml.math(f"{left}<mo>{sign}</mo>{first}"), *map(mathml.math, remaining)]
 
 
-def group(left: Sequence[str], expressions: Sequence[Expression], what: str, sign: str = "=") -> Markup:
-    """Return equations for ``what``, with names for common subexpressions."""
+def group(left: Sequence[str], expressions: Sequence[Expression], subject: str, sign: str = "=") -> Markup:
+    """Return equations for ``subject``, with names for common subexpressions."""
     formulas = named_parts.readable(expressions)
     if formulas.size > LEFT_OUT:
         counts = ", ".join(f"{n} {kind}" for kind, n in operation_counts(list(expressions)).items() if n)
-        return page.paragraph(f"{what}: {len(left)} formulas of {counts}; phigen show prints them.", "note")
-    listed = page.equations([equation(name, form, sign) for name, form in zip(left, formulas.forms, strict=True)])
+        return page.paragraph(f"{subject}: {len(left)} formulas of {counts}; phigen show prints them.", "note")
+    equations = page.equations([equation(name, form, sign) for name, form in zip(left, formulas.forms, strict=True)])
     if formulas.parts:
-        where = page.equations([equation(mathml.name(name), e) for name, e in formulas.parts])
-        listed = page.joined([listed, page.paragraph("where"), where])
-    return listed if formulas.size <= FOLDED else page.fold(what, listed)
+        definitions = page.equations([equation(mathml.name(name), e) for name, e in formulas.parts])
+        equations = page.joined([equations, page.paragraph("where"), definitions])
+    return equations if formulas.size <= FOLDED else page.fold(subject, equations)
 
 
 def polynomial(left: str, formula: Formula) -> Markup:
@@ -43,7 +43,9 @@ def polynomial(left: str, formula: Formula) -> Markup:
     if formula.size <= SHOWN + 1:
         return page.equations([equation(left, formula)])
     cut = replace(formula, terms=formula.terms[:SHOWN], hidden=formula.size - SHOWN)
-    short = page.equations([equation(left, cut)])
+    abbreviated = page.equations([equation(left, cut)])
     if formula.size > MOST_TERMS:
-        return page.joined([short, page.paragraph(f"{formula.size} terms; phigen show --full prints them.", "note")])
-    return page.joined([short, page.fold(f"All {formula.size} terms", page.equations([equation(left, formula)]))])
+        return page.joined(
+            [abbreviated, page.paragraph(f"{formula.size} terms; phigen show --full prints them.", "note")]
+        )
+    return page.joined([abbreviated, page.fold(f"All {formula.size} terms", page.equations([equation(left, formula)]))])

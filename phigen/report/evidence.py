@@ -60,8 +60,8 @@ def proofs_section(material: Material) -> Markup:
     for group, statements in material.examination.groups.items():
         rows = [_statement(s) for s in statements]
         blocks.append(page.table(group, columns, rows, "proofs"))
-    said = "Proved means in exact arithmetic, for all values of the coordinates, covectors and parameters."
-    return page.joined([page.paragraph(said), *blocks])
+    explanation = "Proved means in exact arithmetic, for all values of the coordinates, covectors and parameters."
+    return page.joined([page.paragraph(explanation), *blocks])
 
 
 def measured_section(v: Verification) -> Markup:
@@ -70,20 +70,20 @@ def measured_section(v: Verification) -> Markup:
     columns += [("number", method) for method in v.compared]
     rows = [_check(check, v.compared) for check in v.checks]
     targets = " and ".join(TARGETS[t].title for t in v.targets)
-    said = f"Run {v.run}: {v.made}, generated for {targets}. Solver: {v.label}."
+    conditions = f"Run {v.run}: {v.made}, generated for {targets}. Solver: {v.label}."
     meanings = dict.fromkeys(meaning_of(check.name) for check in v.checks)
     title = "Measured properties of the solver" + ", and of classical methods" * bool(v.compared)
     rows_explained = page.facts((m.row, page.typeset(_meaning(m))) for m in meanings)
     return page.joined(
-        [page.paragraph(said), page.table(title, columns, rows),
+        [page.paragraph(conditions), page.table(title, columns, rows),
          page.paragraph(page.typeset(v.said or stated(v.units)), "note"),
          page.fold("Meaning of the rows", rows_explained)]
     )  # fmt: skip
 
 
 def _meaning(m: Meaning) -> str:
-    said = f"{m.measures[0].upper()}{m.measures[1:]}."
-    return f"{said} A failure means: {m.failure}." if m.failure else said
+    sentence = f"{m.measures[0].upper()}{m.measures[1:]}."
+    return f"{sentence} A failure means: {m.failure}." if m.failure else sentence
 
 
 def summary_table(summaries: Sequence[Summary]) -> Markup:
@@ -97,34 +97,34 @@ def summary_table(summaries: Sequence[Summary]) -> Markup:
     if any(s.good < s.rows for s in summaries):
         rows.append(("rows before the failure", [("number", f"{s.good} of {s.rows}") for s in summaries]))
     columns = [("", "quantity"), *(("number", s.method) for s in summaries)]
-    listed = page.table("Largest errors along the run", columns, rows)
-    return page.joined([listed, page.paragraph(page.typeset(stated(first.units)), "note")])
+    table = page.table("Largest errors along the run", columns, rows)
+    return page.joined([table, page.paragraph(page.typeset(stated(first.units)), "note")])
 
 
 def lyapunov_paragraph(spectrum: Spectrum) -> Markup:
     """Return a paragraph with the Lyapunov exponents and their uncertainty."""
     exponents = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
-    late, after = page.scientific(spectrum.uncertainty), f"{spectrum.clock} = {spectrum.t:.9g}"
+    late_change, duration = page.scientific(spectrum.uncertainty), f"{spectrum.clock} = {spectrum.t:.9g}"
     if len(spectrum.exponents) == 1:
-        said = f"The largest Lyapunov exponent after {after} is {exponents}."
-        return page.paragraph(f"{said} The second half of the time changed it by {late}.")
-    said = f"Lyapunov exponents after {after}: {exponents}; their sum is {page.scientific(spectrum.total)}."
-    known = f"The second half of the time changed them by {late}, at most."
-    return page.paragraph(f"{said} {known}")
+        sentence = f"The largest Lyapunov exponent after {duration} is {exponents}."
+        return page.paragraph(f"{sentence} The second half of the time changed it by {late_change}.")
+    sentence = f"Lyapunov exponents after {duration}: {exponents}; their sum is {page.scientific(spectrum.total)}."
+    uncertainty_note = f"The second half of the time changed them by {late_change}, at most."
+    return page.paragraph(f"{sentence} {uncertainty_note}")
 
 
 def _statement(s: Statement) -> tuple[str, list[page.Cell]]:
     kind = _GOOD if s.verdict == PROVED else _BAD if s.verdict == REFUTED else _UNSURE
-    how = s.detail + (f"; residual {s.residual}" if s.residual else "")
-    return page.typeset(s.name), [(f"verdict {kind}", _MARKS[kind] + s.verdict), ("", page.typeset(how))]
+    detail = s.detail + (f"; residual {s.residual}" if s.residual else "")
+    return page.typeset(s.name), [(f"verdict {kind}", _MARKS[kind] + s.verdict), ("", page.typeset(detail))]
 
 
 def _check(check: Check, compared: Sequence[str]) -> tuple[str, list[page.Cell]]:
     kind = "" if not check.limit else _GOOD if check.passed else _BAD
     verdict = "" if not kind else _MARKS[kind] + ("holds" if check.passed else f"failed: {check.reason}")
     cells = [("number", page.scientific(check.value)), ("", page.typeset(check.limit)), (f"verdict {kind}", verdict)]
-    others = [("number", page.scientific(check.others[m]) if m in check.others else "") for m in compared]
-    return check.name, [*cells, *others]
+    other_values = [("number", page.scientific(check.others[m]) if m in check.others else "") for m in compared]
+    return check.name, [*cells, *other_values]
 
 
 def _drift(drift: Drift) -> page.Cell:
@@ -133,18 +133,23 @@ def _drift(drift: Drift) -> page.Cell:
 
 def _proofs_tile(statements: Sequence[Statement]) -> Tile:
     counts = Counter(s.verdict for s in statements)
-    refuted = counts.pop(REFUTED, 0)
-    kind = _BAD if refuted else _UNSURE if counts[UNDECIDED] else _GOOD
-    others = "; ".join(f"{s.verdict}: {s.name}" for s in statements if s.verdict != PROVED)
-    said = f"{counts[PROVED]} of {len(statements)}"
-    return kind, said, "statements proved", f"{refuted} refuted" if refuted else others or "in exact arithmetic"
+    refuted_count = counts.pop(REFUTED, 0)
+    kind = _BAD if refuted_count else _UNSURE if counts[UNDECIDED] else _GOOD
+    unproved = "; ".join(f"{s.verdict}: {s.name}" for s in statements if s.verdict != PROVED)
+    summary = f"{counts[PROVED]} of {len(statements)}"
+    return (
+        kind,
+        summary,
+        "statements proved",
+        f"{refuted_count} refuted" if refuted_count else unproved or "in exact arithmetic",
+    )
 
 
 def _measured_tiles(v: Verification) -> Iterator[Tile]:
     judged = [c for c in v.checks if c.limit]
-    passed = sum(c.passed for c in judged)
-    kind = _GOOD if passed == len(judged) else _BAD
-    yield kind, f"{passed} of {len(judged)}", "measured properties hold", v.made
+    passed_count = sum(c.passed for c in judged)
+    kind = _GOOD if passed_count == len(judged) else _BAD
+    yield kind, f"{passed_count} of {len(judged)}", "measured properties hold", v.made
     casimirs = [c for c in v.checks if c.name.startswith("Casimir") and "largest" in c.name]
     if casimirs:
         worst = max(casimirs, key=lambda c: c.value)
@@ -162,7 +167,7 @@ def _measured_tiles(v: Verification) -> Iterator[Tile]:
                 yield _tile(check, label, check.others)
 
 
-def _tile(check: Check, label: str, others: Mapping[str, float]) -> Tile:
-    known = {m: v for m, v in others.items() if not math.isnan(v)}
+def _tile(check: Check, label: str, other_values: Mapping[str, float]) -> Tile:
+    defined_values = {m: v for m, v in other_values.items() if not math.isnan(v)}
     value = "exact" if check.value == math.inf else page.scientific(check.value)
-    return _GOOD if check.passed else _BAD, value, label, page.listed(known)
+    return _GOOD if check.passed else _BAD, value, label, page.listed(defined_values)

@@ -18,8 +18,10 @@ def _sub(base: str, index: str) -> str:
 
 
 def _of(function: str, *arguments: str) -> str:
-    inside = _o(",").join(arguments)
-    return f'{function}<mo>&#x2061;</mo><mrow><mo stretchy="false">(</mo>{inside}<mo stretchy="false">)</mo></mrow>'
+    argument_list = _o(",").join(arguments)
+    return (
+        f'{function}<mo>&#x2061;</mo><mrow><mo stretchy="false">(</mo>{argument_list}<mo stretchy="false">)</mo></mrow>'
+    )
 
 
 _x, _y, _p, _s, _m = map(_i, "xypsm")

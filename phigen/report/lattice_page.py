@@ -59,33 +59,40 @@ def lattice_document(material: LatticeMaterial) -> str:
 def _sections(material: LatticeMaterial) -> Iterator[tuple[str, str, Markup]]:
     compilation, verification = material.compilation, material.verification
     notes = (material.failure,) if material.failure else ()
-    whole = Material(material.examination, compilation, material.command, verification=verification, notes=notes)
+    lattice_material = Material(
+        material.examination, compilation, material.command, verification=verification, notes=notes
+    )
     if material.live:
         yield "live", "Live", lattice_live_section(compilation, material.live)
-    yield "brief", "Summary", evidence.brief_section(whole)
+    yield "brief", "Summary", evidence.brief_section(lattice_material)
     yield "system", "Cell", page.joined(_cell(compilation.cell))
     yield "choices", "Method", page.joined(_method(compilation))
-    yield "proofs", "Proofs", evidence.proofs_section(whole)
+    yield "proofs", "Proofs", evidence.proofs_section(lattice_material)
     if verification:
         yield "measured", "Measurements", evidence.measured_section(verification)
     if material.trajectory is not None:
         yield "run", "Run", page.joined(_run(material, material.trajectory))
-    yield "provenance", "Provenance", page.joined(provenance(whole))
+    yield "provenance", "Provenance", page.joined(provenance(lattice_material))
 
 
 def _cell(cell: Cell) -> Iterator[Markup]:
-    said = described(cell)
-    yield page.paragraph(f"{said[0].upper()}{said[1:]}. Fields of a site: {', '.join(cell.fields)}.", "note")
+    description = described(cell)
+    yield page.paragraph(
+        f"{description[0].upper()}{description[1:]}. Fields of a site: {', '.join(cell.fields)}.", "note"
+    )
     for title, equations in formulas(cell):
         yield page.heading(title)
         yield page.equations(
-            [[mathml.math(f"{left}<mo>=</mo>{first}"), *map(mathml.math, rest)] for left, (first, *rest) in equations]
+            [
+                [mathml.math(f"{left}<mo>=</mo>{first}"), *map(mathml.math, continuation)]
+                for left, (first, *continuation) in equations
+            ]
         )
     if cell.parameters:
-        where = {"all": "", "sites": "at every site", "bonds": "at every bond"}
+        places_text = {"all": "", "sites": "at every site", "bonds": "at every bond"}
         rows = [
             (Markup(mathml.math(mathml.name(p.name))),
-             [("number", "" if p.values else f"{float(p.value):.9g}"), ("", where[p.at]), ("", p.description)])
+             [("number", "" if p.values else f"{float(p.value):.9g}"), ("", places_text[p.at]), ("", p.description)])
             for p in cell.parameters
         ]  # fmt: skip
         yield page.table("Parameters", [("", "name"), ("number", "default"), ("", ""), ("", "meaning")], rows)
@@ -138,6 +145,8 @@ def _run(material: LatticeMaterial, trajectory: LatticeTrajectory) -> Iterator[M
     energies = material.energies
     if energies is not None:
         mean = float(np.mean(energies[-1]))
-        said = f"Energy per site at the end: mean {mean:.6g}, standard deviation {np.std(energies[-1]):.2g}."
-        caption = f"{said} Below: the largest Casimir error of all sites, and the spread."
-        yield picture("sites", sites_figure(trajectory, energies), "Energies and Casimirs of the sites", said, caption)
+        summary = f"Energy per site at the end: mean {mean:.6g}, standard deviation {np.std(energies[-1]):.2g}."
+        caption = f"{summary} Below: the largest Casimir error of all sites, and the spread."
+        yield picture(
+            "sites", sites_figure(trajectory, energies), "Energies and Casimirs of the sites", summary, caption
+        )

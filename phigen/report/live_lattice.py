@@ -97,9 +97,9 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
     if not live.solvers or run is None or start is None:
         return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
     spec, picture = compilation.spec, _picture(compilation, start)
-    places = placed(start.bonds, start.sizes[0]) if picture == "graph" else None
-    sizes, shown = _sizes(compilation, run, start), _groups(compilation, picture)
-    moved = [p for p in spec.parameters if isinstance(_values(spec, run, start, p.name), float)]
+    positions = placed(start.bonds, start.sizes[0]) if picture == "graph" else None
+    sizes, panels = _sizes(compilation, run, start), _groups(compilation, picture)
+    slider_parameters = [p for p in spec.parameters if isinstance(_values(spec, run, start, p.name), float)]
     settings = {
         "picture": picture,
         "axes": list(cell.axes),
@@ -112,7 +112,7 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
         "sizes": sizes,
         "site": sizes.index(list(start.sizes)),
         "bonds": start.bonds.reshape(-1).tolist() if start.graph else None,
-        "places": None if places is None else np.round(places, 4).reshape(-1).tolist(),
+        "places": None if positions is None else np.round(positions, 4).reshape(-1).tolist(),
         "parameters": [
             {
                 "name": p.name,
@@ -120,31 +120,35 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
                 "positive": p.positive,
                 "nonnegative": p.nonnegative,
             }
-            for p in moved
+            for p in slider_parameters
         ],
-        "arrays": {p.name: _array(spec, run, start, p) for p in spec.parameters if p not in moved},
+        "arrays": {p.name: _array(spec, run, start, p) for p in spec.parameters if p not in slider_parameters},
         "initial": {name: _given(v, start, name, spec) for name, v in _initial(spec, run).items()},
-        "groups": [{"kind": kind, "fields": fields} for _, kind, fields in shown],
+        "groups": [{"kind": kind, "fields": fields} for _, kind, fields in panels],
         "quantities": _quantities(compilation),
         "observed": list(spec.recorded),
         "names": list(run.lattice.names) if run.lattice else [],
         "sign": _sign(spec, start),
     }
-    about = _DIRECTION.format(*spec.coordinates) if shown[0][1] == "direction" else ""
-    about += _DRAWN if any(v.random for v in _initial(spec, run).values()) else ""
+    direction_note = _DIRECTION.format(*spec.coordinates) if panels[0][1] == "direction" else ""
+    direction_note += _DRAWN if any(v.random for v in _initial(spec, run).values()) else ""
     return page.block(
         "live",
         kind="fields",
         observed=list(spec.recorded),
         say=_say(compilation),
         sides=sides(compilation),
-        label=f"{shown[0][0]} at the sites",
+        label=f"{panels[0][0]} at the sites",
         quantities=[q["name"] for q in _quantities(compilation)],
         sliders=map(slid, _general(live, sizes)),
-        choice=len(shown) > 1,
-        groups=[(k, name) for k, (name, _, _) in enumerate(shown)],
-        folds=[("Parameters", len(moved) <= FEW, map(slid, _parameters(spec, run, start, moved)))] if moved else [],
-        help=HELP[picture] + about,
+        choice=len(panels) > 1,
+        groups=[(k, name) for k, (name, _, _) in enumerate(panels)],
+        folds=[
+            ("Parameters", len(slider_parameters) <= FEW, map(slid, _parameters(spec, run, start, slider_parameters)))
+        ]
+        if slider_parameters
+        else [],
+        help=HELP[picture] + direction_note,
         data=page.data("live-data", settings),
     )
 
@@ -181,10 +185,10 @@ def _sizes(compilation: CompiledLattice, run: Run, start: Start) -> list[list[in
         return choices
     step = compilation.program.step
     periods = step.sites.periods  # type: ignore[union-attr]
-    most = MOST_PAIRS if cell.relation == PAIRS else MOST_IN_CHAIN if len(cell.axes) == 1 else MOST_SITES
+    max_sites = MOST_PAIRS if cell.relation == PAIRS else MOST_IN_CHAIN if len(cell.axes) == 1 else MOST_SITES
     while all(n % (2 * p) == 0 and n >= 2 * FEWEST for n, p in zip(choices[0], periods, strict=True)):
         choices.insert(0, [n // 2 for n in choices[0]])
-    while math.prod(2 * n for n in choices[-1]) <= most:
+    while math.prod(2 * n for n in choices[-1]) <= max_sites:
         choices.append([2 * n for n in choices[-1]])
     return choices
 
@@ -195,8 +199,8 @@ def _general(live: Live, sizes: Sequence[Sequence[int]]) -> Iterator[Slider]:
         yield Slider("Sites", "sites", low=0, high=len(sizes) - 1)
 
 
-def _parameters(spec: Spec, run: Run, start: Start, moved: Sequence[Parameter]) -> Iterator[Slider]:
-    for p in moved:
+def _parameters(spec: Spec, run: Run, start: Start, slider_parameters: Sequence[Parameter]) -> Iterator[Slider]:
+    for p in slider_parameters:
         value = _values(spec, run, start, p.name)
         assert isinstance(value, float)
         yield slider_of(p, value)
@@ -256,9 +260,11 @@ def _formulas(spec: Spec, run: Run) -> str:
     arrays = {**{p.name: _source(run, p) for p in spec.parameters}, **_initial(spec, run)}
     assert spec.lattice is not None
     indices = spec.lattice.indices
-    listed = {n: v.formula for n, v in arrays.items() if v is not None and v.formula is not None and not v.random}
+    formula_texts = {
+        n: v.formula for n, v in arrays.items() if v is not None and v.formula is not None and not v.random
+    }
     names = (*indices, *(f"N_{i}" for i in indices))
-    return ", ".join(f"{json.dumps(name)}: {function_of(formula, names)}" for name, formula in listed.items())
+    return ", ".join(f"{json.dumps(name)}: {function_of(formula, names)}" for name, formula in formula_texts.items())
 
 
 def _sign(spec: Spec, start: Start) -> str:
@@ -276,21 +282,23 @@ def _quantities(compilation: CompiledLattice) -> list[dict[str, Any]]:
     quantities: list[dict[str, Any]] = [] if cell.driven else [quantity("energy error")]
     casimirs = {name: k for k, name in enumerate(cell.casimirs) if name not in pushed}
     if casimirs:
-        named = f"Casimir error{'s' * (len(casimirs) > 1)} ({', '.join(casimirs)})"
-        quantities.append(quantity(named, casimirs=[*casimirs.values()]))
+        label = f"Casimir error{'s' * (len(casimirs) > 1)} ({', '.join(casimirs)})"
+        quantities.append(quantity(label, casimirs=[*casimirs.values()]))
     invariants, first = list(cell.invariants), len(compilation.spec.recorded)
     if invariants:
-        named = f"error{'s' * (len(invariants) > 1)} of {', '.join(invariants)}"
-        named = named if len(invariants) <= 3 else f"error of {len(invariants)} invariants"
-        quantities.append(quantity(named, invariants=[first + 2 * k for k in range(len(invariants))]))
+        label = f"error{'s' * (len(invariants) > 1)} of {', '.join(invariants)}"
+        label = label if len(invariants) <= 3 else f"error of {len(invariants)} invariants"
+        quantities.append(quantity(label, invariants=[first + 2 * k for k in range(len(invariants))]))
     return quantities
 
 
 def _say(compilation: CompiledLattice) -> str:
-    said = "Two solvers integrate the motion from the same start, in your browser. "
+    introduction = "Two solvers integrate the motion from the same start, in your browser. "
     conserved = ["its invariants" if q["invariants"] else "its Casimirs" if q["casimirs"] else "its energy"
             for q in _quantities(compilation)]  # fmt: skip
     conserved_words = " and ".join([", ".join(conserved[:-1]), conserved[-1]] if len(conserved) > 1 else conserved)
     if not conserved_words:
-        return f"{said}{NOTHING}"
-    return f"{said}The exact solution conserves {conserved_words}. The numbers are the errors of the two solvers."
+        return f"{introduction}{NOTHING}"
+    return (
+        f"{introduction}The exact solution conserves {conserved_words}. The numbers are the errors of the two solvers."
+    )

@@ -20,17 +20,17 @@ FLOWS = 12
 
 def method_section(compilation: Compilation) -> Markup:
     """Return the section with the formulas of a step."""
-    said = compilation.by_kind(generating.method, flows.method, collocation.method)
+    description = compilation.by_kind(generating.method, flows.method, collocation.method)
     blocks = compilation.by_kind(_series, _splitting, _collocation)
-    lead = page.paragraph(page.typeset(f"{said[0].upper()}{said[1:]}."))
+    lead = page.paragraph(page.typeset(f"{description[0].upper()}{description[1:]}."))
     return page.joined([lead, *_gauge(compilation), *blocks])
 
 
 def _collocation(compilation: CompiledGauss) -> list[Markup]:
     """Return the equations of a Gauss step and a description of its unknowns."""
-    listed = [page.paragraph(page.typeset(f"{left} = {right}")) for left, right in collocation.equations()]
-    said = [page.paragraph(page.typeset(f"{line}.")) for line in collocation.lines(compilation)]
-    return [page.heading("One step"), *listed, page.heading("Unknowns"), *said]
+    equations = [page.paragraph(page.typeset(f"{left} = {right}")) for left, right in collocation.equations()]
+    description = [page.paragraph(page.typeset(f"{line}.")) for line in collocation.lines(compilation)]
+    return [page.heading("One step"), *equations, page.heading("Unknowns"), *description]
 
 
 def _gauge(compilation: Compilation) -> list[Markup]:
@@ -41,9 +41,9 @@ def _gauge(compilation: Compilation) -> list[Markup]:
     subtracted += [f"{mathml.grouped(value)}<mo>&#x2062;</mo>{mathml.name(c)}" for c, value in gauge.fixed.items()]
     if not subtracted:
         return []
-    said = "Below, H denotes this function. Multiples of Casimirs change the error of a step, but not the flow."
+    explanation = "Below, H denotes this function. Multiples of Casimirs change the error of a step, but not the flow."
     gauged = mathml.math(GAUGED + "".join(f"<mo>−</mo>{part}" for part in subtracted))
-    return [page.heading("Gauge"), page.equations([[gauged]]), page.paragraph(said, "note")]
+    return [page.heading("Gauge"), page.equations([[gauged]]), page.paragraph(explanation, "note")]
 
 
 def _series(compilation: CompiledSeries) -> list[Markup]:
@@ -92,19 +92,19 @@ def _splitting(compilation: CompiledSplitting) -> list[Markup]:
         blocks += _flow(compilation, k, flow)
     for number, matrix in flows.matrices(compilation):
         entries = flows.rates(number, matrix)
-        left, (first, *rest) = mathml.exponential(number)
-        blocks.append(page.equations([[mathml.math(f"{left}<mo>=</mo>{first}"), *map(mathml.math, rest)]]))
+        left, (first, *continuation) = mathml.exponential(number)
+        blocks.append(page.equations([[mathml.math(f"{left}<mo>=</mo>{first}"), *map(mathml.math, continuation)]]))
         blocks.append(group([mathml.name(s) for s in entries], list(entries.values()), "The matrix of an exponential"))
     return [*blocks, _schedule(compilation.program.step, [flow.letter for flow in parts])]
 
 
 def _flow(compilation: CompiledSplitting, k: int, flow: Flow) -> list[Markup]:
-    moved = flows.images(compilation, flow)
-    left = [mathml.name(c) for c in moved]
+    new_values = flows.images(compilation, flow)
+    left = [mathml.name(c) for c in new_values]
     local = flows.definitions(flow, compilation.system.coordinates)
     part = page.equations([equation(mathml.component(flow.letter, k, c), e) for c, e in local])
-    images = group(left, list(moved.values()), f"The flow of {flow.letter}_{k}", "↦")
-    return [part, images, page.paragraph(f"This flow: {flow.manner}.", "note")] if moved else [part]
+    images = group(left, list(new_values.values()), f"The flow of {flow.letter}_{k}", "↦")
+    return [part, images, page.paragraph(f"This flow: {flow.manner}.", "note")] if new_values else [part]
 
 
 def _schedule(step: Step, letters: Sequence[str]) -> Markup:

@@ -13,17 +13,22 @@ from phigen.study.backward import Constancy, truncation
 
 def modified_section(constancy: Constancy | None, why_not: str) -> Markup:
     """Return the measurements as a table and a figure, or the reason why there are none."""
-    said = (
+    explanation = (
         "A step of the solver is the exact flow, over the time h, of a Hamiltonian H̃ near H. So steps conserve H̃, and "
         "the energy H oscillates but does not drift. H̃ is a series in h."
     )
     if constancy is None:
-        return page.joined([page.paragraph(said), page.paragraph(f"It was not measured here: {why_not}.", "note")])
-    said += " With more terms of this series, H̃ changes less along the trajectory."
+        return page.joined(
+            [page.paragraph(explanation), page.paragraph(f"It was not measured here: {why_not}.", "note")]
+        )
+    explanation += " With more terms of this series, H̃ changes less along the trajectory."
     rows = [_row(m, constancy) for m in range(len(constancy.powers))]
     columns = [("", "Hamiltonian"), ("", "expected power"), ("", "measured power")]
     columns.append(("number", f"largest change at steps of {constancy.step:.4g}"))
-    blocks = [page.paragraph(said), page.table("Changes along the trajectory, relative to the energy", columns, rows)]
+    blocks = [
+        page.paragraph(explanation),
+        page.table("Changes along the trajectory, relative to the energy", columns, rows),
+    ]
     if drawable():
         from phigen.report import pictures
 

@@ -82,11 +82,11 @@ def fold(summary: str, body: Markup) -> Markup:
 
 def equations(listed: Sequence[Sequence[str]]) -> Markup:
     """Return equations from parts of MathML, between which lines may break; many short ones are set in columns."""
-    short = len(listed) > MANY and all(sum(map(len, pieces)) < SHORT for pieces in listed)
+    are_short = len(listed) > MANY and all(sum(map(len, parts)) < SHORT for parts in listed)
     return block(
         "equations",
-        kind="columns" if short else "",
-        equations=[[Markup(piece) for piece in pieces] for pieces in listed],
+        kind="columns" if are_short else "",
+        equations=[[Markup(part) for part in parts] for parts in listed],
     )
 
 

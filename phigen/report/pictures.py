@@ -54,10 +54,10 @@ def error_picture(material: Material) -> Markup:
 
 def section_picture(names: Sequence[str], function: str, points: Floats, count: int) -> Markup:
     """Return the figure of some points of the Poincaré section."""
-    shown = points[:: max(1, -(-len(points) // ROWS))]
+    shown_points = points[:: max(1, -(-len(points) // ROWS))]
     caption = f"Poincaré section: {count} points where {function} rises through zero"
-    caption += f"; {len(shown)} of them are drawn." if len(shown) < count else "."
-    figure = figures.section_figure({f"{function} = 0": shown}, names)
+    caption += f"; {len(shown_points)} of them are drawn." if len(shown_points) < count else "."
+    figure = figures.section_figure({f"{function} = 0": shown_points}, names)
     return picture("section", figure, "Poincaré section", caption, caption)
 
 
@@ -66,8 +66,11 @@ def constancy_picture(constancy: Constancy) -> Markup:
     largest = page.listed({truncation(m): float(e.max()) for m, e in enumerate(constancy.errors)})
     caption = "Changes of H and of H̃ with one and two corrections, relative to the energy. Thin lines have the "
     caption += "expected slopes. The dotted line is one unit in the last place of a double."
-    figure, said = figures.constancy_figure(constancy), f"Largest changes at steps of {constancy.step:.4g}: {largest}."
-    return picture("constancy", figure, "Constancy of the modified Hamiltonian", said, caption)
+    figure, description = (
+        figures.constancy_figure(constancy),
+        f"Largest changes at steps of {constancy.step:.4g}: {largest}.",
+    )
+    return picture("constancy", figure, "Constancy of the modified Hamiltonian", description, caption)
 
 
 def lyapunov_picture(spectrum: Spectrum) -> Markup:
@@ -92,9 +95,9 @@ def convergence_picture(study: Study) -> Markup:
 def work_picture(study: Study) -> Markup:
     """Return the figure of errors against computing time."""
     figure = figures.work_precision_figure(study)
-    words = "; ".join(_fastest(study, tolerance) for tolerance in (1e-3, 1e-6, 1e-9))
+    description = "; ".join(_fastest(study, tolerance) for tolerance in (1e-3, 1e-6, 1e-9))
     caption = f"Error at {study.clock} = {study.time:.4g} against the time of the run (measured)."
-    return picture("work", figure, "Work and precision", f"Seconds needed: {words}.", caption)
+    return picture("work", figure, "Work and precision", f"Seconds needed: {description}.", caption)
 
 
 def picture(identifier: str, figure: Figure, title: str, description: str, caption: str, instead: str = "") -> Markup:

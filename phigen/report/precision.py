@@ -14,12 +14,12 @@ TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
 
 def precision_section(study: Study) -> Markup:
     """Return the section on convergence, work and precision, with the conditions of the measurement."""
-    said = (
+    conditions = (
         f"All methods solve the same problem up to {study.clock} = {study.time:.9g}, {study.steps} steps of the run, "
         "with steps up to 64 times larger and 128 times smaller. Errors are relative, against "
         f"{study.reference}, which is good to {page.scientific(study.floor)}."
     )
-    blocks = [page.paragraph(said)]
+    blocks = [page.paragraph(conditions)]
     if drawable():
         from phigen.report import pictures
 
@@ -31,13 +31,13 @@ def precision_section(study: Study) -> Markup:
 
 
 def _conditions(study: Study) -> str:
-    one = (
+    note = (
         "All methods are one C file, compiled with the same flags, with the vector field where it can be inlined"
         if study.language == "C"
         else "There was no C compiler: all methods ran in Python with NumPy, so times are mostly the interpreter's"
     )
     return (
-        f"{one}. Each time is the fastest of {study.rounds} repetitions, the methods taken in turn. Setting up the "
+        f"{note}. Each time is the fastest of {study.rounds} repetitions, the methods taken in turn. Setting up the "
         f"solver, once per trajectory, took {page.scientific(study.set_up)} s, which the others do not contain. Over a "
         "short time, explicit methods of high order often need less time for the same error of the solution; they keep "
         "Casimirs and energy no better than they solve."

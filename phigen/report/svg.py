@@ -36,10 +36,10 @@ def inlined(text: str, identifier: str, title: str, description: str) -> Markup:
     for side in ("width", "height"):
         root.set(side, f"{float(root.attrib[side].removesuffix('pt')) * PIXELS:.0f}")
     root.attrib |= {"role": "img", "aria-labelledby": f"{identifier}-title {identifier}-desc"}
-    for place, (tag, words) in enumerate((("title", title), ("desc", description))):
+    for index, (tag, content) in enumerate((("title", title), ("desc", description))):
         about = ElementTree.Element(tag, id=f"{identifier}-{tag}")
-        about.text = words
-        root.insert(place, about)
+        about.text = content
+        root.insert(index, about)
     return Markup(ElementTree.tostring(root, encoding="unicode", short_empty_elements=True))
 
 

@@ -16,13 +16,13 @@ ROWS, ENTRIES = 6, 90
 
 def system_section(system: System) -> Markup:
     """Return the section with the formulas of the spec."""
-    named = [("H", system.hamiltonian), *system.casimirs.items(), *system.invariants.items()]
+    equations = [("H", system.hamiltonian), *system.casimirs.items(), *system.invariants.items()]
     blocks = [
         page.paragraph(f"Poisson tensor: {system.shape}.", "note"),
         _tensor(system),
         page.heading("Hamiltonian, Casimirs and invariants"),
         _kinds(system),
-        group([mathml.name(n) for n, _ in named], [e for _, e in named], "H, Casimirs and invariants"),
+        group([mathml.name(n) for n, _ in equations], [e for _, e in equations], "H, Casimirs and invariants"),
         page.heading("Equations of motion"),
         page.equations([MOTION]),
         group([mathml.dotted(c) for c in system.coordinates], system.vector_field(), "The equations of motion"),
@@ -46,13 +46,17 @@ def _kinds(system: System) -> Markup:
     undeclared = [c for c in system.casimirs if c not in system.declared]
     kinds = [("Casimirs of the spec", declared), ("Casimirs that phigen found", undeclared)]
     kinds.append(("further invariants", list(system.invariants)))
-    said = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds if names) or "no Casimirs or invariants"
-    return page.paragraph(f"{said[0].upper()}{said[1:]}.", "note")
+    kinds_text = (
+        "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds if names) or "no Casimirs or invariants"
+    )
+    return page.paragraph(f"{kinds_text[0].upper()}{kinds_text[1:]}.", "note")
 
 
 def _parameters(system: System) -> Markup:
     rows = []
     for p in system.parameters:
-        about = f"{p.description} ({p.bound})".strip() if p.bound else p.description
-        rows.append((Markup(mathml.math(mathml.name(p.name))), [("number", f"{float(p.value):.9g}"), ("", about)]))
+        description = f"{p.description} ({p.bound})".strip() if p.bound else p.description
+        rows.append(
+            (Markup(mathml.math(mathml.name(p.name))), [("number", f"{float(p.value):.9g}"), ("", description)])
+        )
     return page.table("Parameters", [("", "name"), ("number", "default"), ("", "meaning")], rows)

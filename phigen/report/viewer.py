@@ -37,29 +37,29 @@ def viewer(
     if first is None:
         return Markup("")
     axes = _axes(first.coordinates)
-    chosen = opening if opening and not _joined(methods, axes) and _joined(opening, axes) else methods
-    until = _until(methods, chosen)
-    shown = {label: curve for label, curve in list(chosen.items())[:CURVES] if len(_finite(curve)) > 1}
-    if not shown:
+    trajectories = opening if opening and not _joined(methods, axes) and _joined(opening, axes) else methods
+    until = _until(methods, trajectories)
+    curves = {label: curve for label, curve in list(trajectories.items())[:CURVES] if len(_finite(curve)) > 1}
+    if not curves:
         return Markup("")
     names = [*(c[:LETTERS] for c in first.coordinates), "t"]
-    view_data = _data(shown, names, axes, _leaf(casimirs, next(iter(shown.values())), axes))
+    view_data = _data(curves, names, axes, _leaf(casimirs, next(iter(curves.values())), axes))
     options = list(enumerate(names))
     return page.block(
         "viewer",
         label=f"The trajectory of {', '.join(names)}. Arrow keys turn it, plus and minus zoom, 0 resets.",
         axes=[(axis, options) for axis in "xyz"],
-        curves=list(enumerate(shown, start=1)),
+        curves=list(enumerate(curves, start=1)),
         last=len(view_data["curves"][0][0]) - 1,
         until=until,
         data=page.data("viewer-data", view_data),
     )
 
 
-def _until(methods: Mapping[str, Trajectory], chosen: Mapping[str, Trajectory]) -> str:
+def _until(methods: Mapping[str, Trajectory], trajectories: Mapping[str, Trajectory]) -> str:
     """Return a sentence for a displayed part that ends before the run; else an empty text."""
-    end, shown = (_finite(next(iter(curves.values())))[-1, -1] for curves in (methods, chosen))
-    return f" It shows the first part of the run, up to t = {shown:.6g}." if abs(shown) < abs(end) else ""
+    end, shown_end = (_finite(next(iter(curves.values())))[-1, -1] for curves in (methods, trajectories))
+    return f" It shows the first part of the run, up to t = {shown_end:.6g}." if abs(shown_end) < abs(end) else ""
 
 
 def _joined(methods: Mapping[str, Trajectory], axes: list[int]) -> bool:
@@ -80,8 +80,8 @@ def _leaf(casimirs: Mapping[str, Expression], curve: Trajectory, axes: list[int]
 
 def _data(methods: Mapping[str, Trajectory], names: list[str], axes: list[int], leaf: Floats | None) -> dict[str, Any]:
     tables = [_finite(curve) for curve in methods.values()]
-    most = min(MOST_ROWS, max(2, MOST_NUMBERS // (len(tables) * len(names))))
-    stride = max(1, -(-max(map(len, tables)) // most))
+    max_rows = min(MOST_ROWS, max(2, MOST_NUMBERS // (len(tables) * len(names))))
+    stride = max(1, -(-max(map(len, tables)) // max_rows))
     tables = [table[::stride] for table in tables]
     low = np.min([table.min(axis=0) for table in tables], axis=0)
     high = np.max([table.max(axis=0) for table in tables], axis=0)
@@ -108,14 +108,14 @@ def _whole(points: Floats) -> list[list[int | None]]:
 
 def _finite(trajectory: Trajectory) -> Any:
     """Return the rows of coordinates and time before the first non-finite row."""
-    bad = np.flatnonzero(~np.isfinite(trajectory.x).all(axis=1))
-    end = int(bad[0]) if len(bad) else len(trajectory)
+    nonfinite_rows = np.flatnonzero(~np.isfinite(trajectory.x).all(axis=1))
+    end = int(nonfinite_rows[0]) if len(nonfinite_rows) else len(trajectory)
     return np.column_stack([trajectory.x[:end], trajectory.t[:end]])
 
 
 def _axes(coordinates: tuple[str, ...]) -> list[int]:
     """Return the initial columns: three coordinates of a group, or two coordinates and the time."""
     group = max(groups(coordinates), key=len)
-    chosen = [coordinates.index(c) for c in group][:3]
-    more = [i for i in range(len(coordinates)) if i not in chosen] if len(chosen) > 2 else []
-    return ([*chosen, *more][:3] + [len(coordinates)] * 3)[:3]
+    columns = [coordinates.index(c) for c in group][:3]
+    other_columns = [i for i in range(len(coordinates)) if i not in columns] if len(columns) > 2 else []
+    return ([*columns, *other_columns][:3] + [len(coordinates)] * 3)[:3]
