@@ -148,13 +148,13 @@ def statements(compilation):
 
 @pytest.mark.parametrize("case", CASES)
 def test_elements_leave_the_other_momentum_as_it_is_and_turn_as_h_says(case):
-    found = statements(made(case))
-    assert found
+    verdicts = statements(made(case))
+    assert verdicts
     if "split" in case:  # flows in sines, elements in those of half the angle: at points
-        assert all(s.holds for s in found)
-        assert [s.verdict for s in found].count(PROVED) >= 2
+        assert all(s.holds for s in verdicts)
+        assert [s.verdict for s in verdicts].count(PROVED) >= 2
     else:
-        assert [s.verdict for s in found] == [PROVED] * len(found)
+        assert [s.verdict for s in verdicts] == [PROVED] * len(verdicts)
 
 
 def test_what_has_too_many_terms_to_expand_is_stated_of_the_formula(monkeypatch):
@@ -169,15 +169,15 @@ def test_what_has_too_many_terms_to_expand_is_stated_of_the_formula(monkeypatch)
 
 def test_a_flow_and_its_element_take_each_function_of_an_angle_once():
     turned = made("symmetric top, split").program.attitude.turns[1]
-    taken = sorted(e.op for e in topological(turned.roots) if e.op in {"sin", "versin", "sinroot", "cosroot"})
-    assert taken == ["cosroot", "sin", "sinroot", "versin"]
+    functions = sorted(e.op for e in topological(turned.roots) if e.op in {"sin", "versin", "sinroot", "cosroot"})
+    assert functions == ["cosroot", "sin", "sinroot", "versin"]
 
 
 def altered(case, **changes):
     """The compilation with another attitude."""
-    found = made(case)
-    attitude = replace(found.program.attitude, **changes)
-    return replace(found, program=replace(found.program, attitude=attitude))
+    compilation_of_case = made(case)
+    attitude = replace(compilation_of_case.program.attitude, **changes)
+    return replace(compilation_of_case, program=replace(compilation_of_case.program, attitude=attitude))
 
 
 @pytest.mark.parametrize("case", ["body by Cayley", "body along paths", "so(4)", "so(3) by matrices"])
@@ -195,8 +195,8 @@ def test_the_wrong_sign_of_p_is_refuted(case, monkeypatch):
 
 
 def test_the_wrong_realisation_is_refuted():
-    found = made("body by Cayley")
-    exponential = replace(found, realisation=made("body").realisation)
+    compilation_of_case = made("body by Cayley")
+    exponential = replace(compilation_of_case, realisation=made("body").realisation)
     assert [s.verdict for s in statements(exponential)] == [PROVED, REFUTED, PROVED]
 
 
@@ -257,12 +257,12 @@ def test_the_closed_form_is_a_solution():
 def errors(case, order, counts, gauge=None):
     """The errors of the attitude after so many steps, against the closed form."""
     exact = elliptic_motion(TIMES, START)[1]
-    found = []
+    norms = []
     for steps in counts:
         module = solver(case, "numpy", order).backend.module
         _states, attitudes = module.reconstruct(START, TIMES[-1] / steps, steps, steps, gauge=gauge)
-        found.append(np.abs(exact[0] @ rotation(attitudes[-1]) - exact[1]).max())
-    return np.array(found)
+        norms.append(np.abs(exact[0] @ rotation(attitudes[-1]) - exact[1]).max())
+    return np.array(norms)
 
 
 COUNTS = {2: (20, 40), 4: (12, 24), 6: (8, 16), 8: (6, 12), 10: (5, 10), 12: (4, 6)}
@@ -323,18 +323,18 @@ SLOW_C = pytest.param("c", marks=pytest.mark.slow)
 def test_a_heavy_top_has_the_attitude_and_position_of_the_whole_motion(target):
     x0 = np.array([0.3, -0.2, 1.0, 0.6, 0.0, 0.8])
     exact = whole_motion(x0, top_gradient, 2.0)
-    found = solver("top", target, 8).integrate(x0, 0.02, 100)
-    assert found.attitude.shape == (101, 4)
-    assert found.position.shape == (101, 3)
-    assert np.abs(found.attitude[-1] - exact[6:10]).max() < 1e-11
-    assert np.abs(found.position[-1] - exact[10:]).max() < 1e-11
+    run = solver("top", target, 8).integrate(x0, 0.02, 100)
+    assert run.attitude.shape == (101, 4)
+    assert run.position.shape == (101, 3)
+    assert np.abs(run.attitude[-1] - exact[6:10]).max() < 1e-11
+    assert np.abs(run.position[-1] - exact[10:]).max() < 1e-11
 
 
 def test_a_split_symmetric_top_has_those_of_the_whole_motion():
     x0 = np.array([0.3, -0.2, 1.0, 0.6, 0.0, 0.8])
     exact = whole_motion(x0, lambda x: (x[:3] * [1, 1, 2 / 3], np.array([0, 0, 1])), 2.0)
-    found = solver("symmetric top, split", "numpy", 6).integrate(x0, 0.02, 100)
-    whole = np.concatenate([found.x[-1], found.attitude[-1], found.position[-1]])
+    run = solver("symmetric top, split", "numpy", 6).integrate(x0, 0.02, 100)
+    whole = np.concatenate([run.x[-1], run.attitude[-1], run.position[-1]])
     assert np.abs(whole - exact).max() < 1e-9
     motion = solver("symmetric top by matrices, split", "numpy", 6).integrate(x0, 0.02, 100).attitude[-1]
     turned = np.column_stack([rotation(exact[6:10]), exact[10:]])
@@ -343,11 +343,11 @@ def test_a_split_symmetric_top_has_those_of_the_whole_motion():
 
 def test_the_element_of_commuting_flows_keeps_the_directions_of_space():
     x0 = np.array([0.4, 0.5, 0.3, 0, 0, 1, 1, 0, 0])
-    found = solver("satellite, split").integrate(x0, 0.1, 50)
-    for vector in (found.x[:, 3:6], found.x[:, 6:]):
-        in_space = (rotation(found.attitude) @ vector[..., None])[..., 0]
+    run = solver("satellite, split").integrate(x0, 0.1, 50)
+    for vector in (run.x[:, 3:6], run.x[:, 6:]):
+        in_space = (rotation(run.attitude) @ vector[..., None])[..., 0]
         assert np.abs(in_space - in_space[0]).max() < 1e-13
-    assert np.abs(found.x[:, 3:6] - found.x[0, 3:6]).max() > 0.5
+    assert np.abs(run.x[:, 3:6] - run.x[0, 3:6]).max() > 0.5
 
 
 @pytest.mark.slow
@@ -355,9 +355,9 @@ def test_a_split_top_moves_as_by_the_series():
     x0 = np.array([0.3, -0.2, 1.0, 0.6, 0.0, 0.8])
     split = solver_of(compiled_text(TOP + "order: 8\nscheme: splitting\n"), "numpy")
     exact = solver("top", "numpy", 8).integrate(x0, 0.02, 50)
-    found = split.integrate(x0, 0.02, 50)
-    assert np.abs(found.attitude - exact.attitude).max() < 1e-9
-    assert np.abs(found.position - exact.position).max() < 1e-9
+    run = split.integrate(x0, 0.02, 50)
+    assert np.abs(run.attitude - exact.attitude).max() < 1e-9
+    assert np.abs(run.position - exact.position).max() < 1e-9
 
 
 def conserved(case, x, g):
@@ -375,10 +375,10 @@ def conserved(case, x, g):
 @pytest.mark.parametrize("case", ["so(4)", "so(4), momenta in space, by Cayley", "so(4), split", "so(3) by matrices"])
 def test_matrices_keep_the_other_momentum_and_stay_orthogonal(case, target):
     x0 = np.random.default_rng(4).normal(size=made(case).system.dimension)
-    found = solver(case, target).integrate(x0, 0.05, 200, 50)
-    kept = conserved(case, found.x, found.attitude)
-    assert np.abs(kept - kept[0]).max() < 1e-14 * 5
-    assert np.abs(found.attitude @ np.swapaxes(found.attitude, 1, 2) - np.eye(len(found.attitude[0]))).max() < 1e-15 * 5
+    run = solver(case, target).integrate(x0, 0.05, 200, 50)
+    momenta = conserved(case, run.x, run.attitude)
+    assert np.abs(momenta - momenta[0]).max() < 1e-14 * 5
+    assert np.abs(run.attitude @ np.swapaxes(run.attitude, 1, 2) - np.eye(len(run.attitude[0]))).max() < 1e-15 * 5
 
 
 @pytest.mark.parametrize("case", ["so(4)", "sl(2)", "heisenberg(1)", "so(3) by matrices"])
@@ -389,9 +389,9 @@ def test_matrices_are_exponentials_of_covectors_of_any_size(case, size):
     basis = np.array([[[float(e.value) for e in row] for row in m] for m in group.matrices])
     generators = np.einsum("ri,iab->rab", p, basis)
     squares = (generators**2).sum(axis=(1, 2))[:, np.newaxis]
-    found = solver(case).backend.module._of_covector(np.concatenate([p, squares], axis=1))
+    integrator = solver(case).backend.module._of_covector(np.concatenate([p, squares], axis=1))
     exact = [np.array(mpmath.expm(mpmath.matrix(m.tolist())).tolist(), float) - np.eye(len(m)) for m in generators]
-    assert np.abs(found.reshape(generators.shape) - exact).max() < 1e-15 * (1 + size * np.abs(exact).max())
+    assert np.abs(integrator.reshape(generators.shape) - exact).max() < 1e-15 * (1 + size * np.abs(exact).max())
 
 
 @pytest.mark.parametrize("case", ["so(4)", "so(3) by matrices"])
@@ -415,8 +415,8 @@ def test_so4_has_the_attitude_of_the_whole_motion():
 
     first = [*x0, *np.eye(4).ravel()]
     exact = solve_ivp(slope, (0, 2.0), first, method="DOP853", rtol=1e-13, atol=1e-14).y[6:, -1]
-    found = solver(case, "numpy", 8).integrate(x0, 0.02, 100)
-    assert np.abs(found.attitude[-1].ravel() - exact).max() < 1e-11
+    run = solver(case, "numpy", 8).integrate(x0, 0.02, 100)
+    assert np.abs(run.attitude[-1].ravel() - exact).max() < 1e-11
 
 
 def test_what_casimirs_turn_keeps_a_matrix_orthogonal_for_a_long_time():
@@ -431,17 +431,17 @@ def test_what_casimirs_turn_keeps_a_matrix_orthogonal_for_a_long_time():
     assert excess(solver("so(4)", "c").integrate(x0[0], 0.1, 50_000, 10_000).attitude) < 5e-15
 
 
-def momenta_in_space(found):
-    return np.einsum("rij,rj->ri", rotation(found.attitude), found.x)
+def momenta_in_space(run):
+    return np.einsum("rij,rj->ri", rotation(run.attitude), run.x)
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("case", ["body", "body, split"])
 def test_spatial_momentum_is_constant_to_round_off_for_many_steps(case):
     start = np.array([0.3, 1.0, 0.2])
-    found = solver(case, "c", 6).integrate(start, 0.1, 100_000, 20_000)
-    assert np.abs(momenta_in_space(found) - start).max() < 3e-14
-    assert np.abs((found.attitude**2).sum(axis=1) - 1).max() < 1e-15
+    run = solver(case, "c", 6).integrate(start, 0.1, 100_000, 20_000)
+    assert np.abs(momenta_in_space(run) - start).max() < 3e-14
+    assert np.abs((run.attitude**2).sum(axis=1) - 1).max() < 1e-15
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
@@ -449,9 +449,9 @@ def test_spatial_momentum_is_constant_to_round_off_for_many_steps(case):
 def test_flows_may_turn_by_any_angle(target, h):
     """12π: the first flow turns by π, where neither a tangent of the half nor a division by 1 + cos will do."""
     start = np.array([0.3, 0.2, 1.0])
-    found = solver("body, split", target, 2).integrate(start, h, 20)
-    assert np.abs(momenta_in_space(found) - start).max() < 3e-14
-    assert np.abs((found.attitude**2).sum(axis=1) - 1).max() < 2e-15
+    run = solver("body, split", target, 2).integrate(start, h, 20)
+    assert np.abs(momenta_in_space(run) - start).max() < 3e-14
+    assert np.abs((run.attitude**2).sum(axis=1) - 1).max() < 2e-15
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
@@ -478,8 +478,8 @@ def test_targets_agree_to_round_off_for_strides_and_starts_and_backward(case):
     c, numpy = (solver(case, target).integrate(x0, -0.03, 40, 7, **first) for target in ("c", "numpy"))
     assert np.abs(c.attitude - numpy.attitude).max() < 2e-14
     if expected.attitude == (4,):
-        given = first["attitude0"] / np.linalg.norm(first["attitude0"])
-        assert np.abs(c.attitude[0] - given).max() < 1e-15
+        unit_attitude = first["attitude0"] / np.linalg.norm(first["attitude0"])
+        assert np.abs(c.attitude[0] - unit_attitude).max() < 1e-15
     else:
         assert np.array_equal(c.attitude[0], first["attitude0"])
     if expected.position:
@@ -532,18 +532,18 @@ def test_members_of_ensembles_have_attitudes_and_positions(target):
     """Each begins with its own and has the bits of a run of it alone, in rows and without, in any number of threads."""
     top, rng = small_top() if target == "small" else solver("top", target), np.random.default_rng(2)
     x0, attitude0, position0 = rng.normal(size=(40, 6)), rng.normal(size=(40, 4)), rng.normal(size=(40, 3))
-    found = top.attitudes(x0, 0.05, 10, 4, attitude0=attitude0, position0=position0)
+    frames = top.attitudes(x0, 0.05, 10, 4, attitude0=attitude0, position0=position0)
     again = top.attitudes(x0, 0.05, steps := 10 if target == "numpy" else 2000, steps // 2, threads=2)
-    assert (found.x.shape, found.attitude.shape, found.position.shape) == ((4, 40, 6), (4, 40, 4), (4, 40, 3))
+    assert (frames.x.shape, frames.attitude.shape, frames.position.shape) == ((4, 40, 6), (4, 40, 4), (4, 40, 3))
     ends = top.attitudes(x0, 0.05, 10, attitude0=attitude0, position0=position0[0])
     for m in (0, 1, 39):
         alone = top.integrate(x0[m], 0.05, 10, 4, attitude0=attitude0[m], position0=position0[m])
-        assert np.array_equal(found.x[:, m], alone.x)
-        assert np.array_equal(found.attitude[:, m], alone.attitude)
-        assert np.array_equal(found.position[:, m], alone.position)
+        assert np.array_equal(frames.x[:, m], alone.x)
+        assert np.array_equal(frames.attitude[:, m], alone.attitude)
+        assert np.array_equal(frames.position[:, m], alone.position)
         assert np.array_equal(again.attitude[:, m], top.integrate(x0[m], 0.05, steps, steps // 2).attitude)
         assert np.abs(ends.attitude[m] - alone.attitude[-1]).max() < 5e-15
-    assert np.abs(ends.position[0] - found.position[-1, 0]).max() < 5e-15
+    assert np.abs(ends.position[0] - frames.position[-1, 0]).max() < 5e-15
     still = top.attitudes(x0, 0.05, 0)
     assert np.array_equal(still.attitude, [[1, 0, 0, 0]] * 40)
     assert np.array_equal(still.position, np.zeros((40, 3)))
@@ -609,15 +609,15 @@ def test_what_has_no_attitude_is_refused_at_the_key(text, message):
 
 
 def test_files_have_the_attitude_and_position(tmp_path):
-    found = solver("top").integrate(np.linspace(0.5, 1.0, 6), 0.05, 7, 3)
+    run = solver("top").integrate(np.linspace(0.5, 1.0, 6), 0.05, 7, 3)
     for name in ("a.csv", "a.npz"):
-        found.save(tmp_path / name)
+        run.save(tmp_path / name)
     head, *lines = (tmp_path / "a.csv").read_text().splitlines()
     assert head.endswith("attitude_w,attitude_x,attitude_y,attitude_z,position_x,position_y,position_z")
-    assert np.array([line.split(",")[-7:] for line in lines], dtype=float)[:, :4].tolist() == found.attitude.tolist()
+    assert np.array([line.split(",")[-7:] for line in lines], dtype=float)[:, :4].tolist() == run.attitude.tolist()
     with np.load(tmp_path / "a.npz") as stored:
-        assert np.array_equal(stored["attitude"], found.attitude)
-        assert np.array_equal(stored["position"], found.position)
+        assert np.array_equal(stored["attitude"], run.attitude)
+        assert np.array_equal(stored["position"], run.position)
 
 
 @pytest.mark.parametrize("section", [False, True])
@@ -626,9 +626,9 @@ def test_long_runs_give_the_attitude_of_each_row(section):
     start = np.array([0.3, 1.0, 0.2])
     finder = CrossingFinder(lambda x: x[:, 0], 0.1) if section else None
     pieces = list(march(backend.start(start, parameters), 0.1, 25, 4, finder))
-    found = solver("body").integrate(start, 0.1, 25, 4)
+    run = solver("body").integrate(start, 0.1, 25, 4)
     assert np.array_equal(np.concatenate([p.numbers for p in pieces]), np.array([0, 4, 8, 12, 16, 20, 24, 25]))
-    assert np.array_equal(np.concatenate([p.turned for p in pieces]), found.attitude)
+    assert np.array_equal(np.concatenate([p.turned for p in pieces]), run.attitude)
 
 
 JAVASCRIPT = """(() => {
@@ -648,11 +648,11 @@ def test_javascript_has_the_attitude_of_numpy_after_kicks_too(case):
     first = {"attitude0": np.random.default_rng(3).normal(size=expected.attitude)}
     if expected.position:
         first["position0"] = np.array([0.1, 0.2, 0.3])
-    options = ", ".join(f"{name}: {given.ravel().tolist()}" for name, given in first.items())
-    *found, turned, moved = javascript(made(case), f"x0: {x0.tolist()}, {options}", "s", JAVASCRIPT)
+    options = ", ".join(f"{name}: {initial_array.ravel().tolist()}" for name, initial_array in first.items())
+    *results, turned, moved = javascript(made(case), f"x0: {x0.tolist()}, {options}", "s", JAVASCRIPT)
     session = solver(case).session(x0, **first).step(-0.03, 30)
-    assert found[0] == pytest.approx(session.attitude.ravel(), abs=3e-15)
-    assert not expected.position or found[1] == pytest.approx(session.position, abs=3e-15)
+    assert results[0] == pytest.approx(session.attitude.ravel(), abs=3e-15)
+    assert not expected.position or results[1] == pytest.approx(session.position, abs=3e-15)
     session.kick(0.1 * session.x).step(0.05)
     session.set_parameters({name: 1.1 * value for name, value in session.parameters.items()}).step(0.05)
     assert turned == pytest.approx(session.attitude.ravel(), abs=3e-15)

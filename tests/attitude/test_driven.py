@@ -61,11 +61,11 @@ def slope(case, t, x):
 @cache
 def reference(case, end):
     """The motion of x and of the quaternion by DOP853, in pieces where the noise is constant."""
-    found, state = solver(made(case), "numpy"), np.array([*START, 1.0, 0, 0, 0])
+    integrator, state = solver(made(case), "numpy"), np.array([*START, 1.0, 0, 0, 0])
 
     def moving(t, y, push):
         x, q, rate, when = y[:3], y[3:], slope(case, t, y[:3]), [t] * ("time" in case)
-        field = found.vector_field(x, *when)
+        field = integrator.vector_field(x, *when)
         if "shaken" in case:
             extra = push[0] * 0.3 * np.array([1, 0, 0]) + push[1] * 0.2 * np.array([0, 2 * x[1], 0])
             rate, field = rate + extra, field + np.cross(x, extra)
@@ -75,8 +75,8 @@ def reference(case, end):
     pieces = DRAWN if "shaken" in case else [None]
     for push in pieces:
         h = end / len(pieces)
-        given = None if push is None else push / h
-        state = solve_ivp(moving, (0, h), state, args=(given,), method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+        increment = None if push is None else push / h
+        state = solve_ivp(moving, (0, h), state, args=(increment,), method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
     return state
 
 
@@ -88,8 +88,8 @@ def along(n, parts):
 def final(case, n, order=2, target="numpy"):
     """The last state and attitude of n steps, and the time."""
     about = {"increments": along(n, len(CASES[case].split("scheme")))} if "shaken" in case else {}
-    found = solver(made(case, order), target).integrate(START, SPAN / n, n, n, **about)
-    return np.array([*found.x[-1], *found.attitude[-1]]), found.t[-1]
+    run = solver(made(case, order), target).integrate(START, SPAN / n, n, n, **about)
+    return np.array([*run.x[-1], *run.attitude[-1]]), run.t[-1]
 
 
 @pytest.mark.thin(2)
@@ -109,17 +109,17 @@ def test_c_and_javascript_agree_with_numpy(case):
     expected = final(case, 16)[0]
     assert final(case, 16, 2, "c")[0] == pytest.approx(expected, abs=1e-13)
     if "shaken" not in case:  # of these the increments are given
-        found = javascript(made(case), f"x0: {START}", f"s.integrate({SPAN / 16}, 16)", "[...s.x, ...s.attitude]")
-        assert found == pytest.approx(expected, abs=1e-13)
+        run = javascript(made(case), f"x0: {START}", f"s.integrate({SPAN / 16}, 16)", "[...s.x, ...s.attitude]")
+        assert run == pytest.approx(expected, abs=1e-13)
 
 
 def test_the_attitude_is_that_of_the_state_where_an_increment_is_refused():
     backend, h = solver(made("shaken"), "c").backend, 0.1
-    given = np.array([[0.1, -0.2], [0.3, np.nan]])
+    increments = np.array([[0.1, -0.2], [0.3, np.nan]])
     stopped, whole = backend.start(np.array(START), {}), backend.start(np.array(START), {})
-    whole.advance_along(h, given[:1])
+    whole.advance_along(h, increments[:1])
     with pytest.raises(BackendError, match="BAD_ARGUMENT"):
-        stopped.advance_along(h, given)
+        stopped.advance_along(h, increments)
     assert (stopped.steps, [*stopped.state(), *stopped.element()]) == (1, [*whole.state(), *whole.element()])
 
 
@@ -127,17 +127,17 @@ def test_the_attitude_is_that_of_the_state_where_an_increment_is_refused():
 @pytest.mark.parametrize("case", CASES)
 def test_members_have_the_bits_of_runs_alone(case, target):
     """With a step, a time, a path of the noise and an attitude of each; to the frames, and after the last of them."""
-    found, count = solver(made(case), target), 3
+    integrator, count = solver(made(case), target), 3
     rng = np.random.default_rng(1)
     x0, q0, h = rng.normal(size=(count, 3)), rng.normal(size=(count, 4)), np.array([0.1, 0.07, 0.11])
-    timed = {"t0": np.array([0.0, 0.4, 2.0])} if found.interface.time else {}
-    drawn = {"seed": 5, "member": 3} if found.interface.noise else {}
-    members = found.attitudes(x0, h, 10, 4, attitude0=q0, **timed, **drawn)
-    ends = found.attitudes(x0, h, 10, attitude0=q0, **timed, **drawn)
+    timed = {"t0": np.array([0.0, 0.4, 2.0])} if integrator.interface.time else {}
+    drawn = {"seed": 5, "member": 3} if integrator.interface.noise else {}
+    members = integrator.attitudes(x0, h, 10, 4, attitude0=q0, **timed, **drawn)
+    ends = integrator.attitudes(x0, h, 10, attitude0=q0, **timed, **drawn)
     for m in range(count):
-        own = {name: values[m] for name, values in timed.items()}
-        own |= {"seed": 5, "member": 3 + m} if drawn else {}
-        alone = found.integrate(x0[m], h[m], 10, 4, attitude0=q0[m], **own)
+        member_values = {name: values[m] for name, values in timed.items()}
+        member_values |= {"seed": 5, "member": 3 + m} if drawn else {}
+        alone = integrator.integrate(x0[m], h[m], 10, 4, attitude0=q0[m], **member_values)
         assert np.array_equal(members.x[:, m], alone.x)
         assert np.array_equal(members.attitude[:, m], alone.attitude)
         assert ends.attitude[m] == pytest.approx(alone.attitude[-1], abs=1e-15)
@@ -146,9 +146,9 @@ def test_members_have_the_bits_of_runs_alone(case, target):
 @pytest.mark.parametrize("case", ["monitored", "monitored by log", "shaken", "split and shaken"])
 def test_the_momentum_in_space_is_constant(case):
     """Monitor and noise are Hamiltonian, so their elements belong to the momentum."""
-    found = solver(made(case), "c").integrate(START, 0.1, 2000, 50)
-    w, u = found.attitude[:, :1], found.attitude[:, 1:]
-    in_space = found.x + 2 * (w * np.cross(u, found.x) + np.cross(u, np.cross(u, found.x)))
+    run = solver(made(case), "c").integrate(START, 0.1, 2000, 50)
+    w, u = run.attitude[:, :1], run.attitude[:, 1:]
+    in_space = run.x + 2 * (w * np.cross(u, run.x) + np.cross(u, np.cross(u, run.x)))
     assert np.abs(in_space - START).max() < 1e-13
 
 
@@ -157,5 +157,7 @@ def test_what_is_stated_is_proved_and_no_more(case):
     stated = list(proofs.check(made(case)))
     assert stated
     assert all(s.holds if "split" in CASES[case] else s.verdict == PROVED for s in stated)
-    kept = any("Ad*" in s.name for s in stated)
-    assert "split" in CASES[case] or kept == (not any(word in CASES[case] for word in ("covector", "damping")))
+    states_momentum = any("Ad*" in s.name for s in stated)
+    assert "split" in CASES[case] or states_momentum == (
+        not any(word in CASES[case] for word in ("covector", "damping"))
+    )
