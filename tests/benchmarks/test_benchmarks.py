@@ -57,9 +57,9 @@ def test_all_peers_solve_the_same_system(problem):
     assert uncertainty < 1e-11
     for method in (*c_peers(problem), lanes_method(problem, 16)):
         setting, chunk = (h, 50) if method.step_based else (1e-8, 50 * h)
-        done = method.run(problem.start, setting, chunk, 2, math.inf)
-        assert done.status == "ok"
-        assert np.abs(done.states - exact).max() < (1e-2 if method.order == 2 else 1e-5), method.name
+        measured = method.run(problem.start, setting, chunk, 2, math.inf)
+        assert measured.status == "ok"
+        assert np.abs(measured.states - exact).max() < (1e-2 if method.order == 2 else 1e-5), method.name
 
 
 def test_a_tiny_case_runs_through_to_its_table():
@@ -112,9 +112,9 @@ def test_gauss_in_lanes_has_its_order(order, h):
 
 def test_gauss_in_lanes_keeps_quadratic_invariants_without_a_drift():
     """With a_ij rounded, in place of mu_ij + mu_ji = 1, the energy drifts in proportion to the time."""
-    done = lanes_method(BODY, 16).run(BODY.start, 0.5, 2000, 100, math.inf)
-    errors = Judge(BODY).errors(done.states)
-    assert done.status == "ok"
+    measured = lanes_method(BODY, 16).run(BODY.start, 0.5, 2000, 100, math.inf)
+    errors = Judge(BODY).errors(measured.states)
+    assert measured.status == "ok"
     assert max(errors["energy"], errors["casimir"]) < 3e-14
 
 
@@ -124,8 +124,8 @@ def test_sine_in_lanes_is_right_to_rounding():
     spinning = (0.3, 40.0, 0.0)
     fast = replace(PENDULUM, start=spinning, typical=0.002)
     exact, _ = reference(fast, 4.0, 2)
-    done = lanes_method(fast, 16).run(spinning, 0.01, 200, 2, math.inf)
-    assert np.abs(done.states - exact).max() < 1e-11
+    measured = lanes_method(fast, 16).run(spinning, 0.01, 200, 2, math.inf)
+    assert np.abs(measured.states - exact).max() < 1e-11
 
 
 def test_coefficients_of_gauss_are_symplectic():
