@@ -363,9 +363,9 @@ def test_parameters_of_a_running_solver_can_be_changed(tmp_path):
     for language in CHANGES:
         first, *numbers, steps, last = run([tmp_path / f"by_{language}"], tmp_path).split()
         assert (first, steps, last) == ("refused", "6", "refused"), language
-        found = np.array([float(number) for number in numbers])
-        assert np.abs(found - [*half, *x[-1], *x[-1], energy]).max() < 1e-6, language
-        assert np.abs(found[2:] - [*x[-1], *x[-1], energy]).max() < 3e-12, language
+        printed_numbers = np.array([float(number) for number in numbers])
+        assert np.abs(printed_numbers - [*half, *x[-1], *x[-1], energy]).max() < 1e-6, language
+        assert np.abs(printed_numbers[2:] - [*x[-1], *x[-1], energy]).max() < 3e-12, language
 
 
 def test_hand_edits_stay_and_lattices_are_refused(tumbler):
