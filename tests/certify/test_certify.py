@@ -283,9 +283,11 @@ def test_the_checker_needs_nothing_of_phigen(tmp_path: Path) -> None:
     (tmp_path / "pendulum.c").write_text(files["pendulum.c"])
     code = "import sys, runpy; sys.modules['phigen'] = None; sys.argv = ['checker.py', 'c.json', 'pendulum.c']\n"
     code += "runpy.run_path('checker.py', run_name='__main__')"
-    done = subprocess.run([sys.executable, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "pendulum: 1 boxes; a step is within" in done.stdout
+    process = subprocess.run(
+        [sys.executable, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (process.returncode, process.stderr) == (0, "")
+    assert "pendulum: 1 boxes; a step is within" in process.stdout
 
 
 def test_a_jacobian_that_is_not_the_derivative_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

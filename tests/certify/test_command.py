@@ -24,9 +24,9 @@ def test_the_page_can_be_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_json_has_bounds_in_the_order_of_the_coordinates(tmp_path: Path) -> None:
-    done = phigen("pendulum", "--json", "-q", "-o", tmp_path, "--samples", 2, "--set", "g=2", "--step", 0.05)
-    assert done.exit_code == 0
-    summary = json.loads(done.stdout)
+    result = phigen("pendulum", "--json", "-q", "-o", tmp_path, "--samples", 2, "--set", "g=2", "--step", 0.05)
+    assert result.exit_code == 0
+    summary = json.loads(result.stdout)
     assert (summary["coordinates"], summary["step"], summary["samples"]) == (["q", "p"], 0.05, 2)
     assert all(0 < far <= bound for far, bound in zip(summary["observed"], summary["bound"], strict=True))
     stored = json.loads((tmp_path / "pendulum" / "pendulum.bounds.json").read_text())
@@ -39,8 +39,8 @@ def test_json_has_bounds_in_the_order_of_the_coordinates(tmp_path: Path) -> None
 def test_the_box_of_a_run_is_that_of_the_certificate_and_options_override_it(tmp_path: Path) -> None:
     text = SPEC.replace("BOX", "{q: [-1, 0.5], p: [-0.5, 1]}")
     (tmp_path / "s.yaml").write_text(text)
-    done = phigen(tmp_path / "s.yaml", "--json", "-q", "-o", tmp_path / "out", "--samples", 0, "--box", "p=0:1")
-    assert json.loads(done.stdout)["domain"] == [[-1.0, 0.5], [0.0, 1.0]]
+    result = phigen(tmp_path / "s.yaml", "--json", "-q", "-o", tmp_path / "out", "--samples", 0, "--box", "p=0:1")
+    assert json.loads(result.stdout)["domain"] == [[-1.0, 0.5], [0.0, 1.0]]
 
 
 @pytest.mark.parametrize(
@@ -54,8 +54,8 @@ def test_the_box_of_a_run_is_that_of_the_certificate_and_options_override_it(tmp
 )
 def test_mistakes_in_a_box_are_reported_at_their_place(tmp_path: Path, box: str, message: str) -> None:
     (tmp_path / "s.yaml").write_text(SPEC.replace("BOX", box))
-    done = phigen(tmp_path / "s.yaml", "-o", tmp_path / "out")
-    assert (done.exit_code, message in done.stderr) == (1, True), done.stderr
+    result = phigen(tmp_path / "s.yaml", "-o", tmp_path / "out")
+    assert (result.exit_code, message in result.stderr) == (1, True), result.stderr
 
 
 SPEC = """phigen: 1
@@ -79,7 +79,7 @@ runs: {a: {initial: [0.1, 0.2], step: 0.1, steps: 10, box: BOX}}
     ],
 )
 def test_refusals(tmp_path: Path, arguments: list[str], code: int, words: str) -> None:
-    done = phigen(*arguments, "-o", tmp_path)
-    assert done.exit_code == code
-    assert words in done.stderr
+    result = phigen(*arguments, "-o", tmp_path)
+    assert result.exit_code == code
+    assert words in result.stderr
     assert list(tmp_path.iterdir()) == []
