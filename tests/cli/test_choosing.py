@@ -27,12 +27,12 @@ def rows(heading):
 
 def energy_error(name, kind, order, step, gauge="auto"):
     """The largest relative error of the energy of the first run up to t = 10,000."""
-    made = built(name, Setting(kind, int(order), gauge, "auto" if kind == SPLITTING else "none"))
+    candidate = built(name, Setting(kind, int(order), gauge, "auto" if kind == SPLITTING else "none"))
     spec, system, _ = described(name)
     run = next(iter(spec.runs.values()))
     values = spec.parameters_of(run)
     problem = SystemProblem(np.array([float(v) for v in run.initial]), values, float(step), 1e4, system=system)
-    return energy_measure(problem)(Candidate(made.solver(), problem), float(step), 1e4).measured
+    return energy_measure(problem)(Candidate(candidate.solver(), problem), float(step), 1e4).measured
 
 
 @cache
@@ -75,9 +75,11 @@ def test_commands_work(phigen, in_tmp):
     assert len(commands) == 2
     phigen("new", "tumbler")
     for command in commands:
-        done, budget = None, 1
-        while not (done and "To paste into the spec" in done.stdout) and budget < 100:  # a busy machine measures less
-            done = phigen(*shlex.split(command), "--budget", str(budget))
+        measured, budget = None, 1
+        while (
+            not (measured and "To paste into the spec" in measured.stdout) and budget < 100
+        ):  # a busy machine measures less
+            measured = phigen(*shlex.split(command), "--budget", str(budget))
             budget *= 5
-        assert done.exit_code == 0, done.stderr
-        assert "To paste into the spec" in done.stdout
+        assert measured.exit_code == 0, measured.stderr
+        assert "To paste into the spec" in measured.stdout

@@ -23,56 +23,56 @@ SPECS = resources.bundled_specs()
 
 
 def test_check_groups_statements_and_never_says_just_ok(phigen):
-    done = phigen("check", SPECS / "rigid_body.yaml")
-    assert done.exit_code == 0
+    result = phigen("check", SPECS / "rigid_body.yaml")
+    assert result.exit_code == 0
     for group in ("Poisson tensor", "Casimirs", "Bi-realisation (exponential)", "Hamilton–Jacobi series"):
-        assert group in done.stdout
-    assert "proved               {α_i, α_j} = π_ij∘α" in done.stdout
-    assert "S_2, S_4, S_6 = 0" in done.stdout
-    assert "3 generic points" in done.stdout
+        assert group in result.stdout
+    assert "proved               {α_i, α_j} = π_ij∘α" in result.stdout
+    assert "S_2, S_4, S_6 = 0" in result.stdout
+    assert "3 generic points" in result.stdout
 
 
 def test_check_says_that_nothing_was_proved_of_what_is_too_large(phigen, monkeypatch):
     monkeypatch.setattr(discretisation, "MOST_OPERATIONS", 50)
-    done = phigen("check", SPECS / "rigid_body.yaml")
-    assert done.exit_code == 3
-    assert "rigid_body.yaml: nothing was proved\n" in done.stderr
-    assert "error: the matrices of a step would take more than 50 operations" in done.stderr
-    assert "hint: ask for a lower order" in done.stderr
+    result = phigen("check", SPECS / "rigid_body.yaml")
+    assert result.exit_code == 3
+    assert "rigid_body.yaml: nothing was proved\n" in result.stderr
+    assert "error: the matrices of a step would take more than 50 operations" in result.stderr
+    assert "hint: ask for a lower order" in result.stderr
 
 
 def test_check_refutes_with_residual_and_goes_on(phigen, write):
     write("good.yaml")
-    done = phigen("check", write("bad.yaml", NOT_POISSON), "good.yaml")
-    assert done.exit_code == 5
-    assert "refuted              Jacobi identity" in done.stdout
-    assert "residual: -x*y" in done.stdout
-    assert "S_2 = 0" in done.stdout  # of the good one
+    result = phigen("check", write("bad.yaml", NOT_POISSON), "good.yaml")
+    assert result.exit_code == 5
+    assert "refuted              Jacobi identity" in result.stdout
+    assert "residual: -x*y" in result.stdout
+    assert "S_2 = 0" in result.stdout  # of the good one
 
 
 def test_one_wrong_bracket_is_one_error_and_not_those_that_follow_from_it(phigen, write):
     path = write("bad.yaml", f"{NOT_POISSON}casimirs: {{C: x + y**2}}\ninvariants: {{F: x*y}}\n")
-    for done in (phigen("build", path), phigen("check", path)):
-        assert done.exit_code == 5
-        assert done.stderr.count("refuted: ") + done.stderr.count(": refuted (") == 1, done.stderr
-    assert "depend on it: Casimirs, invariants, the method" in done.stdout
+    for result in (phigen("build", path), phigen("check", path)):
+        assert result.exit_code == 5
+        assert result.stderr.count("refuted: ") + result.stderr.count(": refuted (") == 1, result.stderr
+    assert "depend on it: Casimirs, invariants, the method" in result.stdout
     assert "Casimirs, invariants" in phigen("build", path).stderr
 
 
 def test_a_casimir_for_another_order_of_the_basis_is_told_of_it(phigen, write):
     algebra = "coordinates: [p1, p2, p3, m1, m2, m3]\npoisson: {lie_algebra: {name: se(3)}}\nhamiltonian: m1**2\n"
-    done = phigen("check", write("a.yaml", f"phigen: 1\nname: a\n{algebra}casimirs: {{C: p1**2 + p2**2 + p3**2}}\n"))
-    assert done.exit_code == 5
-    assert "hint: coordinates stand for the basis of se(3) in its order" in done.stderr
+    result = phigen("check", write("a.yaml", f"phigen: 1\nname: a\n{algebra}casimirs: {{C: p1**2 + p2**2 + p3**2}}\n"))
+    assert result.exit_code == 5
+    assert "hint: coordinates stand for the basis of se(3) in its order" in result.stderr
 
 
 def test_wrong_birealisation_is_one_error_in_the_names_of_the_spec(phigen, write):
     head = "phigen: 1\nname: a\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
     maps = "alpha: [x - x*y*p_y/2, y + x*y*p_x/2], beta: [x + x*y*p_y/2, y - x*y*p_x/2]"
-    done = phigen("build", write("a.yaml", f"{head}birealisation: {{kind: custom, {maps}}}\ninvariants: {{F: x}}\n"))
-    assert done.stderr.count(": refuted (") == 2  # the other is that x is invariant
-    assert "p:" not in done.stderr
-    assert "p_x=" in done.stderr
+    result = phigen("build", write("a.yaml", f"{head}birealisation: {{kind: custom, {maps}}}\ninvariants: {{F: x}}\n"))
+    assert result.stderr.count(": refuted (") == 2  # the other is that x is invariant
+    assert "p:" not in result.stderr
+    assert "p_x=" in result.stderr
 
 
 def test_check_shows_the_geometry_where_no_birealisation_applies(phigen, write):
@@ -80,18 +80,18 @@ def test_check_shows_the_geometry_where_no_birealisation_applies(phigen, write):
     poisson = "poisson: {matrix: [[0, 1 + x**2], [-1 - x**2, 0]]}"
     head = f"phigen: 1\nname: a\ncoordinates: [x, y]\n{poisson}\nhamiltonian: x*y\n"
     path.write_text(head + "birealisation: log-canonical\n")
-    done = phigen("check", path)
-    assert done.exit_code == 1
-    assert "proved               Jacobi identity" in done.stdout
-    assert "a.yaml:6:" in done.stderr
+    result = phigen("check", path)
+    assert result.exit_code == 1
+    assert "proved               Jacobi identity" in result.stdout
+    assert "a.yaml:6:" in result.stderr
 
 
 def test_check_json_holds_every_statement(phigen, write):
-    (found,) = json.loads(phigen("check", "--json", write("bad.yaml", NOT_POISSON)).stdout)
-    verdicts = {s["name"]: s["verdict"] for s in found["statements"]}
+    (record,) = json.loads(phigen("check", "--json", write("bad.yaml", NOT_POISSON)).stdout)
+    verdicts = {s["name"]: s["verdict"] for s in record["statements"]}
     assert verdicts["π is skew"] == "proved"
     assert verdicts["Jacobi identity"] == "refuted"
-    assert found["refuted"] >= 1
+    assert record["refuted"] >= 1
 
 
 def test_check_refutes_the_wrong_sign_of_the_paper(phigen, in_tmp):
@@ -100,17 +100,17 @@ def test_check_refutes_the_wrong_sign_of_the_paper(phigen, in_tmp):
         "birealisation:\n  kind: custom\n"
         "  alpha: [x*exp(y*p_y/2), y*exp(-x*p_x/2)]\n  beta: [x*exp(-y*p_y/2), y*exp(x*p_x/2)]\n"
     )
-    done = phigen("check", "lv.yaml")
-    assert done.exit_code == 5
-    assert "refuted              {α_i, α_j} = π_ij∘α" in done.stdout
+    result = phigen("check", "lv.yaml")
+    assert result.exit_code == 5
+    assert "refuted              {α_i, α_j} = π_ij∘α" in result.stdout
 
 
 # -- show
 
 
 def test_show_prints_the_series_of_mathematics(phigen, in_tmp):
-    done = phigen("show", SPECS / "harmonic_oscillator.yaml", "--json")
-    series = json.loads(done.stdout)["series"]
+    result = phigen("show", SPECS / "harmonic_oscillator.yaml", "--json")
+    series = json.loads(result.stdout)["series"]
     assert list(series) == ["S_1", "S_3"]
 
 
@@ -152,9 +152,9 @@ def test_series_of_a_path_is_proved_beyond_the_formal_degree(phigen, write):
     path = write("a.yaml")
     text = path.read_text().replace("order: 2", "order: 6\nbirealisation: karasev")
     path.write_text(text.replace("canonical: {q: [q], p: [p]}", "brackets: {q: {p: 1 + q**2}}").split("runs:")[0])
-    done = phigen("check", path)
-    assert done.exit_code == 0
-    assert "S_2, S_4, S_6 = 0" in done.stdout
+    result = phigen("check", path)
+    assert result.exit_code == 0
+    assert "S_2, S_4, S_6 = 0" in result.stdout
 
 
 def test_show_abbreviates_unless_full(phigen):
@@ -191,9 +191,9 @@ def test_latex_defines_what_it_uses(phigen):
 def test_modified_hamiltonian_in_latex_is_refused_where_it_is_not_computed(phigen):
     options = ("--scheme", "splitting", "--latex")
     assert "H_{2} &= " in phigen("show", SPECS / "henon_heiles.yaml", *options).stdout
-    done = phigen("show", SPECS / "henon_heiles.yaml", *options, "--modified", "1")
-    assert (done.exit_code, done.stdout) == (1, "")
-    assert "not computed for a step by splitting" in done.stderr
+    result = phigen("show", SPECS / "henon_heiles.yaml", *options, "--modified", "1")
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert "not computed for a step by splitting" in result.stderr
 
 
 def test_show_names_each_correction_once(phigen):
@@ -224,37 +224,37 @@ def test_show_says_that_the_maps_of_a_path_are_series(phigen):
 
 
 def summary(phigen, *args):
-    done = phigen("run", *args, "--json")
-    assert done.exit_code == 0, done.stderr
+    result = phigen("run", *args, "--json")
+    assert result.exit_code == 0, result.stderr
 
     def no_json(word):
         raise AssertionError(f"{word} is not JSON")
 
-    return json.loads(done.stdout, parse_constant=no_json)
+    return json.loads(result.stdout, parse_constant=no_json)
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_run_stores_what_it_integrates(phigen, write, target):
     path = write("a.yaml")
-    told = summary(phigen, path, "-t", target, "-o", "x.csv")
+    document = summary(phigen, path, "-t", target, "-o", "x.csv")
     with Path("x.csv").open() as file:
         rows = list(csv.reader(file))
     assert rows[0][:3] == ["t", "q", "p"]
     assert len(rows) == 52
-    assert [float(v) for v in rows[-1][1:3]] == list(told["final"].values())
+    assert [float(v) for v in rows[-1][1:3]] == list(document["final"].values())
     summary(phigen, path, "-t", target, "-o", "x.npz")
     with np.load("x.npz") as stored:
-        assert stored["x"][-1].tolist() == list(told["final"].values())
+        assert stored["x"][-1].tolist() == list(document["final"].values())
 
 
 def test_run_summary_compares_with_closed_form_and_classical_methods(phigen, write):
-    told = summary(phigen, write("a.yaml"))
-    own, rk4 = told["methods"]
-    assert own["method"] == "phigen, order 2"
-    assert 1e-4 < own["exact"]["error"] < 1e-2
+    document = summary(phigen, write("a.yaml"))
+    of_phigen, rk4 = document["methods"]
+    assert of_phigen["method"] == "phigen, order 2"
+    assert 1e-4 < of_phigen["exact"]["error"] < 1e-2
     assert 1e-7 < rk4["exact"]["error"] < 1e-5
-    assert own["energy"]["error"] < 1e-14  # the midpoint rule conserves quadratic invariants
+    assert of_phigen["energy"]["error"] < 1e-14  # the midpoint rule conserves quadratic invariants
     assert rk4["energy"]["error"] > 1e-7
     shown = phigen("run", "a.yaml").stdout
     assert "against closed form" in shown
@@ -264,10 +264,10 @@ def test_run_summary_compares_with_closed_form_and_classical_methods(phigen, wri
 def test_run_overrides(phigen):
     path = SPECS / "rigid_body.yaml"
     options = ["--step", "0.01", "--steps", "7", "--set", "I1=3/2", "--set", "x2=0.25", "--order", "4"]
-    told = summary(phigen, path, *options)
-    assert (told["step"], told["steps"], told["order"]) == (0.01, 7, 4)
-    assert told["parameters"]["I1"] == 1.5
-    assert told["initial"]["x2"] == 0.25
+    document = summary(phigen, path, *options)
+    assert (document["step"], document["steps"], document["order"]) == (0.01, 7, 4)
+    assert document["parameters"]["I1"] == 1.5
+    assert document["initial"]["x2"] == 0.25
     assert summary(phigen, path, "--run", "tumbling", "--steps", "5")["parameters"]["I1"] == 1.0
 
 
@@ -277,10 +277,10 @@ def test_wrong_setting_is_a_usage_error(phigen, wrong):
 
 
 def test_run_falls_back_to_numpy_and_says_so(phigen, write, without_compiler):
-    done = phigen("run", write("a.yaml"))
-    assert done.exit_code == 0
-    assert "no C compiler" in done.stderr
-    assert "target numpy" in done.stdout
+    result = phigen("run", write("a.yaml"))
+    assert result.exit_code == 0
+    assert "no C compiler" in result.stderr
+    assert "target numpy" in result.stdout
 
 
 @pytest.mark.thin(2)
@@ -288,11 +288,11 @@ def test_run_falls_back_to_numpy_and_says_so(phigen, write, without_compiler):
 def test_a_compiler_that_is_named_is_used_or_refused(phigen, write, monkeypatch, named):
     monkeypatch.setenv("CC", named)
     for command in (["run", write("a.yaml")], ["build", "a.yaml", "--compile"]):
-        done = phigen(*command)
-        assert done.exit_code == 6
-        assert done.stderr.startswith("error: ") or "\nerror: " in done.stderr
-        assert named in done.stderr
-        assert done.stdout == ""
+        result = phigen(*command)
+        assert result.exit_code == 6
+        assert result.stderr.startswith("error: ") or "\nerror: " in result.stderr
+        assert named in result.stderr
+        assert result.stdout == ""
     assert not list(Path("generated").rglob("*.so*"))
     assert phigen("run", "a.yaml", "-t", "numpy").exit_code == 0
 
@@ -300,9 +300,9 @@ def test_a_compiler_that_is_named_is_used_or_refused(phigen, write, monkeypatch,
 def test_run_without_runs_explains(phigen, write):
     path = write("a.yaml")
     path.write_text(path.read_text().split("runs:")[0])
-    done = phigen("run", path)
-    assert done.exit_code == 1
-    assert "no runs" in done.stderr
+    result = phigen("run", path)
+    assert result.exit_code == 1
+    assert "no runs" in result.stderr
 
 
 def test_output_of_unknown_kind_is_refused_before_the_work(phigen, write):
@@ -347,10 +347,10 @@ def test_list_shows_every_bundled_spec(phigen):
 
 @pytest.mark.parametrize("target", slow_but(["c"], ["c", "numpy"]))
 def test_demo_keeps_the_casimir_at_roundoff_up_to_the_singularity(phigen, target):
-    done = phigen("demo", "-t", target)
-    assert done.exit_code == 0
-    assert "0.2553851" in done.stdout
-    cells = next(line for line in done.stdout.splitlines() if line.strip().startswith("0.255 ")).split()
+    result = phigen("demo", "-t", target)
+    assert result.exit_code == 0
+    assert "0.2553851" in result.stdout
+    cells = next(line for line in result.stdout.splitlines() if line.strip().startswith("0.255 ")).split()
     x2, x8, x_rk, c2, c8, c_rk = map(float, cells[2:])
     assert max(c2, c8) < 1e-13 < 1e-6 < c_rk
     assert x8 < 1e-8 < x2 < x_rk
@@ -359,12 +359,12 @@ def test_demo_keeps_the_casimir_at_roundoff_up_to_the_singularity(phigen, target
 def test_check_tells_what_a_target_of_the_spec_refuses(phigen, in_tmp):
     """As build does: of each target that the spec asks for, at its place."""
     text = (SPECS / "pendulum_euler.yaml").read_text(encoding="utf-8")
-    kept = "\n".join(line for line in text.splitlines() if not line.startswith(("targets", "adjoint")))
-    Path("p.yaml").write_text(kept + "\nadjoint: true\ntargets: [c, js]\n", encoding="utf-8")
-    done = phigen("check", "p.yaml")
-    assert done.exit_code == 1
-    assert "not offered in JavaScript" in done.stderr
-    assert "p.yaml:" in done.stderr
+    without_targets = "\n".join(line for line in text.splitlines() if not line.startswith(("targets", "adjoint")))
+    Path("p.yaml").write_text(without_targets + "\nadjoint: true\ntargets: [c, js]\n", encoding="utf-8")
+    result = phigen("check", "p.yaml")
+    assert result.exit_code == 1
+    assert "not offered in JavaScript" in result.stderr
+    assert "p.yaml:" in result.stderr
 
 
 def test_all_triples_that_fail_the_jacobi_identity_are_listed_on_request(phigen, write):

@@ -31,14 +31,14 @@ def body(in_tmp):
 @pytest.mark.slow  # it builds some twenty candidates
 @pytest.mark.parametrize("equal", ["step", "work"])
 def test_numbers_are_those_of_the_methods(phigen, body, equal):
-    done = phigen("compare", body, "--equal", equal, "--budget", "300", "--json", "--plot", "c.svg")
-    assert done.exit_code == 0, done.stderr
+    result = phigen("compare", body, "--equal", equal, "--budget", "300", "--json", "--plot", "c.svg")
+    assert result.exit_code == 0, result.stderr
     assert str(read_origin(Path("c.svg"))).endswith(" by compare")
-    found = json.loads(done.stdout)
-    entries = {entry["title"]: entry for entry in found["methods"] if not entry["refusal"]}
+    document = json.loads(result.stdout)
+    entries = {entry["title"]: entry for entry in document["methods"] if not entry["refusal"]}
     assert {"RK4", "DOP853", "exponential, order 4", "cayley, order 2"} <= set(entries)
-    own = next(entry for entry in entries.values() if entry["own"])
-    assert (own["title"], own["steps"]) == ("exponential, order 4", 100)
+    of_phigen = next(entry for entry in entries.values() if entry["own"])
+    assert (of_phigen["title"], of_phigen["steps"]) == ("exponential, order 4", 100)
     for title, entry in entries.items():
         assert entry["step"] * entry["steps"] == pytest.approx(20)
         if equal == "step":
@@ -59,24 +59,24 @@ def test_numbers_are_those_of_the_methods(phigen, body, equal):
 
 
 def test_table_marks_the_setting_of_the_spec(phigen, body):
-    done = phigen("compare", body, "--orders", "4", "--budget", "0.01", "-q")
-    assert done.exit_code == 0, done.stderr
-    assert "exponential, order 4 *" in done.stdout
-    assert "Not measured, since there was no time to build it; a larger --budget builds them: " in done.stdout
-    assert done.stderr == ""
+    result = phigen("compare", body, "--orders", "4", "--budget", "0.01", "-q")
+    assert result.exit_code == 0, result.stderr
+    assert "exponential, order 4 *" in result.stdout
+    assert "Not measured, since there was no time to build it; a larger --budget builds them: " in result.stdout
+    assert result.stderr == ""
 
 
 @pytest.mark.slow
 def test_lattices_are_compared_too(phigen, in_tmp):
-    done = phigen("compare", "fput", "--horizon", "2", "--orders", "2", "--budget", "300", "--json")
-    assert done.exit_code == 0, done.stderr
-    entries = [entry for entry in json.loads(done.stdout)["methods"] if not entry["refusal"]]
+    result = phigen("compare", "fput", "--horizon", "2", "--orders", "2", "--budget", "300", "--json")
+    assert result.exit_code == 0, result.stderr
+    entries = [entry for entry in json.loads(result.stdout)["methods"] if not entry["refusal"]]
     assert len(entries) > 2
     assert all(entry["defect"] is None and entry["error"] < 0.1 for entry in entries)
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "message"),
     [
         (
             "noise: {kick: {hamiltonian: a}}",
@@ -86,16 +86,16 @@ def test_lattices_are_compared_too(phigen, in_tmp):
         ("time: t", "phigen compare is for systems whose energy is conserved, and time changes it"),
     ],
 )
-def test_open_systems_are_refused_at_their_place(phigen, body, line, told):
+def test_open_systems_are_refused_at_their_place(phigen, body, line, message):
     Path("open.yaml").write_text(BODY.replace("order: 4", line))
-    done = phigen("compare", "open.yaml")
-    assert done.exit_code == package.SpecError.exit_code
-    assert done.stderr.startswith("open.yaml:8:")
-    assert told in done.stderr
+    result = phigen("compare", "open.yaml")
+    assert result.exit_code == package.SpecError.exit_code
+    assert result.stderr.startswith("open.yaml:8:")
+    assert message in result.stderr
 
 
-@pytest.mark.parametrize("given", ["2;4", "0", "18", "two", ""])
-def test_orders_are_numbers(phigen, body, given):
-    done = phigen("compare", body, "--orders", given)
-    assert done.exit_code == 2
-    assert "is not a list of orders from 1 to 16" in done.stderr
+@pytest.mark.parametrize("orders", ["2;4", "0", "18", "two", ""])
+def test_orders_are_numbers(phigen, body, orders):
+    result = phigen("compare", body, "--orders", orders)
+    assert result.exit_code == 2
+    assert "is not a list of orders from 1 to 16" in result.stderr

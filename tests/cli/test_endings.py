@@ -45,9 +45,9 @@ TURNING = BODY.replace("monitor: 1/(1 + x1**2)", "reconstruct: quaternion")
 
 
 def ran(phigen, *args):
-    done = phigen("run", *args, "-t", "numpy", "-q")
-    assert done.exit_code == 0, done.stderr
-    return done
+    result = phigen("run", *args, "-t", "numpy", "-q")
+    assert result.exit_code == 0, result.stderr
+    return result
 
 
 def table(path):
@@ -60,11 +60,11 @@ def swing(write):
 
 
 def test_a_run_ends_at_its_time_by_a_part_of_a_step(phigen, swing):
-    told = ran(phigen, swing, "--run", "until", "-o", "a.csv", "--json").stdout
+    output = ran(phigen, swing, "--run", "until", "-o", "a.csv", "--json").stdout
     rows = table("a.csv")
     assert rows[:, 0] == pytest.approx([0, 1, 2, 3, 4, 5, 6, 6.05], rel=1e-15)
     assert rows[:, 1] == pytest.approx(np.cos(rows[:, 0]), abs=1e-11)
-    assert json.loads(told)["steps"] == 60
+    assert json.loads(output)["steps"] == 60
     ran(phigen, swing, "--run", "steps", "--until", 0.03, "-o", "b.csv")
     assert table("b.csv")[-1, :2] == pytest.approx([0.03, np.cos(0.03)], abs=1e-13)
 
@@ -89,16 +89,18 @@ def test_of_an_end_in_time_and_a_stop_the_first_counts(phigen, swing):
 
 @pytest.mark.parametrize(("name", "expected"), [("falling", [2, 4]), ("both", [0.5, 1.5, 2.5, 3.5])])
 def test_sections_have_a_direction(phigen, swing, name, expected):
-    told = ran(phigen, swing, "--run", name, "--section", "s.csv")
-    found = table("s.csv")[:, 0]
-    assert found[found > 0] == pytest.approx(np.pi * np.array([e for e in expected if e * np.pi < 14]), abs=1e-9)
-    assert ("crossings" if name == "both" else "falling crossings") in told.stdout
+    result = ran(phigen, swing, "--run", name, "--section", "s.csv")
+    crossing_times = table("s.csv")[:, 0]
+    assert crossing_times[crossing_times > 0] == pytest.approx(
+        np.pi * np.array([e for e in expected if e * np.pi < 14]), abs=1e-9
+    )
+    assert ("crossings" if name == "both" else "falling crossings") in result.stdout
 
 
 def test_states_at_given_times(phigen, swing):
     Path("times.txt").write_text("2\n0.25, 0\n 6\n")
-    for given, times in (("1.234", [1.234, 6]), ("times.txt", [0.25, 2, 6])):
-        ran(phigen, swing, "--run", "steps", "--at", given, "-o", "a.csv")
+    for option, times in (("1.234", [1.234, 6]), ("times.txt", [0.25, 2, 6])):
+        ran(phigen, swing, "--run", "steps", "--at", option, "-o", "a.csv")
         rows = table("a.csv")
         assert rows[:, 0] == pytest.approx([0, *times], rel=1e-15)
         assert rows[:, 1] == pytest.approx(np.cos(rows[:, 0]), abs=1e-11)
@@ -114,19 +116,19 @@ def test_a_finished_run_is_extended_as_if_it_had_not_ended(phigen, write, text, 
     spec = write("spec.yaml", text)
     whole = ran(phigen, spec, "--until", 3, "-o", f"a.{suffix}", "--json")
     ran(phigen, spec, "--until", 2, "-o", f"b.{suffix}")
-    told = ran(phigen, spec, "--until", 3, "--extend", "-o", f"b.{suffix}", "--json")
+    result = ran(phigen, spec, "--until", 3, "--extend", "-o", f"b.{suffix}", "--json")
     if suffix == "csv":
         assert np.array_equal(*(np.array(Path(f"{n}.csv").read_text().splitlines()[0]) for n in "ab"))
         a, b = table("a.csv"), table("b.csv")
     else:
         with np.load("a.npz") as one, np.load("b.npz") as other:
-            a, b = (np.column_stack([found["t"], found["x"]]) for found in (one, other))
+            a, b = (np.column_stack([columns["t"], columns["x"]]) for columns in (one, other))
             assert "monitor" not in text or one["tau"].shape == one["t"].shape
     apart = np.abs(b[:, None, :] - a[None]).max(axis=2).min(axis=0)  # rows of b beside each of a
     assert np.sum(apart < 1e-12) >= 0.4 * len(a)  # with a monitor the part of a step shifts all after it
     assert text == BODY or (apart < 1e-12).all()
     assert b[-1] == pytest.approx(a[-1], abs=1e-4 if text == BODY else 1e-12)
-    errors = [json.loads(done.stdout)["methods"][0]["energy"]["error"] for done in (whole, told)]
+    errors = [json.loads(process.stdout)["methods"][0]["energy"]["error"] for process in (whole, result)]
     assert errors[1] == pytest.approx(errors[0], rel=0.3, abs=1e-14)
 
 
@@ -182,8 +184,8 @@ def test_an_extension_looks_for_a_section_that_depends_on_the_time_at_its_own_ti
     clock = SWING.replace("order: 8", "time: t\norder: 2").replace("section: q", "section: t - 5")
     spec = write("spec.yaml", clock)
     ran(phigen, spec, "--run", "both", "--until", 4, "-o", "a.csv")
-    told = json.loads(ran(phigen, spec, "--run", "both", "--until", 6, "--extend", "-o", "a.csv", "--json").stdout)
-    assert told["section"]["crossings"] == 1
+    document = json.loads(ran(phigen, spec, "--run", "both", "--until", 6, "--extend", "-o", "a.csv", "--json").stdout)
+    assert document["section"]["crossings"] == 1
 
 
 def test_exponents_do_not_depend_on_which_rows_are_stored(phigen, swing):
@@ -204,9 +206,9 @@ def test_exponents_do_not_depend_on_which_rows_are_stored(phigen, swing):
 def test_methods_beside_it_have_the_same_times(phigen, write, text, rows):
     spec = write("spec.yaml", text.replace("stride: 5}", "stride: 5, compare: [dop853]}").replace(
         "steps: 60}", "steps: 60, stride: 3, compare: [dop853]}"))  # fmt: skip
-    own, other = json.loads(ran(phigen, spec, *rows, "--json").stdout)["methods"]
+    record, other = json.loads(ran(phigen, spec, *rows, "--json").stdout)["methods"]
     assert other["rows"] == other["good"] > 1
-    assert text == BODY or other["rows"] == own["rows"]
+    assert text == BODY or other["rows"] == record["rows"]
     assert other["energy"]["error"] < 1e-9
 
 
@@ -220,11 +222,11 @@ def test_means_are_of_members_that_made_the_steps_of_the_run(phigen, write, sche
     spec = write("spec.yaml", NOISY.replace("steps: 60}", "steps: 60, seed: 5, members: 2}") + f"scheme: {scheme}\n")
 
     def told(*args):
-        found = json.loads(ran(phigen, spec, *args, "--json").stdout)
-        for name, mean in found["means"].items():
-            value = found["final"].get(name, mean["mean"] + mean["error"])
+        document = json.loads(ran(phigen, spec, *args, "--json").stdout)
+        for name, mean in document["means"].items():
+            value = document["final"].get(name, mean["mean"] + mean["error"])
             assert abs(value - mean["mean"]) == pytest.approx(mean["error"], abs=1e-13)
-        return found["means"]
+        return document["means"]
 
     told("--until", 2.05)
     whole = told("--until", 3)
@@ -243,8 +245,8 @@ def test_another_seed_is_that_of_a_spec_with_it(phigen, write, members):
     other = write("other.yaml", NOISY.replace("steps: 60}", f"steps: 60, members: {members}, seed: 7}}"))
 
     def told(*args):
-        found = json.loads(ran(phigen, *args, "--json").stdout)
-        return found["seed"], found["final"], found.get("means")
+        document = json.loads(ran(phigen, *args, "--json").stdout)
+        return document["seed"], document["final"], document.get("means")
 
     assert told(spec, "--seed", 7) == told(other) == told(other, "--seed", 7)
     assert told(other, "--seed", 0) == told(spec) != told(other)
@@ -286,12 +288,12 @@ def test_an_interrupted_run_with_given_times_goes_on_to_the_same_bytes(phigen, w
 def test_a_duration_stays_with_another_step_and_steps_do_too(phigen, write):
     """By a part of a step where it does not divide the duration; with a monitor that is in τ, and cannot be."""
     spec = write("spec.yaml", SWING.replace("steps: 60}", "duration: 6, stride: 30}"))
-    given = ((0.05, 120, 6), (0.07, 85, 6), (-0.1, 60, -6), (3, 2, 6))
-    for step, steps, end in given:
-        told = json.loads(ran(phigen, spec, "--step", step, "--json").stdout)
-        assert (told["steps"], told["time"]) == (steps, pytest.approx(end, rel=1e-14))
-    told = json.loads(ran(phigen, spec, "--step", 0.07, "--steps", 9, "--json").stdout)
-    assert (told["steps"], told["time"]) == (9, pytest.approx(0.63))
+    cases = ((0.05, 120, 6), (0.07, 85, 6), (-0.1, 60, -6), (3, 2, 6))
+    for step, steps, end in cases:
+        document = json.loads(ran(phigen, spec, "--step", step, "--json").stdout)
+        assert (document["steps"], document["time"]) == (steps, pytest.approx(end, rel=1e-14))
+    document = json.loads(ran(phigen, spec, "--step", 0.07, "--steps", 9, "--json").stdout)
+    assert (document["steps"], document["time"]) == (9, pytest.approx(0.63))
     plain = write("plain.yaml", SWING)
     assert json.loads(ran(phigen, plain, "--step", 0.07, "--json").stdout)["steps"] == 60
     body = write("body.yaml", BODY.replace("until: 5", "duration: 5"))
@@ -304,14 +306,14 @@ def test_a_duration_stays_with_another_step_and_steps_do_too(phigen, write):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "steps"), [("until", 60), ("stopped", 10), ("back", 31), ("never", 20)])
 def test_verify_makes_the_whole_steps_of_the_run(phigen, swing, name, steps):
-    (told,) = json.loads(phigen("verify", swing, "--run", name, "--quick", "--json", "-q").stdout)
-    assert (told["steps"], told["clock"]) == (steps, "t")
+    (record,) = json.loads(phigen("verify", swing, "--run", name, "--quick", "--json", "-q").stdout)
+    assert (record["steps"], record["clock"]) == (steps, "t")
 
 
 def test_verify_makes_one_step_of_a_run_that_is_shorter(phigen, write):
     spec = write("spec.yaml", SWING.replace("until: 6.05, stride: 10", "until: 0.03"))
-    (told,) = json.loads(phigen("verify", spec, "--run", "until", "--quick", "--json", "-q").stdout)
-    assert told["steps"] == 1
+    (record,) = json.loads(phigen("verify", spec, "--run", "until", "--quick", "--json", "-q").stdout)
+    assert record["steps"] == 1
 
 
 @pytest.fixture
@@ -319,15 +321,15 @@ def asked(monkeypatch):
     """What a command asks of the function that measures, in place of which it stops."""
 
     def asked_of(phigen, place, *args):
-        given = []
+        call_arguments = []
 
         def stop(*arguments, **options):
-            given.extend(arguments)
+            call_arguments.extend(arguments)
             raise SystemExit(0)
 
         monkeypatch.setattr(place, stop)
         assert phigen(*args).exit_code == 0
-        return given
+        return call_arguments
 
     return asked_of
 
@@ -336,15 +338,15 @@ def test_verify_makes_steps_in_tau_up_to_a_physical_time(phigen, write, asked):
     """As many as the run: 5 of t are 6.63 of τ."""
     spec = write("spec.yaml", BODY)
     assert json.loads(ran(phigen, spec, "--json").stdout)["steps"] == 132
-    given = asked(phigen, "phigen.study.verification.verify", "verify", spec)
-    assert given[5:7] == [0.05, 132]
+    arguments = asked(phigen, "phigen.study.verification.verify", "verify", spec)
+    assert arguments[5:7] == [0.05, 132]
 
 
 @pytest.mark.slow
 def test_verify_says_that_steps_are_in_tau(phigen, write):
-    done = phigen("verify", write("spec.yaml", BODY), "--quick", "-q")
-    assert done.exit_code == 0
-    assert "132 steps of 0.05 in τ" in done.stdout
+    result = phigen("verify", write("spec.yaml", BODY), "--quick", "-q")
+    assert result.exit_code == 0
+    assert "132 steps of 0.05 in τ" in result.stdout
 
 
 @pytest.mark.thin(2)
@@ -361,13 +363,13 @@ def test_tune_measures_up_to_the_end_of_the_run(phigen, write, asked, text, name
 def test_tune_finds_an_orbit_in_tau_and_tells_lines_for_the_run(phigen, write):
     """All methods make their steps in τ, so that an orbit can be compared."""
     spec = write("spec.yaml", BODY.replace("stride: 5", "stop: x1 + 10"))
-    done = phigen("tune", spec, "--accuracy", 0.001, "--budget", 3, "--measure", "orbit", "--json")
-    assert done.exit_code == 0, done.stderr
-    assert "over τ = 0 … 6.63191" in done.stderr
-    told = json.loads(done.stdout)
-    step, steps = (float(line.split(": ")[1]) for line in told["run_lines"][:2])
+    result = phigen("tune", spec, "--accuracy", 0.001, "--budget", 3, "--measure", "orbit", "--json")
+    assert result.exit_code == 0, result.stderr
+    assert "over τ = 0 … 6.63191" in result.stderr
+    document = json.loads(result.stdout)
+    step, steps = (float(line.split(": ")[1]) for line in document["run_lines"][:2])
     assert 6.6319 < step * steps < 6.6319 + 2 * step
-    assert {c["method"] for c in told["classical"]} == {"RK4 in C", "DOP853 in C"}
+    assert {c["method"] for c in document["classical"]} == {"RK4 in C", "DOP853 in C"}
     assert "up to τ = 6.6319" in phigen("tune", spec, "--budget", 2, "-q", "--accuracy", 1e-3).stdout
 
 
@@ -384,9 +386,9 @@ def test_tune_finds_an_orbit_in_tau_and_tells_lines_for_the_run(phigen, write):
 )
 def test_report_shows_the_run_up_to_its_end(phigen, write, monkeypatch, text, name, said):
     monkeypatch.setattr("phigen.report.drawable.find_spec", lambda name: None)
-    monkeypatch.setattr("phigen.cli.report_material.studied", lambda *given: (None, ""))
-    done = phigen("report", write("spec.yaml", text), "--run", name, "--quick", "-q", "-o", "a.html")
-    assert done.exit_code == 0, done.stderr
+    monkeypatch.setattr("phigen.cli.report_material.studied", lambda *arguments: (None, ""))
+    result = phigen("report", write("spec.yaml", text), "--run", name, "--quick", "-q", "-o", "a.html")
+    assert result.exit_code == 0, result.stderr
     page = Path("a.html").read_text(encoding="utf-8")
     assert said in page
 
@@ -408,8 +410,8 @@ def test_a_run_in_tau_that_fails_stores_the_times_before(phigen, write):
     """A motion that becomes infinite, in a finite τ as well."""
     falling = SWING.split("runs:")[0].replace("(p**2 + q**2)/2\norder: 8", "p**2/2 - q**4\norder: 2")
     falling += "monitor: 1/(1 + p**2)**(1/8)\nruns: {far: {initial: [1, 0], step: 0.1, steps: 400, every: 0.1}}\n"
-    done = phigen("run", write("spec.yaml", falling), "-t", "numpy", "-o", "a.csv")
-    assert (done.exit_code, "failed" in done.stderr) == (7, True)
+    result = phigen("run", write("spec.yaml", falling), "-t", "numpy", "-o", "a.csv")
+    assert (result.exit_code, "failed" in result.stderr) == (7, True)
     times = table("a.csv")[:, 0]
     assert len(times) > 5
     assert np.diff(times[:-1]) == pytest.approx(0.1, abs=1e-9)
@@ -438,11 +440,11 @@ def test_what_does_not_fit_is_told(phigen, write):
         ((swing, "--from", "half.npz"), "does not hold a run of swing: File is not a zip file"),
         ((swing, "--from", "other.npz"), "does not hold a run of swing: it has no column 't'"),
     ):
-        done = phigen("run", *args, "-t", "numpy")
-        assert (done.exit_code, said in done.stderr) == (2, True), (args, done.stderr)
+        result = phigen("run", *args, "-t", "numpy")
+        assert (result.exit_code, said in result.stderr) == (2, True), (args, result.stderr)
     for option in ("--until", "--steps"):
-        done = phigen("run", swing, option, 10**16, "-t", "numpy")
-        assert (done.exit_code, "more than the limit of 1000000000000" in done.stderr) == (3, True), done.stderr
+        result = phigen("run", swing, option, 10**16, "-t", "numpy")
+        assert (result.exit_code, "more than the limit of 1000000000000" in result.stderr) == (3, True), result.stderr
 
 
 def test_times_of_a_spec_are_those_of_the_command_line(phigen, swing):
@@ -487,8 +489,8 @@ runs: {r: {sizes: [4], initial: {q: 1, p: 0}, step: 0.1, steps: 100}}
 @pytest.mark.parametrize(("text", "run", "name"), [(SWING, "steps", "q"), (CHAIN, "r", "M")])
 def test_a_stop_of_the_command_line_is_that_of_the_spec(phigen, write, text, run, name):
     command = ("run", write("a.yaml", text), "--run", run, "-t", "numpy")
-    done = phigen(*command, "--steps", 100, "--stop", f"max({name}, -1) - 1/2", "--json")
-    assert json.loads(done.stdout)["time"] == pytest.approx(np.pi / 3, abs=1e-5)  # order 4 of the chain
+    result = phigen(*command, "--steps", 100, "--stop", f"max({name}, -1) - 1/2", "--json")
+    assert json.loads(result.stdout)["time"] == pytest.approx(np.pi / 3, abs=1e-5)  # order 4 of the chain
     assert "stop: is not met" in phigen(*command, "--stop", f"{name} - 2").stderr
     for wrong, words in (("1/2", "depends neither"), (f"{name} -", "ends too early"), (f"{name}s", "did you mean")):
         refused = phigen(*command, "--stop", wrong)

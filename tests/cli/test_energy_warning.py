@@ -37,11 +37,11 @@ runs: {r: {sizes: [12], initial: {q: 5*sin(2*pi*i/N_i), p: 0}, step: STEP, steps
 @pytest.mark.parametrize("spec", [ORBIT, CHAIN], ids=["system", "lattice"])
 def test_a_large_energy_error_is_a_warning_with_a_step_that_mends_it(phigen, write, spec):
     path = write("large.yaml", spec.replace("STEP", "0.6"))
-    found = phigen("run", path, "-t", "numpy")
-    assert found.exit_code == 0
-    assert re.search(r"warning: the energy error reaches .* of the energy at the start", found.stderr)
-    assert f"phigen tune {path}" in found.stderr
-    step = re.search(r"hint: try --step (\S+);", found.stderr).group(1)
+    result = phigen("run", path, "-t", "numpy")
+    assert result.exit_code == 0
+    assert re.search(r"warning: the energy error reaches .* of the energy at the start", result.stderr)
+    assert f"phigen tune {path}" in result.stderr
+    step = re.search(r"hint: try --step (\S+);", result.stderr).group(1)
     mended = phigen("run", path, "-t", "numpy", "--step", step, "--json")
     assert not mended.stderr, step
     errors = json.loads(mended.stdout)
@@ -52,18 +52,18 @@ def test_a_large_energy_error_is_a_warning_with_a_step_that_mends_it(phigen, wri
 @pytest.mark.slow  # it compiles the solver and RK4
 @pytest.mark.parametrize(("order", "warned"), [(2, True), (6, False)])
 def test_an_energy_error_that_rk4_does_not_make_at_equal_cost_is_a_warning(phigen, order, warned):
-    found = phigen("run", "kepler", "--order", order, "--step", 0.1, "--steps", 1000, "-t", "c", "--json")
-    assert found.exit_code == 0
-    error = json.loads(found.stdout)["methods"][0]["energy"]["error"]
+    result = phigen("run", "kepler", "--order", order, "--step", 0.1, "--steps", 1000, "-t", "c", "--json")
+    assert result.exit_code == 0
+    error = json.loads(result.stdout)["methods"][0]["energy"]["error"]
     assert (1e-3 < error < 0.1) == warned
     said = re.search(
-        r"warning: the energy error reaches (\S+) of .*; RK4 with .* reaches (\S+) in this run", found.stderr
+        r"warning: the energy error reaches (\S+) of .*; RK4 with .* reaches (\S+) in this run", result.stderr
     )
-    assert bool(said) == warned, found.stderr
+    assert bool(said) == warned, result.stderr
     if said:
         assert float(said[1]) == pytest.approx(error, rel=0.1)
         assert 1e-9 < float(said[2]) < error / 2
-        assert "hint: try --order 4, or --step" in found.stderr
+        assert "hint: try --order 4, or --step" in result.stderr
 
 
 @pytest.mark.slow  # it compiles the solver and RK4
@@ -119,7 +119,7 @@ def test_rk4_without_a_finite_energy_has_an_infinite_error(monkeypatch):
 
 
 def test_an_energy_that_noise_changes_is_no_error(phigen):
-    found = phigen("run", "thermal_spin", "-t", "numpy", "--steps", "100", "-v")
-    assert found.exit_code == 0
-    assert "energy error" not in found.stderr
-    assert "largest change" in found.stdout
+    result = phigen("run", "thermal_spin", "-t", "numpy", "--steps", "100", "-v")
+    assert result.exit_code == 0
+    assert "energy error" not in result.stderr
+    assert "largest change" in result.stdout

@@ -35,8 +35,8 @@ try:
 finally:
     print("heavy:", [m for m in {HEAVY!r} if m in sys.modules], file=sys.stderr)
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "heavy: []" in done.stderr
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "heavy: []" in process.stderr
 
 
 @pytest.mark.parametrize("name", ["pendulum", "toda3", "fput"])
@@ -44,8 +44,8 @@ def test_build_imports_no_numerical_library(name, tmp_path):
     """NumPy takes as long to import as a small system takes to compile."""
     code = "import sys; from phigen.cli import main; main()"
     command = [sys.executable, "-X", "importtime", "-c", code, "build", name, "-t", "c", "-q", "-o", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    imported = {line.rpartition("|")[2].strip() for line in process.stderr.splitlines()}
     assert "phigen.compiler" in imported
     assert imported & {"numpy", "sympy", "mpmath", "matplotlib"} == set()
 
@@ -74,20 +74,20 @@ def test_wrong_spec_is_1_with_all_errors_on_stderr(phigen, write):
         "phigen: 1\nname: a\ncoordinates: [x, y]\npoisson: {matrix: [[0, 1], [-1, 0]]}\nhamiltonian: z\nordr: 2\n",
     )
     write("b.yaml", "phigen: 1\nname: b\n")
-    done = phigen("build", "a.yaml", "b.yaml")
-    assert done.exit_code == 1
-    assert done.stdout == ""
-    assert "a.yaml:5:14: error" in done.stderr
-    assert "a.yaml:6:1: error" in done.stderr
-    assert "b.yaml" in done.stderr
+    result = phigen("build", "a.yaml", "b.yaml")
+    assert result.exit_code == 1
+    assert result.stdout == ""
+    assert "a.yaml:5:14: error" in result.stderr
+    assert "a.yaml:6:1: error" in result.stderr
+    assert "b.yaml" in result.stderr
 
 
 def test_warnings_are_messages_with_their_place(phigen, write):
     head = "phigen: 1\nname: a\ncoordinates: [x, y]\npoisson: {canonical: {q: [x], p: [y]}}\norder: 2\n"
     write("a.yaml", head + "hamiltonian: log(-1 - x**2) + y\n")
-    done = phigen("build", "a.yaml", "-t", "numpy")
-    assert done.exit_code == 0
-    warning, line, caret, *_ = done.stderr.splitlines()
+    result = phigen("build", "a.yaml", "-t", "numpy")
+    assert result.exit_code == 0
+    warning, line, caret, *_ = result.stderr.splitlines()
     assert warning.startswith("a.yaml:6:14: warning: H is defined: undecided (no value at any of ")
     assert line.index("log(") == caret.index("^")
     assert phigen("build", "a.yaml", "-t", "numpy", "-q").stderr == ""
@@ -115,28 +115,28 @@ def test_internal_error_is_4_and_asks_for_a_report(phigen, write, monkeypatch, k
         raise kind("nobody expected this")
 
     monkeypatch.setattr("phigen.compiler.examine", broken)
-    done = phigen("check", write("a.yaml"))
-    assert done.exit_code == 4
-    assert "nobody expected this" in done.stderr
-    assert "report" in done.stderr
-    assert "Traceback" not in done.stderr
+    result = phigen("check", write("a.yaml"))
+    assert result.exit_code == 4
+    assert "nobody expected this" in result.stderr
+    assert "report" in result.stderr
+    assert "Traceback" not in result.stderr
     assert "Traceback" in phigen("check", "a.yaml", "-v").stderr
 
 
 def test_missing_compiler_is_6(phigen, write, monkeypatch):
     monkeypatch.setenv("CC", "/there/is/none")
-    done = phigen("run", write("a.yaml"), "-t", "c")
-    assert done.exit_code == 6
-    assert "/there/is/none" in done.stderr
+    result = phigen("run", write("a.yaml"), "-t", "c")
+    assert result.exit_code == 6
+    assert "/there/is/none" in result.stderr
 
 
 def test_failing_integration_is_7_and_keeps_what_was_computed(phigen, write):
     path = write("a.yaml")
     path.write_text(path.read_text().replace("(q**2 + p**2)/2", "p**2/2 - q**6"))
-    done = phigen("run", path, "--steps", "100", "-t", "numpy", "-o", "out.csv")
-    assert done.exit_code == 7
-    assert "smaller step" in done.stderr
-    assert "energy" in done.stdout
+    result = phigen("run", path, "--steps", "100", "-t", "numpy", "-o", "out.csv")
+    assert result.exit_code == 7
+    assert "smaller step" in result.stderr
+    assert "energy" in result.stdout
     assert len(path.with_name("out.csv").read_text().splitlines()) > 2
 
 
@@ -144,18 +144,18 @@ def test_errors_of_several_specs_give_the_smallest_code(phigen, write):
     write("a.yaml", "phigen: 1\n")
     path = write("b.yaml")
     path.write_text(path.read_text().replace("(q**2", "(" * 99 + "q" + ")" * 99 + " + (q**2"))
-    done = phigen("check", "b.yaml", "a.yaml")
-    assert done.exit_code == 1
-    assert "a.yaml" in done.stderr
-    assert "b.yaml" in done.stderr
+    result = phigen("check", "b.yaml", "a.yaml")
+    assert result.exit_code == 1
+    assert "a.yaml" in result.stderr
+    assert "b.yaml" in result.stderr
 
 
 def test_unwritable_output_is_no_bug_of_phigen(phigen, write):
     write("a.yaml")
     write("generated", "a file, no folder")
-    done = phigen("build", "a.yaml")
-    assert done.exit_code in (2, 5)
-    assert "internal" not in done.stderr
+    result = phigen("build", "a.yaml")
+    assert result.exit_code in (2, 5)
+    assert "internal" not in result.stderr
 
 
 def test_command_with_typing_error_gets_a_suggestion(phigen):
@@ -163,7 +163,7 @@ def test_command_with_typing_error_gets_a_suggestion(phigen):
 
 
 @pytest.mark.parametrize(
-    ("given", "hint"),
+    ("misspelt", "hint"),
     [
         ("rigid_body.yaml", "did you mean 'rigid_body'? The bundled spec of that name needs neither folder nor suffix"),
         ("keplr", "did you mean 'kepler'? It is a bundled spec"),
@@ -172,12 +172,12 @@ def test_command_with_typing_error_gets_a_suggestion(phigen):
     ],
 )
 @pytest.mark.parametrize("command", ["run", "build"])
-def test_missing_spec_suggests_names_that_are_near(phigen, write, command, given, hint):
+def test_missing_spec_suggests_names_that_are_near(phigen, write, command, misspelt, hint):
     write("tumbler.yaml")
-    done = phigen(command, given)
-    assert done.exit_code == 1
-    assert repr(given) in done.stderr
-    assert hint in done.stderr
+    result = phigen(command, misspelt)
+    assert result.exit_code == 1
+    assert repr(misspelt) in result.stderr
+    assert hint in result.stderr
 
 
 def test_bundled_spec_is_found_by_its_name(phigen, in_tmp):
@@ -208,10 +208,10 @@ def test_changed_copy_of_a_bundled_spec_is_regenerated_from_its_file(phigen, wri
 def test_no_colour_in_pipes_and_under_no_color(phigen, write):
     write("a.yaml", "phigen: 1\n")
     for environment in ({}, {"NO_COLOR": "1"}):
-        done = subprocess.run(
+        process = subprocess.run(
             [*PHIGEN, "check", "a.yaml"], capture_output=True, text=True, check=False, env={**os.environ, **environment}
         )
-        assert "\x1b" not in done.stdout + done.stderr
+        assert "\x1b" not in process.stdout + process.stderr
 
 
 @pytest.mark.slow
@@ -282,9 +282,9 @@ runpy.run_module("phigen", run_name="__main__")
 def test_interrupt_at_any_moment_is_130_and_one_word(write, moment):
     write("a.yaml")
     code = INTERRUPTED_ONCE.format(condition=moment)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    said = [line for line in done.stderr.splitlines() if line and not line.startswith("a.yaml: ")]
-    assert (done.returncode, said) == (130, ["interrupted"])
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    said = [line for line in process.stderr.splitlines() if line and not line.startswith("a.yaml: ")]
+    assert (process.returncode, said) == (130, ["interrupted"])
 
 
 def test_second_interrupt_ends_what_tidies_up(write):
@@ -299,8 +299,8 @@ finally:
     os.kill(os.getpid(), signal.SIGINT)
     print("not reached")
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (process.returncode, process.stdout, process.stderr) == (130, "", "interrupted\n")
 
 
 def test_interrupt_inside_an_import_is_no_internal_error(phigen, write, monkeypatch):
@@ -322,8 +322,8 @@ def test_the_end_of_input_at_a_prompt_is_an_interrupt(phigen, write, monkeypatch
 def test_completion_script_is_offered():
     env = {**os.environ, "_PHIGEN_COMPLETE": "bash_source"}
     code = "from phigen.cli import group; group.main(prog_name='phigen', args=[])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=env)
-    assert "_PHIGEN_COMPLETE=bash_complete" in done.stdout
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=env)
+    assert "_PHIGEN_COMPLETE=bash_complete" in process.stdout
 
 
 @pytest.mark.parametrize(

@@ -25,9 +25,9 @@ def test_files_of_a_solver_appear_together_or_not_at_all(phigen, write, command)
             assert phigen(*command).exit_code == 0
             before = tree("out")
         with largest_file(8000):
-            done = phigen(*command, "--order", "4")
-        assert done.exit_code == 2
-        assert f"a.c: {FULL}" in done.stderr
+            result = phigen(*command, "--order", "4")
+        assert result.exit_code == 2
+        assert f"a.c: {FULL}" in result.stderr
         assert tree("out") == before
     assert not Path("out/nothing").exists()
 
@@ -50,10 +50,10 @@ def test_nothing_is_left_of_a_file_that_does_not_fit(phigen, write, command):
     Path("out").mkdir()
     assert phigen("run", "a.yaml").exit_code == 0  # which compiles it
     with largest_file(400):
-        done = phigen(*command)
-    assert done.exit_code == 2
-    assert f"{command[-1]}" in done.stderr
-    assert f": {FULL}" in done.stderr
+        result = phigen(*command)
+    assert result.exit_code == 2
+    assert f"{command[-1]}" in result.stderr
+    assert f": {FULL}" in result.stderr
     assert tree("out") == {}
 
 
@@ -64,13 +64,13 @@ def test_a_run_that_fills_the_disk_goes_on_where_there_is_room(phigen, write, fi
     options = ["--steps", "8000", "-o"]
     assert phigen("run", "a.yaml", *options, f"whole-{file}").exit_code == 0
     with largest_file(150_000):
-        done = phigen("run", "a.yaml", *options, file)
-    assert done.exit_code == 2
-    assert FULL in done.stderr
-    assert "--resume" in done.stderr
-    done = phigen("run", "a.yaml", *options, file, "--resume")
-    assert done.exit_code == 0
-    assert "resuming after" in done.stderr
+        result = phigen("run", "a.yaml", *options, file)
+    assert result.exit_code == 2
+    assert FULL in result.stderr
+    assert "--resume" in result.stderr
+    result = phigen("run", "a.yaml", *options, file, "--resume")
+    assert result.exit_code == 0
+    assert "resuming after" in result.stderr
     assert Path(file).read_bytes() == Path(f"whole-{file}").read_bytes()
     assert not [
         p
@@ -83,21 +83,21 @@ def test_a_folder_that_takes_no_files_is_told_before_the_work(phigen, write, mon
     write("a.yaml")
     Path("folder.csv").mkdir()
     for command in (["run", "a.yaml", "-o", "folder.csv"], ["report", "a.yaml", "-o", "folder.csv"]):
-        done = phigen(*command)
-        assert (done.exit_code, "'folder.csv' is a folder" in done.stderr) == (2, True)
+        result = phigen(*command)
+        assert (result.exit_code, "'folder.csv' is a folder" in result.stderr) == (2, True)
     monkeypatch.setattr("os.access", lambda path, mode: False)
-    done = phigen("run", "a.yaml", "-o", "a.csv")
-    assert (done.exit_code, "nothing can be written to the folder '.'" in done.stderr) == (2, True)
+    result = phigen("run", "a.yaml", "-o", "a.csv")
+    assert (result.exit_code, "nothing can be written to the folder '.'" in result.stderr) == (2, True)
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("redirected", [">/dev/full", ">&-"])
 @pytest.mark.parametrize("command", ["list --path kepler", "schema", "new b -o -"])
 def test_data_that_cannot_be_printed_is_an_error_of_stdout(command, redirected):
-    done = shell(f"{command} {redirected}")
-    assert done.returncode == 2
-    assert done.stderr.startswith("error: stdout: ")
-    assert done.stderr.count("\n") == 1
+    result = shell(f"{command} {redirected}")
+    assert result.returncode == 2
+    assert result.stderr.startswith("error: stdout: ")
+    assert result.stderr.count("\n") == 1
 
 
 @pytest.mark.thin(2)
@@ -132,6 +132,6 @@ def test_a_working_directory_that_has_gone_is_named(phigen, write, tmp_path, mon
     Path("gone").mkdir()
     monkeypatch.chdir("gone")
     Path.cwd().rmdir()
-    done = phigen("vendor", path, "out")
-    assert done.exit_code == 2
-    assert "error: the working directory: No such file" in done.stderr
+    result = phigen("vendor", path, "out")
+    assert result.exit_code == 2
+    assert "error: the working directory: No such file" in result.stderr

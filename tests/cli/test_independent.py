@@ -25,10 +25,10 @@ def test_json_has_the_terms_that_were_asked_for(phigen, write):
     write("a.yaml")
     result = phigen("check", "--independent", "--terms", "4", "--json", "a.yaml")
     assert result.exit_code == 0
-    (found,) = json.loads(result.stdout)
-    assert [c["term"] for c in found["independent"]] == [1, 2, 3, 4, None, None]
-    assert {c["verdict"] for c in found["independent"]} == {"proved"}
-    assert set(found["independent"][0]["seconds"]) == {"phigen", "sympy"}
+    (record,) = json.loads(result.stdout)
+    assert [c["term"] for c in record["independent"]] == [1, 2, 3, 4, None, None]
+    assert {c["verdict"] for c in record["independent"]} == {"proved"}
+    assert set(record["independent"][0]["seconds"]) == {"phigen", "sympy"}
     assert "independent" not in json.loads(phigen("check", "--json", "a.yaml").stdout)[0]
 
 

@@ -33,8 +33,8 @@ def test_an_expansion_compiles_as_an_ordinary_spec(phigen, lattice, name):
 def test_the_starter_of_a_lattice_reads_and_is_proved(phigen, tmp_path):
     path = tmp_path / "chain.yaml"
     assert phigen("new", "chain", "--lattice", "-o", path).exit_code == 0
-    done = phigen("check", path)
-    assert (done.exit_code, "C is a Casimir (at every site, for all sizes)" in done.stdout) == (0, True)
+    result = phigen("check", path)
+    assert (result.exit_code, "C is a Casimir (at every site, for all sizes)" in result.stdout) == (0, True)
 
 
 def test_show_prints_the_cell(phigen, lattice):
@@ -73,8 +73,8 @@ def test_show_describes_a_cell_for_machines(phigen, lattice):
 def test_check_refutes_a_wrong_invariant_of_a_lattice_at_its_place(phigen, lattice):
     path = lattice("toda")
     path.write_text(path.read_text(encoding="utf-8").replace("b**3/3 + 2", "b**3/3 - 2"), encoding="utf-8")
-    done = phigen("check", path)
-    assert (done.exit_code, "refuted              K is invariant" in done.stdout) == (5, True)
+    result = phigen("check", path)
+    assert (result.exit_code, "refuted              K is invariant" in result.stdout) == (5, True)
 
 
 def test_a_run_names_the_sizes_of_its_expansion(phigen, lattice):
@@ -93,8 +93,8 @@ def test_a_run_names_the_sizes_of_its_expansion(phigen, lattice):
     ],
 )
 def test_sizes_that_do_not_fit_say_so(phigen, lattice, sizes, code, message):
-    done = phigen("show", lattice("spins_2"), "--expand", sizes)
-    assert (done.exit_code, message in " ".join(done.stderr.split())) == (code, True)
+    result = phigen("show", lattice("spins_2"), "--expand", sizes)
+    assert (result.exit_code, message in " ".join(result.stderr.split())) == (code, True)
 
 
 def test_the_lattice_of_a_system_written_out_has_what_runs_of_lattices_have(phigen, tmp_path):
@@ -114,8 +114,8 @@ runs: {r: {initial: [1, 0, 0, 0, 0, 0, 0, 0], step: 0.1, until: 3.05, every: 0.5
 def test_show_prints_the_lattice_of_a_system_written_out(phigen):
     shown = loads(phigen("show", "spin_chain5", "--lattice").stdout)
     assert shown.lattice.axes == ("i",)
-    done = phigen("show", "kepler", "--lattice")
-    assert (done.exit_code, "kepler is not recognised as a lattice" in done.stderr) == (1, True)
+    result = phigen("show", "kepler", "--lattice")
+    assert (result.exit_code, "kepler is not recognised as a lattice" in result.stderr) == (1, True)
 
 
 START = """\
@@ -136,24 +136,24 @@ runs:
 def test_values_that_do_not_fit_are_refused_at_the_place_of_their_formula(phigen, tmp_path, command):
     path = tmp_path / "start.yaml"
     path.write_text(START)
-    done = phigen(command, path)
-    assert done.exit_code == 1
+    result = phigen(command, path)
+    assert result.exit_code == 1
     said = "start.yaml:5:25: error: k: the parameter is positive by declaration, but -3 at site 5"
-    assert said in done.stderr
-    assert ("start.yaml:10:29: error: q: 3 values, not 2" in done.stderr) == (command == "check")
+    assert said in result.stderr
+    assert ("start.yaml:10:29: error: q: 3 values, not 2" in result.stderr) == (command == "check")
 
 
 def test_verify_says_at_which_states_a_lattice_is_examined(phigen, tmp_path):
     path = tmp_path / "start.yaml"
     path.write_text(START.replace('"2 - i"', "1").replace("steps: 10}", "steps: 400}"))
-    done = phigen("verify", path, "--run", "a", "--quick")
-    assert "evaluated at the start, after every 4 steps and at the end" in done.stdout, done.stdout
-    assert "at least 3.7, stated 4" in done.stdout or "at least 1.7, stated 2" in done.stdout
+    result = phigen("verify", path, "--run", "a", "--quick")
+    assert "evaluated at the start, after every 4 steps and at the end" in result.stdout, result.stdout
+    assert "at least 3.7, stated 4" in result.stdout or "at least 1.7, stated 2" in result.stdout
 
 
 def test_check_says_that_nothing_is_proved_of_a_spec_with_errors(phigen, tmp_path):
     path = tmp_path / "start.yaml"
     path.write_text(START.replace("hamiltonian: p**2", "hamiltonian: r**2"))
-    done = phigen("check", path)
-    assert (done.exit_code, done.stdout) == (1, "")
-    assert f"{path}: nothing was proved, because the spec has errors" in done.stderr
+    result = phigen("check", path)
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert f"{path}: nothing was proved, because the spec has errors" in result.stderr

@@ -30,10 +30,10 @@ def chain(tmp_path):
 
 def test_a_run_keeps_what_it_should(phigen, chain, tmp_path):
     out = tmp_path / "wave.npz"
-    told = json.loads(phigen("run", chain, "-t", "numpy", "--json", "-o", out, "--set", "a=0.5").stdout)
-    assert told["sizes"] == [12]
-    assert 0 < told["errors"]["energy"] < 1e-6
-    assert told["errors"]["P"] < 1e-14
+    document = json.loads(phigen("run", chain, "-t", "numpy", "--json", "-o", out, "--set", "a=0.5").stdout)
+    assert document["sizes"] == [12]
+    assert 0 < document["errors"]["energy"] < 1e-6
+    assert document["errors"]["P"] < 1e-14
     with np.load(out) as stored:
         assert stored["x"].shape == (5, 2, 12)
         assert stored["parameter_a"] == 0.5
@@ -81,18 +81,18 @@ def test_what_names_a_splitting_says_which_sizes_would_take_fewer_colours_or_no_
 
 def test_a_run_is_drawn_over_space_and_time(phigen, chain, tmp_path):
     pytest.importorskip("matplotlib")
-    done = phigen("run", chain, "-t", "numpy", "--lyapunov", "--plot", tmp_path / "wave.svg")
-    assert done.exit_code == 0
-    assert "largest error" in done.stdout
-    assert "largest Lyapunov exponent after t = 2: 0." in done.stdout
+    result = phigen("run", chain, "-t", "numpy", "--lyapunov", "--plot", tmp_path / "wave.svg")
+    assert result.exit_code == 0
+    assert "largest error" in result.stdout
+    assert "largest Lyapunov exponent after t = 2: 0." in result.stdout
     assert "<svg" in (tmp_path / "wave.svg").read_text(encoding="utf-8")
 
 
 def test_what_a_lattice_promises_is_measured(phigen, chain):
     chain.write_text(CHAIN.replace("runs:", "targets: [numpy]\nruns:"), encoding="utf-8")
-    (found,) = json.loads(phigen("verify", chain, "--json", "--quick").stdout)
-    checks = {check["name"]: check["value"] for check in found["checks"]}
-    assert found["passed"]
+    (record,) = json.loads(phigen("verify", chain, "--json", "--quick").stdout)
+    checks = {check["name"]: check["value"] for check in record["checks"]}
+    assert record["passed"]
     assert checks["observed order"] == pytest.approx(4, abs=0.1)
     assert checks["Poisson identity on 3 sites"] < 1e-14
     assert checks["tangent map against differences on 3 sites"] < 1e-10
@@ -107,14 +107,14 @@ def test_a_page_shows_the_cell_and_a_run_over_space_and_time(phigen, chain, tmp_
     )
     chain.write_text(text, encoding="utf-8")
     assert phigen("report", chain, "--quick", "-o", tmp_path / "chain.html").exit_code == 0
-    found = Page((tmp_path / "chain.html").read_text(encoding="utf-8"))
-    assert found.errors == []
-    assert [given["id"] for given in found.all("section")] == [
+    page = Page((tmp_path / "chain.html").read_text(encoding="utf-8"))
+    assert page.errors == []
+    assert [attributes["id"] for attributes in page.all("section")] == [
         "live", "brief", "system", "choices", "proofs", "measured", "run", "provenance",
     ]  # fmt: skip
-    assert {given["id"] for given in found.all("figure")} == {"figure-fields", "figure-sites"}
-    assert {given["id"] for given in found.all("canvas")} == {"live-ours", "live-theirs", "live-errors"}
-    images = [given["href"] for given in found.all("image")]
+    assert {attributes["id"] for attributes in page.all("figure")} == {"figure-fields", "figure-sites"}
+    assert {attributes["id"] for attributes in page.all("canvas")} == {"live-ours", "live-theirs", "live-errors"}
+    images = [attributes["href"] for attributes in page.all("image")]
     assert len(images) >= 3
     assert all(image.startswith("data:image/png;base64,") for image in images)
 
@@ -139,36 +139,36 @@ def test_a_lattice_that_falls_short_is_told(phigen, chain, monkeypatch, wrong, s
             session._x = wrong(session._x, h)
 
     monkeypatch.setattr(NumpyLatticeSession, "advance", advance)
-    done = phigen("verify", chain, "--quick")
-    assert done.exit_code == 5
-    assert said in done.stderr
+    result = phigen("verify", chain, "--quick")
+    assert result.exit_code == 5
+    assert said in result.stderr
 
 
 def test_what_lattices_do_not_have_is_refused(phigen, chain):
-    done = phigen("verify", "--plot", "a.svg", chain)
-    assert done.exit_code in (1, 2)
-    assert "lattice" in done.stderr
+    result = phigen("verify", "--plot", "a.svg", chain)
+    assert result.exit_code in (1, 2)
+    assert "lattice" in result.stderr
 
 
 def test_a_run_starts_at_the_end_of_another_and_ends_at_a_time(phigen, chain, tmp_path):
     first, second, whole = (tmp_path / f"{name}.npz" for name in ("first", "second", "whole"))
     for more in (["-o", first, "--until", "1"], ["--from", first, "-o", second, "--until", "1"], ["-o", whole]):
-        done = phigen("run", chain, "-t", "numpy", *more)
-        assert done.exit_code == 0, done.stderr
+        result = phigen("run", chain, "-t", "numpy", *more)
+        assert result.exit_code == 0, result.stderr
     np.testing.assert_array_equal(np.load(second)["x"][-1], np.load(whole)["x"][-1])
-    done = phigen("run", chain, "--from", first, "--sizes", "13", "-t", "numpy")
-    assert (done.exit_code, "ends with a state of shape (2, 12), the run has (2, 13)" in done.stderr) == (2, True)
+    result = phigen("run", chain, "--from", first, "--sizes", "13", "-t", "numpy")
+    assert (result.exit_code, "ends with a state of shape (2, 12), the run has (2, 13)" in result.stderr) == (2, True)
     (tmp_path / "no.npz").write_text("no")
-    done = phigen("run", chain, "--from", tmp_path / "no.npz", "-t", "numpy")
-    assert (done.exit_code, "is no .npz of a run of a lattice" in done.stderr) == (2, True)
+    result = phigen("run", chain, "--from", tmp_path / "no.npz", "-t", "numpy")
+    assert (result.exit_code, "is no .npz of a run of a lattice" in result.stderr) == (2, True)
 
 
 @pytest.mark.parametrize(
     ("option", "said"), [("--step=0", "not 0"), ("--set=a=nan", "with a number"), ("--set=m=-1", "m must be positive")]
 )
 def test_numbers_that_no_run_can_have_are_errors_of_the_command_line(phigen, chain, option, said):
-    done = phigen("run", chain, option, "-t", "numpy")
-    assert (done.exit_code, said in done.stderr) == (2, True)
+    result = phigen("run", chain, option, "-t", "numpy")
+    assert (result.exit_code, said in result.stderr) == (2, True)
 
 
 def test_a_film_of_a_lattice_is_drawn_and_refused_elsewhere(phigen, chain, tmp_path, monkeypatch):
@@ -176,8 +176,8 @@ def test_a_film_of_a_lattice_is_drawn_and_refused_elsewhere(phigen, chain, tmp_p
     from PIL import Image
 
     film = tmp_path / "chain.gif"
-    done = phigen("run", chain, "--target", "numpy", "--steps", "3", "--plot", film)
-    assert done.exit_code == 0, done.stderr
+    result = phigen("run", chain, "--target", "numpy", "--steps", "3", "--plot", film)
+    assert result.exit_code == 0, result.stderr
     with Image.open(film) as pictures:
         assert pictures.n_frames > 1
     assert sorted(p.suffix for p in tmp_path.iterdir() if p.stem.startswith(".")) == []
@@ -189,14 +189,14 @@ def test_a_film_of_a_lattice_is_drawn_and_refused_elsewhere(phigen, chain, tmp_p
 
 def test_a_run_has_other_sizes_on_request(phigen, chain, tmp_path):
     out = tmp_path / "wave.npz"
-    told = json.loads(phigen("run", chain, "-t", "numpy", "--json", "-o", out, "--sizes", "30").stdout)
-    assert told["sizes"] == [30]
+    document = json.loads(phigen("run", chain, "-t", "numpy", "--json", "-o", out, "--sizes", "30").stdout)
+    assert document["sizes"] == [30]
     with np.load(out) as stored:
         np.testing.assert_allclose(stored["x"][0, 0], np.sin(np.pi * np.arange(30) / 30))
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("sizes", "said"),
     [
         ("3x3", "3x3 has 2 sizes; chain has one axis"),
         ("1", "1 is too small for the stencil; sizes are at least 2"),
@@ -205,10 +205,10 @@ def test_a_run_has_other_sizes_on_request(phigen, chain, tmp_path):
     ],
 )
 @pytest.mark.parametrize("command", ["run", "verify"])
-def test_sizes_that_do_not_fit_are_errors_of_the_command_line(phigen, chain, command, given, said):
-    done = phigen(command, chain, "--sizes", given)
-    assert done.exit_code == 2
-    assert said in " ".join(done.stderr.split())
+def test_sizes_that_do_not_fit_are_errors_of_the_command_line(phigen, chain, command, sizes, said):
+    result = phigen(command, chain, "--sizes", sizes)
+    assert result.exit_code == 2
+    assert said in " ".join(result.stderr.split())
 
 
 def test_systems_without_sizes_say_so(phigen):
@@ -219,17 +219,17 @@ def test_systems_without_sizes_say_so(phigen):
 def test_a_run_of_other_sizes_is_not_gone_on_with(phigen, chain, tmp_path):
     from phigen import compile
 
-    def stop(done):
-        if done > 10:
+    def stop(steps_done):
+        if steps_done > 10:
             raise KeyboardInterrupt
 
-    kept = tmp_path / "wave.npz.checkpoint"
+    checkpoint = tmp_path / "wave.npz.checkpoint"
     with pytest.raises(KeyboardInterrupt):
-        compile(chain, target="numpy").integrate(np.zeros((2, 12)), 0.05, 40, 10, checkpoints=kept, progress=stop)
+        compile(chain, target="numpy").integrate(np.zeros((2, 12)), 0.05, 40, 10, checkpoints=checkpoint, progress=stop)
     asked = ("run", chain, "-t", "numpy", "-o", tmp_path / "wave.npz", "--resume", "--sizes", "14")
-    done = phigen(*asked)
-    assert done.exit_code == 2
-    assert "belongs to another run" in done.stderr
+    result = phigen(*asked)
+    assert result.exit_code == 2
+    assert "belongs to another run" in result.stderr
 
 
 @pytest.fixture
@@ -260,10 +260,10 @@ def files_beside(chain):
 def test_what_a_killed_run_left_is_not_overwritten(phigen, chain, killed):
     command, left = killed
     assert sorted(left) == ["wave.npz.checkpoint", "wave.npz.part.npy"]
-    done = phigen(*command)
-    assert done.exit_code == 2
+    result = phigen(*command)
+    assert result.exit_code == 2
     assert "belongs to an interrupted run: continue it with --resume, or remove the file" in " ".join(
-        done.stderr.split()
+        result.stderr.split()
     )
     assert files_beside(chain) == left
 
@@ -284,9 +284,9 @@ def test_a_complete_run_is_not_gone_on_with(phigen, chain, tmp_path):
     command = ("run", chain, "-t", "numpy", "-o", tmp_path / "wave.npz", "--resume")
     assert phigen(*command).exit_code == 0  # nothing there yet: from the start
     before = files_beside(chain)
-    done = phigen(*command)
-    assert done.exit_code == 2
-    assert "its run is complete, and there is nothing to resume" in " ".join(done.stderr.split())
+    result = phigen(*command)
+    assert result.exit_code == 2
+    assert "its run is complete, and there is nothing to resume" in " ".join(result.stderr.split())
     assert files_beside(chain) == before
     assert "name them by --output" in phigen("run", chain, "--resume").stderr
 
@@ -294,9 +294,9 @@ def test_a_complete_run_is_not_gone_on_with(phigen, chain, tmp_path):
 @pytest.mark.parametrize("harm", [lambda path: path.unlink(), lambda path: np.save(path, np.zeros((5, 2, 12)))])
 def test_frames_of_another_run_are_not_gone_on_with(phigen, chain, killed, tmp_path, harm):
     harm(tmp_path / "wave.npz.part.npy")
-    done = phigen(*killed[0], "--resume")
-    assert done.exit_code == 2
-    assert "frames" in done.stderr
+    result = phigen(*killed[0], "--resume")
+    assert result.exit_code == 2
+    assert "frames" in result.stderr
     assert (tmp_path / "wave.npz.checkpoint").exists()
 
 
@@ -305,8 +305,8 @@ def test_another_seed_is_that_of_a_spec_with_it(phigen, chain, tmp_path):
     last = []
     for text, more in ((noisy, ["--seed", 7]), (noisy.replace("stride: 10", "stride: 10, seed: 7"), []), (noisy, [])):
         chain.write_text(text, encoding="utf-8")
-        done = phigen("run", chain, "-t", "numpy", "-o", tmp_path / "a.npz", *more)
-        assert done.exit_code == 0, done.stderr
+        result = phigen("run", chain, "-t", "numpy", "-o", tmp_path / "a.npz", *more)
+        assert result.exit_code == 0, result.stderr
         with np.load(tmp_path / "a.npz") as stored:
             last.append(stored["x"][-1])
     assert (last[0] == last[1]).all()
@@ -324,5 +324,5 @@ def test_an_energy_that_is_no_number_is_told(phigen, tmp_path):
         "hamiltonian: {sites: x - log(x) + y}\nruns: {r: {initial: {x: [1, -1], y: 1}, step: 0.1, steps: 4}}\n",
         encoding="utf-8",
     )
-    done = phigen("run", path, "-t", "numpy")
-    assert "warning: H is not a finite number on all of this run: do not trust these states" in done.stderr
+    result = phigen("run", path, "-t", "numpy")
+    assert "warning: H is not a finite number on all of this run: do not trust these states" in result.stderr

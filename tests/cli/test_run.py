@@ -30,8 +30,8 @@ def no_comparison(monkeypatch):
     prepared = experiment.prepared
 
     def alone(*args, **kwargs):
-        found = prepared(*args, **kwargs)
-        return experiment.replace(found, run=experiment.replace(found.run, compare=()))
+        run = prepared(*args, **kwargs)
+        return experiment.replace(run, run=experiment.replace(run.run, compare=()))
 
     monkeypatch.setattr("phigen.cli.run.prepared", alone)
 
@@ -59,10 +59,10 @@ def test_an_interrupted_run_goes_on_to_the_same_bytes(phigen, in_tmp, name, targ
         assert "interrupted after" in stopped.stderr
         assert Path(f"a.{suffix}.checkpoint").exists()
     assert 0 < json.loads(stopped.stdout)["steps"] < 60
-    done = phigen(*run, "--resume")
-    assert done.exit_code == 0, done.stderr
+    result = phigen(*run, "--resume")
+    assert result.exit_code == 0, result.stderr
     assert files(f"a.{suffix}") == expected
-    assert json.loads(done.stdout) == json.loads(whole.stdout)
+    assert json.loads(result.stdout) == json.loads(whole.stdout)
     assert sorted(p.name for p in in_tmp.iterdir()) == [f"a.{suffix}"] + ["a.csv-metadata.json"] * (suffix == "csv")
 
 
@@ -92,9 +92,9 @@ def test_sections_and_exponents_go_on_as_well(phigen, in_tmp):
     with np.load("a.npz") as stored:  # what there is can be read
         assert 10 < len(stored["t"]) < 140
     assert len(Path("s.csv").read_text().splitlines()) > 1
-    done = phigen(*run, "--resume")
+    result = phigen(*run, "--resume")
     assert files(*names) == expected
-    assert done.stdout == whole.stdout
+    assert result.stdout == whole.stdout
 
 
 KILLED = """
@@ -135,8 +135,8 @@ def test_a_killed_run_goes_on_to_the_same_bytes(phigen, in_tmp, number, code):
 
 def test_an_integration_that_fails_keeps_its_rows(phigen, in_tmp):
     run = ("run", SPECS / "lotka_volterra.yaml", "--step", "0.01", "--steps", "100", "-o", "a.npz", "--plot", "a.png")
-    done = phigen(*run)
-    assert done.exit_code == 7
+    result = phigen(*run)
+    assert result.exit_code == 7
     with np.load("a.npz") as stored:
         assert len(stored["t"]) == 1 + 25 // 10 + 1
         assert stored["steps"] == 25
@@ -148,7 +148,7 @@ def test_resuming_another_run_is_refused_and_says_why(phigen, in_tmp):
     run = ("run", SPECS / "rigid_body.yaml", "-o", "a.csv")
     with interrupted(3):
         assert phigen(*run).exit_code == 130
-    kept = files("a.csv", "a.csv.checkpoint")
+    contents = files("a.csv", "a.csv.checkpoint")
     for change, said in [
         (("--step", "0.01"), "step was 0.05 and is 0.01"),
         (("--set", "I1=5"), "parameters was"),
@@ -158,11 +158,11 @@ def test_resuming_another_run_is_refused_and_says_why(phigen, in_tmp):
         (("--run", "tumbling"), "run was 'reference' and is 'tumbling'"),
         (("--lyapunov",), "lyapunov was False and is True"),
     ]:
-        done = phigen(*run, *change, "--resume")
-        assert done.exit_code == 2, change
-        assert re.search(said, done.stderr)
+        result = phigen(*run, *change, "--resume")
+        assert result.exit_code == 2, change
+        assert re.search(said, result.stderr)
     assert "continue it with --resume, or remove the file" in phigen(*run).stderr
-    assert files("a.csv", "a.csv.checkpoint") == kept
+    assert files("a.csv", "a.csv.checkpoint") == contents
     Path("a.csv").write_text("t\n")
     assert "fewer than" in phigen(*run, "--resume").stderr
     Path("a.csv.checkpoint").write_text("nonsense")
@@ -174,9 +174,9 @@ def test_a_changed_spec_is_not_resumed(phigen, write):
     with interrupted(3):
         assert phigen("run", path, "-o", "a.csv").exit_code == 130
     path.write_text(path.read_text().replace("(q**2 + p**2)/2", "(q**2 + p**2)/2 + q**4"))
-    done = phigen("run", path, "-o", "a.csv", "--resume")
-    assert done.exit_code == 2
-    assert "the spec has changed" in done.stderr
+    result = phigen("run", path, "-o", "a.csv", "--resume")
+    assert result.exit_code == 2
+    assert "the spec has changed" in result.stderr
 
 
 def test_resume_without_an_interrupted_run(phigen, write):
@@ -193,11 +193,11 @@ def test_memory_does_not_grow_with_the_length_of_a_run(phigen, in_tmp, monkeypat
 
     def peak(steps):
         tracemalloc.start()
-        done = phigen("run", SPECS / "harmonic_oscillator.yaml", "--steps", steps, "-o", "a.npz", "-q")
-        found = tracemalloc.get_traced_memory()[1]
+        result = phigen("run", SPECS / "harmonic_oscillator.yaml", "--steps", steps, "-o", "a.npz", "-q")
+        peak_memory = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-        assert done.exit_code == 0
-        return found
+        assert result.exit_code == 0
+        return peak_memory
 
     peak(1000)  # what is loaded once
     short, long = peak(4_000), peak(16_000)
@@ -205,39 +205,39 @@ def test_memory_does_not_grow_with_the_length_of_a_run(phigen, in_tmp, monkeypat
 
 
 def test_section_and_exponents_are_told(phigen, in_tmp):
-    done = phigen("run", *EVERYTHING, "--steps", 3000, "--section", "s.npz", "--json")
-    told = json.loads(done.stdout)
+    result = phigen("run", *EVERYTHING, "--steps", 3000, "--section", "s.npz", "--json")
+    document = json.loads(result.stdout)
     with np.load("s.npz") as stored:
-        assert len(stored["t"]) == told["section"]["crossings"]
+        assert len(stored["t"]) == document["section"]["crossings"]
         assert np.max(np.abs(stored["x"][:, 2])) < 1e-15
-    exponents = told["lyapunov"]["exponents"]
+    exponents = document["lyapunov"]["exponents"]
     assert exponents == sorted(exponents, reverse=True)
-    assert abs(told["lyapunov"]["sum"]) < 1e-10
-    assert told["lyapunov"]["history"]["time"][-1] == told["time"] == told["lyapunov"]["time"]
+    assert abs(document["lyapunov"]["sum"]) < 1e-10
+    assert document["lyapunov"]["history"]["time"][-1] == document["time"] == document["lyapunov"]["time"]
     shown = phigen("run", *EVERYTHING, "--steps", 3000).stdout
     assert "crossings of the section x3 = 0" in shown
     assert "Lyapunov exponents after t = 300" in shown
 
 
 def test_a_section_needs_one_in_the_spec(phigen, write):
-    done = phigen("run", write("a.yaml"), "--section", "s.csv")
-    assert done.exit_code == 2
-    assert "has no section" in done.stderr
+    result = phigen("run", write("a.yaml"), "--section", "s.csv")
+    assert result.exit_code == 2
+    assert "has no section" in result.stderr
 
 
 @pytest.mark.parametrize("option", [("-o", "a.xls"), ("--section", "a.txt"), ("--plot", "a.jpg")])
 def test_files_of_other_kinds_are_refused_before_the_work(phigen, in_tmp, option):
-    done = phigen("run", "nowhere.yaml", *option)
-    assert done.exit_code == 2
-    assert "must end in" in done.stderr
+    result = phigen("run", "nowhere.yaml", *option)
+    assert result.exit_code == 2
+    assert "must end in" in result.stderr
 
 
 @pytest.mark.parametrize("command", [("run", "-o", "a.csv"), ("run", "--plot", "a.svg"), ("tune", "--plot", "a.svg")])
 def test_folders_that_are_not_there_are_told_before_the_work(phigen, in_tmp, command):
     name, option, file = command
-    done = phigen(name, "nowhere.yaml", option, f"lost/{file}")
-    assert done.exit_code == 2
-    assert "there is no folder 'lost'" in done.stderr
+    result = phigen(name, "nowhere.yaml", option, f"lost/{file}")
+    assert result.exit_code == 2
+    assert "there is no folder 'lost'" in result.stderr
 
 
 @pytest.mark.parametrize("suffix", slow_but(["svg"], ["png", "svg", "pdf"]))
@@ -250,9 +250,9 @@ def test_the_same_run_is_drawn_with_the_same_bytes(phigen, write, suffix):
 
 def test_figures_without_matplotlib_are_refused_before_the_work(phigen, write, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    done = phigen("run", write("a.yaml"), "--plot", "a.png", "-o", "a.csv")
-    assert done.exit_code == 2
-    assert "pip install matplotlib" in done.stderr
+    result = phigen("run", write("a.yaml"), "--plot", "a.png", "-o", "a.csv")
+    assert result.exit_code == 2
+    assert "pip install matplotlib" in result.stderr
     assert not Path("a.csv").exists()
 
 
@@ -261,8 +261,8 @@ def test_with_noise_states_are_stored_after_whole_steps_only(phigen, tmp_path):
 
     def made(name, *options):
         path = tmp_path / name
-        done = phigen("run", "double_well", "-t", "numpy", "--steps", "8", *options, "-o", path)
-        return done, path.read_text().splitlines() if done.exit_code == 0 else []
+        result = phigen("run", "double_well", "-t", "numpy", "--steps", "8", *options, "-o", path)
+        return result, path.read_text().splitlines() if result.exit_code == 0 else []
 
     (_, every), (_, some) = made("a.csv", "--every", "0.1"), made("b.csv", "--at", "0.1,0.3")
     assert some[2:4] == [every[2], every[4]]
@@ -300,9 +300,9 @@ def test_a_run_does_not_start_from_what_no_run_has_written(phigen, write, file):
         np.savez(file, **content)
     else:
         Path(file).write_text(content)
-    done = phigen("run", path, "-t", "numpy", "--from", file)
-    assert done.exit_code == 2
-    assert why in " ".join(done.stderr.split())
+    result = phigen("run", path, "-t", "numpy", "--from", file)
+    assert result.exit_code == 2
+    assert why in " ".join(result.stderr.split())
 
 
 def test_more_members_than_there_is_memory_for_are_refused_at_their_place(phigen, write):
@@ -311,6 +311,6 @@ def test_more_members_than_there_is_memory_for_are_refused_at_their_place(phigen
         "hamiltonian: p**2/2 + q**2/2\nnoise: {w: {hamiltonian: q}}\n"
         "runs: {a: {initial: [1, 0], step: 0.1, steps: 10, members: 4294967296}}\n"
     )
-    done = phigen("run", write("a.yaml", noisy), "-t", "numpy")
-    assert done.exit_code == 3
-    assert "a.yaml:7:60: error: 4294967296 members take 192 GiB of memory" in done.stderr
+    result = phigen("run", write("a.yaml", noisy), "-t", "numpy")
+    assert result.exit_code == 3
+    assert "a.yaml:7:60: error: 4294967296 members take 192 GiB of memory" in result.stderr
