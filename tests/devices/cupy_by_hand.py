@@ -154,9 +154,9 @@ class RawModule:
             flags = ["-O1", "-w", "-std=c++17", "-ffp-contract=off", "-shared", "-fPIC"]
             defined = [o for o in self.options if o.startswith("-D")]
             command = ["g++", *flags, *defined, source, "-o", built]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            if done.returncode:
-                raise CompileException(done.stderr)
+            process = subprocess.run(command, capture_output=True, text=True, check=False)
+            if process.returncode:
+                raise CompileException(process.stderr)
             self._library = ctypes.CDLL(str(built))
 
     def get_function(self, name):
@@ -167,14 +167,14 @@ class RawModule:
 
 def module():
     """Return the module that takes the place of the package cupy."""
-    made = ModuleType("cupy")
+    cupy = ModuleType("cupy")
     properties = {
         "name": b"Emulated card",
         "multiProcessorCount": 4,
         "totalGlobalMem": 1 << 30,
         "sharedMemPerBlock": 49_152,
     }
-    made.cuda = SimpleNamespace(
+    cupy.cuda = SimpleNamespace(
         runtime=SimpleNamespace(
             getDeviceCount=lambda: 1,
             getDeviceProperties=lambda device: properties,
@@ -185,5 +185,5 @@ def module():
         compiler=SimpleNamespace(CompileException=CompileException),
         Device=Device,
     )
-    made.RawModule, made.empty = RawModule, empty
-    return made
+    cupy.RawModule, cupy.empty = RawModule, empty
+    return cupy

@@ -44,10 +44,10 @@ def test_members_have_the_bits_of_c(cupy):
     device, c = both(compile_text(BODY))
     assert repr(device.device) == "<CUDA device: Emulated card, 1024 MiB>"
     x0 = np.random.default_rng(2).standard_normal((300, 3)) + 1
-    own = {"h": np.linspace(0.01, 0.1, 300), "I1": np.linspace(1, 2, 300)}
-    for more in ({"h": 0.1}, own):
-        given = {"X0": x0, "steps": 20, "stride": 6, **more}
-        np.testing.assert_array_equal(device.ensemble(**given), c.ensemble(**given))
+    member_values = {"h": np.linspace(0.01, 0.1, 300), "I1": np.linspace(1, 2, 300)}
+    for more in ({"h": 0.1}, member_values):
+        arguments = {"X0": x0, "steps": 20, "stride": 6, **more}
+        np.testing.assert_array_equal(device.ensemble(**arguments), c.ensemble(**arguments))
 
 
 @pytest.mark.slow

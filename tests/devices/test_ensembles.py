@@ -103,16 +103,18 @@ def test_members_with_common_coefficients_have_the_bits_of_others(source, x0):
     fixed = device.backend if gauge is None else device.backend.with_gauge(gauge)
     solver = type(device)(fixed, device.interface)
     common = solver.ensemble(x0, 0.1, 20)
-    own = solver.ensemble(x0, np.full(100, 0.1), 20)
+    run = solver.ensemble(x0, np.full(100, 0.1), 20)
     assert set(fixed._compiled) == {True, False}
-    np.testing.assert_array_equal(common, own)
+    np.testing.assert_array_equal(common, run)
 
 
 @pytest.mark.slow
 def test_members_have_parameters_and_steps_of_their_own(body, x0):
     device, c = body
-    own = {"h": np.linspace(0.01, 0.1, 100), "I1": np.linspace(1, 2, 100)}
-    np.testing.assert_array_equal(device.ensemble(x0, steps=20, **own), c.ensemble(x0, steps=20, **own))
+    member_values = {"h": np.linspace(0.01, 0.1, 100), "I1": np.linspace(1, 2, 100)}
+    np.testing.assert_array_equal(
+        device.ensemble(x0, steps=20, **member_values), c.ensemble(x0, steps=20, **member_values)
+    )
 
 
 @pytest.mark.parametrize("size", [pytest.param(1, marks=pytest.mark.slow), 48])
