@@ -232,12 +232,12 @@ def lie_poisson(basis: Sequence[Matrix], x: Sequence[Symbol]) -> Matrix:
 
 def constants(pi: Matrix, x: Sequence[Symbol]) -> dict[str, Any]:
     """Return the structure constants of a linear structure as a spec has them."""
-    found: dict[str, Any] = {}
+    structure_constants: dict[str, Any] = {}
     for i, j in combinations(range(len(x)), 2):
         parts = {f"E{k + 1}": text(sympy.diff(pi[i, j], v)) for k, v in enumerate(x) if sympy.diff(pi[i, j], v) != 0}
         if parts:
-            found.setdefault(f"E{i + 1}", {})[f"E{j + 1}"] = parts
-    return found
+            structure_constants.setdefault(f"E{i + 1}", {})[f"E{j + 1}"] = parts
+    return structure_constants
 
 
 def unit(n: int, i: int, j: int) -> Matrix:

@@ -40,6 +40,6 @@ def lattice(trial: Any) -> None:
 def members(trial: Any, many: Any) -> None:
     """Members with parameters, steps and times of their own are those of C."""
     device, c = solver_of(trial.compilation, "opencl"), trial.solvers["c"]
-    x, sizes, given, since = many
-    ours, theirs = (s.ensemble(x, sizes, 6, 4, **since, **given) for s in (device, c))
+    x, sizes, parameters, since = many
+    ours, theirs = (s.ensemble(x, sizes, 6, 4, **since, **parameters) for s in (device, c))
     expect_close(ours, theirs, trial.part("c", 1e-12), "members of OpenCL and C", float(np.abs(theirs).max()))

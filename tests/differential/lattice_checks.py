@@ -268,9 +268,9 @@ def _javascript(trial: Trial, steps: int) -> Any:
     (source,) = emit(plain, "js", COMMAND).values()
     with tempfile.TemporaryDirectory() as folder:
         write(Path(folder), {"solver.mjs": source})
-        made = f"const options = {json.dumps(options)}; {seed}const s = new module.Solver(options); "
-        done = f"s.integrate({trial.h!r}, {steps}); return [[...s.x], s.t, s.hamiltonian()]"
-        return asked_of_node(Path(folder) / "solver.mjs", made + done)
+        setup = f"const options = {json.dumps(options)}; {seed}const s = new module.Solver(options); "
+        call = f"s.integrate({trial.h!r}, {steps}); return [[...s.x], s.t, s.hamiltonian()]"
+        return asked_of_node(Path(folder) / "solver.mjs", setup + call)
 
 
 def bits(trial: Trial) -> None:
@@ -289,8 +289,8 @@ def bits(trial: Trial) -> None:
 def _expect_resumed(trial: Trial, solver: LatticeSolver, rows: Floats, folder: Path, target: str) -> None:
     """Expect a run that was interrupted, and goes on from its checkpoint, to be the whole run."""
 
-    def stop(done: int) -> None:
-        if done >= 6:
+    def stop(steps_done: int) -> None:
+        if steps_done >= 6:
             raise KeyboardInterrupt
 
     more: dict[str, Any] = {
@@ -319,12 +319,12 @@ def sessions(trial: Trial) -> None:
 
 def members(trial: Trial) -> None:
     """Members of ensembles, with disorder and steps of their own, are single runs."""
-    x, sizes, given = _many(trial, 3)
+    x, sizes, options = _many(trial, 3)
     shared = {"bonds": trial.system.edges} if trial.system.graph else {}
     for target, solver in trial.solvers.items():
-        rows = solver.ensemble(x, sizes, 5, 2, **trial.since, **given, **shared)
+        rows = solver.ensemble(x, sizes, 5, 2, **trial.since, **options, **shared)
         for m in (0, 2):
-            each = {k: v[m] if np.ndim(v[m]) else float(v[m]) for k, v in given.items()}
+            each = {k: v[m] if np.ndim(v[m]) else float(v[m]) for k, v in options.items()}
             begin = trial.since | ({"member": m} if trial.system.noise else {})
             run = solver.integrate(x[m], float(sizes[m]), 5, 2, **begin, **each, **shared)
             expect_close(rows[:, m], run.x, trial.part(target, 1e-12), f"{target}: member {m} and its run")
@@ -334,8 +334,8 @@ def _many(trial: Trial, many: int) -> tuple[Floats, Floats, dict[str, Any]]:
     """States, steps and parameters of members."""
     random = trial.random
     x = trial.x0 + 0.05 * random.uniform(-1, 1, (many, *trial.x0.shape))
-    given = {n: np.multiply.outer(random.uniform(0.9, 1.1, many), v) for n, v in trial.values.items()}
-    return x, trial.h * random.uniform(0.7, 1, many), given
+    parameters = {n: np.multiply.outer(random.uniform(0.9, 1.1, many), v) for n, v in trial.values.items()}
+    return x, trial.h * random.uniform(0.7, 1, many), parameters
 
 
 def gradient(trial: Trial) -> None:
@@ -344,44 +344,46 @@ def gradient(trial: Trial) -> None:
     bars, along = random.normal(size=(4, *trial.x0.shape)), random.normal(size=trial.x0.shape)
     pushes = {n: 0.3 * random.normal(size=np.shape(v)) for n, v in trial.values.items()}
     shared = {"bonds": trial.system.edges} if trial.system.graph else {}
-    found = {}
+    derivatives = {}
     for target, solver in trial.solvers.items():
         back = solver.pullback(trial.x0, trial.h, steps, bars, stride, **trial.since, **trial.given)
         run = solver.integrate(trial.x0, trial.h, steps, stride, **trial.since, **trial.given)
         expect_close(back.x1, run.x, trial.part(target, 1e-13), f"{target}: states of the pullback and of the run")
         for name, bar in back.parameters_bar.items():
             expect(np.shape(bar) == np.shape(trial.values[name]), f"{target}: {name}_bar has shape {np.shape(bar)}")
-        found[target] = np.concatenate([back.x0_bar.ravel(), *(np.ravel(back.parameters_bar[n]) for n in trial.values)])
+        derivatives[target] = np.concatenate(
+            [back.x0_bar.ravel(), *(np.ravel(back.parameters_bar[n]) for n in trial.values)]
+        )
 
     run = trial.solvers["numpy" if trial.single else "c"]
 
     def weighed(e: float) -> Floats:
-        given = {n: v + e * pushes[n] for n, v in trial.values.items()} | shared
-        rows = run.integrate(trial.x0 + e * along, trial.h, steps, stride, **trial.since, **given).x
+        displaced = {n: v + e * pushes[n] for n, v in trial.values.items()} | shared
+        rows = run.integrate(trial.x0 + e * along, trial.h, steps, stride, **trial.since, **displaced).x
         return np.array(float(np.sum(bars * rows)))
 
     slope, doubt = derivative(weighed)
     direction = np.concatenate([along.ravel(), *(np.ravel(pushes[n]) for n in trial.values)])
-    scale = float(np.abs(found["numpy"]) @ np.abs(direction)) + float(np.abs(slope)) + 1e-3
-    for target, bar in found.items():
+    scale = float(np.abs(derivatives["numpy"]) @ np.abs(direction)) + float(np.abs(slope)) + 1e-3
+    for target, bar in derivatives.items():
         part = max(trial.part(target, 1e-9, 5e-3), 30 * float(doubt) / scale)
         expect_close(np.array(bar @ direction), slope, part, f"{target}: pullback and differences", scale)
-    expect_close(found["c"], found["numpy"], trial.part("c", 1e-11, 5e-3), "pullback of C and NumPy")
+    expect_close(derivatives["c"], derivatives["numpy"], trial.part("c", 1e-11, 5e-3), "pullback of C and NumPy")
 
 
 def member_gradients(trial: Trial) -> None:
     """Cotangents of members are those of single runs."""
-    x, sizes, given = _many(trial, 3)
+    x, sizes, options = _many(trial, 3)
     bars, shared = trial.random.normal(size=x.shape), {"bonds": trial.system.edges} if trial.system.graph else {}
     for target, solver in trial.solvers.items():
-        back = solver.pullback(x, sizes, 3, bars, **trial.since, **given, **shared)
+        back = solver.pullback(x, sizes, 3, bars, **trial.since, **options, **shared)
         for m in (0, 2):
-            each = {k: v[m] if np.ndim(v[m]) else float(v[m]) for k, v in given.items()}
+            each = {k: v[m] if np.ndim(v[m]) else float(v[m]) for k, v in options.items()}
             alone = solver.pullback(x[m], float(sizes[m]), 3, bars[m], **trial.since, **each, **shared)
             expect_close(
                 back.x0_bar[m], alone.x0_bar, trial.part(target, 1e-11, 5e-3), f"{target}: x0_bar of member {m}"
             )
-            for name in given:
+            for name in options:
                 scale = 1 + float(np.abs(alone.parameters_bar[name]).max(initial=0))
                 expect_close(
                     back.parameters_bar[name][m],
@@ -467,10 +469,10 @@ def hopeless(trial: Trial) -> None:
 def extras(trial: Trial) -> None:
     """What the spec asks for and what `compile` is asked for is there."""
     solver = phigen.compile(phigen.spec.loads(trial.system.text), "numpy", **trial.system.asked)
-    wanted = trial.compilation.program.extras
-    if wanted.adjoint:
+    requested = trial.compilation.program.extras
+    if requested.adjoint:
         solver.pullback(trial.x0, trial.h, 1, trial.x0, **trial.since, **trial.given)
-    if wanted.tangent:
+    if requested.tangent:
         solver.step_tangent(trial.x0, trial.h, trial.x0[None], **trial.since, **trial.given)
     expect(solver.interface.single == trial.single, "real: float of the spec is lost")
 
@@ -534,13 +536,13 @@ CHECKS = (
 def script(system: Lattice, check: Check | None) -> str:
     """A script that shows what a check found."""
     trial = Trial(system, None, {})  # type: ignore[arg-type]
-    given = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in (trial.given | trial.since).items()}
+    arguments = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in (trial.given | trial.since).items()}
     h = float(f"{0.1 / speed_of(trial.field, trial.t0, trial.x0.ravel()):.2g}")
     return (
         f"import numpy as np, phigen, phigen.spec\n"
         f'spec = phigen.spec.loads(open("case.yaml").read())  # the lines above\n'
         f"x, h = np.array({trial.x0.round(3).tolist()}), {h!r}\n"
-        f"given = {given}\n"
+        f"given = {arguments}\n"
         f'for target in ("c", "numpy"):\n'
         f"    s = phigen.compile(spec, target{''.join(f', {k}=True' for k in system.asked)})\n"
         + "\n".join(f"    {line}" for line in (check.lines if check else "").splitlines())

@@ -181,7 +181,7 @@ def _initial(source: random.Random, cell: Cell, place: dict[str, Any]) -> Any:
 def _with_energy(source: random.Random, drawn: Lattice, cell: Cell) -> Lattice:
     """The lattice with a Hamiltonian: terms of a site, and terms that relate sites."""
     one_part = source.random() < 0.15
-    own, between = _terms(source, cell, one_part)
+    site_terms, between = _terms(source, cell, one_part)
     if not drawn.axes:
         ends = [
             _between(source, cell, "[a]", "[b]", between, symmetric=drawn.pairs)
@@ -190,8 +190,8 @@ def _with_energy(source: random.Random, drawn: Lattice, cell: Cell) -> Lattice:
         if cell.kind == "food web":
             ends = []  # energies of bonds beside brackets along bonds are refused
         weight = Symbol("k") if drawn.graph and source.random() < 0.5 else Symbol("J")
-        return replace(drawn, sites=tuple(own), ends=tuple(weight * e for e in ends))
-    terms = list(own)
+        return replace(drawn, sites=tuple(site_terms), ends=tuple(weight * e for e in ends))
+    terms = list(site_terms)
     reach = [1] * len(drawn.axes) if drawn.across else [0] * len(drawn.axes)
     for _ in range(source.choice([0, 1, 1, 2, 3])):
         offset = _offset(source, drawn)

@@ -70,8 +70,10 @@ class Ordinary:
         yield from {"phigen": 1, "name": f"o{self.seed}"}.items()
         yield "coordinates", [str(v) for v in self.structure.coordinates]
         if self.parameters:
-            given = {n: {"value": text(v), "positive": p} if p else text(v) for n, (v, p) in self.parameters.items()}
-            yield "parameters", given
+            parameters = {
+                n: {"value": text(v), "positive": p} if p else text(v) for n, (v, p) in self.parameters.items()
+            }
+            yield "parameters", parameters
         if self.timed:
             yield "time", str(TIME)
         yield "poisson", dict(self.structure.form)
@@ -169,9 +171,9 @@ class Ordinary:
             if len(self.terms) > 1:
                 yield replace(self, terms=self.terms[:k] + self.terms[k + 1 :])
         for name in ("covector", "vector", "noise", "observables", "options", "asked"):
-            given = getattr(self, name)
-            for key in given:
-                yield replace(self, **{name: {k: v for k, v in given.items() if k != key}})
+            values = getattr(self, name)
+            for key in values:
+                yield replace(self, **{name: {k: v for k, v in values.items() if k != key}})
         if self.damping is not None:
             yield replace(self, damping=None)
         if self.monitor is not None:
@@ -324,14 +326,14 @@ def _bodies(source: random.Random, drawn: Ordinary, options: dict[str, Any]) -> 
             terms.append(-m * mass[str(j)] / sympy.sqrt(between))
     if change == "jacobi" and source.random() < 0.4:
         terms.append(small(source) * at("x1") ** 2 * at(f"y{count - 1}") / 400)
-    given = {"scheme": "splitting", "coordinates_from": change, "order": source.choice([2, 2, 4])}
+    spec_options = {"scheme": "splitting", "coordinates_from": change, "order": source.choice([2, 2, 4])}
     if count == 3 and source.random() < 0.7:
-        given["composition"] = source.choice(
-            {2: ["saba-4-2", "wisdom-holman", "wisdom-holman-3"], 4: ["aba-8-4"]}[given["order"]]
+        spec_options["composition"] = source.choice(
+            {2: ["saba-4-2", "wisdom-holman", "wisdom-holman-3"], 4: ["aba-8-4"]}[spec_options["order"]]
         )
     state = tuple(start[str(v)] for v in structure.coordinates)
     return replace(
-        drawn, structure=structure, terms=tuple(terms), start=state, parameters={}, options={**options, **given}
+        drawn, structure=structure, terms=tuple(terms), start=state, parameters={}, options={**options, **spec_options}
     )
 
 

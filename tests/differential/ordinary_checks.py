@@ -271,28 +271,28 @@ def until(trial: Trial) -> None:
 def members(trial: Trial) -> None:
     """Members of ensembles, with parameters, steps and times of their own, are single runs."""
     many, steps = 11, 6
-    x, sizes, given, since = _many(trial, many)
+    x, sizes, options, since = _many(trial, many)
     for target, solver in trial.solvers.items():
-        rows = solver.ensemble(x, sizes, steps, 4, **since, **given)
-        last = solver.ensemble(x, sizes, steps, **since, **given)
+        rows = solver.ensemble(x, sizes, steps, 4, **since, **options)
+        last = solver.ensemble(x, sizes, steps, **since, **options)
         expect_close(last, rows[-1], trial.part(target, 1e-13), f"{target}: an ensemble with and without a stride")
         for m in (0, many - 1):
-            each = {k: float(v[m]) for k, v in given.items()}
+            each = {k: float(v[m]) for k, v in options.items()}
             begin = {k: (float(v[m]) if k == "t0" else v) for k, v in since.items()} | (
                 {"member": m} if trial.system.noise else {}
             )
             run = solver.integrate(x[m], sizes[m], steps, 4, **begin, **each)
             expect_close(rows[:, m], run.x, trial.part(target, 1e-12), f"{target}: member {m} of {many} and its run")
-        _expect_unmoved_by_failure(trial, target, rows, (x, sizes, given, since))
+        _expect_unmoved_by_failure(trial, target, rows, (x, sizes, options, since))
 
 
 def _expect_unmoved_by_failure(trial: Trial, target: str, rows: Floats, many: Any) -> None:
     """Members follow their trajectories if another one fails, as one that starts far from all others may."""
-    x, sizes, given, since = many
+    x, sizes, parameters, since = many
     far = x.copy()
     far[1] = 1e150
     try:
-        ends = trial.solvers[target].ensemble(far, sizes, 6, **since, **given)
+        ends = trial.solvers[target].ensemble(far, sizes, 6, **since, **parameters)
     except StepError as failed:
         ends = failed.trajectory
         if list(failed.members) != [1]:
@@ -306,11 +306,11 @@ def _many(trial: Trial, many: int) -> tuple[Floats, Floats, dict[str, Floats], d
     random = trial.random
     x = trial.x0 + 0.05 * random.uniform(-1, 1, (many, len(trial.x0)))
     sizes = trial.h * random.uniform(0.7, 1, many)
-    given = {name: value * random.uniform(0.9, 1.1, many) for name, value in trial.system.values.items()}
+    parameters = {name: value * random.uniform(0.9, 1.1, many) for name, value in trial.system.values.items()}
     since = dict(trial.since)
     if trial.system.timed:
         since["t0"] = trial.t0 + random.uniform(-1, 1, many)
-    return x, sizes, given, since
+    return x, sizes, parameters, since
 
 
 def gradient(trial: Trial) -> None:
@@ -319,44 +319,44 @@ def gradient(trial: Trial) -> None:
     values, n = trial.system.values, len(trial.x0)
     bars, along = random.normal(size=(4, n)), random.normal(size=n)
     pushes = {name: 0.3 * value * random.normal() for name, value in values.items()}
-    found = {}
+    derivatives = {}
     for target, solver in trial.fixed.items():
         back = solver.pullback(trial.x0, trial.h, steps, bars, stride, **trial.since)
         run = solver.integrate(trial.x0, trial.h, steps, stride, **trial.since)
         expect_close(back.x1, run.x, trial.part(target, 1e-13), f"{target}: states of the pullback and of the run")
-        found[target] = np.array([*back.x0_bar, *(back.parameters_bar[name] for name in values)])
+        derivatives[target] = np.array([*back.x0_bar, *(back.parameters_bar[name] for name in values)])
 
     run = trial.fixed["numpy" if trial.single else "c"]
 
     def weighed(e: float) -> Floats:
-        given = {name: value + e * pushes[name] for name, value in values.items()}
-        rows = run.integrate(trial.x0 + e * along, trial.h, steps, stride, **trial.since, **given).x
+        displaced = {name: value + e * pushes[name] for name, value in values.items()}
+        rows = run.integrate(trial.x0 + e * along, trial.h, steps, stride, **trial.since, **displaced).x
         return np.array(float(np.sum(bars * rows)))
 
     slope, doubt = derivative(weighed)
     direction = np.array([*along, *(pushes[name] for name in values)])
-    scale = float(np.abs(found["numpy"]) @ np.abs(direction)) + float(np.abs(slope)) + 1e-3
-    for target, bar in found.items():
+    scale = float(np.abs(derivatives["numpy"]) @ np.abs(direction)) + float(np.abs(slope)) + 1e-3
+    for target, bar in derivatives.items():
         part = max(trial.part(target, 1e-9, 5e-3), 30 * float(doubt) / scale)
         expect_close(np.array(bar @ direction), slope, part, f"{target}: pullback and differences", scale)
-    expect_close(found["c"], found["numpy"], trial.part("c", 1e-11, 5e-3), "pullback of C and NumPy")
+    expect_close(derivatives["c"], derivatives["numpy"], trial.part("c", 1e-11, 5e-3), "pullback of C and NumPy")
 
 
 def member_gradients(trial: Trial) -> None:
     """Cotangents of members are those of single runs."""
     many, steps = 10, 3
-    x, sizes, given, since = _many(trial, many)
+    x, sizes, options, since = _many(trial, many)
     bars = trial.random.normal(size=x.shape)
     for target, solver in trial.solvers.items():
-        back = solver.pullback(x, sizes, steps, bars, **since, **given)
+        back = solver.pullback(x, sizes, steps, bars, **since, **options)
         scale = float(np.abs(back.x0_bar).max())
         for m in (0, many - 1):
-            each = {k: float(v[m]) for k, v in given.items()}
+            each = {k: float(v[m]) for k, v in options.items()}
             begin = {k: (float(v[m]) if k == "t0" else v) for k, v in since.items()}
             alone = solver.pullback(x[m], float(sizes[m]), steps, bars[m], **begin, **each)
             part = trial.part(target, 1e-11, 5e-3)
             expect_close(back.x0_bar[m], alone.x0_bar, part, f"{target}: x0_bar of member {m} and of its run", scale)
-            for name in given:
+            for name in options:
                 bar = np.array(back.parameters_bar[name][m])
                 expect_close(bar, alone.parameters_bar[name], part, f"{target}: {name}_bar of member {m}", scale + 1)
 

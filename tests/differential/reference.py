@@ -54,8 +54,8 @@ def expect_same_bits(value: Floats, reference: Floats, what: str) -> None:
 
 def flow(field: Field, t0: float, x0: Floats, span: float) -> Floats:
     """Return the state after a span of time, to about 1e-12."""
-    found = solve_ivp(field, (t0, t0 + span), x0, method="DOP853", rtol=2.5e-14, atol=1e-15)
-    return np.asarray(found.y[:, -1], dtype=float) if found.success else np.full_like(x0, np.nan)
+    solution = solve_ivp(field, (t0, t0 + span), x0, method="DOP853", rtol=2.5e-14, atol=1e-15)
+    return np.asarray(solution.y[:, -1], dtype=float) if solution.success else np.full_like(x0, np.nan)
 
 
 def speed_of(field: Field, t0: float, x0: Floats) -> float:

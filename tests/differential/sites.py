@@ -174,17 +174,17 @@ class Lattice:
 
         def turned(t: float, x: Floats, slope: Floats) -> Floats:
             """π times a covector."""
-            found = np.zeros_like(x)
+            increments = np.zeros_like(x)
             for i, j, term in entries:
-                found[i] += term.at(t, x, values) * slope[j]
+                increments[i] += term.at(t, x, values) * slope[j]
             for f, g, place, term in across:
                 base = self.places("[a]", True) if self.graph else np.arange(self.count)
                 other = self.places(place, self.graph)
                 inside = other >= 0
                 value = term.at(t, x, values)[inside]
-                np.add.at(found[f], base[inside], value * slope[g][other[inside]])
-                np.add.at(found[g], other[inside], -value * slope[f][base[inside]])
-            return found
+                np.add.at(increments[f], base[inside], value * slope[g][other[inside]])
+                np.add.at(increments[g], other[inside], -value * slope[f][base[inside]])
+            return increments
 
         def rate(t: float, x: Floats) -> Floats:
             slope = np.zeros_like(x)
@@ -195,10 +195,10 @@ class Lattice:
                 pushed[term.target] += term.at(t, x, values)
             if damping is not None:
                 pushed += damping.at(t, x, values) * turned(t, x, slope)
-            found = turned(t, x, pushed)
+            increments = turned(t, x, pushed)
             for term in pushes["vector"]:
-                found[term.target] += term.at(t, x, values)
-            return found
+                increments[term.target] += term.at(t, x, values)
+            return increments
 
         return rate
 
@@ -238,20 +238,20 @@ class Lattice:
     def matrix(self, values: Mapping[str, Any], x: Floats) -> Floats:
         """π of the whole lattice, (fields · sites) squared."""
         n = self.count
-        found = np.zeros((len(x) * n, len(x) * n))
+        entries = np.zeros((len(x) * n, len(x) * n))
         for i, row in enumerate(self.pi.tolist()):
             for j, e in enumerate(row):
                 if e != 0:
-                    found[i * n : (i + 1) * n, j * n : (j + 1) * n] += np.diag(self._term(e).at(0.0, x, values))
+                    entries[i * n : (i + 1) * n, j * n : (j + 1) * n] += np.diag(self._term(e).at(0.0, x, values))
         for f, g, place, e in self.across:
             base = self.places("[a]", True) if self.graph else np.arange(n)
             other, value = self.places(place, self.graph), self._term(e, edges=self.graph).at(0.0, x, values)
             for a, b, v in zip(base, other, value, strict=True):
                 if b >= 0:
                     i, j = self.fields.index(f) * n + a, self.fields.index(g) * n + b
-                    found[i, j] += v
-                    found[j, i] -= v
-        return found
+                    entries[i, j] += v
+                    entries[j, i] -= v
+        return entries
 
     # --- shrinking
 
@@ -357,8 +357,8 @@ class _Slope:
 
     def add(self, t: float, x: Floats, values: Mapping[str, Any], slope: Floats) -> None:
         """Add ∇ of the sum of the term."""
-        *found, _ = self.term.values(t, x, values)
-        for name, value in zip(self.reads, found, strict=True):
+        *arguments, _ = self.term.values(t, x, values)
+        for name, value in zip(self.reads, arguments, strict=True):
             base, places = self.term.read[name]
             assert places is not None
             inside = self.term.inside

@@ -88,17 +88,20 @@ class Suite:
             warnings.simplefilter("ignore", PhigenWarning)
             for attempt in range(_ATTEMPTS):
                 system = self.draw(seed, attempt)
-                found, made, refused = self._tried(system, None)
+                found_failures, checks_made, refused = self._tried(system, None)
                 if not refused:
                     break
-            small = [self._shrunk(system, name) if shrink else system for name in found]
-            again = [self._tried(s, name)[0].get(name, found[name]) for s, name in zip(small, found, strict=True)]
+            small = [self._shrunk(system, name) if shrink else system for name in found_failures]
+            again = [
+                self._tried(s, name)[0].get(name, found_failures[name])
+                for s, name in zip(small, found_failures, strict=True)
+            ]
         named = {check.name: check for check in self.checks}
         failures = tuple(
             Failure(name, message, s, self.script(s, named.get(name)))
-            for name, message, s in zip(found, again, small, strict=True)
+            for name, message, s in zip(found_failures, again, small, strict=True)
         )
-        return Outcome(failures, tuple(made), refused)
+        return Outcome(failures, tuple(checks_made), refused)
 
     def _tried(self, system: Any, only: str | None) -> tuple[dict[str, str], list[str], str]:
         """The messages of the checks that fail, the names of those that were made, and why phigen refuses it."""
@@ -108,17 +111,17 @@ class Suite:
             return {}, [], str(error)
         except Exception as error:  # whatever it is, it is a defect
             return {"it compiles": _said(error)}, [], ""
-        found, made = dict[str, str](), list[str]()
+        failures, checks_made = dict[str, str](), list[str]()
         for check in self.checks:
             if only in (None, check.name) and check.applies(trial):
-                made.append(check.name)
+                checks_made.append(check.name)
                 try:
                     check.run(trial)
                 except DisagreementError as error:
-                    found[check.name] = str(error)
+                    failures[check.name] = str(error)
                 except Exception as error:  # as well
-                    found[check.name] = _said(error)
-        return found, made, ""
+                    failures[check.name] = _said(error)
+        return failures, checks_made, ""
 
     def _shrunk(self, system: Any, name: str, most: int = 60) -> Any:
         """The system with all parts left out without which the check still fails."""
