@@ -30,7 +30,7 @@ def test_only_values_of_both_signs_have_colours_on_both_sides_of_0(values, name,
 
 
 def test_a_diagram_of_a_positive_field_uses_all_colours():
-    made = phigen.compile("volterra", "numpy").integrate(1 + np.arange(8.0).reshape(1, 8), h=0.001, steps=2)
-    errors = {"energy": np.full(len(made), 1e-9)}
-    images = [image for part in lattice_figure(made, errors, "").subfigs for axes in part.axes for image in axes.images]
-    assert [image.get_clim() for image in images] == [(made.x.min(), made.x.max())]
+    run = phigen.compile("volterra", "numpy").integrate(1 + np.arange(8.0).reshape(1, 8), h=0.001, steps=2)
+    errors = {"energy": np.full(len(run), 1e-9)}
+    images = [image for part in lattice_figure(run, errors, "").subfigs for axes in part.axes for image in axes.images]
+    assert [image.get_clim() for image in images] == [(run.x.min(), run.x.max())]
