@@ -80,13 +80,13 @@ MORE = ["satellite", "seasonal_predator_prey", "kepler_eccentric", "thermal_spin
 @pytest.mark.parametrize("source", [FREE, NASTY, *(pytest.param(s, marks=pytest.mark.slow) for s in MORE)])
 def test_descriptions_and_declarations_are_those_of_the_standard(source, tmp_path):
     """The schema and rules of fmpy; the C compiles without warnings, after the headers of the standard too."""
-    compilation, made = unit(source)
+    compilation, files = unit(source)
     for version in (2, 3):
         path = tmp_path / f"{version}.fmu"
-        path.write_bytes(archive(made, version, {}))
+        path.write_bytes(archive(files, version, {}))
         assert validate_fmu(str(path)) == []
-        assert path.read_bytes() == archive(made, version, {})
-    for file, text in made.sources.items():
+        assert path.read_bytes() == archive(files, version, {})
+    for file, text in files.sources.items():
         (tmp_path / file).write_text(text, encoding="utf-8")
     headers = "".join(f'#include "fmi{v}Functions.h"\n' for v in (3, 2))
     name = compilation.spec.name
@@ -112,8 +112,8 @@ def test_description_takes_a_run_that_goes_forward_and_leaves_out_blank_units():
     text = body_spec("body").replace("runs: {r:", f"runs: {{{BACKWARD}, r:")
     blank = 'unit: "\u0378", description: "\u0378"}'  # of no character, so that nothing is left in the XML
     text = text.replace("unit: kg.m2}", blank).replace("title: 'a body'", "title: ' '")
-    _, made = unit(text)
-    for description in made.descriptions.values():
+    _, files = unit(text)
+    for description in files.descriptions.values():
         root = ET.fromstring(description)
         experiment = root.find("DefaultExperiment").attrib
         assert [float(experiment[key]) for key in ("startTime", "stepSize", "stopTime")] == [0, 0.1, 10]
@@ -184,12 +184,12 @@ def test_inputs_act_from_the_communication_point_on(body, version, tmp_path):
         instance.step(0.0, 0.93)
         instance.set({"torque": -0.5})
         instance.step(0.93, 1.0)
-        found = instance.get("m1", "m2", "m3", "casimirs.C", "observables.spin", "torque")
+        outputs = instance.get("m1", "m2", "m3", "casimirs.C", "observables.spin", "torque")
     solver = phigen.compile(body[0].spec, order=8)
     x = solver.integrate([1, 0.8, 0.1], h=0.01, steps=93, I3=5).x[-1]
     x = solver.integrate(x, h=0.01, steps=100, I3=5, torque=-0.5).x[-1]
-    assert np.abs(np.array(found[:3]) - x).max() < 2e-6
-    assert found[3:] == pytest.approx([x @ x, x[2] / 5, -0.5], abs=1e-5)
+    assert np.abs(np.array(outputs[:3]) - x).max() < 2e-6
+    assert outputs[3:] == pytest.approx([x @ x, x[2] / 5, -0.5], abs=1e-5)
 
 
 def test_initial_values_parameters_and_step_can_be_set(body, tmp_path):
@@ -198,9 +198,9 @@ def test_initial_values_parameters_and_step_can_be_set(body, tmp_path):
     with running(paths[3], tmp_path, start=5.0, values=values) as instance:
         assert instance.get("time", "m1", "system.hamiltonian") == [5.0, 0.3, 0.3**2 / 4 + 0.8**2 / 6 + 0.1**2 / 14]
         instance.step(5.0, 0.4)
-        found = instance.get("m1", "m2", "m3")
+        outputs = instance.get("m1", "m2", "m3")
     exact = phigen.compile(body[0].spec, order=8).integrate([0.3, 0.8, 0.1], h=0.01, steps=40, I3=7, torque=0).x[-1]
-    assert np.abs(np.array(found) - exact).max() < 1e-9
+    assert np.abs(np.array(outputs) - exact).max() < 1e-9
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -250,8 +250,8 @@ def test_states_can_be_copied_and_serialised(free, version, tmp_path):
 
 def test_environment_in_c_under_sanitizers(tmp_path):
     """Modes, early return, states, corrupted bytes and refused values, in one program with the FMU."""
-    _, made = unit(body_spec("body"))
-    for file, text in made.sources.items():
+    _, files = unit(body_spec("body"))
+    for file, text in files.sources.items():
         (tmp_path / file).write_text(text, encoding="utf-8")
     defined = {"UNIT": '"body_fmi.c"', "TOKEN": "body_token", "STEP": "0.1", "FMU(kind)": "body_FMU_##kind"}
     defined["LAST_TIME"] = "body_fmi2GetRealStatus"
@@ -269,11 +269,11 @@ def test_steps_equal_in_tau_meet_physical_times(tmp_path):
     names = compilation.spec.coordinates
     run_ = next(iter(compilation.spec.runs.values()))
     reference = phigen.compile("kepler_eccentric", profile=compilation.program.profile)
-    found, h = reference.integrate([float(x) for x in run_.initial], h=float(run_.step), steps=60), 0.37
+    run, h = reference.integrate([float(x) for x in run_.initial], h=float(run_.step), steps=60), 0.37
     with running(paths[3], tmp_path) as instance:
-        for k in range(int(found.t[-1] / h) - 1):
+        for k in range(int(run.t[-1] / h) - 1):
             instance.step(k * h, h)
-            at = found.at([(k + 1) * h])[0]
+            at = run.at([(k + 1) * h])[0]
             assert np.abs(np.array(instance.get(*names)) - at).max() < 1e-8
     with running(paths[3], tmp_path / "still", start=1.0, values={"solver.step": 1e-30}) as instance:
         with pytest.raises(Exception, match="discard"):  # 1 + 1e-30 is 1: the time stands still
@@ -345,10 +345,10 @@ def test_command_writes_both_versions_without_a_compiler(tmp_path, monkeypatch):
 @pytest.mark.skipif("PHIGEN_ALL_PLATFORMS" not in os.environ, reason="zig makes C libraries first, some minutes")
 def test_zig_makes_libraries_for_other_platforms():
     pytest.importorskip("ziglang")
-    _, made = unit("satellite")
+    _, files = unit("satellite")
     begins = {".so": b"\x7fELF", ".dll": b"MZ", ".dylib": b"\xcf\xfa\xed\xfe"}
     assert set(compilers()) == set(PLATFORMS)
-    libraries = binaries(made, PLATFORMS)
+    libraries = binaries(files, PLATFORMS)
     assert set(libraries) == set(PLATFORMS)
     for name, library in libraries.items():
         assert library.startswith(begins[PLATFORMS[name].suffix])

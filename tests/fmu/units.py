@@ -25,12 +25,12 @@ def unit(source, **options):
     return compilation, unit_of(compilation, emit(compilation.program, "c", "phigen build"))
 
 
-def compiled(made, folder, flags=("-O1",)):
+def compiled(files, folder, flags=("-O1",)):
     """The bytes of the library of an FMU for this machine."""
-    for file, text in made.sources.items():
+    for file, text in files.sources.items():
         (folder / file).write_text(text, encoding="utf-8")
     output = folder / "unit.so"
-    sources = [folder / file for file in made.sources if file.endswith(".c")]
+    sources = [folder / file for file in files.sources if file.endswith(".c")]
     compiler = toolchain.find()
     toolchain.compile_library(sources, output, replace(compiler, tuning=(*FLAGS, *flags)))
     return output.read_bytes()
@@ -38,11 +38,11 @@ def compiled(made, folder, flags=("-O1",)):
 
 def written(source, folder, versions=(3, 2), **options):
     """The compilation, and the paths of the FMU by version."""
-    compilation, made = unit(source, **options)
-    library = {host().folder: compiled(made, folder)}
+    compilation, files = unit(source, **options)
+    library = {host().folder: compiled(files, folder)}
     paths = {v: folder / f"fmi{v}.fmu" for v in versions}
     for version, path in paths.items():
-        path.write_bytes(archive(made, version, library))
+        path.write_bytes(archive(files, version, library))
     return compilation, paths
 
 
