@@ -57,14 +57,14 @@ pytestmark = pytest.mark.few("mixed", "driven", of=KINDS)
 @cache
 def compilation(kind):
     text, order, _ = KINDS[kind]
-    given = spec.loads(f"phigen: 1\nname: t\n{text}scheme: gauss\ngauge: none\n")
-    return compile_spec(given.overridden(order=order, tangent=True, adjoint=True))
+    specification = spec.loads(f"phigen: 1\nname: t\n{text}scheme: gauss\ngauge: none\n")
+    return compile_spec(specification.overridden(order=order, tangent=True, adjoint=True))
 
 
 @cache
 def method(kind, target):
-    made = compilation(kind)
-    return solver(small(made), "c") if target == "small" else solver(made, target)
+    compiled = compilation(kind)
+    return solver(small(compiled), "c") if target == "small" else solver(compiled, target)
 
 
 def start(kind):
@@ -111,25 +111,25 @@ def test_pullback_is_the_gradient_of_the_run(kind):
 @pytest.mark.parametrize("target", ["c", "numpy", "small"])
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "monitored"])  # where e follows the start
 def test_pullback_is_the_transpose_of_the_tangent_map(kind, target):
-    made, x = method(kind, target), start(kind)
+    integrator, x = method(kind, target), start(kind)
     bar, product = weights(len(x)), np.eye(len(x))
-    for _, tangent in made.tangents(x, H, STEPS):
+    for _, tangent in integrator.tangents(x, H, STEPS):
         product = tangent @ product
-    x0_bar = made.pullback(x, H, STEPS, bar).x0_bar
+    x0_bar = integrator.pullback(x, H, STEPS, bar).x0_bar
     assert np.abs(x0_bar - bar @ product).max() <= 1e-14 * np.abs(x0_bar).max()
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_gradients_of_members_are_those_of_single_runs(target):
     """With steps, parameters and times of their own."""
-    made, rng, x = method("driven", target), np.random.default_rng(2), start("driven")
+    integrator, rng, x = method("driven", target), np.random.default_rng(2), start("driven")
     many, h, t0 = x + 0.1 * rng.normal(size=(3, 2)), H * (1 + 0.1 * rng.random(3)), rng.random(3)
-    own = {name: value * (1 + 0.1 * rng.random(3)) for name, value in given("driven").items()}
+    member_values = {name: value * (1 + 0.1 * rng.random(3)) for name, value in given("driven").items()}
     bar = rng.normal(size=(3, 2))
-    together = made.pullback(many, h, STEPS, bar, t0=t0, parameters=own)
+    together = integrator.pullback(many, h, STEPS, bar, t0=t0, parameters=member_values)
     for m in range(3):
-        alone = made.pullback(
-            many[m], h[m], STEPS, bar[m], t0=t0[m], parameters={name: value[m] for name, value in own.items()}
+        alone = integrator.pullback(
+            many[m], h[m], STEPS, bar[m], t0=t0[m], parameters={name: value[m] for name, value in member_values.items()}
         )
         assert together.x0_bar[m] == pytest.approx(alone.x0_bar, rel=1e-13)
         assert [b[m] for b in together.parameters_bar.values()] == pytest.approx(
@@ -140,12 +140,12 @@ def test_gradients_of_members_are_those_of_single_runs(target):
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
     """Steps of later segments begin without what earlier ones predict, so digits are lost to rounding only."""
-    made, x, bar = method("mixed", target), start("mixed"), weights((4, 5))
-    whole = made.pullback(x, H, 30, bar, 10)
+    integrator, x, bar = method("mixed", target), start("mixed"), weights((4, 5))
+    whole = integrator.pullback(x, H, 30, bar, 10)
     monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 7 * 29)  # seven steps
     if target == "numpy":
-        monkeypatch.setattr(made.backend.module, "MAX_TAPE", 7 * 22)
-    part = made.pullback(x, H, 30, bar, 10)
+        monkeypatch.setattr(integrator.backend.module, "MAX_TAPE", 7 * 22)
+    part = integrator.pullback(x, H, 30, bar, 10)
     assert part.x1 == pytest.approx(whole.x1, abs=1e-13)
     assert part.x0_bar == pytest.approx(whole.x0_bar, rel=0, abs=1e-12 * np.abs(whole.x0_bar).max())
 

@@ -66,8 +66,8 @@ def test_attitude_and_position_have_the_order_of_the_method(sign):
     errors = []
     for n in (40, 80):
         run = method.integrate(start, 4.0 / n, n)
-        found = np.concatenate([run.position[-1], rotation(run.attitude[-1]).ravel()])
-        errors.append(np.abs(found - exact[6:]).max())
+        final = np.concatenate([run.position[-1], rotation(run.attitude[-1]).ravel()])
+        errors.append(np.abs(final - exact[6:]).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.2)
     assert errors[1] < 1e-4
 

@@ -27,8 +27,8 @@ def newton(_, y):
 @pytest.mark.slow
 def test_energy_is_kept_through_the_encounter_and_the_comet_goes_where_newton_says():
     """The whole energy is a million times that of the comet."""
-    made = solver(compile_spec(SPEC), "c")
-    run = made.integrate(START, float(RUN.step), RUN.steps)
+    integrator = solver(compile_spec(SPEC), "c")
+    run = integrator.integrate(START, float(RUN.step), RUN.steps)
     until = float(run.t[-1])
     assert np.abs(run.energy / run.energy[0] - 1).max() < 1e-12
     exact = solve_ivp(newton, (0, until), START, "DOP853", rtol=3e-14, atol=1e-20)

@@ -65,12 +65,13 @@ def test_state_and_time_have_the_order_of_the_method(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_targets_have_the_same_states_and_times(case):
-    made, (_, x0, h) = compilation(case), CASES[case]
+    compiled, (_, x0, h) = compilation(case), CASES[case]
     runs = [
-        solver(c, target).integrate(x0, h, STEPS) for c, target in ((made, "numpy"), (made, "c"), (small(made), "c"))
+        solver(c, target).integrate(x0, h, STEPS)
+        for c, target in ((compiled, "numpy"), (compiled, "c"), (small(compiled), "c"))
     ]
     ends = [[*run.x[-1], run.t[-1]] for run in runs]
-    ends.append(javascript(made, f"x0: {list(map(float, x0))}", f"s.integrate({h}, {STEPS});", "[...s.x, s.t]"))
+    ends.append(javascript(compiled, f"x0: {list(map(float, x0))}", f"s.integrate({h}, {STEPS});", "[...s.x, s.t]"))
     for end in ends[1:]:
         assert end == pytest.approx(ends[0], abs=1e-13)
 
@@ -100,8 +101,8 @@ def test_check_proves_the_field_of_forces_and_monitors(case):
 
 def test_steps_back_take_the_time_back():
     _, x0, h = CASES["kepler"]
-    for made in (compilation("kepler"), small(compilation("kepler"))):
-        session = solver(made, "c").session(x0)
+    for compiled in (compilation("kepler"), small(compilation("kepler"))):
+        session = solver(compiled, "c").session(x0)
         for sign in (1, -1):
             for _ in range(4):
                 session.step(sign * h)

@@ -51,8 +51,8 @@ STARTS = {
 
 def of(spec, order, target="numpy", **more):
     """A Gauss solver with tangents."""
-    given = replace(spec, reconstruct="", composition="auto", **more)
-    return solver(compile_spec(given.overridden(order=order, scheme="gauss", tangent=True)), target)
+    variant = replace(spec, reconstruct="", composition="auto", **more)
+    return solver(compile_spec(variant.overridden(order=order, scheme="gauss", tangent=True)), target)
 
 
 def defect(method, x, h, poisson):
@@ -68,9 +68,9 @@ def poisson_of(spec):
 
     from phigen.geometry.system import system_from_spec
 
-    given = system_from_spec(spec).to_sympy()
-    matrix = given.poisson.subs(given.parameters)
-    f = sympy.lambdify([list(given.coordinates)], matrix, "numpy")
+    system = system_from_spec(spec).to_sympy()
+    matrix = system.poisson.subs(system.parameters)
+    f = sympy.lambdify([list(system.coordinates)], matrix, "numpy")
     return lambda x: np.array(f(x), dtype=float)
 
 

@@ -24,10 +24,10 @@ DIMENSIONS = {
 
 def constants(brackets):
     """Structure constants from {(i, j): {k: number}}."""
-    found = {}
+    structure_constants = {}
     for (i, j), row in brackets.items():
-        found.setdefault(i, {})[j] = {k: number(v) for k, v in row.items()}
-    return found
+        structure_constants.setdefault(i, {})[j] = {k: number(v) for k, v in row.items()}
+    return structure_constants
 
 
 OSCILLATOR = from_structure_constants(4, constants({(0, 1): {2: 1}, (0, 2): {1: -1}, (1, 2): {3: 1}}))
@@ -36,39 +36,39 @@ OSCILLATOR = from_structure_constants(4, constants({(0, 1): {2: 1}, (0, 2): {1: 
 @pytest.mark.parametrize(("family", "size"), DIMENSIONS)
 def test_named_algebras_have_star_algebras(family, size):
     lie = named(family, size)
-    found = quaternionic(lie)
-    assert found is not None
-    assert found.dimension == DIMENSIONS[family, size]
-    assert found.sound
+    algebra = quaternionic(lie)
+    assert algebra is not None
+    assert algebra.dimension == DIMENSIONS[family, size]
+    assert algebra.sound
     for i in range(lie.dimension):
         for j in range(lie.dimension):
             expected = {}
             for k, c in lie.bracket(i, j).items():
-                for at, v in found.basis[k].items():
-                    expected[at] = expected.get(at, found.field.zero) + v * found.field.convert(c)
+                for at, v in algebra.basis[k].items():
+                    expected[at] = expected.get(at, algebra.field.zero) + v * algebra.field.convert(c)
             expected = {at: v for at, v in expected.items() if v != 0}
-            assert found.commutator(found.basis[i], found.basis[j]) == expected
+            assert algebra.commutator(algebra.basis[i], algebra.basis[j]) == expected
 
 
 def test_oscillator_algebra_has_one():
-    found = quaternionic(OSCILLATOR)
-    assert found is not None
-    assert (found.dimension, found.sound) == (6, True)
+    algebra = quaternionic(OSCILLATOR)
+    assert algebra is not None
+    assert (algebra.dimension, algebra.sound) == (6, True)
 
 
 def test_change_of_basis_with_parameters():
     """[a, b] = r·c, [b, c] = s·a, [c, a] = b/r, which is so(3) or sl(2) by the sign of s."""
     r, s = symbol("r"), symbol("s")
     lie = from_structure_constants(3, {0: {1: {2: r}, 2: {1: -1 / r}}, 1: {2: {0: s}}})
-    found = quaternionic(lie)
-    assert found is not None
-    assert (found.dimension, found.sound) == (4, True)
+    algebra = quaternionic(lie)
+    assert algebra is not None
+    assert (algebra.dimension, algebra.sound) == (4, True)
 
 
 def test_algebras_of_matrices_have_one_of_matrices():
     """so(5) keeps a form on R^5; sl(3) and motions of R^4 keep none, and act on vectors and covectors."""
-    found = {name: of_matrices(named(*name)) for name in (("so", 5), ("sl", 3), ("se", 4))}
-    assert {name: a and (a.dimension, a.sound) for name, a in found.items()} == {
+    algebras = {name: of_matrices(named(*name)) for name in (("so", 5), ("sl", 3), ("se", 4))}
+    assert {name: a and (a.dimension, a.sound) for name, a in algebras.items()} == {
         ("so", 5): (25, True),
         ("sl", 3): (18, True),
         ("se", 4): (25, True),
@@ -81,11 +81,11 @@ def test_algebras_of_higher_rank_have_no_quaternions():
 
 
 def test_a_wrong_product_is_noticed():
-    found = quaternionic(named("so", 3))
-    table = {**found.table, (1, 2): {3: -found.field.one}}
-    assert not replace(found, table=table).sound
-    assert not replace(found, star=[{0: found.field.one}] * 4).sound
-    assert not replace(found, functional=[{0: found.field.one}, *found.functional[1:]]).sound
+    algebra = quaternionic(named("so", 3))
+    table = {**algebra.table, (1, 2): {3: -algebra.field.one}}
+    assert not replace(algebra, table=table).sound
+    assert not replace(algebra, star=[{0: algebra.field.one}] * 4).sound
+    assert not replace(algebra, functional=[{0: algebra.field.one}, *algebra.functional[1:]]).sound
 
 
 def table_of(lie):
@@ -157,16 +157,18 @@ FAST = [("so(3)", rebased), ("so(3,1)", rebased), ("u(2)", rebased), ("u(3)", sc
 def test_members_of_families_are_found_in_other_bases(name, change):
     standard, centre, dimension = (ANY_BASIS | SPARSE_BASIS)[name]
     lie = change(standard, 3, centre)
-    found = star_algebra(lie)
-    assert found is not None
-    assert (found.dimension, found.sound) == (dimension, True)
+    algebra = star_algebra(lie)
+    assert algebra is not None
+    assert (algebra.dimension, algebra.sound) == (dimension, True)
     for i in range(lie.dimension):
         for j in range(i):
             expected = {}
             for k, c in lie.bracket(i, j).items():
-                for at, v in found.basis[k].items():
-                    expected[at] = expected.get(at, found.field.zero) + v * found.field.convert(c)
-            assert found.commutator(found.basis[i], found.basis[j]) == {at: v for at, v in expected.items() if v != 0}
+                for at, v in algebra.basis[k].items():
+                    expected[at] = expected.get(at, algebra.field.zero) + v * algebra.field.convert(c)
+            assert algebra.commutator(algebra.basis[i], algebra.basis[j]) == {
+                at: v for at, v in expected.items() if v != 0
+            }
 
 
 @pytest.mark.slow
@@ -176,8 +178,8 @@ def test_dense_bases_of_higher_rank_would_make_too_much_code():
 
 @pytest.mark.parametrize(("family", "size"), [("sp", 4), ("su", 3), ("gl", 3)])
 def test_enveloping_algebras_have_their_quotient(family, size):
-    found = enveloping(named(family, size))
-    assert found is not None
-    assert found.sound
+    quotient = enveloping(named(family, size))
+    assert quotient is not None
+    assert quotient.sound
     assert enveloping(named("se", 3)) is None  # it is not simple
     assert enveloping(named("so", 4)) is None

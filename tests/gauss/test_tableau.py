@@ -14,10 +14,10 @@ STAGES = range(1, 9)
 
 @pytest.mark.parametrize("stages", STAGES)
 def test_nodes_and_weights_are_those_of_legendre(stages):
-    found = tableau(stages)
+    method = tableau(stages)
     nodes, weights = np.polynomial.legendre.leggauss(stages)
-    assert found.nodes == pytest.approx((1 + nodes) / 2, abs=1e-15)
-    assert found.weights == pytest.approx(weights / 2, abs=1e-15)
+    assert method.nodes == pytest.approx((1 + nodes) / 2, abs=1e-15)
+    assert method.weights == pytest.approx(weights / 2, abs=1e-15)
 
 
 def test_nodes_have_more_digits_than_are_used():
@@ -40,9 +40,9 @@ def test_mixing_is_symplectic_without_rounding(stages):
 @pytest.mark.parametrize("stages", STAGES)
 def test_stages_integrate_polynomials(stages):
     """Σ_j a_ij c_j^k = c_i^{k+1}/(k+1) for k < s."""
-    found = tableau(stages)
-    a = np.array(found.mixing) * found.weights
-    c = np.array(found.nodes)
+    method = tableau(stages)
+    a = np.array(method.mixing) * method.weights
+    c = np.array(method.nodes)
     for k in range(stages):
         assert a @ c**k == pytest.approx(c ** (k + 1) / (k + 1), abs=4e-16)
 
@@ -50,9 +50,9 @@ def test_stages_integrate_polynomials(stages):
 @pytest.mark.parametrize("stages", [2, 4, 8])
 def test_prediction_extrapolates_slow_signals(stages):
     """Of f = cos(ωt) the offsets at the next step's stages follow from the last step's to a small part."""
-    found, omega = tableau(stages), 0.5
-    c, b = np.array(found.nodes), np.array(found.weights)
-    offsets = np.array(found.prediction) @ (b * np.cos(omega * (c - 1)))
+    method, omega = tableau(stages), 0.5
+    c, b = np.array(method.nodes), np.array(method.weights)
+    offsets = np.array(method.prediction) @ (b * np.cos(omega * (c - 1)))
     assert offsets == pytest.approx(np.sin(omega * c) / omega, abs={2: 0.1, 4: 3e-3, 8: 1e-4}[stages])
 
 

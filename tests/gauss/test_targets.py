@@ -35,11 +35,11 @@ def methods(compilation):
 
 def ends(compilation, x0, h, **more):
     """Where the solvers end after some steps, JavaScript included."""
-    found = {name: m.integrate(x0, h, STEPS, **more).x[-1] for name, m in methods(compilation).items()}
-    found["js"] = np.array(
+    final_states = {name: m.integrate(x0, h, STEPS, **more).x[-1] for name, m in methods(compilation).items()}
+    final_states["js"] = np.array(
         javascript(compilation, f"x0: {list(map(float, x0))}", f"s.integrate({h}, {STEPS});", "[...s.x]")
     )
-    return found
+    return final_states
 
 
 @pytest.mark.thin(3)
@@ -50,19 +50,21 @@ def test_targets_are_equal_to_rounding(name, order):
     compilation = compiled(name, order, "gauss")
     run = first_run(compilation)
     x0 = [float(v) for v in run.initial]
-    found = ends(compilation, x0, 4 * float(run.step))
+    final_states = ends(compilation, x0, 4 * float(run.step))
     for other in ("c", "small", "js"):
-        assert found[other] == pytest.approx(found["numpy"], rel=0, abs=1e-13 * np.abs(found["numpy"]).max())
+        assert final_states[other] == pytest.approx(
+            final_states["numpy"], rel=0, abs=1e-13 * np.abs(final_states["numpy"]).max()
+        )
 
 
 def test_time_and_forces_enter_at_the_stages():
     """A pendulum with friction, driven: all targets are equal, and right to the order of the method."""
     compilation = compile_text(FORCED, 8)
-    found = ends(compilation, [0.3, 0.4], 0.2)
+    final_states = ends(compilation, [0.3, 0.4], 0.2)
     exact = solver(compile_text(FORCED, 16), "c").integrate([0.3, 0.4], 0.1, 2 * STEPS).x[-1]
-    for state in found.values():
+    for state in final_states.values():
         assert state == pytest.approx(exact, abs=2e-9)
-        assert state == pytest.approx(found["numpy"], abs=1e-13)
+        assert state == pytest.approx(final_states["numpy"], abs=1e-13)
 
 
 @pytest.mark.thin(2)
@@ -128,7 +130,10 @@ def test_gauge_shifts_the_hamiltonian_that_is_discretised():
     """H and H − λC have the same flow: with the shift the same states to the order, from other stages."""
     spec = spec_of("rigid_body")
     shifted = replace(spec, gauge={"C": number(1) / number(3)})
-    methods_ = [solver(compile_spec(given.overridden(order=8, scheme="gauss")), "c") for given in (spec, shifted)]
+    methods_ = [
+        solver(compile_spec(specification.overridden(order=8, scheme="gauss")), "c")
+        for specification in (spec, shifted)
+    ]
     plain, other = (method.integrate([0.4, -0.8, 0.5], 0.4, 20).x[-1] for method in methods_)
     assert plain == pytest.approx(other, abs=1e-7)
     assert np.abs(plain - other).max() > 1e-15
