@@ -75,14 +75,14 @@ H, STEPS = 0.11, 5
 @cache
 def compilation(kind):
     text, step = KINDS[kind]
-    found = compile_spec(
+    compilation = compile_spec(
         spec.loads(f"phigen: 1\nname: t\n{text}"),
         scheme="splitting" if step is Splitting else None,
         tangent=True,
         adjoint=True,
     )
-    assert isinstance(found.program.step, step)
-    return found
+    assert isinstance(compilation.program.step, step)
+    return compilation
 
 
 def start(kind):
@@ -98,37 +98,39 @@ def difference(f, width=1e-3):
     return sum(w * (f(k * width) - f(-k * width)) for k, w in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))) / width
 
 
-def given(made):
+def given(integrator):
     """The parameters that tests of all kinds use: other than the defaults."""
-    return {name: 1.07 * value for name, value in made.interface.parameters.items()}
+    return {name: 1.07 * value for name, value in integrator.interface.parameters.items()}
 
 
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_pullback_is_the_gradient_of_the_run(kind):
     """All rows have a cotangent; what is held fixed by a gauge is held fixed here too, e of a monitor follows."""
-    made, numpy, x = *(solver(compilation(kind), target) for target in ("c", "numpy")), start(kind)
+    integrator, numpy, x = *(solver(compilation(kind), target) for target in ("c", "numpy")), start(kind)
     if compilation(kind).program.gauge:
-        gauge = numpy.backend.module.gauge(x, **given(made))
-        made, numpy = (type(s)(s.backend.with_gauge(gauge), s.interface) for s in (made, numpy))
-    parameters, stride = given(made), 2
+        gauge = numpy.backend.module.gauge(x, **given(integrator))
+        integrator, numpy = (type(s)(s.backend.with_gauge(gauge), s.interface) for s in (integrator, numpy))
+    parameters, stride = given(integrator), 2
     bar = weights((4, len(x)))
-    rows, x0_bar, found = made.pullback(x, H, STEPS, bar, stride, parameters=parameters)
-    trajectory = made.integrate(x, H, STEPS, stride, parameters=parameters)
+    rows, x0_bar, parameters_bar = integrator.pullback(x, H, STEPS, bar, stride, parameters=parameters)
+    trajectory = integrator.integrate(x, H, STEPS, stride, parameters=parameters)
     assert rows == pytest.approx(trajectory.x, abs=1e-14)
 
     def weighed(x, **changed):
-        return np.sum(bar * made.integrate(x, H, STEPS, stride, parameters={**parameters, **changed}).x)
+        return np.sum(bar * integrator.integrate(x, H, STEPS, stride, parameters={**parameters, **changed}).x)
 
     for j, unit in enumerate(np.eye(len(x))):
         assert x0_bar[j] == pytest.approx(difference(lambda e, u=unit: weighed(x + e * u)), abs=1e-10)
     for name, value in parameters.items():
         slope = difference(lambda e, n=name, v=value: weighed(x, **{n: v + e}))
-        assert found[name] == pytest.approx(slope, abs=3e-10), name
+        assert parameters_bar[name] == pytest.approx(slope, abs=3e-10), name
     again = numpy.pullback(x, H, STEPS, bar, stride, parameters=parameters)
     assert again.x1 == pytest.approx(rows, abs=1e-14)
     assert again.x0_bar == pytest.approx(x0_bar, rel=1e-13)
-    assert [again.parameters_bar[name] for name in found] == pytest.approx(list(found.values()), rel=1e-12)
+    assert [again.parameters_bar[name] for name in parameters_bar] == pytest.approx(
+        list(parameters_bar.values()), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -143,27 +145,27 @@ def test_a_splitting_whose_brackets_are_all_zero_pulls_back_what_it_is_given(tar
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("kind", [k for k in KINDS if "monitor" not in k])
 def test_pullback_is_the_transpose_of_the_tangent_map(kind, target):
-    made, x = solver(compilation(kind), target), start(kind)
+    integrator, x = solver(compilation(kind), target), start(kind)
     bar, product = weights(len(x)), np.eye(len(x))
-    for _, tangent in made.tangents(x, H, STEPS):
+    for _, tangent in integrator.tangents(x, H, STEPS):
         product = tangent @ product
-    x0_bar = made.pullback(x, H, STEPS, bar).x0_bar
+    x0_bar = integrator.pullback(x, H, STEPS, bar).x0_bar
     assert np.max(np.abs(x0_bar - bar @ product)) <= 3e-15 * np.max(np.abs(x0_bar))
 
 
 def test_stages_whose_paths_are_long_are_gone_back_through_one_after_the_other():
     """Each begins where the one after it has traced its path back to; what moves that to the mean must not do harm."""
-    made, x, bar, h, steps = solver(compilation("path, long"), "c"), start("path, long"), weights(3), 0.3, 50
+    integrator, x, bar, h, steps = solver(compilation("path, long"), "c"), start("path, long"), weights(3), 0.3, 50
     product = np.eye(3)
-    for _, tangent in made.tangents(x, h, steps):
+    for _, tangent in integrator.tangents(x, h, steps):
         product = tangent @ product
-    _, x0_bar, found = made.pullback(x, h, steps, bar)
+    _, x0_bar, parameters_bar = integrator.pullback(x, h, steps, bar)
     assert np.max(np.abs(x0_bar - bar @ product)) <= 1e-8 * np.max(np.abs(x0_bar))
-    for name, value in made.interface.parameters.items():
+    for name, value in integrator.interface.parameters.items():
         slope = difference(
-            lambda e, n=name, v=value: bar @ made.integrate(x, h, steps, steps, **{n: v + e}).x[-1], 1e-4
+            lambda e, n=name, v=value: bar @ integrator.integrate(x, h, steps, steps, **{n: v + e}).x[-1], 1e-4
         )
-        assert found[name] == pytest.approx(slope, rel=1e-5), name
+        assert parameters_bar[name] == pytest.approx(slope, rel=1e-5), name
 
 
 @precisely
@@ -192,14 +194,14 @@ def exact_gradient(kind, parameters, x, bar, steps):
 def test_gradient_agrees_with_many_digits(kind):
     x, steps = start(kind), 3 if kind == "newton" else 1
     bar = weights(len(x))
-    made = solver(compilation(kind), "c")
-    parameters = given(made)
+    integrator = solver(compilation(kind), "c")
+    parameters = given(integrator)
     expected, by = exact_gradient(kind, parameters, x, bar, steps)
     for target in TARGETS:
-        _, x0_bar, found = solver(compilation(kind), target).pullback(x, H, steps, bar, parameters=parameters)
+        _, x0_bar, parameters_bar = solver(compilation(kind), target).pullback(x, H, steps, bar, parameters=parameters)
         size = max(map(abs, expected))
         assert max(abs(a - b) for a, b in zip(x0_bar, expected, strict=True)) <= 1e-14 * size
-        assert max(abs(found[name] - by[name]) for name in by) <= 1e-14 * max(map(abs, by.values()))
+        assert max(abs(parameters_bar[name] - by[name]) for name in by) <= 1e-14 * max(map(abs, by.values()))
 
 
 def test_sparse_newton_matrices_are_gone_back_through_in_lanes():
@@ -208,28 +210,28 @@ def test_sparse_newton_matrices_are_gone_back_through_in_lanes():
     names = [f"x{k}" for k in range(7)]
     text = f"coordinates: [{', '.join(names)}]\nparameters: {{r: 1.1}}\npoisson: {{log_canonical: {rows}}}\n"
     text += f"hamiltonian: r*x0 + {' + '.join(names[1:])}\norder: 2\nadjoint: true\n"
-    made = compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"))
-    assert made.program.step.factors
+    compilation = compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"))
+    assert compilation.program.step.factors
     x, bar = 1 + 0.3 * np.arange(7) % 1.1, weights(7)
-    ours, theirs = (solver(made, target).pullback(x, 0.1, 21, bar, r=1.2) for target in ("c", "numpy"))
+    ours, theirs = (solver(compilation, target).pullback(x, 0.1, 21, bar, r=1.2) for target in ("c", "numpy"))
     assert ours.x0_bar == pytest.approx(theirs.x0_bar, rel=1e-13)
     assert ours.parameters_bar["r"] == pytest.approx(theirs.parameters_bar["r"], rel=1e-12)
-    members = solver(made, "c").pullback(np.tile(x, (3, 1)), 0.1, 21, np.tile(bar, (3, 1)), r=1.2)
+    members = solver(compilation, "c").pullback(np.tile(x, (3, 1)), 0.1, 21, np.tile(bar, (3, 1)), r=1.2)
     assert members.x0_bar == pytest.approx(np.tile(ours.x0_bar, (3, 1)), rel=1e-13)
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
-    made = solver(compilation("newton"), target)
+    integrator = solver(compilation("newton"), target)
     x, bar = start("newton"), weights((11, 3))
-    whole = made.pullback(x, H, 150, bar[:6], 30)
+    whole = integrator.pullback(x, H, 150, bar[:6], 30)
     monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 3 * 47)  # 47 steps
     if target == "numpy":
-        monkeypatch.setattr(made.backend.module, "MAX_TAPE", 3 * 3 * 47)
+        monkeypatch.setattr(integrator.backend.module, "MAX_TAPE", 3 * 3 * 47)
     for stride in (30, 100):
         rows = bar[:6] if stride == 30 else bar[:3]
-        part = made.pullback(x, H, 150, rows, stride)
+        part = integrator.pullback(x, H, 150, rows, stride)
         assert part.x1[-1] == pytest.approx(whole.x1[-1], abs=1e-12)
         if stride == 30:
             assert np.max(np.abs(part.x0_bar - whole.x0_bar)) <= 1e-12 * np.max(np.abs(whole.x0_bar))
@@ -237,73 +239,73 @@ def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
                 assert part.parameters_bar[name] == pytest.approx(value, rel=1e-11)
         else:
             monkeypatch.undo()
-            again = made.pullback(x, H, 150, rows, stride)
+            again = integrator.pullback(x, H, 150, rows, stride)
             assert np.max(np.abs(part.x0_bar - again.x0_bar)) <= 1e-12 * np.max(np.abs(again.x0_bar))
 
 
 @pytest.mark.parametrize(("steps", "stride", "most"), [(10, 3, 7), (10, 10, 4), (10, 3, 100), (7, 5, 2), (0, 1, 5)])
 def test_segments_cover_a_run_and_its_rows(steps, stride, most):
-    found = segments(steps, stride, most)
-    assert [k for s in found for k in range(s.first, s.first + s.count)] == list(range(steps))
-    assert [r for s in found for r in s.rows] == list(range(1, 1 + -(-steps // stride)))
-    assert all(s.count <= most and len(s.rows) in (0, -(-s.count // s.stride)) for s in found)
-    for s in found:
+    parts = segments(steps, stride, most)
+    assert [k for s in parts for k in range(s.first, s.first + s.count)] == list(range(steps))
+    assert [r for s in parts for r in s.rows] == list(range(1, 1 + -(-steps // stride)))
+    assert all(s.count <= most and len(s.rows) in (0, -(-s.count // s.stride)) for s in parts)
+    for s in parts:
         ends = [min((r) * stride, steps) for r in s.rows]
         assert ends == [min(s.first + (k + 1) * s.stride, s.first + s.count) for k in range(len(s.rows))]
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_members_and_their_parameters_have_cotangents(target):
-    made, x = solver(compilation("newton"), target), start("newton")
+    integrator, x = solver(compilation("newton"), target), start("newton")
     many, bar = x + 0.1 * weights((3, 3)), weights((3, 3))
     masses = np.array([1.5, 2.0, 2.5])
-    x1, x0_bar, found = made.pullback(many, H, STEPS, bar, I2=masses, I3=2.0)
-    each = [made.pullback(many[m], H, STEPS, bar[m], I2=masses[m], I3=2.0) for m in range(3)]
+    x1, x0_bar, parameters_bar = integrator.pullback(many, H, STEPS, bar, I2=masses, I3=2.0)
+    each = [integrator.pullback(many[m], H, STEPS, bar[m], I2=masses[m], I3=2.0) for m in range(3)]
     assert x1 == pytest.approx(np.array([e.x1 for e in each]), abs=1e-15)
     assert x0_bar == pytest.approx(np.array([e.x0_bar for e in each]), abs=1e-14)
-    assert found["I2"] == pytest.approx(np.array([e.parameters_bar["I2"] for e in each]), abs=1e-14)
-    assert found["I3"] == pytest.approx(sum(e.parameters_bar["I3"] for e in each), abs=1e-14)
-    together = made.pullback(many, H, STEPS, bar, I2=2.0)
-    apart = [made.pullback(many[m], H, STEPS, bar[m], I2=2.0) for m in range(3)]
+    assert parameters_bar["I2"] == pytest.approx(np.array([e.parameters_bar["I2"] for e in each]), abs=1e-14)
+    assert parameters_bar["I3"] == pytest.approx(sum(e.parameters_bar["I3"] for e in each), abs=1e-14)
+    together = integrator.pullback(many, H, STEPS, bar, I2=2.0)
+    apart = [integrator.pullback(many[m], H, STEPS, bar[m], I2=2.0) for m in range(3)]
     assert together.x0_bar == pytest.approx(np.array([e.x0_bar for e in apart]), abs=1e-14)
     assert together.parameters_bar["I2"] == pytest.approx(sum(e.parameters_bar["I2"] for e in apart), abs=1e-14)
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_one_start_is_that_of_all_members_and_there_may_be_none(target):
-    made, x = solver(compilation("newton"), target), start("newton")
+    integrator, x = solver(compilation("newton"), target), start("newton")
     bar, masses = weights((3, 3)), np.array([1.5, 2.0, 2.5])
-    one, each = (made.pullback(begin, H, STEPS, bar, I2=masses) for begin in (x, np.tile(x, (3, 1))))
+    one, each = (integrator.pullback(begin, H, STEPS, bar, I2=masses) for begin in (x, np.tile(x, (3, 1))))
     assert all(np.array_equal(a, b) for a, b in zip(one[:2], each[:2], strict=True))
     assert np.array_equal(one.parameters_bar["I2"], each.parameters_bar["I2"])
     none = np.empty((0, 3))
-    x1, x0_bar, found = made.pullback(none, H, STEPS, none, I2=np.empty(0))
-    assert (x1.shape, x0_bar.shape, found["I2"].shape, found["I3"]) == ((0, 3), (0, 3), (0,), 0)
-    rows = made.pullback(none, H, 4, np.empty((3, 0, 3)), stride=2).x1
+    x1, x0_bar, parameters_bar = integrator.pullback(none, H, STEPS, none, I2=np.empty(0))
+    assert (x1.shape, x0_bar.shape, parameters_bar["I2"].shape, parameters_bar["I3"]) == ((0, 3), (0, 3), (0,), 0)
+    rows = integrator.pullback(none, H, 4, np.empty((3, 0, 3)), stride=2).x1
     assert rows.shape == (3, 0, 3)
 
 
 @pytest.mark.parametrize("kind", ["newton, time", "splitting, monitor", "path, time, composed", "kicks, time"])
 def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypatch):
     """Those that are not in lanes. Steps, parameters and times of their own; long runs are those of segments."""
-    made, rng = solver(compilation(kind), "c"), np.random.default_rng(2)
+    integrator, rng = solver(compilation(kind), "c"), np.random.default_rng(2)
     monkeypatch.setattr(runs, "PART_GRANULARITY", 2)
     monkeypatch.setattr(runs, "_STEPS_PER_THREAD", 1)
     many, h = start(kind) + 0.1 * rng.random((5, len(start(kind)))), H * (1 + 0.1 * rng.random(5))
-    own = {name: value * (1 + 0.1 * rng.random(5)) for name, value in made.interface.parameters.items()}
-    t0 = rng.random(5) if made.interface.time else None
+    member_values = {name: value * (1 + 0.1 * rng.random(5)) for name, value in integrator.interface.parameters.items()}
+    t0 = rng.random(5) if integrator.interface.time else None
     bar = rng.normal(size=(4, *many.shape))
-    together = made.pullback(many, h, STEPS, bar, 2, t0=t0, threads=1, parameters=own)
-    shared = made.pullback(many, h, STEPS, bar, 2, t0=t0, threads=3, parameters=own)
+    together = integrator.pullback(many, h, STEPS, bar, 2, t0=t0, threads=1, parameters=member_values)
+    shared = integrator.pullback(many, h, STEPS, bar, 2, t0=t0, threads=3, parameters=member_values)
     for m in range(5):
-        mine, begin = {name: value[m] for name, value in own.items()}, None if t0 is None else t0[m]
-        alone = made.pullback(many[m], h[m], STEPS, bar[:, m], 2, t0=begin, parameters=mine)
-        for found in (together, shared):
-            assert np.array_equal(found.x1[:, m], alone.x1)
-            assert np.array_equal(found.x0_bar[m], alone.x0_bar)
-            assert all(found.parameters_bar[name][m] == alone.parameters_bar[name] for name in own)
+        mine, begin = {name: value[m] for name, value in member_values.items()}, None if t0 is None else t0[m]
+        alone = integrator.pullback(many[m], h[m], STEPS, bar[:, m], 2, t0=begin, parameters=mine)
+        for pulled_back in (together, shared):
+            assert np.array_equal(pulled_back.x1[:, m], alone.x1)
+            assert np.array_equal(pulled_back.x0_bar[m], alone.x0_bar)
+            assert all(pulled_back.parameters_bar[name][m] == alone.parameters_bar[name] for name in member_values)
     monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 1)
-    cut = made.pullback(many, h, STEPS, bar, 2, t0=t0, threads=3, parameters=own)
+    cut = integrator.pullback(many, h, STEPS, bar, 2, t0=t0, threads=3, parameters=member_values)
     assert np.max(np.abs(cut.x0_bar - together.x0_bar)) <= 1e-12 * np.max(np.abs(cut.x0_bar))
     for name, bars in cut.parameters_bar.items():
         assert bars == pytest.approx(together.parameters_bar[name], rel=1e-10, abs=1e-13)
@@ -346,42 +348,49 @@ def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
     assert "t_pull_group(" in code
     assert ("t_pull_arrive(" in code) == (bool(scheme) and "damped" not in kind)
     monkeypatch.setattr(runs, "_STEPS_PER_THREAD", 1)
-    made, rng, count, far = solver(compiled, "c"), np.random.default_rng(3), 43, 5
+    integrator, rng, count, far = solver(compiled, "c"), np.random.default_rng(3), 43, 5
     first = np.array([0.4, 0.9, 0.3][: compiled.program.dimension])
     many, h = first + 0.1 * rng.random((count, len(first))), H * (1 + 0.1 * rng.random(count))
     wider, longer, in_reach = FAR[kind]
     many[far], h[far] = wider * many[far], longer * h[far]
-    own = {name: value * (1 + 0.1 * rng.random(count)) for name, value in made.interface.parameters.items()}
+    member_values = {
+        name: value * (1 + 0.1 * rng.random(count)) for name, value in integrator.interface.parameters.items()
+    }
     bar = rng.normal(size=(4, *many.shape))
-    one, two = (made.pullback(many, h, 23, bar, 9, threads=n, parameters=own) for n in (1, 2))
+    one, two = (integrator.pullback(many, h, 23, bar, 9, threads=n, parameters=member_values) for n in (1, 2))
     assert np.array_equal(one.x0_bar, two.x0_bar)
     for m in range(count):
-        alone = made.pullback(many[m], h[m], 23, bar[:, m], 9, parameters={k: v[m] for k, v in own.items()})
+        alone = integrator.pullback(
+            many[m], h[m], 23, bar[:, m], 9, parameters={k: v[m] for k, v in member_values.items()}
+        )
         near = 1e-13 * np.max(np.abs([*alone.x0_bar, *alone.parameters_bar.values()])) * (m != far or in_reach)
         assert np.max(np.abs(one.x1[:, m] - alone.x1)) <= near
         assert np.max(np.abs(one.x0_bar[m] - alone.x0_bar)) <= near
-        assert max(abs(one.parameters_bar[k][m] - alone.parameters_bar[k]) for k in own) <= near
-    monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 7 * int(made.backend._c.trail_size_each()))
-    cut, others = made.pullback(many, h, 23, bar, 9, threads=2, parameters=own), np.arange(count) != far
-    for whole, found in ((one.x0_bar, cut.x0_bar), *((one.parameters_bar[k], cut.parameters_bar[k]) for k in own)):
-        assert np.max(np.abs(whole - found)[others]) <= 1e-12 * np.max(np.abs(whole[others]))
+        assert max(abs(one.parameters_bar[k][m] - alone.parameters_bar[k]) for k in member_values) <= near
+    monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 7 * int(integrator.backend._c.trail_size_each()))
+    cut, others = integrator.pullback(many, h, 23, bar, 9, threads=2, parameters=member_values), np.arange(count) != far
+    for whole, cotangents in (
+        (one.x0_bar, cut.x0_bar),
+        *((one.parameters_bar[k], cut.parameters_bar[k]) for k in member_values),
+    ):
+        assert np.max(np.abs(whole - cotangents)[others]) <= 1e-12 * np.max(np.abs(whole[others]))
     assert cut.x1[:, others] == pytest.approx(one.x1[:, others], abs=1e-13)
 
 
 def test_jacobian_has_columns_for_state_and_parameters():
-    made, x = solver(compilation("newton"), "c"), start("newton")
-    x1, by_x0, by = made.jacobian(x, H, I2=1.9)
-    after, tangent = made.step_tangent(x, H, I2=1.9)
+    integrator, x = solver(compilation("newton"), "c"), start("newton")
+    x1, by_x0, by = integrator.jacobian(x, H, I2=1.9)
+    after, tangent = integrator.step_tangent(x, H, I2=1.9)
     assert np.array_equal(x1, after)
     assert np.max(np.abs(by_x0 - tangent)) <= 1e-15
-    assert by["I2"] == pytest.approx(difference(lambda e: made.step(x, H, I2=1.9 + e)), abs=1e-11)
+    assert by["I2"] == pytest.approx(difference(lambda e: integrator.step(x, H, I2=1.9 + e)), abs=1e-11)
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_run_of_no_steps_gives_its_cotangent_back(target):
-    made, x = solver(compilation("newton"), target), start("newton")
-    x1, x0_bar, found = made.pullback(x, H, 0, [1, 2, 3])
-    assert (x1.tolist(), x0_bar.tolist(), set(found.values())) == (x.tolist(), [1, 2, 3], {0.0})
+    integrator, x = solver(compilation("newton"), target), start("newton")
+    x1, x0_bar, parameters_bar = integrator.pullback(x, H, 0, [1, 2, 3])
+    assert (x1.tolist(), x0_bar.tolist(), set(parameters_bar.values())) == (x.tolist(), [1, 2, 3], {0.0})
 
 
 @pytest.mark.parametrize("kind", ["newton", "path", "splitting, time"])
@@ -395,28 +404,28 @@ def test_transposed_kernels_are_of_the_size_of_the_kernel(kind):
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_what_cannot_be_pulled_back_is_told(target):
-    made, x = solver(compilation("newton"), target), start("newton")
+    integrator, x = solver(compilation("newton"), target), start("newton")
     with pytest.raises(StepError) as failed:
-        made.pullback(1e3 * x, 50.0, 10, x)
+        integrator.pullback(1e3 * x, 50.0, 10, x)
     assert failed.value.step == 0
     assert failed.value.members == ()  # one state is no ensemble
     with pytest.raises(StepError) as failed:
-        made.pullback(np.array([x, 1e3 * x, x, x]), 0.5, 10, np.array([x, x, x, x]))
+        integrator.pullback(np.array([x, 1e3 * x, x, x]), 0.5, 10, np.array([x, x, x, x]))
     assert failed.value.members == (1,)
     for shape in ((2,), (3, 3)):
         with pytest.raises(ValueError, match=r"cotangent must have shape \(3,\)"):
-            made.pullback(x, H, 2, np.ones(shape))
+            integrator.pullback(x, H, 2, np.ones(shape))
     with pytest.raises(ValueError, match="finite"):
-        made.pullback(x, H, 2, [1, np.nan, 1])
+        integrator.pullback(x, H, 2, [1, np.nan, 1])
     for bar, why in ((x + 1j, "real"), (["1", "2", "3"], "array of numbers"), ([[1, 2], 3, 4], "array of numbers")):
         with pytest.raises(TypeError, match=f"cotangent must be.*{why}"):
-            made.pullback(x, H, 2, bar)
+            integrator.pullback(x, H, 2, bar)
     with pytest.raises(TypeError, match="'I2' must be one number"):
-        made.jacobian(x, H, 2, I2=[1.0])
+        integrator.jacobian(x, H, 2, I2=[1.0])
     with pytest.raises(ValueError, match=r"'I2' must have shape \(1,\)"):
-        made.pullback([x], H, 2, [x], I2=[1, 2])
+        integrator.pullback([x], H, 2, [x], I2=[1, 2])
     with pytest.raises(TypeError, match="unknown parameter"):
-        made.pullback(x, H, 2, x, I4=1)
+        integrator.pullback(x, H, 2, x, I4=1)
     with pytest.raises(TypeError, match="adjoint=True"):
         compile("rigid_body", target=target).pullback(x, H, 2, x)
 
@@ -430,11 +439,11 @@ def test_c_failure_leaves_state_and_cotangents():
     assert (bytes(raw.memory), bar.tolist(), more.tolist()) == (before, [1, 2, 3], [7] * 4)
     assert raw.call("step_adjoint", ctypes.c_int, raw.here, ctypes.c_double(0.1), here, None, into) == 4
     assert raw.call("step_adjoint", ctypes.c_int, raw.here, ctypes.c_double(0.1), here, here, into) == 0
-    own = bar.copy()
+    unchanged = bar.copy()
     raw.init(start("newton"))
     bar[:] = [1, 2, 3]
     assert raw.call("step_adjoint", ctypes.c_int, raw.here, ctypes.c_double(0.1), here, here, None) == 0
-    assert np.array_equal(bar, own)
+    assert np.array_equal(bar, unchanged)
     assert (more != 7.0).all()
 
 
@@ -454,8 +463,8 @@ def test_transposes_of_flows_compute_nothing_that_is_known_or_unused():
     step = compile_spec(spec.loads(head + SWING.replace("(2*m)", "2"))).program.step
     alone = [set(symbols_of(e)) == {TIME} for e in step.prepare.outputs[0].values]
     assert any(alone)
-    found = [[kernel.outputs[1].values[c].is_zero for kernel in step.adjoint.steps] for c in range(len(alone))]
-    assert [all(unused) for unused in found] == alone
+    zero_outputs = [[kernel.outputs[1].values[c].is_zero for kernel in step.adjoint.steps] for c in range(len(alone))]
+    assert [all(unused) for unused in zero_outputs] == alone
 
 
 def test_c_defines_functions_of_flows_only_where_flows_call_them():
@@ -468,11 +477,11 @@ def test_c_defines_functions_of_flows_only_where_flows_call_them():
 def test_steps_that_forget_what_was_before_are_pulled_back_too():
     """Where a guess misleads, a step is made again without: then the solver remembers fewer steps than it has made."""
     both = {"tangent": True, "adjoint": True}
-    made = solver(compile_spec(spec.loads(f"phigen: 1\nname: t\n{RATTLEBACK}"), **both), "c")
+    integrator = solver(compile_spec(spec.loads(f"phigen: 1\nname: t\n{RATTLEBACK}"), **both), "c")
     x, steps, bar, product = np.array([0.01, 0.5, -1]), 20, weights(3), np.eye(3)
-    for _, tangent in made.tangents(x, 0.4, steps):
+    for _, tangent in integrator.tangents(x, 0.4, steps):
         product = tangent @ product
-    x0_bar = made.pullback(x, 0.4, steps, bar).x0_bar
+    x0_bar = integrator.pullback(x, 0.4, steps, bar).x0_bar
     assert np.max(np.abs(x0_bar - bar @ product)) <= 1e-12 * np.max(np.abs(x0_bar))
 
 

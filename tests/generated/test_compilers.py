@@ -96,8 +96,8 @@ BACK = ["klein_gordon", "lotka_volterra", "pendulum_euler", "kepler"]
 
 
 def test_splittings_with_derivatives_are_cpp_as_well(tmp_path):
-    made = compile_spec(spec_of("rigid_body"), scheme="splitting", tangent=True, adjoint=True)
-    files = emit(made.program, "c", "phigen")
+    compilation = compile_spec(spec_of("rigid_body"), scheme="splitting", tangent=True, adjoint=True)
+    files = emit(compilation.program, "c", "phigen")
     assert "rigid_body_pull_group(" in files["rigid_body.c"]
     write(tmp_path, files)
     run([tool("g++"), "-x", "c++", "-std=c++20", *WARNINGS, "-fsyntax-only", "rigid_body.c"], tmp_path)
@@ -116,9 +116,12 @@ LIKE_OTHERS = {*ALIKE, "planets"} - {*BACK, *QUICK}
 def test_fast_code_with_derivatives_is_cpp_as_well(name, tmp_path):
     """By one standard of each compiler, `test_all_c_is_cpp_as_well` has both of both. clang alone says which inline
     functions nothing calls. As C++ kernels are what they are as C, and the rest is the same in all of a kind."""
-    found = spec_of(name)
-    extras = {"tangent": not found.lattice, "adjoint": not (found.noise or (found.lattice and found.monitor))}
-    write(tmp_path, emit(compile_spec(found, **extras, profile="fast").program, "c", "phigen"))
+    specification = spec_of(name)
+    extras = {
+        "tangent": not specification.lattice,
+        "adjoint": not (specification.noise or (specification.lattice and specification.monitor)),
+    }
+    write(tmp_path, emit(compile_spec(specification, **extras, profile="fast").program, "c", "phigen"))
     every = [("clang", "c", "c99"), ("clang++", "c++", "c++17"), ("g++", "c++", "c++20")]
     for compiler, language, standard in every if name in (*QUICK, *BACK) else every[:1]:
         run([tool(compiler), "-x", language, f"-std={standard}", *WARNINGS, "-fsyntax-only", f"{name}.c"], tmp_path)

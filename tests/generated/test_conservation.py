@@ -63,9 +63,9 @@ def conditioning(compilation, states, parameters, casimir):
 
 def check_casimirs(name, run, trajectory):
     """Constant to round-off."""
-    for casimir, found in trajectory.casimirs.items():
+    for casimir, casimir_values in trajectory.casimirs.items():
         scale = size_of_casimir(compiled(name), trajectory, casimir, growing=(name, run) in GROWING)
-        assert np.max(np.abs(found - found[0])) <= 1e-13 * scale, casimir
+        assert np.max(np.abs(casimir_values - casimir_values[0])) <= 1e-13 * scale, casimir
 
 
 WITH_CASIMIRS = [name for name in NAMES if described(name)[1].casimirs]
@@ -76,9 +76,9 @@ def test_casimirs_are_constant_to_round_off_in_numpy(name):
     compilation = compiled(name)
     at, steps = setting(compilation), 20 if isinstance(compilation.program.step, Path) else 200
     trajectory = solver(compilation, "numpy").integrate(at.x, at.h, steps, stride=10, parameters=at.parameters)
-    for casimir, found in trajectory.casimirs.items():
+    for casimir, casimir_values in trajectory.casimirs.items():
         scale = size_of_casimir(compilation, trajectory, casimir)
-        assert np.max(np.abs(found - found[0])) <= 2e-15 * scale, casimir
+        assert np.max(np.abs(casimir_values - casimir_values[0])) <= 2e-15 * scale, casimir
 
 
 def size_of_casimir(compilation, trajectory, casimir, *, growing=False):
@@ -116,10 +116,10 @@ def check_invariants(name, trajectory):
     for invariant, e in compilation.system.invariants.items():
         if (name, invariant) in PRECESSING:
             continue
-        found = np.array([float(v) for v in evaluated(compilation, e, rows, trajectory.parameters)])
-        error = np.abs(found - found[0])
+        values_along_run = np.array([float(v) for v in evaluated(compilation, e, rows, trajectory.parameters)])
+        error = np.abs(values_along_run - values_along_run[0])
         halves = [half.max() for half in np.array_split(error[1:], 2)]
-        scale = max(abs(found[0]), np.abs(rows).max() * 1e-3)
+        scale = max(abs(values_along_run[0]), np.abs(rows).max() * 1e-3)
         assert halves[1] < 1.5 * halves[0] or max(halves) <= ROUND_OFF * scale, invariant
 
 

@@ -235,8 +235,8 @@ def test_runge_kutta_fails_every_check(name):
     for _ in range(5_000):
         x = step(x)
         states.append(x)
-    found = solve.casimirs(np.array(states), parameters=at.parameters)
-    assert max(np.max(np.abs(c - c[0])) / abs(c[0]) for c in found.values()) > 1e3 * DRIFT
+    casimirs = solve.casimirs(np.array(states), parameters=at.parameters)
+    assert max(np.max(np.abs(c - c[0])) / abs(c[0]) for c in casimirs.values()) > 1e3 * DRIFT
     energy = solve.hamiltonian(np.array(states), parameters=at.parameters)
     error = np.abs(energy - energy[0])
     windows = [w.max() for w in np.array_split(error[1:], 10)]

@@ -161,8 +161,8 @@ def test_differences_of_numpy_end_where_no_path_is_left(monkeypatch):
     module, calls = solver(compiled("nambu_pendulum"), "numpy").backend.module, []
     lost = np.full((2, 3), np.nan), np.full((2, 3), np.nan), np.array([8, 8])
     monkeypatch.setattr(module, "_path", lambda *arguments: calls.append(1) or lost)
-    jacobian, made = module._differences(np.zeros((99, 1)), np.ones((2, 3)), np.ones((2, 3)), np.ones((2, 3)))
-    assert (len(calls), made.tolist()) == (1, [8, 8])
+    jacobian, succeeded = module._differences(np.zeros((99, 1)), np.ones((2, 3)), np.ones((2, 3)), np.ones((2, 3)))
+    assert (len(calls), succeeded.tolist()) == (1, [8, 8])
     assert np.isnan(jacobian).any(axis=(1, 2)).all()
 
 
@@ -222,8 +222,10 @@ STEPS = {"newton": Newton, "gauged": Newton, "explicit": Explicit, "path": Path,
 @cache
 def kind(name):
     """The compilation of a kind of step, with its tangent map, and with a gauge where that is chosen."""
-    found = spec.loads(f"phigen: 1\nname: t\n{KINDS[name]}")
-    compilation = compile_spec(found if name == "gauged" else replace(found, gauge="none"), tangent=True)
+    specification = spec.loads(f"phigen: 1\nname: t\n{KINDS[name]}")
+    compilation = compile_spec(
+        specification if name == "gauged" else replace(specification, gauge="none"), tangent=True
+    )
     assert isinstance(compilation.program.step, STEPS[name])
     assert bool(compilation.program.gauge) == (name == "gauged")
     return compilation
@@ -309,13 +311,13 @@ def test_a_copy_of_the_solver_is_a_branch(name):
     at, raw = setting(compilation), RawC(compilation)
     raw.init(at.x, at.parameters)
     assert raw.integrate(at.h, 7) == 0
-    kept = raw.memory.copy()
+    memory = raw.memory.copy()
     assert raw.integrate(at.h, 5) == 0
     end = bits(raw.x)
-    raw.memory[:] = kept
+    raw.memory[:] = memory
     assert raw.integrate(at.h, 5) == 0
     assert bits(raw.x) == end
-    raw.memory[:] = kept
+    raw.memory[:] = memory
     assert raw.integrate(-at.h, 5) == 0
     assert bits(raw.x) != end
 

@@ -91,11 +91,11 @@ def final(kind, n, order=2, target="numpy"):
 
 
 def reference(kind):
-    found, timed = solver(made(kind), "numpy"), bool(made(kind).program.time)
+    integrator, timed = solver(made(kind), "numpy"), bool(made(kind).program.time)
 
     def field(t, x):
         rate = 1 / (1 + x[0] ** 2) if kind == "monitored" else 1
-        return rate * (found.vector_field(x, t) if timed else found.vector_field(x))
+        return rate * (integrator.vector_field(x, t) if timed else integrator.vector_field(x))
 
     return solve_ivp(field, (0, SPAN), SYSTEMS[kind][1], method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
 
@@ -123,8 +123,8 @@ def test_targets_agree_to_roundoff(kind):
 @pytest.mark.parametrize("kind", ["damped", "covector", "path", "split damping", "split on leaves"])
 def test_covectors_keep_casimirs(kind):
     """A force put beside the leaves, such as f for πζ, changes them at the order of the step."""
-    found = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 0.1, 20_000, 100)
-    assert np.ptp(found.casimirs["C"]) < 1e-13
+    run = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 0.1, 20_000, 100)
+    assert np.ptp(run.casimirs["C"]) < 1e-13
 
 
 def test_damping_takes_energy_down_to_the_minimum():
@@ -161,38 +161,38 @@ def test_a_field_or_an_axis_may_vanish(text):
 
 def test_damping_in_a_splitting_takes_energy_in_every_step():
     """Of the wrong sign, or with half of a part left out, it does not, or ends elsewhere."""
-    found = solver(compile_text(SPUN), "c").integrate([0.1, 0.2, -0.9], 0.1, 1_000, K=1.0)
-    assert (np.diff(found.energy) <= 1e-15).all()
-    assert found.energy[-1] == pytest.approx(-0.86 - 0.25, abs=2e-3)  # between the field and the axis
+    run = solver(compile_text(SPUN), "c").integrate([0.1, 0.2, -0.9], 0.1, 1_000, K=1.0)
+    assert (np.diff(run.energy) <= 1e-15).all()
+    assert run.energy[-1] == pytest.approx(-0.86 - 0.25, abs=2e-3)  # between the field and the axis
 
 
 @pytest.mark.parametrize("kind", ["covector", "vector"])
 def test_the_energy_is_what_time_and_forces_put_in(kind):
     """The balance has the error of the method, while the work itself is large."""
-    found = {}
+    errors_by_step = {}
     for n in (100, 200):
         rows = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 10 / n, n)
-        found[n] = summarise("phigen", made(kind).system, None, dict(rows.parameters), rows.t, rows.x)
-    assert abs(found[100].work) > 0.1
-    assert found[100].units["energy"].moves
-    assert found[100].units["C"].moves == (kind == "vector")
-    assert found[100].energy.error / found[200].energy.error == pytest.approx(4, rel=0.2)
+        errors_by_step[n] = summarise("phigen", made(kind).system, None, dict(rows.parameters), rows.t, rows.x)
+    assert abs(errors_by_step[100].work) > 0.1
+    assert errors_by_step[100].units["energy"].moves
+    assert errors_by_step[100].units["C"].moves == (kind == "vector")
+    assert errors_by_step[100].energy.error / errors_by_step[200].energy.error == pytest.approx(4, rel=0.2)
 
 
 def test_an_ensemble_takes_the_steps_of_its_members():
     starts = np.array([[0.8, 0.1, 0.5], [0.1, 0.9, 0.2], [0.3, 0.3, 0.9]])
-    found = solver(made("vector"), "c").ensemble(starts, 0.1, 50)
+    run = solver(made("vector"), "c").ensemble(starts, 0.1, 50)
     single = [solver(made("vector"), "c").integrate(x, 0.1, 50, 50).x[-1] for x in starts]
-    assert found == pytest.approx(np.array(single), abs=1e-13)
+    assert run == pytest.approx(np.array(single), abs=1e-13)
 
 
 @pytest.mark.parametrize("kind", slow_but(["populations"], ["populations", "path"]))
 def test_verification_asks_for_what_is_promised(kind):
     """The derivative is that of a step though ∂(∇S + hζ) is not symmetric; energy and Poisson are not judged."""
     solvers = {target: solver(made(kind), target) for target in ("c", "numpy")}
-    found = verify(made(kind), solvers, "test", SYSTEMS[kind][1], {}, 0.1, 50, quick=True)
-    assert found.failures == []
-    required = {c.name.partition(":")[0] for c in found.checks if c.limit}
+    verification = verify(made(kind), solvers, "test", SYSTEMS[kind][1], {}, 0.1, 50, quick=True)
+    assert verification.failures == []
+    required = {c.name.partition(":")[0] for c in verification.checks if c.limit}
     assert "tangent map against differences" in required
     assert "Poisson defect, exact tangent" not in required
     assert ("Casimir C" in required) == (kind == "path")
@@ -234,12 +234,12 @@ RUNS = "runs: {one: {initial: [1, 0, 0], step: 0.1, steps: 5}, two: {initial: [1
     ],
 )
 def test_damping_takes_energy_where_its_rate_is_not_negative(rate, more, verdict, detail):
-    found = examine(loads(TURNING.replace("RATE", rate) + more, "a.yaml"))
-    (stated,) = found.groups["Damping"]
+    examination = examine(loads(TURNING.replace("RATE", rate) + more, "a.yaml"))
+    (stated,) = examination.groups["Damping"]
     assert (stated.verdict, stated.detail) == (verdict, detail)
     if verdict == "refuted":
-        assert "a.yaml:7:10: error: λ ≥ 0" in refutation(found)
-        assert "what adds energy is a force" in refutation(found)
+        assert "a.yaml:7:10: error: λ ≥ 0" in refutation(examination)
+        assert "what adds energy is a force" in refutation(examination)
 
 
 def test_damping_of_which_nothing_is_known_has_no_statement():

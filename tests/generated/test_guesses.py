@@ -67,10 +67,10 @@ def test_guesses_after_a_kick_are_of_the_motion_from_there():
     raw = RawC(compile_spec(spec.load(resources.bundled_specs() / "rigid_body.yaml"), order=4, profile="fast"))
     assert raw.init([0.3, 1.0, 0.2]) == 0
     rng = np.random.default_rng(1)
-    taken = []
+    iteration_counts = []
     for change in 0.01 * rng.uniform(-1, 1, (60, 3)):
         before = int(raw.counters[1])
         assert raw.step(0.05) == 0
-        taken.append(int(raw.counters[1]) - before)
+        iteration_counts.append(int(raw.counters[1]) - before)
         assert raw.call("kick", ctypes.c_int, raw.here, ctypes.c_void_p(change.ctypes.data)) == 0
-    assert np.mean(taken[10:]) < 2.1
+    assert np.mean(iteration_counts[10:]) < 2.1

@@ -43,8 +43,8 @@ FEW = [
 
 def expect_clean(name, folder, compilers, **options):
     """Compile the C with all warnings as C, or as C++."""
-    made = compile_spec(spec.loads(f"phigen: 1\nname: t\n{SYSTEMS[name]}"), **options)
-    write(folder, emit(made.program, "c", "phigen build"))
+    compilation = compile_spec(spec.loads(f"phigen: 1\nname: t\n{SYSTEMS[name]}"), **options)
+    write(folder, emit(compilation.program, "c", "phigen build"))
     for compiler in compilers:
         language = ["-x", "c++", "-std=c++17"] if compiler.endswith("++") else ["-std=c99"]
         run([tool(compiler), *language, *WARNINGS, "-fsyntax-only", "t.c"], folder)

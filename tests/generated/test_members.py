@@ -17,10 +17,10 @@ KINDS = ["rigid_body", "nambu_pendulum", "pendulum_euler", "spin_resonance", "ke
 def own(compilation, count):
     """States, steps, and what else each of so many members has of its own, by the names of the arguments."""
     at, k = setting(compilation), np.arange(count)
-    given = {name: value * (1 + 0.003 * k) for name, value in at.parameters.items()}
+    parameters = {name: value * (1 + 0.003 * k) for name, value in at.parameters.items()}
     if compilation.program.time:
-        given["t0"] = 0.1 * k
-    return np.outer(1 + 0.002 * k, at.x), at.h * (1 - 0.01 * k), given
+        parameters["t0"] = 0.1 * k
+    return np.outer(1 + 0.002 * k, at.x), at.h * (1 - 0.01 * k), parameters
 
 
 @pytest.mark.thin(2)
@@ -28,12 +28,12 @@ def own(compilation, count):
 def test_members_with_numbers_of_their_own_are_trajectories(name, target):
     """To round-off; eleven are a full group of eight and one that is not. Frames are on the same ways."""
     compilation = compiled(name)
-    solve, (start, h, given) = solver(compilation, target), own(compilation, 11)
-    frames = solve.ensemble(start, h, 10, 4, **given)
+    solve, (start, h, parameters) = solver(compilation, target), own(compilation, 11)
+    frames = solve.ensemble(start, h, 10, 4, **parameters)
     assert frames.shape == (4, *start.shape)
-    assert (solve.ensemble(start, h, 10, **given) == frames[-1]).all()
+    assert (solve.ensemble(start, h, 10, **parameters) == frames[-1]).all()
     for m in range(0, 11, 5):
-        alone = solve.integrate(start[m], h[m], 10, 4, **{key: value[m] for key, value in given.items()}).x
+        alone = solve.integrate(start[m], h[m], 10, 4, **{key: value[m] for key, value in parameters.items()}).x
         np.testing.assert_allclose(frames[:, m], alone, rtol=0, atol=1e-15 * np.max(np.abs(alone)))
 
 
@@ -54,23 +54,23 @@ def test_numbers_of_all_are_those_of_each_and_neighbours_do_not_matter(name, sch
 
 def test_the_number_of_threads_changes_no_bit():
     """More members than one call integrates; as if all were made by one."""
-    solve, (start, h, given) = solver(compiled("rigid_body"), "c"), own(compiled("rigid_body"), 11)
+    solve, (start, h, parameters) = solver(compiled("rigid_body"), "c"), own(compiled("rigid_body"), 11)
     start, h = np.tile(start, (300, 1)) * (1 + 1e-5 * np.arange(3300))[:, np.newaxis], np.tile(h, 300)
-    given = {key: np.tile(value, 300) for key, value in given.items()}
-    ends = [solve.ensemble(start, h, 40, 20, threads=threads, **given) for threads in (1, 2, 5)]
+    parameters = {key: np.tile(value, 300) for key, value in parameters.items()}
+    ends = [solve.ensemble(start, h, 40, 20, threads=threads, **parameters) for threads in (1, 2, 5)]
     assert all((end == ends[0]).all() for end in ends)
 
 
 def test_parts_of_ensembles_end_where_groups_do(monkeypatch):
     monkeypatch.setattr(sharing, "cores", lambda: 3)
     asked = sharing.Members(np.zeros((1000, 2)), np.float64(1), 1000, {}, np.float64(0))
-    made = []
-    sharing.shared_out(asked, None, made.append)
-    made.sort(key=lambda part: part.start)
-    assert [part.start for part in made] == list(range(0, 1000, made[0].stop))
-    assert made[0].stop % sharing.PART_GRANULARITY == 0
-    assert made[-1].stop == 1000
-    assert len(made) > 3
+    ranges = []
+    sharing.shared_out(asked, None, ranges.append)
+    ranges.sort(key=lambda part: part.start)
+    assert [part.start for part in ranges] == list(range(0, 1000, ranges[0].stop))
+    assert ranges[0].stop % sharing.PART_GRANULARITY == 0
+    assert ranges[-1].stop == 1000
+    assert len(ranges) > 3
 
 
 FAST = [*product(TARGETS, ["fast"])]
@@ -159,9 +159,9 @@ def test_what_is_not_given_to_each_is_that_of_all(target):
 )
 def test_wrong_arguments_of_members_are_errors(arguments, error, said):
     solve = solver(compiled("rigid_body"), "c")
-    given = {"X0": np.ones((3, 3)), "h": 0.1, "steps": 1, **arguments}
+    call_arguments = {"X0": np.ones((3, 3)), "h": 0.1, "steps": 1, **arguments}
     with pytest.raises(error, match=said):
-        solve.ensemble(**given)
+        solve.ensemble(**call_arguments)
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -180,7 +180,7 @@ def test_a_step_too_large_for_one_member_is_that_of_no_other(target):
 def test_members_in_numpy_have_the_same_bits_beside_one_that_fails(name, monkeypatch):
     """In the middle of a step, where guesses, carries, times, noise and attitudes have been under way for some."""
     compilation, others = compiled(name), np.array([0, 1, 3])
-    solve, (start, h, given) = solver(compilation, "numpy"), own(compilation, 4)
+    solve, (start, h, parameters) = solver(compilation, "numpy"), own(compilation, 4)
     h = h[0] if solve.interface.noise else h
     paths = {"seed": 3} if solve.interface.noise else {}
     module, calls = solve.backend.module, []
@@ -194,13 +194,17 @@ def test_members_in_numpy_have_the_same_bits_beside_one_that_fails(name, monkeyp
         return following, rest, memory, status
 
     run = solve.attitudes if solve.interface.attitude else solve.ensemble
-    good = run(start, h, 12, 5, **given, **paths)
+    good = run(start, h, 12, 5, **parameters, **paths)
     monkeypatch.setattr(module, "_advance", fail_once)
     with pytest.raises(StepError) as failed:
-        run(start, h, 12, 5, **given, **paths)
+        run(start, h, 12, 5, **parameters, **paths)
     assert (failed.value.members, failed.value.step, failed.value.status) == ((2,), 6, "SINGULAR")
-    found = failed.value.trajectory
-    pairs = [(found.x, good.x), (found.attitude, good.attitude)] if solve.interface.attitude else [(found, good)]
+    partial_run = failed.value.trajectory
+    pairs = (
+        [(partial_run.x, good.x), (partial_run.attitude, good.attitude)]
+        if solve.interface.attitude
+        else [(partial_run, good)]
+    )
     for beside, alone in pairs:
         assert np.array_equal(beside[:, others], alone[:, others])
         assert np.array_equal(beside[:2, 2], alone[:2, 2])
@@ -211,23 +215,25 @@ def test_members_in_numpy_have_the_same_bits_beside_one_that_fails(name, monkeyp
 def test_members_whose_guess_misleads_begin_again_with_their_own_numbers(name):
     """The first members' coefficients, parameters, steps or times in place of their own would make other steps."""
     compilation, few = compiled(name), np.array([1, 3])
-    module, (x, h, given) = solver(compilation, "numpy").backend.module, own(compilation, 4)
-    t0 = given.pop("t0", np.zeros(4))
+    module, (x, h, member_parameters) = solver(compilation, "numpy").backend.module, own(compilation, 4)
+    t0 = member_parameters.pop("t0", np.zeros(4))
 
     def stage(members):
-        parameters = module._values({key: value[members] for key, value in given.items()})
-        made = module._coefficients(parameters, x[members], h[members], None)[0]
-        return module._renewed(made, t0[members], h[members]) if compilation.program.time else made
+        parameters = module._values({key: value[members] for key, value in member_parameters.items()})
+        coefficients = module._coefficients(parameters, x[members], h[members], None)[0]
+        return module._renewed(coefficients, t0[members], h[members]) if compilation.program.time else coefficients
 
     everybody, still = stage(np.arange(4)), np.zeros_like(x)
-    for found, alone in zip(module._stage_at(everybody, few), stage(few), strict=True):
-        for a, b in zip(found.values(), alone.values(), strict=True) if isinstance(alone, dict) else [(found, alone)]:
+    for batched, alone in zip(module._stage_at(everybody, few), stage(few), strict=True):
+        for a, b in (
+            zip(batched.values(), alone.values(), strict=True) if isinstance(alone, dict) else [(batched, alone)]
+        ):
             np.testing.assert_array_equal(a, b)
     misled = still.copy()
     misled[few] = 1e6 * (1 + x[few])
     expected, *_ = module._advance(everybody, x, still, (still, still))
     with np.errstate(all="ignore"):
         assert (module._solved(everybody, x, still, misled)[3] != "").any()
-        found, _, _, status = module._advance(everybody, x, still, (misled, misled))
+        batched, _, _, status = module._advance(everybody, x, still, (misled, misled))
     assert (status == "").all()
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14 * np.max(np.abs(expected)))
+    np.testing.assert_allclose(batched, expected, rtol=0, atol=1e-14 * np.max(np.abs(expected)))

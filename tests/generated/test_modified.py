@@ -30,13 +30,13 @@ def compile_with(text, count):
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_constant_to_higher_order(name, count):
     compilation = compile_with(SYSTEMS[name], count)
-    made = solver(compilation, "numpy")
-    module = made.backend.module
+    integrator = solver(compilation, "numpy")
+    module = integrator.backend.module
     x0 = np.array([0.4, 1.0, 0.3][: len(compilation.system.coordinates)])
     gauge = module.gauge(x0) if compilation.program.gauge else None
     spreads = []
     for h in (0.2, 0.1):
-        x = made.integrate(x0, h, round(6 / h)).x
+        x = integrator.integrate(x0, h, round(6 / h)).x
         spreads.append(np.ptp(module.modified_hamiltonian(x, h, gauge=gauge)))
     expected = compilation.program.order + (2 if compilation.realisation.symmetric else 1) * count
     assert math.log2(spreads[0] / spreads[1]) > expected - 0.4
@@ -52,9 +52,9 @@ def test_targets_agree(name):
     raw = RawC(compilation)
     middle = [ctypes.c_void_p(gauge.ctypes.data)] if compilation.program.gauge else []
     place = ctypes.c_void_p(x.ctypes.data)
-    found = raw.call("modified_hamiltonian", ctypes.c_double, None, *middle, ctypes.c_double(0.1), place)
-    assert found == pytest.approx(float(module.modified_hamiltonian(x[:n], 0.1)), rel=1e-14)
-    assert found != pytest.approx(float(module.hamiltonian(x[:n])), rel=1e-6)
+    value_in_c = raw.call("modified_hamiltonian", ctypes.c_double, None, *middle, ctypes.c_double(0.1), place)
+    assert value_in_c == pytest.approx(float(module.modified_hamiltonian(x[:n], 0.1)), rel=1e-14)
+    assert value_in_c != pytest.approx(float(module.hamiltonian(x[:n])), rel=1e-6)
 
 
 def test_numpy_is_as_silent_where_it_overflows_as_the_other_functions():

@@ -107,29 +107,31 @@ KNOWN = [
 
 @pytest.mark.parametrize(("counter", "key", "expected"), KNOWN)
 def test_the_generator_gives_the_known_answers(counter, key, expected):
-    found = solver(made("thermal"), "numpy").backend.module._philox(
+    integrator = solver(made("thermal"), "numpy").backend.module._philox(
         [np.array([c], dtype=np.uint64) for c in counter], key
     )
-    assert [int(word[0]) for word in found] == expected == list(philox4x32(counter, key))
+    assert [int(word[0]) for word in integrator] == expected == list(philox4x32(counter, key))
 
 
 def test_the_rounds_are_those_of_numpy():
     """NumPy has Philox with words of 64 bits, which differs in width and constants only; it counts before it draws."""
     counter, key = (np.array(words, dtype=np.uint64) for words in ([0, 2**40, 3, 2**64 - 1], [7, 2**63 + 1]))
-    own = np.random.Philox(key=key, counter=counter)
+    numpy_generator = np.random.Philox(key=key, counter=counter)
     constants = (0xD2E7470EE14C6C93, 0xCA5A826395121157), (0x9E3779B97F4A7C15, 0xBB67AE8584CAA73B)
-    assert own.random_raw(4).tolist() == list(philox([1, 2**40, 3, 2**64 - 1], [7, 2**63 + 1], 64, *constants))
+    assert numpy_generator.random_raw(4).tolist() == list(
+        philox([1, 2**40, 3, 2**64 - 1], [7, 2**63 + 1], 64, *constants)
+    )
 
 
 def normals(seed, member, step, count):
     """The variates of a step, from the words of the generator."""
-    found = []
+    drawn_numbers = []
     for pair in range((count + 1) // 2):
         a, b, c, d = philox4x32([step % 2**32, step >> 32, member, pair], [seed % 2**32, seed >> 32])
         u, v = (((high >> 5) * 2**26 + (low >> 6)) / 2**53 for high, low in ((a, b), (c, d)))
         radius = min(np.sqrt(-2 * np.log(u + 2.0**-54)), MAX_NORMAL_VARIATE)
-        found += [radius * np.cos(2 * np.pi * v), radius * np.sin(2 * np.pi * v)]
-    return np.array(found[:count])
+        drawn_numbers += [radius * np.cos(2 * np.pi * v), radius * np.sin(2 * np.pi * v)]
+    return np.array(drawn_numbers[:count])
 
 
 #: p_i = −Σ ΔW_i: momenta show the numbers.
@@ -147,8 +149,8 @@ def test_steps_take_the_numbers_of_their_seed_member_and_step(seed, member, step
     bare = compile_text(BARE)
     expected = -0.5 * np.cumsum([normals(seed, member, step + k, 3) for k in range(4)], axis=0)
     for target in ("c", "numpy"):
-        found = solver(bare, target).integrate([0.0] * 6, 0.25, 4, seed=seed, member=member, step0=step)
-        assert found.x[1:, 3:] == pytest.approx(expected, abs=1e-14)
+        run = solver(bare, target).integrate([0.0] * 6, 0.25, 4, seed=seed, member=member, step0=step)
+        assert run.x[1:, 3:] == pytest.approx(expected, abs=1e-14)
     options = f"x0: [0, 0, 0, 0, 0, 0], seed: {seed}n, member: {member}, step0: {step}"
     assert javascript(bare, options, "s.integrate(0.25, 4)", "[...s.x]")[3:] == pytest.approx(expected[-1], abs=1e-14)
 
@@ -161,11 +163,11 @@ def test_the_numbers_are_normal_and_bounded():
     assert np.abs(drawn).max() < MAX_NORMAL_VARIATE
     still = SimpleNamespace(**vars(module))
     zero = [np.zeros(1, dtype=np.uint64)] * 4  # the rarest: log of 2^-54
-    module._philox, kept = (lambda counter, key: zero), module._philox
+    module._philox, original = (lambda counter, key: zero), module._philox
     try:
         assert module._normals(0, np.zeros(1, dtype=int), 0)[0, 0] == MAX_NORMAL_VARIATE
     finally:
-        module._philox = kept
+        module._philox = original
     del still
 
 
@@ -197,9 +199,9 @@ def test_noise_along_a_casimir_moves_nothing(scheme, target):
 
 @pytest.mark.parametrize("kind", ["thermal", "dated", "split", "path"])
 def test_casimirs_are_kept_at_any_temperature(kind):
-    found = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 0.1, 50_000, 100)
-    assert np.ptp(found.x[:, 0]) > 0.5
-    assert np.ptp(found.casimirs["C"]) < 1e-13
+    run = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 0.1, 50_000, 100)
+    assert np.ptp(run.x[:, 0]) > 0.5
+    assert np.ptp(run.casimirs["C"]) < 1e-13
 
 
 @pytest.mark.parametrize("kind", SYSTEMS)
@@ -252,11 +254,11 @@ int main(void)
 
 def test_results_do_not_depend_on_threads(tmp_path):
     write(tmp_path, {**emit(made("thermal").program, "c", COMMAND, single_file=True), "main.c": THREADS})
-    found = set()
+    distinct_results = set()
     for flags, threads in (([], 1), (["-fopenmp"], 1), (["-fopenmp"], 3)):
         run([tool("gcc"), "-std=c99", "-O0", *flags, "main.c", "-lm", "-o", "main"], tmp_path)
-        found.add(run([tmp_path / "main"], tmp_path, OMP_NUM_THREADS=str(threads)))
-    assert len(found) == 1
+        distinct_results.add(run([tmp_path / "main"], tmp_path, OMP_NUM_THREADS=str(threads)))
+    assert len(distinct_results) == 1
 
 
 # --- orders
@@ -266,7 +268,7 @@ def test_results_do_not_depend_on_threads(tmp_path):
 @pytest.mark.parametrize("kind", slow_but(["thermal", "path"], SYSTEMS))
 def test_the_strong_order_is_reached(kind):
     _, start, stated = SYSTEMS[kind]
-    found = strong_order(
+    observed_order = strong_order(
         solver(made(kind), "c"),
         np.array(start),
         {p.name: float(p.value) for p in made(kind).program.parameters},
@@ -275,7 +277,7 @@ def test_the_strong_order_is_reached(kind):
         4,
         32,
     )
-    assert found == pytest.approx(stated, abs=0.2)
+    assert observed_order == pytest.approx(stated, abs=0.2)
 
 
 def wrong(kind, *, drift=0.0, spread=1.0):
@@ -292,16 +294,16 @@ def wrong(kind, *, drift=0.0, spread=1.0):
 def test_noise_in_another_sense_has_no_strong_order(off):
     """Itô's dm = … + Σ X dW has the drift −½ Σ (X·∇)X = 2λT m in Stratonovich's sense, half of m with these numbers."""
     parameters = {"lam": 0.5, "T": 0.5, "B": 1.0}
-    found = strong_order(wrong("thermal", **off), np.array([0, 0.6, 0.8]), parameters, 0.0, 0.1, 4, 32)
-    assert found < 0.25
+    observed_order = strong_order(wrong("thermal", **off), np.array([0, 0.6, 0.8]), parameters, 0.0, 0.1, 4, 32)
+    assert observed_order < 0.25
 
 
 @cache
 def nodes(sources):
     """Nodes (points, sources) and weights of the Gauss–Hermite rule of degree 13 for normal variates."""
     points, weights = np.polynomial.hermite_e.hermegauss(7)
-    found = product(zip(points, weights / weights.sum(), strict=True), repeat=sources)
-    return tuple(np.array(part) for part in zip(*(zip(*pairs, strict=True) for pairs in found), strict=True))
+    combinations = product(zip(points, weights / weights.sum(), strict=True), repeat=sources)
+    return tuple(np.array(part) for part in zip(*(zip(*pairs, strict=True) for pairs in combinations), strict=True))
 
 
 def mean_map(compilation, h):
@@ -338,9 +340,9 @@ noise: {x: {hamiltonian: x, amplitude: 0.7}, y: {hamiltonian: y, amplitude: 0.9}
 
 def generator(compilation):
     """A + ½ Σ B², the matrix of dE[x]/dt, of linear motion."""
-    found, eye = solver(compilation, "numpy"), np.eye(compilation.program.dimension)
-    fields = np.moveaxis(found.noise_fields(eye), 1, 0)
-    return found.vector_field(eye).T + sum(b.T @ b.T for b in fields) / 2
+    integrator, eye = solver(compilation, "numpy"), np.eye(compilation.program.dimension)
+    fields = np.moveaxis(integrator.noise_fields(eye), 1, 0)
+    return integrator.vector_field(eye).T + sum(b.T @ b.T for b in fields) / 2
 
 
 @pytest.mark.parametrize(("text", "order"), [*((text, 1) for text in LINEAR.values()), (SPLIT, 2), (LANGEVIN, 2)])
@@ -359,13 +361,13 @@ def test_the_weak_order_is_reached(text, order):
 @pytest.mark.parametrize(("scheme", "h"), [("series", 0.1), ("splitting", 0.5)])
 def test_a_spin_in_a_bath_has_the_magnetisation_of_langevin(scheme, h):
     """⟨m⟩ = coth(B/T) − T/B; half of the variance of the noise is told from that. Splittings are of weak order 2."""
-    found = solver(compile_text(SYSTEMS["thermal"][0] + f"scheme: {scheme}\n"), "c")
+    integrator = solver(compile_text(SYSTEMS["thermal"][0] + f"scheme: {scheme}\n"), "c")
     members = 4_000
     starts, beta = np.tile([0.0, 0.6, 0.8], (members, 1)), 2.0
     expected = 1 / np.tanh(beta) - 1 / beta
 
     def missed(**parameters):
-        z = found.ensemble(starts, h, round(15 / h), seed=1, **parameters)[:, 2]
+        z = integrator.ensemble(starts, h, round(15 / h), seed=1, **parameters)[:, 2]
         return abs(z.mean() - expected) / (z.std() / np.sqrt(members))
 
     assert missed() < 4
@@ -406,9 +408,9 @@ hamiltonian: p**2/2 + q**4/4
     ],
 )
 def test_the_temperature_is_found_where_there_is_one(more, temperature):
-    found = [s.name for s in examine(compile_text(OSCILLATOR + more + "\n").spec).groups["Noise"][1:]]
+    statements = [s.name for s in examine(compile_text(OSCILLATOR + more + "\n").spec).groups["Noise"][1:]]
     expected = f"the density exp(−H/θ) on the leaves is stationary, with θ = {temperature}"
-    assert found == ([expected] if temperature else [])
+    assert statements == ([expected] if temperature else [])
 
 
 def test_a_source_without_a_flow_in_closed_form_is_named():
@@ -422,7 +424,7 @@ def test_a_source_without_a_flow_in_closed_form_is_named():
 @pytest.mark.parametrize("kind", slow_but(["dated"], ["dated", "thermal", "split"]))
 def test_verification_asks_for_what_is_promised(kind):
     solvers = {target: solver(made(kind), target) for target in ("c", "numpy")}
-    found = verify(
+    verification = verify(
         made(kind),
         solvers,
         "test",
@@ -432,8 +434,8 @@ def test_verification_asks_for_what_is_promised(kind):
         50,
         quick=True,
     )
-    assert found.failures == []
-    required = {c.name.partition(":")[0].partition(" (")[0] for c in found.checks if c.limit}
+    assert verification.failures == []
+    required = {c.name.partition(":")[0].partition(" (")[0] for c in verification.checks if c.limit}
     assert {"observed order, without the noise", "strong order, along common paths", "Casimir C"} <= required
     assert {
         "reversibility",
@@ -494,8 +496,8 @@ def test_arguments_of_noise_are_checked():
 
 def test_states_at_times_are_those_after_whole_steps():
     """A part of a step has other random numbers than the whole: its end is not on the path."""
-    found = solver(made("thermal"), "numpy").integrate([0, 0, 1], 0.1, 6, 2, seed=3)
-    assert found.at([0.4, 0.2]).tolist() == [found.x[2].tolist(), found.x[1].tolist()]
+    run = solver(made("thermal"), "numpy").integrate([0, 0, 1], 0.1, 6, 2, seed=3)
+    assert run.at([0.4, 0.2]).tolist() == [run.x[2].tolist(), run.x[1].tolist()]
     for between in (0.1, 0.25):
         with pytest.raises(ValueError, match=f"{between} is between two of them"):
-            found.at([0.2, between])
+            run.at([0.2, between])

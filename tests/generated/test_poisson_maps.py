@@ -89,7 +89,7 @@ def test_generated_steps_are_those_of_the_scheme_to_round_off(name, run):
         assert raw.step(at.h) == 0
         with mpmath.workdps(50):
             pairs = list(zip(raw.exact_state(), step(before), before, strict=True))
-            error = max(abs(found - exact) for found, exact, _ in pairs)
+            error = max(abs(computed - exact) for computed, exact, _ in pairs)
             increment = max(abs(exact - start) for _, exact, start in pairs)
             size = max(abs(start) for *_, start in pairs)
         # The increment is rounded, not the state; a user's own α and β may cancel, though.
@@ -137,11 +137,11 @@ def test_observables_agree_with_their_formulas(name):
         ]
     for target in ("c", "numpy"):
         s = solver(compilation, target)
-        found = [float(s.hamiltonian(moved, parameters=at.parameters))]
-        found += [float(v) for v in s.casimirs(moved, parameters=at.parameters).values()]
-        found += s.vector_field(moved, parameters=at.parameters).tolist()
+        evaluated_values = [float(s.hamiltonian(moved, parameters=at.parameters))]
+        evaluated_values += [float(v) for v in s.casimirs(moved, parameters=at.parameters).values()]
+        evaluated_values += s.vector_field(moved, parameters=at.parameters).tolist()
         scale = max(abs(v) for v in [*exact, *moved])
-        np.testing.assert_allclose(found, exact, rtol=1e-14, atol=4e-15 * scale)
+        np.testing.assert_allclose(evaluated_values, exact, rtol=1e-14, atol=4e-15 * scale)
 
 
 # -- reversibility
@@ -230,8 +230,8 @@ def closed_form(compilation, run, times, at):
     names = {**at.parameters, **{f"x0:{c}": v for c, v in zip(coordinates, at.x, strict=True)}}
     table = np.full((len(times), len(coordinates)), np.nan)
     for k, t in enumerate(times.tolist()):
-        found = values(list(formulas.values()), {**names, ELAPSED: t})
-        for c, v in zip(formulas, found, strict=True):
+        solution = values(list(formulas.values()), {**names, ELAPSED: t})
+        for c, v in zip(formulas, solution, strict=True):
             table[k, coordinates.index(c)] = float(v)
     return table
 

@@ -49,8 +49,8 @@ def test_small_code_makes_the_steps_of_fast_code(name, scheme):
 )
 def test_small_code_is_short(name, order, lines, runtime, row):
     """With a gauge that is chosen, which most tests do without. The table of docs/generated.md has the figures."""
-    given = spec.load(resources.bundled_specs() / f"{name}.yaml")
-    compilation = compile_spec(replace(given, profile="small"), order=order)
+    specification = spec.load(resources.bundled_specs() / f"{name}.yaml")
+    compilation = compile_spec(replace(specification, profile="small"), order=order)
     texts = files(compilation, "c").values()
     length = sum(text.count("\n") for text in texts)
     assert length <= lines
@@ -74,8 +74,8 @@ WORDS = {
 
 def described(name, profile, without=()):
     """The compilation of a system of the corpus, gauge included, without some parts."""
-    given = spec.load(resources.bundled_specs() / f"{name}.yaml")
-    return compile_spec(given, order=4, profile=profile, without=without)
+    specification = spec.load(resources.bundled_specs() / f"{name}.yaml")
+    return compile_spec(specification, order=4, profile=profile, without=without)
 
 
 @pytest.mark.thin(3)

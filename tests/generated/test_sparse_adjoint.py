@@ -46,13 +46,13 @@ def pivoting(compilation):
     return Solver(CSolver(changed, names), names)
 
 
-def slopes(made, x, bar):
+def slopes(integrator, x, bar):
     """The derivatives of bar·x(end) along the state and the parameter, by central differences."""
 
     def end(state, w):
-        return bar @ made.integrate(state, H, STEPS, STEPS, w=w).x[-1]
+        return bar @ integrator.integrate(state, H, STEPS, STEPS, w=w).x[-1]
 
-    (w,) = made.interface.parameters.values()
+    (w,) = integrator.interface.parameters.values()
     units = [(WIDTH * e, 0) for e in np.eye(len(x))] + [(0, WIDTH)]
     return np.array([(end(x + e, w + d) - end(x - e, w - d)) / (2 * WIDTH) for e, d in units])
 
@@ -76,8 +76,8 @@ def test_gradients_of_sparse_implicit_steps_are_differences(seed, pairs, order):
     jacobian = np.array([e.is_zero for e in step.linearise.outputs[2].values]).reshape(2 * pairs, -1)
     assert (jacobian != jacobian.T).any()
     several = [solver(plain, "numpy"), solver(plain, "c"), pivoting(laned)]
-    for made in several if pairs == 2 else [*several, solver(laned, "c"), pivoting(plain)]:
-        _, x0_bar, by = made.pullback(x, H, STEPS, bar)
+    for integrator in several if pairs == 2 else [*several, solver(laned, "c"), pivoting(plain)]:
+        _, x0_bar, by = integrator.pullback(x, H, STEPS, bar)
         assert [*x0_bar, by["w"]] == pytest.approx(expected, abs=1e-6 * np.max(np.abs(expected)))
     cotangent = solver(plain, "c").pullback(x, H, 1, bar).x0_bar
     tangent = solver(plain, "numpy").jacobian(x, H)[1]

@@ -82,12 +82,12 @@ FEW = [("c", name) for name in QUICK if name not in KINDS] + [("numpy", "lotka_v
 @pytest.mark.parametrize(("target", "name"), slow_but(FEW, product(TARGETS, NAMES)))
 def test_step_is_a_poisson_map(name, target):
     compilation = with_tangent(name) if name in QUICK else small(with_tangent(name))
-    made = solver(compilation, target)
+    integrator = solver(compilation, target)
     at = setting(compilation)
     x = np.array(at.x)
     for h in (at.h, -at.h / 2):
-        image, tangent = made.step_tangent(x, h, parameters=at.parameters)
-        assert np.max(np.abs(image - made.step(x, h, parameters=at.parameters))) == 0
+        image, tangent = integrator.step_tangent(x, h, parameters=at.parameters)
+        assert np.max(np.abs(image - integrator.step(x, h, parameters=at.parameters))) == 0
         assert defect(compilation, x, image, tangent, at.parameters) <= 1e-12
         x = image
 
@@ -114,12 +114,12 @@ def test_tangent_agrees_with_many_digits(name, target):
 @pytest.mark.parametrize("name", ["pendulum_euler", "ablowitz_ladik3", "rigid_body"])
 def test_tangent_agrees_with_differences(name, target):
     compilation = with_tangent(name)
-    made, at = solver(compilation, target), setting(compilation)
+    integrator, at = solver(compilation, target), setting(compilation)
 
     def step(x):
-        return made.step(x, at.h, parameters=at.parameters)
+        return integrator.step(x, at.h, parameters=at.parameters)
 
-    tangent = made.step_tangent(at.x, at.h, parameters=at.parameters)[1]
+    tangent = integrator.step_tangent(at.x, at.h, parameters=at.parameters)[1]
     assert np.max(np.abs(tangent - differences(step, np.array(at.x)))) <= 1e-10
 
 
@@ -128,14 +128,14 @@ def test_tangent_agrees_with_differences(name, target):
 def test_stages_of_a_composition_are_multiplied(target):
     compilation = text_with_tangent(COMPOSED)
     assert len(compilation.program.fractions) > 1
-    made, x = solver(compilation, target), np.array([0.3, 0.9, -0.4])
-    image, tangent = made.step_tangent(x, 0.2)
-    assert np.max(np.abs(tangent - differences(lambda y: made.step(y, 0.2), x))) <= 1e-11
+    integrator, x = solver(compilation, target), np.array([0.3, 0.9, -0.4])
+    image, tangent = integrator.step_tangent(x, 0.2)
+    assert np.max(np.abs(tangent - differences(lambda y: integrator.step(y, 0.2), x))) <= 1e-11
     assert defect(compilation, x, image, tangent, {}) <= 1e-14
-    back = made.step_tangent(image, -0.2)[1]
+    back = integrator.step_tangent(image, -0.2)[1]
     assert np.max(np.abs(back @ tangent - np.eye(3))) <= 1e-14
     if target == "numpy":  # whose module has a loop of its own
-        assert np.max(np.abs(made.backend.module.step_tangent(x, 0.2)[1] - tangent)) <= 1e-15
+        assert np.max(np.abs(integrator.backend.module.step_tangent(x, 0.2)[1] - tangent)) <= 1e-15
 
 
 @pytest.mark.thin(2)
@@ -202,9 +202,9 @@ def test_numpy_takes_many_members():
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_step_that_fails_raises(target):
-    made = solver(with_tangent("rigid_body"), target)
+    integrator = solver(with_tangent("rigid_body"), target)
     with pytest.raises(StepError):
-        made.step_tangent([1e3, 2e3, -1e3], 50.0)
+        integrator.step_tangent([1e3, 2e3, -1e3], 50.0)
 
 
 @pytest.mark.thin(2)
@@ -235,8 +235,8 @@ def test_generated_c_has_no_warnings(name, compiler, tmp_path):
 def test_splittings_that_turn_an_attitude_have_tangents_too():
     """The derivative is that of the same steps without."""
     text = f"{BODY}profile: small\nscheme: splitting\norder: 4\ncomposition: suzuki\n"
-    found = [
+    tangent_maps = [
         solver(text_with_tangent(text + more), "c").step_tangent([0.4, 0.9, 0.3], 0.1)
         for more in ("", "reconstruct: quaternion\n")
     ]
-    assert np.array_equal(found[0][1], found[1][1])
+    assert np.array_equal(tangent_maps[0][1], tangent_maps[1][1])

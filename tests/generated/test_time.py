@@ -112,11 +112,11 @@ pytestmark = pytest.mark.few(
 @cache
 def compilation_of(kind):
     text, order, birealisation, composition = KINDS[kind]
-    given = spec.loads(f"phigen: 1\nname: t\n{text}order: {order}\n")
+    specification = spec.loads(f"phigen: 1\nname: t\n{text}order: {order}\n")
     if birealisation == "splitting":
-        return compile_spec(replace(given, composition=composition), scheme="splitting")
-    given = replace(given, birealisation=BirealisationChoice(birealisation), composition=composition)
-    return compile_spec(given)
+        return compile_spec(replace(specification, composition=composition), scheme="splitting")
+    specification = replace(specification, birealisation=BirealisationChoice(birealisation), composition=composition)
+    return compile_spec(specification)
 
 
 def start_of(kind):
@@ -131,15 +131,15 @@ def terms_of(text, kind, count):
 
 @pytest.mark.parametrize("kind", ["constant", "canonical-euler"])
 def test_the_series_is_that_of_the_pair_typed_by_hand(kind):
-    _, realisation, found = terms_of(PENDULUM, kind, 4)
+    _, realisation, derived = terms_of(PENDULUM, kind, 4)
     both, whole, by_hand = terms_of(BY_HAND, "constant", 4)
     if kind == "canonical-euler":  # the pair keeps the midpoint
         alpha = [*realisation.alpha[:1], whole.alpha[1], *realisation.alpha[1:], whole.alpha[3]]
         listed = graph_series(both.hamiltonian, alpha, both.coordinates, 4, symmetric=False)
     else:
         listed = [by_hand.tower.expression(s) for s in by_hand.terms]
-    for i, (mine, theirs) in enumerate(zip(found.terms, listed, strict=True), 1):
-        difference = found.tower.expression(mine) - theirs + (symbol("e") if i == 1 else 0)
+    for i, (mine, theirs) in enumerate(zip(derived.terms, listed, strict=True), 1):
+        difference = derived.tower.expression(mine) - theirs + (symbol("e") if i == 1 else 0)
         assert decide_zero(f"S_{i}", [("", difference)]).verdict == "proved"
 
 
@@ -168,11 +168,11 @@ def errors(solve, field, x0, span, counts):
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_order_is_that_of_autonomous_systems(kind):
     compilation = compilation_of(kind)
-    found = solver(compilation, "numpy")
+    integrator = solver(compilation, "numpy")
     steps = (20, 40) if compilation.order.order < 6 else (8, 16)
     coarse, fine = errors(
-        lambda x, h, n: found.integrate(x, h, n, n, t0=T0).x[-1],
-        lambda t, x: found.vector_field(x, t),
+        lambda x, h, n: integrator.integrate(x, h, n, n, t0=T0).x[-1],
+        lambda t, x: integrator.vector_field(x, t),
         start_of(kind),
         2.0,
         steps,
@@ -182,10 +182,10 @@ def test_the_order_is_that_of_autonomous_systems(kind):
 
 @pytest.mark.parametrize("shift", [-H / 2, H / 2])
 def test_the_time_at_an_end_of_the_step_gives_order_one_only(shift):
-    found = solver(compilation_of("newton"), "numpy")
+    integrator = solver(compilation_of("newton"), "numpy")
     coarse, fine = errors(
-        lambda x, h, n: found.integrate(x, h, n, n, t0=T0 + shift * h / H).x[-1],
-        lambda t, x: found.vector_field(x, t),
+        lambda x, h, n: integrator.integrate(x, h, n, n, t0=T0 + shift * h / H).x[-1],
+        lambda t, x: integrator.vector_field(x, t),
         start_of("newton"),
         2.0,
         (20, 40),
@@ -202,13 +202,13 @@ IN_C = [*product(KINDS, ["small"]), *product(QUICKLY, ["fast"])]
 def test_c_agrees_with_numpy_to_roundoff(kind, profile):
     compilation, x0 = compilation_of(kind), start_of(kind)
     expected = solver(compilation, "numpy").integrate(x0, H, STEPS, t0=T0)
-    found = compilation if profile == "fast" else small(compilation)
-    c = solver(found, "c").integrate(x0, H, STEPS, t0=T0)
+    variant = compilation if profile == "fast" else small(compilation)
+    c = solver(variant, "c").integrate(x0, H, STEPS, t0=T0)
     assert c.x == pytest.approx(expected.x, abs=1e-13)
     assert c.t == pytest.approx(expected.t, abs=0)
     assert c.energy == pytest.approx(expected.energy, abs=1e-13)
     field = solver(compilation, "numpy").vector_field(c.x[-1], c.t[-1])
-    assert solver(found, "c").vector_field(c.x[-1], c.t[-1]) == pytest.approx(field, abs=1e-13)
+    assert solver(variant, "c").vector_field(c.x[-1], c.t[-1]) == pytest.approx(field, abs=1e-13)
 
 
 @pytest.mark.thin(2)
@@ -226,33 +226,33 @@ def test_javascript_agrees_with_numpy_to_roundoff(kind):
 
 
 def test_the_time_is_counted_not_added_up():
-    found = solver(compilation_of("newton"), "c")
-    t = found.integrate([1, 0], 0.1, 1000, 1000, t0=0.3).t
+    integrator = solver(compilation_of("newton"), "c")
+    t = integrator.integrate([1, 0], 0.1, 1000, 1000, t0=0.3).t
     assert t.tolist() == [0.3, 0.3 + 1000 * 0.1]
-    assert found.integrate([1, 0], H, 7, t0=T0).x[-1].tolist() == steps_in_two(found, 3, 4)
+    assert integrator.integrate([1, 0], H, 7, t0=T0).x[-1].tolist() == steps_in_two(integrator, 3, 4)
 
 
-def steps_in_two(found, first, second):
+def steps_in_two(compiled_system, first, second):
     """The state after so many steps, with a break between them in which the session is saved."""
-    session = found.backend.start(np.array([1.0, 0.0]), {"A": 0.5, "omega": 2.0}, T0)
+    session = compiled_system.backend.start(np.array([1.0, 0.0]), {"A": 0.5, "omega": 2.0}, T0)
     session.advance(H, first)
-    session = found.backend.restored(session.saved(), {"A": 0.5, "omega": 2.0})
+    session = compiled_system.backend.restored(session.saved(), {"A": 0.5, "omega": 2.0})
     session.advance(H, second)
     return session.state().tolist()
 
 
 def test_a_saved_session_goes_on_at_its_time():
-    found = solver(compilation_of("newton"), "numpy")
-    assert found.integrate([1, 0], H, 7, t0=T0).x[-1].tolist() == steps_in_two(found, 3, 4)
+    integrator = solver(compilation_of("newton"), "numpy")
+    assert integrator.integrate([1, 0], H, 7, t0=T0).x[-1].tolist() == steps_in_two(integrator, 3, 4)
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_ensembles_start_at_the_time_of_all_members(target):
-    found = solver(compilation_of("newton, non-linear π"), target)
+    integrator = solver(compilation_of("newton, non-linear π"), target)
     starts = np.random.default_rng(3).normal(size=(5, 3))
-    ends = found.ensemble(starts, H, STEPS, t0=T0)
+    ends = integrator.ensemble(starts, H, STEPS, t0=T0)
     for x0, end in zip(starts, ends, strict=True):
-        assert end == pytest.approx(found.integrate(x0, H, STEPS, STEPS, t0=T0).x[-1], abs=1e-13)
+        assert end == pytest.approx(integrator.integrate(x0, H, STEPS, STEPS, t0=T0).x[-1], abs=1e-13)
 
 
 POISSON = ["newton, non-linear π", "newton, log-canonical", "path", "splitting, time by itself"]
@@ -276,15 +276,15 @@ def test_casimirs_are_constant_and_the_statements_are_proved():
     long = solver(compilation_of("newton, non-linear π"), "c").integrate([0.6, 0.5, 0.7], H, 5000, 50)
     assert np.ptp(long.casimirs["C"]) < 1e-13
     assert np.ptp(long.energy) > 0.1
-    found = examine(spec.loads(f"phigen: 1\nname: t\n{BODY}"))
-    assert {s.verdict for s in found.groups["Hamilton–Jacobi series"]} == {"proved"}
+    examination = examine(spec.loads(f"phigen: 1\nname: t\n{BODY}"))
+    assert {s.verdict for s in examination.groups["Hamilton–Jacobi series"]} == {"proved"}
 
 
 def test_invariants_may_depend_on_the_time():
     moving = "time: t\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 - q*t\n"
     for invariant, verdict in (("p - t**2/2", "proved"), ("p - t**2/3", "refuted")):
-        found = examine(spec.loads(f"phigen: 1\nname: t\n{moving}invariants: {{F: {invariant}}}\n"))
-        assert [s.verdict for s in found.groups["Invariants"]] == [verdict]
+        examination = examine(spec.loads(f"phigen: 1\nname: t\n{moving}invariants: {{F: {invariant}}}\n"))
+        assert [s.verdict for s in examination.groups["Invariants"]] == [verdict]
 
 
 def test_what_depends_on_the_time_only_is_computed_once_in_a_step():
@@ -296,9 +296,9 @@ def test_what_depends_on_the_time_only_is_computed_once_in_a_step():
 
 
 def test_sections_may_depend_on_the_time():
-    found = solver(compilation_of("newton"), "c").section([1, 0], H, 100, lambda x, t: np.sin(t + x[:, 0]), t0=T0)
-    assert len(found) > 0
-    assert np.sin(found.t + found.x[:, 0]) == pytest.approx(0, abs=1e-13)
+    integrator = solver(compilation_of("newton"), "c").section([1, 0], H, 100, lambda x, t: np.sin(t + x[:, 0]), t0=T0)
+    assert len(integrator) > 0
+    assert np.sin(integrator.t + integrator.x[:, 0]) == pytest.approx(0, abs=1e-13)
 
 
 def test_a_time_is_asked_for_where_there_is_one_and_refused_where_there_is_none():
@@ -326,16 +326,16 @@ def test_the_hamiltonian_takes_a_time_for_each_state():
 def test_the_python_api_takes_a_start(tmp_path):
     path = tmp_path / "driven.yaml"
     path.write_text(f"phigen: 1\nname: driven\n{PENDULUM}", encoding="utf-8")
-    found = phigen.compile(phigen.load(path), target="numpy")
-    assert found.step([1, 0], H, t0=T0) == pytest.approx(found.integrate([1, 0], H, 1, t0=T0).x[-1], abs=0)
+    solver = phigen.compile(phigen.load(path), target="numpy")
+    assert solver.step([1, 0], H, t0=T0) == pytest.approx(solver.integrate([1, 0], H, 1, t0=T0).x[-1], abs=0)
 
 
 @pytest.mark.parametrize("kind", ["constant", "canonical-euler"])
 def test_a_step_is_the_flow_of_the_modified_hamiltonian_which_depends_on_the_time(kind):
-    given = spec.loads(f"phigen: 1\nname: t\n{PENDULUM}order: 2\nmodified_hamiltonian: 2\n")
-    compilation = compile_spec(replace(given, birealisation=BirealisationChoice(kind)))
-    found, x0 = solver(compilation, "numpy"), np.array([0.6, 0.5])
-    modified, width = found.backend.module.modified_hamiltonian, 1e-4
+    specification = spec.loads(f"phigen: 1\nname: t\n{PENDULUM}order: 2\nmodified_hamiltonian: 2\n")
+    compilation = compile_spec(replace(specification, birealisation=BirealisationChoice(kind)))
+    integrator, x0 = solver(compilation, "numpy"), np.array([0.6, 0.5])
+    modified, width = integrator.backend.module.modified_hamiltonian, 1e-4
 
     def field(t, x, h):
         q, p = ((modified(x + e, h, t) - modified(x - e, h, t)) / (2 * width) for e in width * np.eye(2))
@@ -344,15 +344,15 @@ def test_a_step_is_the_flow_of_the_modified_hamiltonian_which_depends_on_the_tim
     missed = []
     for h in (0.4, 0.2):
         flow = solve_ivp(field, (T0, T0 + h), x0, method="DOP853", rtol=1e-12, atol=1e-13, args=(h,)).y[:, -1]
-        missed.append(np.max(np.abs(found.step(x0, h, t0=T0) - flow)))
+        missed.append(np.max(np.abs(integrator.step(x0, h, t0=T0) - flow)))
     assert np.log2(missed[0] / missed[1]) > compilation.program.modified.power + 0.6
 
 
 @pytest.mark.parametrize("kind", ["newton, log-canonical", "newton, not symmetric"])
 def test_sympy_derives_the_same_series(kind):
-    found = list(compare(compilation_of(kind), 3))
-    assert {c.statement.verdict for c in found} == {"proved"}
-    assert ("∇S_h" in [c.statement.name for c in found]) == compilation_of(kind).realisation.symmetric
+    agreements = list(compare(compilation_of(kind), 3))
+    assert {c.statement.verdict for c in agreements} == {"proved"}
+    assert ("∇S_h" in [c.statement.name for c in agreements]) == compilation_of(kind).realisation.symmetric
 
 
 def test_systems_from_sympy_may_have_a_time():
@@ -368,11 +368,13 @@ def test_systems_from_sympy_may_have_a_time():
 def test_a_spin_in_resonance_follows_rabis_solution(h):
     compilation = compiled("spin_resonance")
     run = compilation.spec.runs["resonance"]
-    found = solver(compilation, "c").integrate([0, 0, 1], h, round(20 / h))
-    solution = exact_solution(compilation.system, run, compilation.spec.parameters_of(run), found.x[0], found.t)
-    error = np.max(np.abs(found.x - np.stack([solution[c] for c in compilation.system.coordinates], axis=1)))
+    trajectory = solver(compilation, "c").integrate([0, 0, 1], h, round(20 / h))
+    solution = exact_solution(
+        compilation.system, run, compilation.spec.parameters_of(run), trajectory.x[0], trajectory.t
+    )
+    error = np.max(np.abs(trajectory.x - np.stack([solution[c] for c in compilation.system.coordinates], axis=1)))
     assert error < 1e-6 * (h / 0.1) ** 4 * 1.1
-    assert found.x[-1, 2] == pytest.approx(np.cos(0.3 * 20), abs=1e-6)
+    assert trajectory.x[-1, 2] == pytest.approx(np.cos(0.3 * 20), abs=1e-6)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind.startswith("splitting")])

@@ -47,21 +47,21 @@ def test_loops_over_lanes_become_vectors(compiler, case, tmp_path):
     write(tmp_path, emit(compilation.program, "c", "phigen"))
     marked = marked_loops((tmp_path / f"{name}.c").read_text(encoding="utf-8"))
     assert {f"{name}_{function}" for function in functions.split()} - {*marked.values()} == set()
-    found = vectors(compiler, tmp_path / f"{name}.c")
-    assert {f"{function}, line {line}" for line, function in marked.items() if line not in found} == set()
+    vectorised = vectors(compiler, tmp_path / f"{name}.c")
+    assert {f"{function}, line {line}" for line, function in marked.items() if line not in vectorised} == set()
 
 
 def marked_loops(code):
     """The function of each line with a loop that compilers are told to make vectors of."""
-    found, function = {}, ""
+    loops, function = {}, ""
     lines = code.splitlines()
     for number, line in enumerate(lines, 1):
         if start := re.match(r"[a-z].*?\b(\w+)\((?!\*)", line):
             function = start[1]
         if re.fullmatch(r" +\w+_EACH_(LANE|SITE)", line):
             assert lines[number].lstrip().startswith("for ("), lines[number]
-            found[number + 1] = function
-    return found
+            loops[number + 1] = function
+    return loops
 
 
 #: How a compiler is asked to write into a file what it did with loops, and what it says of those that became vectors.
