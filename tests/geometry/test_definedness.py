@@ -34,19 +34,19 @@ def statements(text):
     ],
 )
 def test_what_has_no_value_anywhere_is_refused_where_it_stands(text, name, detail):
-    (found,) = statements(text)
-    assert (found.name, found.verdict) == (f"{name} is defined", REFUTED)
+    (statement,) = statements(text)
+    assert (statement.name, statement.verdict) == (f"{name} is defined", REFUTED)
     with pytest.raises(CheckError, match=f"{name} is defined") as caught:
         compile_proved(spec.loads(PAIR + text))
     line = {"H": 5, "F": 6}[name]
     assert str(caught.value).startswith(f"<string>:{line}:")
-    assert detail in found.detail
+    assert detail in statement.detail
 
 
 def test_where_no_run_says_where_it_starts_a_search_in_vain_is_a_warning():
     text = PAIR + "hamiltonian: sqrt(1e-6 - x**2) + y**2\n"
-    (found,) = examine(spec.loads(text)).groups[DEFINEDNESS]
-    assert (found.verdict, found.detail) == (UNDECIDED, "no value at any of 192 points")
+    (statement,) = examine(spec.loads(text)).groups[DEFINEDNESS]
+    assert (statement.verdict, statement.detail) == (UNDECIDED, "no value at any of 192 points")
     with pytest.warns(PhigenWarning, match=r"^<string>:5:14: warning: H is defined: undecided"):
         compile_proved(spec.loads(text))
 
@@ -54,8 +54,8 @@ def test_where_no_run_says_where_it_starts_a_search_in_vain_is_a_warning():
 def test_a_run_that_starts_where_something_has_no_value_is_a_warning():
     runs = "runs: {good: {initial: [1, 1], step: 0.1, steps: 1}, bad: {initial: [-1, 1], step: 0.1, steps: 1}}\n"
     text = PAIR + "hamiltonian: y**2 + x - log(x)\ninvariants: {F: x - log(x) + y**2}\n" + runs
-    (found,) = examine(spec.loads(text)).groups[DEFINEDNESS]
-    assert (found.name, found.detail) == ("everything is defined where bad starts", "no value of H, F there")
+    (statement,) = examine(spec.loads(text)).groups[DEFINEDNESS]
+    assert (statement.name, statement.detail) == ("everything is defined where bad starts", "no value of H, F there")
     with pytest.warns(PhigenWarning, match=r"^<string>:7:\d+: warning: everything is defined where bad starts"):
         compile_proved(spec.loads(text))
 

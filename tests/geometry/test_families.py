@@ -81,9 +81,9 @@ def test_small_families_have_the_documented_bases():
     [("rigid_body", "so", 3, -1), ("lagrange_top", "se", 3, -1), ("so4_manakov", "so", 4, 1)],
 )
 def test_corpus_brackets_are_those_of_the_families(spec, name, size, sign):
-    given = system_from_spec(load(bundled_specs() / f"{spec}.yaml"))
+    system = system_from_spec(load(bundled_specs() / f"{spec}.yaml"))
     algebra = named(name, size) if sign > 0 else named(name, size).opposite()
-    assert given.poisson == algebra.poisson(given.coordinates)
+    assert system.poisson == algebra.poisson(system.coordinates)
 
 
 @pytest.mark.parametrize(("name", "size"), FAMILIES)

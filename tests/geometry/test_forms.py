@@ -31,8 +31,8 @@ def test_canonical_bracket_of_position_and_momentum_is_one():
 def test_log_canonical_gives_the_lotka_volterra_field():
     s = system("x1 x2 x3", "{log_canonical: [[0,1,1],[-1,0,1],[-1,-1,0]]}", "x1+x2+x3")
     expected = ["x1*(x2+x3)", "x2*(x3-x1)", "-x3*(x1+x2)"]
-    wanted = system("x1 x2 x3", "{canonical: {q: [x1], p: [x2]}}", "0", f"invariants: {dict(enumerate_as(expected))}")
-    residuals = [("", f - g) for f, g in zip(s.vector_field(), wanted.invariants.values(), strict=True)]
+    subject = system("x1 x2 x3", "{canonical: {q: [x1], p: [x2]}}", "0", f"invariants: {dict(enumerate_as(expected))}")
+    residuals = [("", f - g) for f, g in zip(s.vector_field(), subject.invariants.values(), strict=True)]
     assert decide_zero("field", residuals).verdict == PROVED
 
 

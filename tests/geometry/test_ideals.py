@@ -16,12 +16,12 @@ def product(a, b):
 )
 def test_projections_are_onto_commuting_ideals(name, size, ranks):
     algebra = family(name, size).lie_algebra
-    found = ideal_projections(algebra)
+    projections = ideal_projections(algebra)
     # The trace of a projection is its rank.
-    assert sorted((sum(p[i][i] for i in range(len(p))) for p in found), reverse=True) == ranks
+    assert sorted((sum(p[i][i] for i in range(len(p))) for p in projections), reverse=True) == ranks
     n = algebra.dimension
-    for a, p in enumerate(found):
-        for b, q in enumerate(found):
+    for a, p in enumerate(projections):
+        for b, q in enumerate(projections):
             columns = product(p, q)
             assert all(columns[j][i] == (p[i][j] if a == b else 0) for i in range(n) for j in range(n))
 

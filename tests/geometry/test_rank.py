@@ -39,7 +39,7 @@ def test_neither_multiples_of_a_prime_nor_denominators_with_it_lower_the_rank():
 def test_numbers_are_looked_at_once(monkeypatch):
     """As the gradients of linear Casimirs are, of which large algebras have hundreds."""
     points = []
-    monkeypatch.setattr(rank, "sample_point", lambda *given: points.append(1) or sample_point(*given))
+    monkeypatch.setattr(rank, "sample_point", lambda *arguments: points.append(1) or sample_point(*arguments))
     for entry, times in ((ONE, 1), (x, POINTS)):
         points.clear()
         assert generic_ranks([[[entry]]]) == [1]

@@ -14,9 +14,9 @@ def shape(coordinates, poisson):
 
 
 def test_canonical_pairs_are_found_in_any_order_and_sign():
-    found = shape("p q z y b", "{brackets: {q: {p: 1}, y: {b: '2/2'}}}")
-    assert isinstance(found, Canonical)
-    assert (found.q, found.p, found.rest) == (("q", "y"), ("p", "b"), ("z",))
+    detected = shape("p q z y b", "{brackets: {q: {p: 1}, y: {b: '2/2'}}}")
+    assert isinstance(detected, Canonical)
+    assert (detected.q, detected.p, detected.rest) == (("q", "y"), ("p", "b"), ("z",))
 
 
 @pytest.mark.parametrize(
@@ -30,9 +30,9 @@ def test_canonical_pairs_are_found_in_any_order_and_sign():
     ],
 )
 def test_a_bracket_that_is_constant_by_an_identity_has_its_value(entry, value):
-    found = shape("x y", f"{{brackets: {{x: {{y: '{entry}'}}}}}}")
-    assert isinstance(found, Canonical if value == "1" else Constant)
-    assert str(found.matrix[0][1]) == value
+    detected = shape("x y", f"{{brackets: {{x: {{y: '{entry}'}}}}}}")
+    assert isinstance(detected, Canonical if value == "1" else Constant)
+    assert str(detected.matrix[0][1]) == value
 
 
 @pytest.mark.parametrize(
@@ -44,10 +44,10 @@ def test_a_bracket_that_is_constant_by_an_identity_has_its_value(entry, value):
     ],
 )
 def test_linear_affine_and_log_canonical_brackets_are_found_by_identities(brackets, kind):
-    found = shape("x y z", f"{{brackets: {brackets}}}")
-    assert isinstance(found, kind)
+    detected = shape("x y z", f"{{brackets: {brackets}}}")
+    assert isinstance(detected, kind)
     if kind is LogCanonical:
-        assert [str(e) for e in found.a[0]] == ["0", "m", "1"]
+        assert [str(e) for e in detected.a[0]] == ["0", "m", "1"]
 
 
 @pytest.mark.parametrize("entry", ["abs(x)/x", "sqrt(x**2)/x", "abs(x)*y/x", "sqrt(x**4 + 1) - x**2"])
@@ -69,9 +69,9 @@ def test_coordinates_that_cancel_do_not_count():
 
 
 def test_log_canonical_with_parameters():
-    found = shape("x y z", "{brackets: {x: {y: 'sqrt(l)*x*y'}, y: {z: -y*z/m}}}")
-    assert isinstance(found, LogCanonical)
-    assert [str(e) for e in found.a[1]] == ["-sqrt(l)", "0", "-1/m"]
+    detected = shape("x y z", "{brackets: {x: {y: 'sqrt(l)*x*y'}, y: {z: -y*z/m}}}")
+    assert isinstance(detected, LogCanonical)
+    assert [str(e) for e in detected.a[1]] == ["-sqrt(l)", "0", "-1/m"]
 
 
 @pytest.mark.parametrize("entry", ["x*y + 1", "x*y**2", "x*x", "x*y*exp(x)", "x"])
@@ -80,10 +80,10 @@ def test_almost_log_canonical_is_not(entry):
 
 
 def test_rigid_body_with_inertia_in_the_bracket_is_a_lie_algebra():
-    found = shape("x y z", "{brackets: {x: {y: -z/m, z: y/l}, y: {z: -x}}}")
-    assert isinstance(found, LiePoisson)
-    assert isinstance(found.algebra, LieAlgebra)
-    written = {ij: {k: str(c) for k, c in row.items()} for ij, row in found.algebra.constants.items()}
+    detected = shape("x y z", "{brackets: {x: {y: -z/m, z: y/l}, y: {z: -x}}}")
+    assert isinstance(detected, LiePoisson)
+    assert isinstance(detected.algebra, LieAlgebra)
+    written = {ij: {k: str(c) for k, c in row.items()} for ij, row in detected.algebra.constants.items()}
     assert written == {(0, 1): {2: "-1/m"}, (0, 2): {1: "1/l"}, (1, 2): {0: "-1"}}
 
 
