@@ -99,9 +99,9 @@ def transpose(*body: ir.Statement) -> row_transposes.Transpose:
 
 
 def test_cotangents_of_neighbours_are_handed_over() -> None:
-    own, beside = ir.Store(BAR, symbol(SEED)), ir.Store(BAR, -symbol(SEED), offset=(1,))
+    own_store, beside = ir.Store(BAR, symbol(SEED)), ir.Store(BAR, -symbol(SEED), offset=(1,))
     layout = rows(lattice("fput"))
-    both = transpose(own, beside)
+    both = transpose(own_store, beside)
     expect(row_transposes.transposed(both, layout, vectors=False), """
         discard coef
         discard sums
