@@ -14,12 +14,12 @@ def lowered(text, order=None, scheme=None):
 
 
 def test_implicit_steps_are_solved_in_blocks():
-    found = lowered(f"{BODY}order: 4\n")
-    assert isinstance(found, Blocks)
-    assert [k.kernel.name for k in found.kernels] == ["linearise", "evaluate", "invert"]
-    evaluate = found.kernels[1].kernel
+    lowered_program = lowered(f"{BODY}order: 4\n")
+    assert isinstance(lowered_program, Blocks)
+    assert [k.kernel.name for k in lowered_program.kernels] == ["linearise", "evaluate", "invert"]
+    evaluate = lowered_program.kernels[1].kernel
     assert [o.name for o in evaluate.outputs] == ["displacement", "increment"]
-    assert found.vectorised
+    assert lowered_program.vectorised
 
 
 def test_calls_of_the_library_are_no_vector_instructions():
@@ -35,9 +35,15 @@ def test_sparse_matrices_keep_their_factors():
     chain = "coordinates: [x1, x2, x3, x4, x5, x6, x7]\n"
     rows = [[(j - i) if abs(i - j) == 1 else 0 for j in range(7)] for i in range(7)]
     text = f"{chain}poisson: {{log_canonical: {rows}}}\nhamiltonian: x1 + x2 + x3 + x4 + x5 + x6 + x7\norder: 2\n"
-    found = lowered(text)
-    assert [k.kernel.name for k in found.kernels] == ["linearise", "evaluate", "factorise", "substitute", "substitute"]
-    assert [(k.single, k.sparse) for k in found.kernels] == [
+    lowered_program = lowered(text)
+    assert [k.kernel.name for k in lowered_program.kernels] == [
+        "linearise",
+        "evaluate",
+        "factorise",
+        "substitute",
+        "substitute",
+    ]
+    assert [(k.single, k.sparse) for k in lowered_program.kernels] == [
         (False, True),
         (False, False),
         (False, False),
@@ -56,15 +62,19 @@ def test_sparse_matrices_keep_their_factors():
     ],
 )
 def test_members_with_explicit_steps_are_packed_if_every_function_has_a_version_for_lanes(text, near):
-    found = lowered(text)
-    assert found is None if near is None else isinstance(found, Packs) and found.small_argument == near
+    lowered_program = lowered(text)
+    assert (
+        lowered_program is None
+        if near is None
+        else isinstance(lowered_program, Packs) and lowered_program.small_argument == near
+    )
 
 
 def test_flows_take_polynomials_near_zero():
-    found = in_lanes(compiled("toda3", 4, "splitting").program)
-    assert isinstance(found, Packs)
-    assert len(found.kernels) == len(compiled("toda3", 4, "splitting").program.step.flows)
-    assert found.small_argument
+    lowered_program = in_lanes(compiled("toda3", 4, "splitting").program)
+    assert isinstance(lowered_program, Packs)
+    assert len(lowered_program.kernels) == len(compiled("toda3", 4, "splitting").program.step.flows)
+    assert lowered_program.small_argument
 
 
 @pytest.mark.parametrize(("dimension", "able"), [(3, True), (40, False)])
@@ -72,8 +82,8 @@ def test_what_needs_too_much_room_is_not_computed_in_lanes(dimension, able):
     names = [f"x{i}" for i in range(dimension)]
     rows = [[(j - i) if abs(i - j) == 1 else 0 for j in range(dimension)] for i in range(dimension)]
     text = f"coordinates: {names}\npoisson: {{matrix: {rows}}}\nhamiltonian: {' + '.join(f'{n}**2' for n in names)}\n"
-    found = lowered(f"{text}order: 2\nbirealisation: constant\n".replace("'", ""))
-    assert isinstance(found, Blocks) is able
+    lowered_program = lowered(f"{text}order: 2\nbirealisation: constant\n".replace("'", ""))
+    assert isinstance(lowered_program, Blocks) is able
     if able:
-        assert found.grouped(0)
-        assert not found.grouped(MAX_STACK_BYTES // (8 * LANES))
+        assert lowered_program.grouped(0)
+        assert not lowered_program.grouped(MAX_STACK_BYTES // (8 * LANES))

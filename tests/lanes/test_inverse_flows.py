@@ -41,11 +41,11 @@ def test_transposes_at_the_end_of_a_flow_are_those_at_its_start_which_they_find(
     """The coefficients are those of some time; cotangents are any."""
     program, rng = made(name), np.random.default_rng(5)
     step, n = program.step, program.dimension
-    found = recomputing_transposes(program, step)
+    transposes = recomputing_transposes(program, step)
     values = {**{p.name: p.value for p in program.parameters}, **dict.fromkeys(step.prepare.inputs["h"], 0.3)}
     values |= dict.fromkeys(step.prepare.inputs.get("kick", ()), 0.01)
     coef = {coefficient(k): value for k, value in enumerate(evaluate(step.prepare.roots, values))}
-    for flow, back, undone in zip(step.flows, step.adjoint.steps, found, strict=True):
+    for flow, back, undone in zip(step.flows, step.adjoint.steps, transposes, strict=True):
         start = 0.5 + 0.4 * rng.random(n)
         before = dict(zip(program.coordinates, start, strict=True))
         end = start + evaluate(flow.roots, {**coef, **before})
@@ -78,10 +78,10 @@ def test_monitored_flows_move_more_than_the_state_and_are_in_no_packs():
 def test_products_with_one_number_share_it():
     a, b, c = map(symbol, "abc")
     half = number(Fraction(1, 2))
-    found = with_numbers_shared([half * (a * b), half * (a * c) + a])
-    assert operation_counts(found) == {"additions": 1, "multiplications": 3, "divisions": 0, "functions": 0}
+    shared_products = with_numbers_shared([half * (a * b), half * (a * c) + a])
+    assert operation_counts(shared_products) == {"additions": 1, "multiplications": 3, "divisions": 0, "functions": 0}
     values = {"a": 3.0, "b": 5.0, "c": 7.0}
-    assert evaluate(found, values) == [7.5, 13.5]
+    assert evaluate(shared_products, values) == [7.5, 13.5]
     assert with_numbers_shared([half * (a * b) + a * b]) == [half * (a * b) + a * b]
 
 
