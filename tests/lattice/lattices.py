@@ -152,15 +152,15 @@ LATTICES = {
 
 def on_grid(cell: Cell, start: Start, expression: Expression) -> np.ndarray:
     """An expression at every site of a periodic grid, neighbours by shifted arrays."""
-    found = {n: v for n, v in start.parameters.items() if n not in cell.neighbours.names}
+    parameters = {n: v for n, v in start.parameters.items() if n not in cell.neighbours.names}
     fields = dict(zip(cell.fields, start.state, strict=True))
     for symbol, (base, offset) in cell.places(expression).items():
         array = fields[base] if base in fields else start.parameters[base]
-        found[symbol] = np.roll(array, [-o for o in offset], axis=tuple(range(len(offset))))
-    return np.broadcast_to(evaluate([expression], found)[0], start.sizes)
+        parameters[symbol] = np.roll(array, [-o for o in offset], axis=tuple(range(len(offset))))
+    return np.broadcast_to(evaluate([expression], parameters)[0], start.sizes)
 
 
-def with_threads(made: Callable[[], np.ndarray]) -> Iterator[np.ndarray]:
+def with_threads(compute: Callable[[], np.ndarray]) -> Iterator[np.ndarray]:
     """What is made with one thread of OpenMP and with several, more than cores: those wait for one another asleep."""
     try:
         library = ctypes.CDLL("libgomp.so.1")
@@ -168,5 +168,5 @@ def with_threads(made: Callable[[], np.ndarray]) -> Iterator[np.ndarray]:
         pytest.skip("no OpenMP")
     for threads in (1, 3, 4):
         library.omp_set_num_threads(threads)
-        yield made()
+        yield compute()
     library.omp_set_num_threads(2)

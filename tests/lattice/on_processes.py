@@ -16,8 +16,8 @@ from phigen.mpi import DistributedLattice
 from phigen.runtime import toolchain
 
 
-def interrupt(done: int) -> None:
-    if done == 20:
+def interrupt(steps_done: int) -> None:
+    if steps_done == 20:
         raise KeyboardInterrupt
 
 

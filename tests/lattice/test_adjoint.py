@@ -201,9 +201,9 @@ def beginning(solver, sizes=SITES):
     return x
 
 
-def arguments(solver, given):
+def arguments(solver, parameters):
     """Parameters, and when the run begins."""
-    return {"parameters": given} | ({"t0": 0.7} if solver.interface.time else {})
+    return {"parameters": parameters} | ({"t0": 0.7} if solver.interface.time else {})
 
 
 def difference(f, width=1e-3):
@@ -211,34 +211,34 @@ def difference(f, width=1e-3):
     return sum(w * (f(k * width) - f(-k * width)) for k, w in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))) / width
 
 
-def numbers(solver, given):
+def numbers(solver, parameters):
     """All parameters but bonds, as arrays of what was given or of defaults."""
-    return {name: np.asarray(given.get(name, value)) for name, value in solver.interface.parameters.items()}
+    return {name: np.asarray(parameters.get(name, value)) for name, value in solver.interface.parameters.items()}
 
 
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("name", LATTICES)
 def test_pullback_is_the_gradient_of_the_run(name):
     """Along random directions of the state, and of each parameter, with a cotangent of every frame."""
-    solver, given, random = made(name), LATTICES[name], np.random.default_rng(5)
+    solver, parameters, random = made(name), LATTICES[name], np.random.default_rng(5)
     x = beginning(solver)
     bar = random.normal(size=(3, *x.shape))
-    frames, x0_bar, found = solver.pullback(x, H, STEPS, bar, 2, **arguments(solver, given))
-    run = solver.integrate(x, H, STEPS, 2, **arguments(solver, given)).x
+    frames, x0_bar, parameters_bar = solver.pullback(x, H, STEPS, bar, 2, **arguments(solver, parameters))
+    run = solver.integrate(x, H, STEPS, 2, **arguments(solver, parameters)).x
     assert frames == pytest.approx(run, abs=1e-14) if " " in name else np.array_equal(frames, run)
 
     def weighed(x, **changed):
-        return np.sum(bar * solver.integrate(x, H, STEPS, 2, **arguments(solver, {**given, **changed})).x)
+        return np.sum(bar * solver.integrate(x, H, STEPS, 2, **arguments(solver, {**parameters, **changed})).x)
 
     along = random.normal(size=x.shape)
     slope = difference(lambda e: weighed(x + e * along))
     assert np.sum(x0_bar * along) == pytest.approx(slope, rel=1e-8)
-    for parameter, value in numbers(solver, given).items():
+    for parameter, value in numbers(solver, parameters).items():
         along = random.normal(size=value.shape)
         width = 1e-3 * min(1.0, float(np.min(np.abs(value))) or 1.0)
         slope = difference(lambda e, n=parameter, v=value, a=along: weighed(x, **{n: v + e * a}), width)
-        assert found[parameter].shape == value.shape
-        assert np.sum(found[parameter] * along) == pytest.approx(slope, rel=1e-7, abs=1e-9), parameter
+        assert parameters_bar[parameter].shape == value.shape
+        assert np.sum(parameters_bar[parameter] * along) == pytest.approx(slope, rel=1e-7, abs=1e-9), parameter
 
 
 @precisely
@@ -266,7 +266,7 @@ def test_gradient_agrees_with_many_digits():
     moved = module.PARTS[0][0]([0.1] * 9, ones, module._Sites(ones.shape, {}))
     module.DRIFT = module.PARTS[int(moved[0, 0] == 1.0)][0].__name__
     bar = np.random.default_rng(7).normal(size=x.shape)
-    _, x0_bar, found = solver.pullback(x, H, STEPS, bar, alpha=0.3, beta=0.8)
+    _, x0_bar, parameters_bar = solver.pullback(x, H, STEPS, bar, alpha=0.3, beta=0.8)
     width = mpmath.mpf(10) ** -12
 
     def slope(f):
@@ -281,9 +281,9 @@ def test_gradient_agrees_with_many_digits():
         exact = slope(lambda e, p=place: precise_end(at(p, e), mpmath.mpf(0.3), mpmath.mpf(0.8), bar, module))
         assert abs(x0_bar[place] - exact) <= 1e-14 * np.abs(x0_bar).max()
     exact = slope(lambda e: precise_end(start, 0.3 + e, mpmath.mpf(0.8), bar, module))
-    assert abs(found["alpha"] - exact) <= 1e-14 * abs(exact)
+    assert abs(parameters_bar["alpha"] - exact) <= 1e-14 * abs(exact)
     exact = slope(lambda e: precise_end(start, mpmath.mpf(0.3), 0.8 + e, bar, module))
-    assert abs(found["beta"] - exact) <= 1e-14 * abs(exact)
+    assert abs(parameters_bar["beta"] - exact) <= 1e-14 * abs(exact)
 
 
 def test_long_runs_are_pulled_back_in_segments(monkeypatch):
@@ -301,13 +301,13 @@ def test_members_and_their_disorder_have_cotangents():
     x, random = beginning(solver), np.random.default_rng(9)
     many, disorder = x + 0.1 * random.random((3, *x.shape)), random.random((3, SITES))
     bar, strengths = random.normal(size=many.shape), np.array([0.8, 1.0, 1.2])
-    x1, x0_bar, found = solver.pullback(many, H, STEPS, bar, B=disorder, J=strengths, delta=0.7)
+    x1, x0_bar, parameters_bar = solver.pullback(many, H, STEPS, bar, B=disorder, J=strengths, delta=0.7)
     each = [solver.pullback(many[m], H, STEPS, bar[m], B=disorder[m], J=strengths[m], delta=0.7) for m in range(3)]
     assert np.array_equal(x1, [e.x1 for e in each])
     assert np.array_equal(x0_bar, [e.x0_bar for e in each])
-    assert np.array_equal(found["B"], [e.parameters_bar["B"] for e in each])
-    assert np.array_equal(found["J"], [e.parameters_bar["J"] for e in each])
-    assert found["delta"] == pytest.approx(sum(e.parameters_bar["delta"] for e in each), rel=1e-14)
+    assert np.array_equal(parameters_bar["B"], [e.parameters_bar["B"] for e in each])
+    assert np.array_equal(parameters_bar["J"], [e.parameters_bar["J"] for e in each])
+    assert parameters_bar["delta"] == pytest.approx(sum(e.parameters_bar["delta"] for e in each), rel=1e-14)
     assert solver.pullback(x, H, 0, bar[0], B=0.5).parameters_bar["B"] == 0.0
     steps = np.array([0.5, 1.0, -1.5]) * H
     one = solver.pullback(x, steps, STEPS, bar, B=0.5)
@@ -320,19 +320,19 @@ def test_members_and_their_disorder_have_cotangents():
 
 def test_lattices_may_have_no_members_to_pull_back():
     solver, none = made("xxz_disorder"), np.empty((0, 3, SITES))
-    x1, x0_bar, found = solver.pullback(none, H, STEPS, none, B=np.ones(SITES), J=np.empty(0))
+    x1, x0_bar, parameters_bar = solver.pullback(none, H, STEPS, none, B=np.ones(SITES), J=np.empty(0))
     assert (x1.shape, x0_bar.shape) == (none.shape, none.shape)
-    assert [found[name].shape for name in ("B", "J", "delta")] == [(SITES,), (0,), ()]
+    assert [parameters_bar[name].shape for name in ("B", "J", "delta")] == [(SITES,), (0,), ()]
 
 
 def weighed_tangents(solver, x, bar, stride, parameters):
     """The derivatives of Σ bar·frames along some directions of the start, by tangent vectors; and the directions."""
     along = np.random.default_rng(6).normal(size=(2, *x.shape))
-    found = np.array([np.sum(bar[0] * v) for v in along])
+    products = np.array([np.sum(bar[0] * v) for v in along])
     run = solver.tangents(x, H, STEPS + 1, along, stride, **arguments(solver, parameters))
     for weights, (_, carried) in zip(bar[1:], run, strict=True):
-        found += [np.sum(weights * v) for v in carried]
-    return found, along
+        products += [np.sum(weights * v) for v in carried]
+    return products, along
 
 
 @pytest.mark.thin(3)
@@ -341,14 +341,17 @@ def test_c_pulls_back_what_numpy_does_and_tangent_vectors_say(name):
     solver, numpy, random = made(name, "c"), made(name), np.random.default_rng(5)
     x = beginning(solver, IN_C[name])
     at_sites = {p: 1 + random.random(x.shape[1:]) for p in solver.interface.at_sites}
-    bar, given = random.normal(size=(4, *x.shape)), LATTICES.get(name, LATTICES.get(name.partition(" ")[0], at_sites))
-    frames, x0_bar, found = solver.pullback(x, H, STEPS + 1, bar, 2, **arguments(solver, given))
-    assert np.array_equal(frames, solver.integrate(x, H, STEPS + 1, 2, **arguments(solver, given)).x)
-    expected = numpy.pullback(x, H, STEPS + 1, bar, 2, **arguments(solver, given))
+    bar, parameters = (
+        random.normal(size=(4, *x.shape)),
+        LATTICES.get(name, LATTICES.get(name.partition(" ")[0], at_sites)),
+    )
+    frames, x0_bar, parameters_bar = solver.pullback(x, H, STEPS + 1, bar, 2, **arguments(solver, parameters))
+    assert np.array_equal(frames, solver.integrate(x, H, STEPS + 1, 2, **arguments(solver, parameters)).x)
+    expected = numpy.pullback(x, H, STEPS + 1, bar, 2, **arguments(solver, parameters))
     assert x0_bar == pytest.approx(expected.x0_bar, rel=1e-13, abs=1e-13)
     for parameter, value in expected.parameters_bar.items():
-        assert found[parameter] == pytest.approx(value, rel=1e-12, abs=1e-13), parameter
-    slopes, along = weighed_tangents(solver, x, bar, 2, given)
+        assert parameters_bar[parameter] == pytest.approx(value, rel=1e-12, abs=1e-13), parameter
+    slopes, along = weighed_tangents(solver, x, bar, 2, parameters)
     assert [np.sum(x0_bar * v) for v in along] == pytest.approx(slopes, rel=1e-12)
 
 
@@ -356,8 +359,10 @@ def test_c_pulls_back_what_numpy_does_and_tangent_vectors_say(name):
 def test_functions_go_back_by_what_is_for_small_arguments_or_for_any(name, scale):
     in_c, numpy, random = (*(made(name, target) for target in ("c", "numpy")), np.random.default_rng(5))
     x, bar = beginning(in_c) * [[1], [scale]], random.normal(size=(2, SITES))
-    found, expected = (solver.pullback(x, H, STEPS, bar, parameters=LATTICES.get(name, {})) for solver in (in_c, numpy))
-    assert found.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12, abs=1e-12)
+    small_argument, expected = (
+        solver.pullback(x, H, STEPS, bar, parameters=LATTICES.get(name, {})) for solver in (in_c, numpy)
+    )
+    assert small_argument.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12, abs=1e-12)
 
 
 def test_fields_before_sweeps_are_found_again():
@@ -407,15 +412,15 @@ hamiltonian: {sites: p**2/2 - k*q**2/2, bonds: "(q[a] - q[b])**2/8"}
 
 
 @pytest.mark.thin(2)
-@pytest.mark.parametrize(("text", "given"), [(UNSTABLE, {}), (UNSTABLE_GRAPH, RING)], ids=["grid", "graph"])
-def test_sweeps_are_undone_over_single_steps_where_fields_grow_fast(text, given):
+@pytest.mark.parametrize(("text", "parameters"), [(UNSTABLE, {}), (UNSTABLE_GRAPH, RING)], ids=["grid", "graph"])
+def test_sweeps_are_undone_over_single_steps_where_fields_grow_fast(text, parameters):
     """Over 40 steps by a factor of 1e15: of where they began nothing is left in the end, to its last digit."""
     spec, random = phigen.spec.loads(text), np.random.default_rng(8)
     in_c, numpy = (phigen.compile(spec, target=target, adjoint=True) for target in ("c", "numpy"))
     x, bar = random.normal(size=(2, 2, SITES))
-    found, expected = (solver.pullback(x, 0.3, 40, bar, parameters=given) for solver in (in_c, numpy))
-    assert found.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12)
-    assert found.parameters_bar["k"] == pytest.approx(expected.parameters_bar["k"], rel=1e-12)
+    in_c_result, expected = (solver.pullback(x, 0.3, 40, bar, parameters=parameters) for solver in (in_c, numpy))
+    assert in_c_result.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12)
+    assert in_c_result.parameters_bar["k"] == pytest.approx(expected.parameters_bar["k"], rel=1e-12)
 
 
 #: By a factor of 1e7 in a step: what is left of a velocity does not tell what it was; along one axis, and along bonds.
@@ -440,16 +445,16 @@ DAMPED_GRAPH = (
 
 
 @pytest.mark.thin(2)
-@pytest.mark.parametrize(("text", "given"), [(DAMPED, {}), (DAMPED_GRAPH, RING)], ids=["grid", "graph"])
-def test_flows_of_a_step_are_made_anew_where_velocities_are_damped_away(text, given):
+@pytest.mark.parametrize(("text", "parameters"), [(DAMPED, {}), (DAMPED_GRAPH, RING)], ids=["grid", "graph"])
+def test_flows_of_a_step_are_made_anew_where_velocities_are_damped_away(text, parameters):
     spec, random = phigen.spec.loads(text), np.random.default_rng(8)
     in_c, numpy = (phigen.compile(spec, target=target, adjoint=True) for target in ("c", "numpy"))
     x, bar = random.normal(size=(2, 2, SITES))
     for h in (0.01, 0.3):  # by 1.8, over single steps; and as above
-        found, expected = (solver.pullback(x, h, 40, bar, parameters=given) for solver in (in_c, numpy))
-        assert found.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12, abs=1e-13)
-        assert found.parameters_bar["g"] == pytest.approx(expected.parameters_bar["g"], rel=1e-12)
-        assert found.parameters_bar["a"] == pytest.approx(expected.parameters_bar["a"], rel=1e-12)
+        in_c_result, expected = (solver.pullback(x, h, 40, bar, parameters=parameters) for solver in (in_c, numpy))
+        assert in_c_result.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12, abs=1e-13)
+        assert in_c_result.parameters_bar["g"] == pytest.approx(expected.parameters_bar["g"], rel=1e-12)
+        assert in_c_result.parameters_bar["a"] == pytest.approx(expected.parameters_bar["a"], rel=1e-12)
 
 
 def same(a, b):
@@ -463,13 +468,13 @@ def test_c_has_the_same_bits_for_any_memory(monkeypatch, name, steps, stride):
     """Of steps that are made again from states that were kept, or where there is no room, from those before."""
     solver, random = made(name, "c"), np.random.default_rng(8)
     x = 0.3 * beginning(solver, IN_C[name])
-    bar, given = random.normal(size=(1 + -(-steps // stride), *x.shape)), LATTICES.get(name, {})
-    whole = solver.pullback(x, H, steps, bar, stride, parameters=given)
-    for kept, states in ((0, 1), (0, 4), (1200, 1)):
+    bar, parameters = random.normal(size=(1 + -(-steps // stride), *x.shape)), LATTICES.get(name, {})
+    whole = solver.pullback(x, H, steps, bar, stride, parameters=parameters)
+    for memory_limit, states in ((0, 1), (0, 4), (1200, 1)):
         monkeypatch.setattr(c_lattice, "MAX_TAPE_BYTES", 0)
-        monkeypatch.setattr(c_lattice, "MIN_TAPE_VALUES", kept)
+        monkeypatch.setattr(c_lattice, "MIN_TAPE_VALUES", memory_limit)
         monkeypatch.setattr(c_lattice, "MIN_CHECKPOINTS", states)
-        part = solver.pullback(x, H, steps, bar, stride, parameters=given)
+        part = solver.pullback(x, H, steps, bar, stride, parameters=parameters)
         assert np.array_equal(part.x1, whole.x1)
         assert np.array_equal(part.x0_bar, whole.x0_bar)
         assert same(part.parameters_bar, whole.parameters_bar)
@@ -480,9 +485,9 @@ def test_segments_of_the_series_in_c_are_made_again_to_round_off(monkeypatch):
     x, bar = 0.3 * random.random((2, SITES)), random.normal(size=(4, 2, SITES))
     whole = solver.pullback(x, H, 17, bar, 7)
     assert np.array_equal(whole.x1, solver.integrate(x, H, 17, 7).x)
-    for kept, states in ((0, 1), (1200, 1)):
+    for memory_limit, states in ((0, 1), (1200, 1)):
         monkeypatch.setattr(c_lattice, "MAX_TAPE_BYTES", 0)
-        monkeypatch.setattr(c_lattice, "MIN_TAPE_VALUES", kept)
+        monkeypatch.setattr(c_lattice, "MIN_TAPE_VALUES", memory_limit)
         monkeypatch.setattr(c_lattice, "MIN_CHECKPOINTS", states)
         part = solver.pullback(x, H, 17, bar, 7)
         assert part.x1 == pytest.approx(whole.x1, abs=1e-14)
@@ -492,14 +497,14 @@ def test_segments_of_the_series_in_c_are_made_again_to_round_off(monkeypatch):
 
 def test_all_of_a_run_is_kept_where_steps_are_dear(monkeypatch):
     """As those of the series are; of a longer run as much as there is room for."""
-    solver, kept = made("driven composed", "c"), []
+    solver, segment_lengths = made("driven composed", "c"), []
     x = 0.3 * beginning(solver)
     monkeypatch.setattr(c_lattice, "MIN_TAPE_VALUES", 0)
-    monkeypatch.setattr(c_lattice, "expect_room", lambda what, size: kept.append(size))
+    monkeypatch.setattr(c_lattice, "expect_room", lambda what, size: segment_lengths.append(size))
 
     def room(steps):
         solver.pullback(x, H, steps, x)
-        return kept[-1]
+        return segment_lengths[-1]
 
     whole, half = room(1000), room(500)
     assert whole - half == pytest.approx(half - room(1), rel=0.01)
@@ -518,18 +523,18 @@ LARGE |= {"heisenberg_plane fast": (80, 76), "heisenberg fast": (40, 40, 40)}
 def test_c_has_the_same_bits_for_any_threads(name):
     solver, random = made(name, "c"), np.random.default_rng(8)
     x = 0.3 * beginning(solver, LARGE[name])
-    bar, given = random.normal(size=x.shape), {}
+    bar, parameters = random.normal(size=x.shape), {}
     if solver.interface.at_bonds:
         ends = [[i, (i + k) % LARGE[name]] for k in (1, 7) for i in range(LARGE[name])]
-        given = {"bonds": np.array(ends), "J": random.normal(size=len(ends))}
-    found = [*with_threads(lambda: solver.pullback(x, H, 1, bar, parameters=given))]
-    for one in found:
-        assert np.array_equal(one.x0_bar, found[0].x0_bar)
-        assert same(one.parameters_bar, found[0].parameters_bar)
-    expected = made(name).pullback(x, H, 1, bar, parameters=given)
-    assert np.allclose(found[0].x0_bar, expected.x0_bar, rtol=1e-12, atol=1e-12)
+        parameters = {"bonds": np.array(ends), "J": random.normal(size=len(ends))}
+    results = [*with_threads(lambda: solver.pullback(x, H, 1, bar, parameters=parameters))]
+    for one in results:
+        assert np.array_equal(one.x0_bar, results[0].x0_bar)
+        assert same(one.parameters_bar, results[0].parameters_bar)
+    expected = made(name).pullback(x, H, 1, bar, parameters=parameters)
+    assert np.allclose(results[0].x0_bar, expected.x0_bar, rtol=1e-12, atol=1e-12)
     for parameter, value in expected.parameters_bar.items():  # sums over rows of many pieces
-        assert found[0].parameters_bar[parameter] == pytest.approx(value, rel=1e-11, abs=1e-11), parameter
+        assert results[0].parameters_bar[parameter] == pytest.approx(value, rel=1e-11, abs=1e-11), parameter
 
 
 @pytest.mark.parametrize("name", ["driven", pytest.param("driven composed", marks=pytest.mark.slow)])

@@ -57,10 +57,10 @@ def refusal(folder: Path, **files: str) -> tuple[tuple[int, int], str]:
     ],
 )
 def test_columns_of_bonds_are_found_by_their_names(tmp_path, bonds, ends, k, l):  # noqa: E741
-    found = start(tmp_path, bonds=bonds)
-    assert found.bonds.tolist() == ends
-    assert found.parameters["k"].tolist() == k
-    assert found.parameters["l"].tolist() == l
+    start_values = start(tmp_path, bonds=bonds)
+    assert start_values.bonds.tolist() == ends
+    assert start_values.parameters["k"].tolist() == k
+    assert start_values.parameters["l"].tolist() == l
 
 
 @pytest.mark.parametrize(

@@ -51,15 +51,15 @@ def expect_clean(compilation, folder, *compilers):
 @pytest.mark.parametrize("profile", ["fast", "small"])
 def test_lattices_without_brackets_compile(profile, tmp_path):
     text = PAIRS + "coordinates: [x]\npoisson: {matrix: [[0]]}\nhamiltonian: {sites: x}\n"
-    made = compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"), profile=profile)
-    expect_clean(made, tmp_path, "gcc")
+    compilation = compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"), profile=profile)
+    expect_clean(compilation, tmp_path, "gcc")
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("lattice", LATTICES)
 def test_lattices_with_parts_that_have_no_use_compile(lattice, tmp_path):
-    made = compile_spec(spec.loads(text_of(lattice)), adjoint=True, profile="fast")
-    expect_clean(made, tmp_path, "clang")
+    compilation = compile_spec(spec.loads(text_of(lattice)), adjoint=True, profile="fast")
+    expect_clean(compilation, tmp_path, "clang")
 
 
 @pytest.mark.slow
@@ -68,8 +68,8 @@ def test_lattices_with_parts_that_have_no_use_compile_with_all_extras(lattice, t
     """clang warns of what gcc does; that looks at the code with most parts, as C and as C++."""
     for profile, most in (("fast", EXTRAS[1]), ("small", EXTRAS[0])):
         for extras in EXTRAS:
-            made = compile_spec(spec.loads(text_of(lattice)), **extras, profile=profile)
-            expect_clean(made, tmp_path, *(("gcc", "clang", "g++") if extras == most else ("clang",)))
+            compilation = compile_spec(spec.loads(text_of(lattice)), **extras, profile=profile)
+            expect_clean(compilation, tmp_path, *(("gcc", "clang", "g++") if extras == most else ("clang",)))
 
 
 MAIN = """#include "t.h"
@@ -85,8 +85,8 @@ int main(void)
 def test_lattices_in_cpp_link_with_openmp_and_take_no_solver_for_a_bad_argument(tmp_path):
     """All functions with a status as their value, of a lattice that splits, which has most of them."""
     text = text_of("neighbours are read in reverse alone") + "without: []\n"
-    made = compile_spec(spec.loads(text), tangent=True, adjoint=True, profile="fast")
-    files = emit(made.program, "c", "phigen build")
+    compilation = compile_spec(spec.loads(text), tangent=True, adjoint=True, profile="fast")
+    files = emit(compilation.program, "c", "phigen build")
     tests = [
         f"    bad += t_{name}({', '.join(['0'] * count)}) != t_BAD_ARGUMENT;"
         for name, count in functions_with_status(files["t.h"])

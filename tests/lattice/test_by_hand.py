@@ -17,9 +17,9 @@ SIZES = {"sheet": (9, 5), "cube": (7, 3, 3), "volterra": (30,)}
 
 def by_hand(name: str, x: np.ndarray, h: float, steps: int, seed: int) -> np.ndarray:
     """Steps stage by stage, each in pieces that are cut at random and made in any order."""
-    found = solver(name, 4, "c")
-    stages = found.backend.stages()
-    session = found.started(Beginning(x, h, found.values(disorder(name, x), {}, x.shape[1:])))
+    integrator = solver(name, 4, "c")
+    stages = integrator.backend.stages()
+    session = integrator.started(Beginning(x, h, integrator.values(disorder(name, x), {}, x.shape[1:])))
     session.begin(h)
     random = np.random.default_rng(seed)
     flows = [0, *range(1, len(stages) - 2)]
@@ -50,12 +50,12 @@ def test_bits_do_not_depend_on_the_frames(name: str) -> None:
 def test_a_stage_reads_no_further_than_it_says(name: str) -> None:
     """What lies beyond its halo, and fields that it does not read there, may be anything."""
     x = start(name, SIZES.get(name, (40,)))
-    found = solver(name, 4, "c")
+    integrator = solver(name, 4, "c")
     first, end = 3, 5
-    for number, stage in enumerate(found.backend.stages()):
+    for number, stage in enumerate(integrator.backend.stages()):
         seen = []
         for wrong in (False, True):
-            session = found.started(Beginning(x, 0.03, found.values(disorder(name, x), {}, x.shape[1:])))
+            session = integrator.started(Beginning(x, 0.03, integrator.values(disorder(name, x), {}, x.shape[1:])))
             session.begin(0.03)
             for field in range(len(x) if wrong else 0):
                 beside = stage.read >> field & 1
@@ -76,9 +76,9 @@ def test_a_stage_reads_no_further_than_it_says(name: str) -> None:
 def test_planes_that_are_put_are_where_sweeps_begin(name: str) -> None:
     """Their copies beside rows too: the first sweep has the bits that it has from a start there."""
     x = start(name, SIZES.get(name, (40,)))
-    found, swept = solver(name, 4, "c"), []
+    integrator, swept = solver(name, 4, "c"), []
     for begun in (x, 0.5 * x):
-        session = found.started(Beginning(begun, 0.03, found.values(disorder(name, x), {}, x.shape[1:])))
+        session = integrator.started(Beginning(begun, 0.03, integrator.values(disorder(name, x), {}, x.shape[1:])))
         session.begin(0.03)
         for field in range(len(x)):
             session.put_planes(field, 0, x.shape[1], x[field])
@@ -90,8 +90,8 @@ def test_planes_that_are_put_are_where_sweeps_begin(name: str) -> None:
 
 def test_planes_and_stages_that_there_are_not_are_refused() -> None:
     x = start("sheet", (9, 5))
-    found = solver("sheet", 4, "c")
-    session = found.started(Beginning(x, 0.1, found.values(disorder("sheet", x), {}, x.shape[1:])))
+    integrator = solver("sheet", 4, "c")
+    session = integrator.started(Beginning(x, 0.1, integrator.values(disorder("sheet", x), {}, x.shape[1:])))
     with pytest.raises(ValueError, match="BAD_ARGUMENT"):
         session.sweep(0, 1, 0, 9)  # before the step size is known
     session.begin(0.1)

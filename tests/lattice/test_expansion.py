@@ -60,7 +60,7 @@ def test_the_field_at_a_site_is_that_of_the_expansion(name: str) -> None:
 def test_forces_are_the_gradient_of_h_at_open_ends_too(name: str) -> None:
     _, cell, start, expansion, system = prepared(name)
     slopes = evaluate(gradient(system.hamiltonian, system.coordinates), values(name))
-    found = dict(zip(system.coordinates, slopes, strict=True))
+    slope_of = dict(zip(system.coordinates, slopes, strict=True))
     for f, listed in contributions(cell).items():
         for site in expansion.sites:
             force = 0.0
@@ -71,7 +71,7 @@ def test_forces_are_the_gradient_of_h_at_open_ends_too(name: str) -> None:
                 )
                 term = expansion.at(c.expression, site) if inside else None
                 force += float(evaluate([term], values(name))[0]) if term is not None else 0.0
-            np.testing.assert_allclose(force, found[expansion.names[f, site]], rtol=1e-12, atol=1e-13)
+            np.testing.assert_allclose(force, slope_of[expansion.names[f, site]], rtol=1e-12, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", [n for n in GRIDS if "open" not in LATTICES[n]])
@@ -113,8 +113,8 @@ def test_brackets_along_bonds_add_up() -> None:
     for k, (a, b) in enumerate(start.bonds):
         expected[a, b] += A[k] * x[a] * x[b]
         expected[b, a] -= A[k] * x[a] * x[b]
-    found = [evaluate(row, values("food_web")) for row in system.poisson]
-    np.testing.assert_allclose(np.array(found, dtype=float), expected, rtol=1e-14)
+    matrix = [evaluate(row, values("food_web")) for row in system.poisson]
+    np.testing.assert_allclose(np.array(matrix, dtype=float), expected, rtol=1e-14)
     assert expansion.coordinates == ("x_0", "x_1", "x_2", "x_3")
 
 
@@ -141,29 +141,29 @@ def test_the_text_of_an_expansion_reads_as_the_same_spec(name: str) -> None:
     spec, _, start, expansion, _ = prepared(name)
     (run,) = spec.runs.values()
     numbers = expansion.numbers(start.parameters)
-    made = replace(expansion.spec(), runs={run.name: run_of(expansion, run, start.state, numbers)})
-    read = loads(spec_text(made))
+    expanded_spec = replace(expansion.spec(), runs={run.name: run_of(expansion, run, start.state, numbers)})
+    read = loads(spec_text(expanded_spec))
     here = values(name)
     assert (read.coordinates, [p.name for p in read.parameters]) == (
-        made.coordinates,
-        [p.name for p in made.parameters],
+        expanded_spec.coordinates,
+        [p.name for p in expanded_spec.parameters],
     )
-    pairs = [(read.hamiltonian, made.hamiltonian)]
-    rows = zip(read.poisson.entries, made.poisson.entries, strict=True)
+    pairs = [(read.hamiltonian, expanded_spec.hamiltonian)]
+    rows = zip(read.poisson.entries, expanded_spec.poisson.entries, strict=True)
     pairs += [pair for r, s in rows for pair in zip(r, s, strict=True)]
-    pairs += [(read.casimirs[n], e) for n, e in made.casimirs.items()]
-    pairs += [(read.invariants[n], e) for n, e in made.invariants.items()]
+    pairs += [(read.casimirs[n], e) for n, e in expanded_spec.casimirs.items()]
+    pairs += [(read.invariants[n], e) for n, e in expanded_spec.invariants.items()]
     for left, right in pairs:
         np.testing.assert_allclose(*evaluate([left, right], here), rtol=1e-13, atol=1e-15)
-    assert read.runs[run.name].initial == made.runs[run.name].initial
-    assert read.runs[run.name].parameters == made.runs[run.name].parameters
+    assert read.runs[run.name].initial == expanded_spec.runs[run.name].initial
+    assert read.runs[run.name].parameters == expanded_spec.runs[run.name].parameters
 
 
 def test_the_text_of_a_large_expansion_keeps_the_limits_of_expressions() -> None:
-    made = expand(prepared("fput")[1], (100,)).spec()
-    text = spec_text(made)
+    expanded_spec = expand(prepared("fput")[1], (100,)).spec()
+    text = spec_text(expanded_spec)
     assert "H_part1" in text
-    assert recognised(loads(text), made.poisson.entries).lattice.boundary == ("periodic",)
+    assert recognised(loads(text), expanded_spec.poisson.entries).lattice.boundary == ("periodic",)
 
 
 def test_sizes_that_do_not_fit_are_refused() -> None:
@@ -211,11 +211,11 @@ def test_random_lattices_move_as_their_expansions(seed: int) -> None:
     spec = loads(random_lattice(seed))
     cell, start = cell_from_spec(spec), start_of(spec, spec.runs["r"])
     expansion = expand(cell, start.sizes)
-    made = expansion.spec()
+    expanded_spec = expansion.spec()
     here = expansion.numbers(start.parameters)
-    here |= dict(zip(made.coordinates, start.state.reshape(-1), strict=True))
-    slopes = gradient(made.hamiltonian, made.coordinates)
-    rates = evaluate(hamiltonian_vector_field(made.poisson.entries, slopes), here)
+    here |= dict(zip(expanded_spec.coordinates, start.state.reshape(-1), strict=True))
+    slopes = gradient(expanded_spec.hamiltonian, expanded_spec.coordinates)
+    rates = evaluate(hamiltonian_vector_field(expanded_spec.poisson.entries, slopes), here)
     force = {f: np.zeros(start.sizes) for f in cell.fields}
     for f, listed in contributions(cell).items():
         for site, c in itertools.product(expansion.sites, listed):
@@ -227,7 +227,7 @@ def test_random_lattices_move_as_their_expansions(seed: int) -> None:
         [pi * force["p"], -pi * force["q"]], np.reshape(rates, start.state.shape), rtol=1e-11, atol=1e-12
     )
     energy, _ = summed(cell, cell.hamiltonian, start.state, start.parameters)
-    np.testing.assert_allclose(energy, evaluate([made.hamiltonian], here)[0], rtol=1e-12)
+    np.testing.assert_allclose(energy, evaluate([expanded_spec.hamiltonian], here)[0], rtol=1e-12)
 
 
 def test_bodies_that_meet_take_the_logarithmic_monitor_as_an_ordinary_system(tmp_path):

@@ -37,15 +37,15 @@ def bonds(text, sites):
 @pytest.mark.parametrize("seed", range(3))
 def test_gradients_of_few_sites_are_differences(seed, sites):
     text, rng = drawn(seed), np.random.default_rng(seed)
-    made, more = phigen.compile(phigen.spec.loads(text), target="numpy", adjoint=True), bonds(text, sites)
+    solver, more = phigen.compile(phigen.spec.loads(text), target="numpy", adjoint=True), bonds(text, sites)
     x, bar, along = rng.uniform(-1, 1, (3, 2, sites))
-    x0_bar = made.pullback(x, H, STEPS, bar, **more).x0_bar
+    x0_bar = solver.pullback(x, H, STEPS, bar, **more).x0_bar
 
     def end(e):
-        return np.sum(bar * made.integrate(x + e * along, H, STEPS, STEPS, **more).x[-1])
+        return np.sum(bar * solver.integrate(x + e * along, H, STEPS, STEPS, **more).x[-1])
 
     assert np.sum(x0_bar * along) == pytest.approx((end(1e-4) - end(-1e-4)) / 2e-4, rel=1e-6, abs=1e-9)
-    assert not made.pullback(x, H, STEPS, np.zeros_like(bar), **more).x0_bar.any()
+    assert not solver.pullback(x, H, STEPS, np.zeros_like(bar), **more).x0_bar.any()
 
 
 @pytest.mark.slow

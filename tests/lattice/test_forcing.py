@@ -119,8 +119,8 @@ def test_the_field_with_forces_is_that_of_the_expansion(name: str) -> None:
     spec = specs.loads(spec_text(whole.spec()))  # as phigen show --expand prints it
     here = numbers | dict(zip(spec.coordinates, x.reshape(-1), strict=True)) | at_start(name)
     field = evaluate(system_from_spec(spec).vector_field(), here)
-    found = solver(name).vector_field(x, parameters=values, **at_start(name))
-    np.testing.assert_allclose(found.reshape(-1), np.array(field, dtype=float), atol=1e-13)
+    integrator = solver(name).vector_field(x, parameters=values, **at_start(name))
+    np.testing.assert_allclose(integrator.reshape(-1), np.array(field, dtype=float), atol=1e-13)
 
 
 @pytest.mark.parametrize("order", [2, 4])
@@ -135,8 +135,8 @@ def test_steps_with_forces_have_their_order(name: str, order: int) -> None:
 
     exact = solve_ivp(rate, (begin, begin + 0.4), x.reshape(-1), "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     asked: dict[str, Any] = {"parameters": values, **({"t0": begin} if at_start(name) else {})}
-    found = solver(name, order)
-    errors = [np.abs(found.integrate(x, 0.4 / n, n, n, **asked).x[-1].reshape(-1) - exact).max() for n in (4, 8)]
+    integrator = solver(name, order)
+    errors = [np.abs(integrator.integrate(x, 0.4 / n, n, n, **asked).x[-1].reshape(-1) - exact).max() for n in (4, 8)]
     assert np.log2(errors[0] / errors[1]) > order - 0.3
 
 
@@ -150,8 +150,8 @@ def test_covectors_and_noise_keep_the_casimirs_of_every_site(name: str) -> None:
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_what_is_claimed_is_proved(name: str) -> None:
-    made = compiled(name)
-    groups = lattice_statements.lattice(made.cell) | lattice_statements.sweeps(made)
+    compilation = compiled(name)
+    groups = lattice_statements.lattice(compilation.cell) | lattice_statements.sweeps(compilation)
     assert [str(s) for group in groups.values() for s in group if s.verdict != PROVED] == []
     titles = [s.name for s in groups.get("Noise", ())]
     stationary = [t for t in titles if t.startswith("the density exp(−H/θ) on the leaves is stationary, with θ = T")]
@@ -186,8 +186,8 @@ def test_noisy_steps_are_those_of_the_expansion_with_the_same_increments(name: s
     expected = ordinary.integrate(
         x.reshape(-1), 0.05, increments=increments(name, 0.05, 3, draws), parameters=numbers
     ).x[-1]
-    found = solver(name).integrate(x, 0.05, 3, parameters=values, **draws).x[-1]
-    np.testing.assert_allclose(found.reshape(-1), expected, rtol=0, atol=1e-13)
+    final = solver(name).integrate(x, 0.05, 3, parameters=values, **draws).x[-1]
+    np.testing.assert_allclose(final.reshape(-1), expected, rtol=0, atol=1e-13)
 
 
 def test_increments_are_independent_and_of_variance_h() -> None:
@@ -209,18 +209,18 @@ def test_c_makes_the_steps_of_numpy_and_goes_on_with_the_same_bits(name: str, tm
     x, values = given(name)
     draws = {"seed": 3, "member": 1, "step0": 2} if compiled(name).program.noise else {}
     asked: dict[str, Any] = {**draws, "parameters": values}
-    found = solver(name, 2, "c")
-    run = found.integrate(x, 0.05, 9, 3, **asked)
+    integrator = solver(name, 2, "c")
+    run = integrator.integrate(x, 0.05, 9, 3, **asked)
     np.testing.assert_allclose(run.x[-1], solver(name).integrate(x, 0.05, 9, 3, **asked).x[-1], rtol=0, atol=1e-13)
-    kept = tmp_path / "kept"
+    checkpoint = tmp_path / "kept"
 
-    def stop(done: int) -> None:
-        if done == 6:
+    def stop(steps_done: int) -> None:
+        if steps_done == 6:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        found.integrate(x, 0.05, 9, 3, checkpoints=kept, progress=stop, **asked)
-    assert found.integrate(x, 0.05, 9, 3, checkpoints=kept, **asked).x.tobytes() == run.x.tobytes()
+        integrator.integrate(x, 0.05, 9, 3, checkpoints=checkpoint, progress=stop, **asked)
+    assert integrator.integrate(x, 0.05, 9, 3, checkpoints=checkpoint, **asked).x.tobytes() == run.x.tobytes()
 
 
 @pytest.mark.parametrize("name", ["bath", "free", "langevin"])
@@ -241,8 +241,8 @@ def test_members_of_an_ensemble_have_noise_of_their_own() -> None:
 
 
 def test_friction_and_noise_have_the_gibbs_measure() -> None:
-    found = solver("langevin", 2, "c")
-    run = found.integrate(np.zeros((2, 512)), 0.1, 1500, 15, seed=1, parameters={"g": 0.5, "T": 0.7})
+    integrator = solver("langevin", 2, "c")
+    run = integrator.integrate(np.zeros((2, 512)), 0.1, 1500, 15, seed=1, parameters={"g": 0.5, "T": 0.7})
     q, p = run.x[20:, 0], run.x[20:, 1]
     waves = 2 * np.pi * np.arange(512) / 512
     np.testing.assert_allclose((p**2).mean(), 0.7, rtol=0.02)
@@ -272,18 +272,18 @@ def test_steps_along_other_increments_have_no_strong_order(monkeypatch: pytest.M
     assert strongly("langevin", 1) < 0.4
 
 
-def mean_map(made: Compilation, h: float) -> np.ndarray:
+def mean_map(compiled_lattice: Compilation, h: float) -> np.ndarray:
     """E of a step of linear motion at a site, a matrix: every site has increments of its own, all of a quadrature."""
     points, weights = np.polynomial.hermite_e.hermegauss(5)
-    noise, count = made.program.noise, len(made.program.coordinates)
+    noise, count = compiled_lattice.program.noise, len(compiled_lattice.program.coordinates)
     assert noise is not None
     draws = len(noise.sources) * noise.parts
     nodes = np.array(list(product(points, repeat=draws))).T.reshape(noise.parts, len(noise.sources), -1)
     weight = np.prod(list(product(weights / weights.sum(), repeat=draws)), axis=1)
-    found, columns = lattice_solver_of(made, "numpy"), []
+    solver, columns = lattice_solver_of(compiled_lattice, "numpy"), []
     for unit in np.eye(count):
         x = np.tile(unit[:, None], len(weight))
-        session: Any = found.started(Beginning(x, h, found.values(None, {}, x.shape[1:])))
+        session: Any = solver.started(Beginning(x, h, solver.values(None, {}, x.shape[1:])))
         session.advance_along(h, np.sqrt(h / noise.parts) * nodes[None])
         columns.append(session.state() @ weight)
     return np.array(columns).T
@@ -293,11 +293,11 @@ def mean_map(made: Compilation, h: float) -> np.ndarray:
 def test_the_weak_order_is_reached_on_lattices(scheme: str, order: int) -> None:
     noise = "noise: {x: {hamiltonian: x, amplitude: 0.7}, y: {hamiltonian: y, amplitude: 0.9}}\n"
     text = f"lattice: {{axes: [i]}}\nscheme: {scheme}\norder: 2\n{noise}{SPINS}hamiltonian: -z - x/2"
-    made = compile_spec(specs.loads(f"phigen: 1\nname: turning\n{text}\n"))
-    fields = [lattice_noise._field(made.spec, s) for s in ("x", "y")]
-    drift, *spread = (s.vector_field(np.eye(3)) for s in (lattice_solver_of(made, "numpy"), *fields))
+    compilation = compile_spec(specs.loads(f"phigen: 1\nname: turning\n{text}\n"))
+    fields = [lattice_noise._field(compilation.spec, s) for s in ("x", "y")]
+    drift, *spread = (s.vector_field(np.eye(3)) for s in (lattice_solver_of(compilation, "numpy"), *fields))
     exact = expm(drift + sum(b @ b for b in spread) / 2)
-    coarse, fine = (np.abs(np.linalg.matrix_power(mean_map(made, 1 / n), n) - exact).max() for n in (8, 16))
+    coarse, fine = (np.abs(np.linalg.matrix_power(mean_map(compilation, 1 / n), n) - exact).max() for n in (8, 16))
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.25)
 
 
@@ -306,14 +306,14 @@ def test_damping_by_colours_takes_energy_in_every_step_and_keeps_spins(name: str
     """Sites that were damped together with their neighbours, or all twice, would end elsewhere, or not step by step."""
     (x, values), asked = given(name), {"seed": 1} if name == "cool" else {}
     values |= {n: 1e-40 for n in values if n == "T"} | {"l": 0.3}
-    found = solver(name, 2, "c").integrate(x, 0.05, 400, parameters=values, **asked)
-    assert (np.diff(found.energy) < 1e-14).all()
-    assert np.abs(found.casimirs["C"] - found.casimirs["C"][0]).max() < 1e-13
-    np.testing.assert_allclose(found.x[20], solver(name).integrate(x, 0.05, 20, 20, parameters=values, **asked).x[-1])
+    run = solver(name, 2, "c").integrate(x, 0.05, 400, parameters=values, **asked)
+    assert (np.diff(run.energy) < 1e-14).all()
+    assert np.abs(run.casimirs["C"] - run.casimirs["C"][0]).max() < 1e-13
+    np.testing.assert_allclose(run.x[20], solver(name).integrate(x, 0.05, 20, 20, parameters=values, **asked).x[-1])
     series = compile_spec(specs.loads(f"phigen: 1\nname: s\nscheme: series\norder: 2\n{TEXTS[name]}\n"))
     exact = lattice_solver_of(series, "c").integrate(x, 0.002, 500, 500, parameters=values, **asked).x[-1]
     fine = solver(name, 2, "c").integrate(x, 0.025, 40, 40, parameters=values, **asked).x[-1]
-    assert np.abs(found.x[20] - exact).max() / np.abs(fine - exact).max() == pytest.approx(4, rel=0.1)
+    assert np.abs(run.x[20] - exact).max() / np.abs(fine - exact).max() == pytest.approx(4, rel=0.1)
 
 
 @pytest.mark.thin(1)
@@ -357,13 +357,13 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
     start = Start(y.shape[1:], y, heat, np.empty((0, 2), dtype=np.int64))
     carrying = compile_spec(compiled("langevin").spec, tangent=True)
     solvers = {"numpy": lattice_solver_of(carrying, "numpy")}
-    found = verify_lattice(carrying, solvers, "run", start, 0.05, 20, seed=1, quick=True)
-    assert found.failures == []
-    names = {c.name for c in found.checks}
+    verification = verify_lattice(carrying, solvers, "run", start, 0.05, 20, seed=1, quick=True)
+    assert verification.failures == []
+    names = {c.name for c in verification.checks}
     assert {"observed order, without the noise", "energy: largest change", "reversibility"} <= names
     assert any("tangent map against differences" in name for name in names)
     assert {"strong order, along common paths", "steps that fail, of increments as large as can be"} <= names
-    assert not any("Poisson identity" in c.name for c in found.checks)
+    assert not any("Poisson identity" in c.name for c in verification.checks)
 
 
 @pytest.mark.parametrize(
@@ -400,10 +400,10 @@ def test_headers_say_what_holds_with_forces_and_noise() -> None:
 
 @pytest.mark.parametrize(("name", "target"), [("bath", "numpy"), ("bath", "c"), ("langevin", "numpy")])
 def test_tangent_vectors_are_carried_along_the_path_of_the_noise(name: str, target: str) -> None:
-    made = compile_spec(compiled(name).spec, tangent=True)
-    found, (x, values) = lattice_solver_of(made, target), given(name)
+    compilation = compile_spec(compiled(name).spec, tangent=True)
+    solver, (x, values) = lattice_solver_of(compilation, target), given(name)
     along, asked = np.random.default_rng(0).normal(size=x.shape), {"seed": 4, "parameters": values}
-    after, (carried,) = found.step_tangent(x, 0.05, along[None], **asked)
-    np.testing.assert_allclose(after, found.step(x, 0.05, **asked), rtol=0, atol=1e-14)
-    ahead, behind = (found.step(x + e * along, 0.05, **asked) for e in (1e-5, -1e-5))
+    after, (carried,) = solver.step_tangent(x, 0.05, along[None], **asked)
+    np.testing.assert_allclose(after, solver.step(x, 0.05, **asked), rtol=0, atol=1e-14)
+    ahead, behind = (solver.step(x + e * along, 0.05, **asked) for e in (1e-5, -1e-5))
     np.testing.assert_allclose(carried, (ahead - behind) / 2e-5, rtol=0, atol=1e-8)

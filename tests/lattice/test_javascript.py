@@ -172,7 +172,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("case", CASES)
 def test_steps_and_what_is_seen_are_those_of_numpy_to_roundoff(case: str, answers: dict[str, dict[str, Any]]) -> None:
-    compilation, found = compiled(case), answers[case]
+    compilation, answer = compiled(case), answers[case]
     name = compilation.program.name
     (start, h), dated = begun(case), bool(compilation.program.time)
     module = load_module(emit(compilation.program, "numpy", "phigen")[f"{name}.py"], name)
@@ -184,16 +184,16 @@ def test_steps_and_what_is_seen_are_those_of_numpy_to_roundoff(case: str, answer
     def agrees(mine: list[float], theirs: np.ndarray, part: float = 1e-13) -> None:
         np.testing.assert_allclose(np.reshape(mine, theirs.shape), theirs, rtol=part, atol=part * np.abs(theirs).max())
 
-    assert found["done"] == {"value": STEPS}
+    assert answer["done"] == {"value": STEPS}
     if not compilation.program.is_monitored:  # whose times tests/lattice/test_monitor.py compares
-        assert found["t"] == pytest.approx(end, rel=1e-14)
-    np.testing.assert_allclose(np.reshape(found["x"], x.shape), x, rtol=0, atol=1e-13 * size)
-    assert found["energy"] == pytest.approx(module.hamiltonian(x, **then), rel=1e-12)
-    agrees(found["density"], module.density(x, **then), 1e-11)
-    agrees(found["field"], module.vector_field(x, **then), 1e-11)
+        assert answer["t"] == pytest.approx(end, rel=1e-14)
+    np.testing.assert_allclose(np.reshape(answer["x"], x.shape), x, rtol=0, atol=1e-13 * size)
+    assert answer["energy"] == pytest.approx(module.hamiltonian(x, **then), rel=1e-12)
+    agrees(answer["density"], module.density(x, **then), 1e-11)
+    agrees(answer["field"], module.vector_field(x, **then), 1e-11)
     if compilation.program.casimirs:
-        agrees(found["casimirs"], module.casimirs(x, **start.arguments))
-    assert found["first"] == found["x"][: len(found["first"])]
+        agrees(answer["casimirs"], module.casimirs(x, **start.arguments))
+    assert answer["first"] == answer["x"][: len(answer["first"])]
 
 
 @pytest.mark.slow
@@ -216,9 +216,9 @@ def test_a_step_that_cannot_be_made_leaves_the_state(case: str, answers: dict[st
 
 
 def test_one_number_is_the_value_at_all_bonds_of_none(tmp_path: Path, answers: dict[str, dict[str, Any]]) -> None:
-    given = job(tmp_path, "no bonds")
-    given["options"]["params"] = {"k": 1.0, "l": [], "m": [1, 2, 3]}
-    assert node([given])[0]["x"] == answers["no bonds"]["x"]
+    request = job(tmp_path, "no bonds")
+    request["options"]["params"] = {"k": 1.0, "l": [], "m": [1, 2, 3]}
+    assert node([request])[0]["x"] == answers["no bonds"]["x"]
 
 
 #: Tangent vectors: open ends, colours, a graph of colours, pairs, noise, the series with sweeps and Newton's method.
@@ -237,8 +237,8 @@ def carrying(compilation: Compilation) -> Compilation:
 def carried(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[str, Any], np.ndarray, np.ndarray]]:
     """What each answers, and the state and vectors that NumPy has."""
     folder, jobs, expected = tmp_path_factory.mktemp("carried"), [], []
-    for case, made in CARRYING.items():
-        compilation = made(case)
+    for case, compiled_lattice in CARRYING.items():
+        compilation = compiled_lattice(case)
         if case in test_tangents.IN_C:
             x = test_tangents.start(case, test_tangents.FEW.get(case))
             values, h = test_tangents.disorder(case, x), test_tangents.H
@@ -255,8 +255,8 @@ def carried(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[st
         options = {"x0": x.ravel().tolist(), "sizes": x.shape[1:], "bonds": about.pop("bonds", None), "params": about}
         path = folder / f"{case.replace(' ', '_')}.mjs"
         path.write_text(*emit(compilation.program, "js", "phigen").values(), encoding="utf-8")
-        given = {"module": path.as_uri(), "options": options | draws, "h": h, "steps": 0}
-        jobs.append({**given, "vectors": vectors.reshape(2, -1).tolist()})
+        request = {"module": path.as_uri(), "options": options | draws, "h": h, "steps": 0}
+        jobs.append({**request, "vectors": vectors.reshape(2, -1).tolist()})
     answers = node(jobs)
     return {case: (a, *e) for case, a, e in zip(CARRYING, answers, expected, strict=True)}
 
@@ -264,11 +264,13 @@ def carried(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[st
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CARRYING)
 def test_tangent_vectors_are_those_of_numpy_to_roundoff(case: str, carried: dict[str, Any]) -> None:
-    found, after, vectors = carried[case]
+    answer, after, vectors = carried[case]
     size = np.abs(vectors).max()
-    np.testing.assert_allclose(np.reshape(found["carried"], vectors.shape), vectors, rtol=0, atol=1e-12 * size)
-    np.testing.assert_allclose(np.reshape(found["after"], after.shape), after, rtol=0, atol=1e-13 * np.abs(after).max())
-    assert found["unlike"]["status"] == "BAD_ARGUMENT"
+    np.testing.assert_allclose(np.reshape(answer["carried"], vectors.shape), vectors, rtol=0, atol=1e-12 * size)
+    np.testing.assert_allclose(
+        np.reshape(answer["after"], after.shape), after, rtol=0, atol=1e-13 * np.abs(after).max()
+    )
+    assert answer["unlike"]["status"] == "BAD_ARGUMENT"
 
 
 REFUSED = {

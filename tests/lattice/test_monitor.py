@@ -198,17 +198,17 @@ def test_runs_are_continued_with_the_times_and_the_level_of_one_run(tmp_path):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_an_interrupted_run_goes_on_with_the_same_bits(tmp_path, target):
-    solver, made = phigen.compile(loads(BODIES), target=target), []
+    solver, steps_made = phigen.compile(loads(BODIES), target=target), []
 
-    def stop(done: int) -> None:
-        made.append(done)
-        if done == 6:
+    def stop(steps_done: int) -> None:
+        steps_made.append(steps_done)
+        if steps_done == 6:
             raise KeyboardInterrupt
 
-    given = {"checkpoints": tmp_path / "state", "output": tmp_path / "frames.npz"}
+    options = {"checkpoints": tmp_path / "state", "output": tmp_path / "frames.npz"}
     with pytest.raises(KeyboardInterrupt):
-        solver.integrate(X0, 0.02, 12, 3, progress=stop, **given)
-    resumed, whole = solver.integrate(X0, 0.02, 12, 3, **given), solver.integrate(X0, 0.02, 12, 3)
+        solver.integrate(X0, 0.02, 12, 3, progress=stop, **options)
+    resumed, whole = solver.integrate(X0, 0.02, 12, 3, **options), solver.integrate(X0, 0.02, 12, 3)
     np.testing.assert_array_equal(resumed.x, whole.x)
     np.testing.assert_array_equal(resumed.t, whole.t)
     np.testing.assert_array_equal(resumed.tau, whole.tau)

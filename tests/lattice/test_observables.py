@@ -181,10 +181,10 @@ def test_javascript_has_the_same_observables(case, tmp_path):
     (module,) = emit(compile_spec(spec).program, "js", "").values()
     path = tmp_path / f"{spec.name}.mjs"
     path.write_text(module)
-    given = {k: np.ravel(v).tolist() if np.ndim(v) else v for k, v in trajectory.parameters.items()}
+    listed_parameters = {k: np.ravel(v).tolist() if np.ndim(v) else v for k, v in trajectory.parameters.items()}
     options = {"x0": trajectory.x[-1].ravel().tolist(), "sizes": list(trajectory.x.shape[2:])}
-    options |= {"bonds": given.pop("bonds")} if "bonds" in given else {}
-    options |= {"params": given, "t0": float(trajectory.t[-1])}
+    options |= {"bonds": listed_parameters.pop("bonds")} if "bonds" in listed_parameters else {}
+    options |= {"params": listed_parameters, "t0": float(trajectory.t[-1])}
     body = f"""const s = new module.Solver({json.dumps(options)});
     const {{ OBSERVABLES, OBSERVED_FIELDS: fields = [] }} = module.Solver;
     return [OBSERVABLES, [...s.observables()], fields, fields.length ? [...s.observedFields()] : []];"""
@@ -226,11 +226,11 @@ def test_extremes_over_no_bonds_are_infinite_and_those_of_no_number_are_none(tex
 def test_the_command_prints_means(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "web.yaml").write_text(WEB.replace("stride: 2", "average: {after: 0.1}"))
-    told = json.loads(CliRunner().invoke(group, ["run", "web.yaml", "--json"], prog_name="phigen").stdout)
+    result = json.loads(CliRunner().invoke(group, ["run", "web.yaml", "--json"], prog_name="phigen").stdout)
     trajectory = phigen.compile("web.yaml").run()
     late = trajectory.observables["flow"][2:]
-    assert told["observables"]["flow"]["mean"] == pytest.approx(late.mean(), rel=1e-12)
-    assert [*told["observables"]] == ["flow", "oriented", "tightest", "steepest", "P", "hot"]
+    assert result["observables"]["flow"]["mean"] == pytest.approx(late.mean(), rel=1e-12)
+    assert [*result["observables"]] == ["flow", "oriented", "tightest", "steepest", "P", "hot"]
     plain = CliRunner().invoke(group, ["run", "web.yaml"], prog_name="phigen").stdout
     assert "observables, means over 5 rows from t = 0.1 to 0.3" in plain
 
@@ -302,26 +302,26 @@ def test_a_run_may_record_numbers_alone(tmp_path, monkeypatch):
 def test_series_go_on_from_their_checkpoint(tmp_path, monkeypatch):
     monkeypatch.setattr(lattice_series, "CHECKPOINT_SECONDS", 0.0)
     solver = phigen.compile(phigen.spec.loads(WEB), target="numpy")
-    x0, bonds, kept = np.array([[0.1, 0.5, 0.9], [1.0, 0.0, -1.0]]), [[0, 1], [1, 2]], tmp_path / "kept"
+    x0, bonds, checkpoint = np.array([[0.1, 0.5, 0.9], [1.0, 0.0, -1.0]]), [[0, 1], [1, 2]], tmp_path / "kept"
 
     def interrupt(step):
         if step == 6:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=kept, progress=interrupt)
+        solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=checkpoint, progress=interrupt)
     with pytest.raises(ValueError, match="an interrupted run: continue"):
-        solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=kept, resume=False)
+        solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=checkpoint, resume=False)
     with pytest.raises(
         ValueError, match="cannot record 'e'; there are energy, flow, oriented, tightest, steepest, P, hot"
     ):
         solver.series(x0, 0.05, 12, of=["e"], bonds=bonds)
-    resumed = solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=kept)
+    resumed = solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=checkpoint)
     whole = solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds)
     np.testing.assert_array_equal(resumed.columns["hot"], whole.columns["hot"])
     np.testing.assert_array_equal(resumed.last, whole.last)
     assert len(whole) == 7
-    assert not kept.exists()
+    assert not checkpoint.exists()
 
 
 @pytest.mark.parametrize(

@@ -43,12 +43,14 @@ def drawn(kind, seed):
     return text, {"J": 0.9, "B": disorder} | ({"bonds": links} if kind == "graph" else {})
 
 
-def slope(made, x, bar, along, given, changed=""):
+def slope(integrator, x, bar, along, parameters, changed=""):
     """The derivative of Σ bar·frames in a direction of the state, or of a parameter."""
 
     def weighed(e):
-        state, own = (x, given | {changed: given[changed] + e * along}) if changed else (x + e * along, given)
-        return np.sum(bar * made.integrate(state, H, STEPS, STRIDE, **own).x)
+        state, arguments = (
+            (x, parameters | {changed: parameters[changed] + e * along}) if changed else (x + e * along, parameters)
+        )
+        return np.sum(bar * integrator.integrate(state, H, STEPS, STRIDE, **arguments).x)
 
     return (weighed(1e-4) - weighed(-1e-4)) / 2e-4
 
@@ -64,8 +66,8 @@ def cases():
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("kind", "seed", "profile"), cases())
 def test_gradients_of_lattices_of_one_part_are_differences(kind, seed, profile):
-    text, given = drawn(kind, seed)
-    expect_gradients(phigen.spec.loads(text), given, seed, profile)
+    text, parameters = drawn(kind, seed)
+    expect_gradients(phigen.spec.loads(text), parameters, seed, profile)
 
 
 @pytest.mark.slow
@@ -73,11 +75,11 @@ def test_gradients_of_lattices_of_one_part_are_differences(kind, seed, profile):
 def test_gradients_of_one_part_are_differences_where_fields_are_stored(kind, monkeypatch):
     """Not found again by the inverse of a flow, which all these have."""
     monkeypatch.setattr(sweep_inverse, "_changes", lambda *_: {})
-    text, given = drawn(kind, 1)
-    assert "t_make_steps_with_tape(" in expect_gradients(phigen.spec.loads(text), given, 1, "fast")
+    text, parameters = drawn(kind, 1)
+    assert "t_make_steps_with_tape(" in expect_gradients(phigen.spec.loads(text), parameters, 1, "fast")
 
 
-def expect_gradients(spec, given, seed, profile):
+def expect_gradients(spec, parameters, seed, profile):
     """Compare pullbacks in C with differences, and with NumPy; the C is returned."""
     program = compile_spec(spec, adjoint=True, profile=profile).program
     assert len(program.step.parts) == 1
@@ -86,10 +88,10 @@ def expect_gradients(spec, given, seed, profile):
     rng = np.random.default_rng(seed)
     x, along = rng.uniform(-1, 1, (2, len(in_c.interface.coordinates), SITES))
     bar = rng.normal(size=(4, *x.shape))
-    _, x0_bar, found = in_c.pullback(x, H, STEPS, bar, STRIDE, **given)
-    assert np.sum(x0_bar * along) == pytest.approx(slope(in_c, x, bar, along, given), rel=1e-6)
-    assert found["J"] == pytest.approx(slope(in_c, x, bar, 1.0, given, "J"), rel=1e-6)
-    assert found["B"] @ along[0] == pytest.approx(slope(in_c, x, bar, along[0], given, "B"), rel=1e-6)
-    expected = numpy.pullback(x, H, STEPS, bar, STRIDE, **given)
+    _, x0_bar, parameters_bar = in_c.pullback(x, H, STEPS, bar, STRIDE, **parameters)
+    assert np.sum(x0_bar * along) == pytest.approx(slope(in_c, x, bar, along, parameters), rel=1e-6)
+    assert parameters_bar["J"] == pytest.approx(slope(in_c, x, bar, 1.0, parameters, "J"), rel=1e-6)
+    assert parameters_bar["B"] @ along[0] == pytest.approx(slope(in_c, x, bar, along[0], parameters, "B"), rel=1e-6)
+    expected = numpy.pullback(x, H, STEPS, bar, STRIDE, **parameters)
     assert x0_bar == pytest.approx(expected.x0_bar, rel=1e-12, abs=1e-12)
     return emit(program, "c", "phigen build")["t.c"]

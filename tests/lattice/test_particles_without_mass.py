@@ -124,10 +124,10 @@ def test_javascript_moves_particles_without_mass_alike(text, tmp_path):
 def test_methods_for_test_particles_are_verified_with_their_gradients(tmp_path):
     path = tmp_path / "bodies.yaml"
     path.write_text(PAIRS)
-    told = CliRunner().invoke(group, ["verify", str(path), "--adjoint", "--quick", "--json"], prog_name="phigen")
-    assert told.exit_code == 0, told.output
-    assert '"Poisson identity on 3 sites, m = 0.01 for 0"' in told.stdout
-    assert '"gradient against differences on all sites"' in told.stdout
+    result = CliRunner().invoke(group, ["verify", str(path), "--adjoint", "--quick", "--json"], prog_name="phigen")
+    assert result.exit_code == 0, result.output
+    assert '"Poisson identity on 3 sites, m = 0.01 for 0"' in result.stdout
+    assert '"gradient against differences on all sites"' in result.stdout
 
 
 def test_powers_of_named_symbols_are_multiplied_together():

@@ -21,14 +21,14 @@ def square(side: int) -> np.ndarray:
 def test_a_square_grid_is_drawn_as_one_whatever_the_order_of_its_sites() -> None:
     shuffled = np.random.default_rng(1).permutation(36)
     bonds = shuffled[square(6)]
-    found = placed(bonds, 36)
-    assert found is not None
-    drawn = lengths(bonds, found)
+    positions = placed(bonds, 36)
+    assert positions is not None
+    drawn = lengths(bonds, positions)
     assert drawn.max() < 1.6 * drawn.min()
-    apart = np.linalg.norm(found[:, None] - found[None], axis=2) + np.eye(36)
+    apart = np.linalg.norm(positions[:, None] - positions[None], axis=2) + np.eye(36)
     assert apart.min() > 0.9 * drawn.min()
-    assert (found.min(), found.max()) == (0.0, 1.0)
-    np.testing.assert_array_equal(found, placed(bonds, 36))
+    assert (positions.min(), positions.max()) == (0.0, 1.0)
+    np.testing.assert_array_equal(positions, placed(bonds, 36))
 
 
 @pytest.mark.parametrize(
@@ -36,10 +36,10 @@ def test_a_square_grid_is_drawn_as_one_whatever_the_order_of_its_sites() -> None
 )
 def test_no_two_sites_lie_on_one_another(bonds: list[list[int]], sites: int) -> None:
     """A star, whose distances leave the plane open; graphs of several parts; one site."""
-    found = placed(np.array(bonds, dtype=np.int64).reshape(-1, 2), sites)
-    assert found is not None
-    assert np.isfinite(found).all()
-    apart = np.linalg.norm(found[:, None] - found[None], axis=2) + np.eye(sites)
+    positions = placed(np.array(bonds, dtype=np.int64).reshape(-1, 2), sites)
+    assert positions is not None
+    assert np.isfinite(positions).all()
+    apart = np.linalg.norm(positions[:, None] - positions[None], axis=2) + np.eye(sites)
     assert apart.min() > 0.1
 
 

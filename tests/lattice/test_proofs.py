@@ -29,8 +29,8 @@ def verdicts(text: str) -> dict[str, str]:
 
 def stated(text: str, name: str) -> str:
     """The one statement of that name, as text."""
-    (found,) = (s for s in examine(loads(text)).statements if s.name == name)
-    return str(found)
+    (statement,) = (s for s in examine(loads(text)).statements if s.name == name)
+    return str(statement)
 
 
 @pytest.mark.parametrize("name", LATTICES)
@@ -55,9 +55,9 @@ def test_a_bracket_of_neighbours_without_jacobi_identity_is_refuted_with_the_tri
 
 def test_nothing_rests_on_a_bracket_that_is_refuted() -> None:
     wrong = TODA.replace("BOUNDARY", "periodic").replace("{a: {b: a/2,", "{a: {b: a*b,")
-    found = examine(loads(wrong))
-    assert found.unexamined
-    assert [s.name for s in found.refuted] == ["Jacobi identity"]
+    examination = examine(loads(wrong))
+    assert examination.unexamined
+    assert [s.name for s in examination.refuted] == ["Jacobi identity"]
 
 
 def test_a_matrix_that_is_not_skew_is_refuted() -> None:
@@ -99,9 +99,9 @@ def test_magnetisation_is_invariant_in_a_field_along_it_only() -> None:
 
 
 def test_open_ends_are_looked_at_apart() -> None:
-    found = verdicts(TODA.replace("BOUNDARY", "open"))
-    assert found["Jacobi identity"] == PROVED
-    assert [n for n, v in found.items() if v == REFUTED] == ["B is a Casimir", "A is a Casimir", "K is invariant"]
+    verdict_of = verdicts(TODA.replace("BOUNDARY", "open"))
+    assert verdict_of["Jacobi identity"] == PROVED
+    assert [n for n, v in verdict_of.items() if v == REFUTED] == ["B is a Casimir", "A is a Casimir", "K is invariant"]
     text = TODA.replace("BOUNDARY", "open")
     assert "at open ends, 2 sites" in stated(text, "K is invariant")
 
@@ -153,11 +153,11 @@ def random_bracket(seed: int) -> Cell:
         bracket[f, g] = value
         bracket[base, frame.at(f, tuple(-o for o in offset))] = frame.shifted(-value, tuple(-o for o in offset))
 
-    for f, own in (("a", a), ("b", b)):
+    for f, same_site in (("a", a), ("b", b)):
         for g, other in right.items():
             if (f, g) == ("b", "b") or draw.random() < 0.3:
                 continue
-            choices = [own * other, own * other, own, other, own * other + 1]
+            choices = [same_site * other, same_site * other, same_site, other, same_site * other + 1]
             state(f, g, draw.choice([1, -1, 2]) * draw.choice(choices[: 2 + 3 * (draw.random() < 0.4)]))
     return Cell("random", ("a", "b"), a, bracket, axes=("i",), boundary=("periodic",))
 

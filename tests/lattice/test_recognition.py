@@ -40,12 +40,12 @@ def bundled(name: str) -> Spec:
 @pytest.mark.parametrize("name", SIZES)
 def test_a_lattice_comes_back_from_its_expansion(name: str) -> None:
     spec = loads(LATTICES[name])
-    found = recognised_lattice(expanded(name), least=4)
-    assert (found.lattice.axes, found.lattice.boundary) == (spec.lattice.axes, spec.lattice.boundary)
-    assert {p.name: p.at for p in found.parameters} == {p.name: p.at for p in spec.parameters}
-    assert found.lattice.kinds == spec.lattice.kinds
-    assert set(found.invariants) == set(spec.invariants)
-    mine, theirs = vector_field(cell_from_spec(found)), vector_field(cell_from_spec(spec))
+    recognised = recognised_lattice(expanded(name), least=4)
+    assert (recognised.lattice.axes, recognised.lattice.boundary) == (spec.lattice.axes, spec.lattice.boundary)
+    assert {p.name: p.at for p in recognised.parameters} == {p.name: p.at for p in spec.parameters}
+    assert recognised.lattice.kinds == spec.lattice.kinds
+    assert set(recognised.invariants) == set(spec.invariants)
+    mine, theirs = vector_field(cell_from_spec(recognised)), vector_field(cell_from_spec(spec))
     assert decide_zero("", [(f, e - theirs[f]) for f, e in mine.items()]).verdict == PROVED
 
 
@@ -88,8 +88,8 @@ def test_parameters_with_numbers_are_at_sites_with_their_values_of_a_run() -> No
     ordinary = replace(
         expansion.spec(), runs={"quench": run_of(expansion, run, start.state, expansion.numbers(start.parameters))}
     )
-    found = loads(spec_text(recognised_lattice(ordinary, least=4)))
-    again = start_of(found, found.runs["quench"])
+    specification = loads(spec_text(recognised_lattice(ordinary, least=4)))
+    again = start_of(specification, specification.runs["quench"])
     assert again.parameters["B"].tolist() == start.parameters["B"].tolist()
     assert again.state.tolist() == start.state.tolist()
 

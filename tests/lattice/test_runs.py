@@ -221,21 +221,21 @@ def spec(tmp_path, monkeypatch):
 
 
 def ran(cli, *args):
-    done = cli("run", *args, "-t", "numpy", "-q")
-    assert done.exit_code == 0, done.stderr
-    return done
+    result = cli("run", *args, "-t", "numpy", "-q")
+    assert result.exit_code == 0, result.stderr
+    return result
 
 
 def test_a_table_has_a_column_for_each_number_of_a_state(cli, spec, rotors):
-    told = ran(cli, spec, "-o", "a.csv", "--section", "s.csv").stdout
+    output = ran(cli, spec, "-o", "a.csv", "--section", "s.csv").stdout
     run, (header, *rows) = rotors.run("mix"), spec.with_name("a.csv").read_text().splitlines()
     assert header == "t,q_0,q_1,q_2,q_3,q_4,p_0,p_1,p_2,p_3,p_4,energy,T,C"
     expected = np.column_stack([run.t, run.x.reshape(len(run), -1), run.energy, run.observed])
     np.testing.assert_array_equal([[float(v) for v in row.split(",")] for row in rows], expected)
-    assert "crossing of the section T - level = 0" in told
+    assert "crossing of the section T - level = 0" in output
     assert len(spec.with_name("s.csv").read_text().splitlines()) == 1 + len(run.crossings)
-    done = cli("run", spec, "--sizes", "501", "-o", "a.csv")
-    assert (done.exit_code, "1002 columns, more than 1000" in done.stderr) == (2, True)
+    result = cli("run", spec, "--sizes", "501", "-o", "a.csv")
+    assert (result.exit_code, "1002 columns, more than 1000" in result.stderr) == (2, True)
 
 
 def test_states_at_given_times_and_what_cannot_be(cli, spec, rotors):
@@ -251,8 +251,8 @@ def test_states_at_given_times_and_what_cannot_be(cli, spec, rotors):
         (["--until", "-1"], "never reached"),
         (["--extend", "-o", "no.npz"], "continues a finished run"),
     ):
-        done = cli("run", spec, "--run", "until", "-t", "numpy", *option)
-        assert (done.exit_code, message in " ".join(done.stderr.split())) == (2, True)
+        result = cli("run", spec, "--run", "until", "-t", "numpy", *option)
+        assert (result.exit_code, message in " ".join(result.stderr.split())) == (2, True)
 
 
 @pytest.mark.parametrize(
@@ -271,8 +271,8 @@ def test_a_run_that_is_extended_is_the_longer_run(cli, spec, name, suffix, first
             assert sorted(rows) == sorted(expected)
             for key in set(rows) - {"coordinates", "axes", "origin"}:
                 np.testing.assert_allclose(rows[key], expected[key], rtol=1e-13, atol=1e-14)
-    done = cli("run", spec, "--run", name, "-o", file, "--extend", "--set", "K=1", "--sizes", "6", "-t", "numpy")
-    assert (done.exit_code, "does not hold a run of rotors" in done.stderr) == (2, True)
+    result = cli("run", spec, "--run", name, "-o", file, "--extend", "--set", "K=1", "--sizes", "6", "-t", "numpy")
+    assert (result.exit_code, "does not hold a run of rotors" in result.stderr) == (2, True)
 
 
 @pytest.mark.parametrize("more", [["--run", "mix"], ["--run", "both"], ["--run", "until", "--extend"]])

@@ -64,9 +64,9 @@ def solver(
     name: str, run: tuple[int, ...], target: str = "numpy", profile: str = "fast", *, adjoint: bool = False
 ) -> LatticeSolver:
     """A solver for runs of some size, and hence with a seam or without."""
-    found = phigen.compile(loads(text(name, run, profile)), target=target, tangent=not adjoint, adjoint=adjoint)
-    assert isinstance(found, LatticeSolver)
-    return found
+    solver = phigen.compile(loads(text(name, run, profile)), target=target, tangent=not adjoint, adjoint=adjoint)
+    assert isinstance(solver, LatticeSolver)
+    return solver
 
 
 def odd(name: str) -> tuple[int, ...]:
@@ -82,9 +82,9 @@ def start(name: str, sizes: tuple[int, ...]) -> np.ndarray:
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "sizes"), [*CASES[:-1], pytest.param(*CASES[-1], marks=pytest.mark.slow)])
 def test_steps_are_poisson_maps(name: str, sizes: tuple[int, ...]) -> None:
-    x, found = start(name, sizes), solver(name, odd(name))
+    x, integrator = start(name, sizes), solver(name, odd(name))
     whole = expand(cell_from_spec(loads(text(name, odd(name), "fast"))), sizes, ())
-    after, carried = found.step_tangent(x, H, np.eye(x.size).reshape(-1, *x.shape))
+    after, carried = integrator.step_tangent(x, H, np.eye(x.size).reshape(-1, *x.shape))
     matrix = carried.reshape(x.size, x.size).T
     moved = matrix @ poisson_at(whole, x, {}) @ matrix.T
     np.testing.assert_allclose(moved, poisson_at(whole, after, {}), rtol=0, atol=2e-14)
@@ -93,12 +93,12 @@ def test_steps_are_poisson_maps(name: str, sizes: tuple[int, ...]) -> None:
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "sizes"), CASES)
 def test_steps_follow_h_with_their_order(name: str, sizes: tuple[int, ...]) -> None:
-    x, found = start(name, sizes), solver(name, odd(name))
-    field, small = found.vector_field(x, **({"t": 0.0} if found.interface.time else {})), 1e-3
-    ahead, back = (found.integrate(x, h, 1).x[-1] for h in (small, -small))
+    x, integrator = start(name, sizes), solver(name, odd(name))
+    field, small = integrator.vector_field(x, **({"t": 0.0} if integrator.interface.time else {})), 1e-3
+    ahead, back = (integrator.integrate(x, h, 1).x[-1] for h in (small, -small))
     np.testing.assert_allclose((ahead - back) / (2 * small), field, rtol=0, atol=1e-4 * np.abs(field).max())
-    precise = found.integrate(x, 0.2 / 16, 16).x[-1]
-    errors = [np.abs(found.integrate(x, 0.2 / n, n).x[-1] - precise).max() for n in (2, 4)]
+    precise = integrator.integrate(x, 0.2 / 16, 16).x[-1]
+    errors = [np.abs(integrator.integrate(x, 0.2 / n, n).x[-1] - precise).max() for n in (2, 4)]
     assert 3.7 < np.log2(errors[0] / errors[1]) < 4.5
 
 
@@ -133,8 +133,8 @@ def test_javascript_makes_the_steps_of_numpy(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["bogoyavlensky", "sheet"])
 def test_bits_are_those_of_any_number_of_threads(name: str) -> None:
     sizes = (4099,) if name == "bogoyavlensky" else (75, 83)
-    x, found = start(name, sizes), solver(name, odd(name), "c")
-    first, *others = with_threads(lambda: found.integrate(x, H, 3).x[-1])
+    x, integrator = start(name, sizes), solver(name, odd(name), "c")
+    first, *others = with_threads(lambda: integrator.integrate(x, H, 3).x[-1])
     assert all(np.array_equal(first, other) for other in others)
     np.testing.assert_allclose(first, solver(name, odd(name)).integrate(x, H, 3).x[-1], rtol=0, atol=1e-13)
 
@@ -152,12 +152,12 @@ def test_sizes_that_colours_fit_have_the_bits_of_a_solver_without_a_seam(name: s
 @pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("name", "sizes"), IN_C)
 def test_pullback_is_the_gradient_of_the_run(name: str, sizes: tuple[int, ...], target: str) -> None:
-    x, found, random = start(name, sizes), solver(name, odd(name), target, adjoint=True), np.random.default_rng(5)
+    x, integrator, random = start(name, sizes), solver(name, odd(name), target, adjoint=True), np.random.default_rng(5)
     bar, along, width = random.normal(size=(3, *x.shape)), random.normal(size=x.shape), 1e-3
-    _, x0_bar, _ = found.pullback(x, 0.05, 4, bar, 2)
+    _, x0_bar, _ = integrator.pullback(x, 0.05, 4, bar, 2)
 
     def weighed(e: float) -> float:
-        return float(np.sum(bar * found.integrate(x + e * along, 0.05, 4, 2).x))
+        return float(np.sum(bar * integrator.integrate(x + e * along, 0.05, 4, 2).x))
 
     weights = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
     slope = sum(w * (weighed(k * width) - weighed(-k * width)) for k, w in weights) / width
@@ -166,14 +166,14 @@ def test_pullback_is_the_gradient_of_the_run(name: str, sizes: tuple[int, ...], 
 
 @pytest.mark.slow
 def test_damping_by_colours_takes_energy_in_every_step_and_keeps_spins() -> None:
-    found = solver("damped", (7,))
+    integrator = solver("damped", (7,))
     x = start("damped", (9,))
-    run = found.integrate(x, 0.3, 50)
+    run = integrator.integrate(x, 0.3, 50)
     assert (np.diff(run.energy) < 0).all()
     np.testing.assert_allclose((run.x**2).sum(axis=1)[-1], (x**2).sum(axis=0), rtol=1e-13)
     small = 1e-3
-    ahead, back = (found.integrate(x, h, 1).x[-1] for h in (small, -small))
-    np.testing.assert_allclose((ahead - back) / (2 * small), found.vector_field(x), rtol=0, atol=1e-4)
+    ahead, back = (integrator.integrate(x, h, 1).x[-1] for h in (small, -small))
+    np.testing.assert_allclose((ahead - back) / (2 * small), integrator.vector_field(x), rtol=0, atol=1e-4)
 
 
 def test_too_small_sizes_and_open_ends_beside_have_no_seam() -> None:

@@ -114,19 +114,19 @@ def test_steps_that_sweeps_cannot_make_are_those_of_the_ordinary_system(name: st
     else:
         reference = module.integrate(x, 0.2, 5, **more)[-1]
     for target in ("numpy", "c"):
-        found = lattice_solver_of(compilation, target).integrate(x, 0.2, 5, 5, **more).x[-1]
-        np.testing.assert_allclose(found, reference, rtol=0, atol=1e-12)
+        final = lattice_solver_of(compilation, target).integrate(x, 0.2, 5, 5, **more).x[-1]
+        np.testing.assert_allclose(final, reference, rtol=0, atol=1e-12)
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "sizes"), CASES)
 def test_cotangents_go_back_through_such_steps(name: str, sizes: tuple[int, ...]) -> None:
     """By elimination with the transpose of the matrix, or by Krylov spaces: as tangent vectors go forward."""
-    found = lattice_solver_of(compiled(name), "c")
+    solver = lattice_solver_of(compiled(name), "c")
     x, more, random = start(name, sizes), bonds(name, sizes[0]), np.random.default_rng(4)
     bar, along = random.normal(size=(2, *x.shape))
-    ((_, (carried,)),) = found.tangents(x, 0.2, 5, along[None], 5, **more)
-    assert np.sum(found.pullback(x, 0.2, 5, bar, **more).x0_bar * along) == pytest.approx(
+    ((_, (carried,)),) = solver.tangents(x, 0.2, 5, along[None], 5, **more)
+    assert np.sum(solver.pullback(x, 0.2, 5, bar, **more).x0_bar * along) == pytest.approx(
         np.sum(bar * carried), rel=1e-12
     )
 
@@ -144,9 +144,9 @@ def test_short_code_follows_sweeps_by_differences_and_solves_stages_to_round_off
 @pytest.mark.parametrize("profile", ["fast", "small"])
 def test_equations_without_a_solution_are_told(target: str, profile: str) -> None:
     spec = specs.loads(f"phigen: 1\nname: bursting\n{BURSTING}\n")
-    found, x = lattice_solver_of(compile_spec(spec, profile=profile), target), np.zeros((2, 3, 4))
+    solver, x = lattice_solver_of(compile_spec(spec, profile=profile), target), np.zeros((2, 3, 4))
     with pytest.raises(StepError, match="NO_CONVERGENCE") as failure:  # the matrix at x is singular
-        found.integrate(x, 2.0, 5, 1)
+        solver.integrate(x, 2.0, 5, 1)
     assert np.array_equal(failure.value.trajectory.x[-1], x)
 
 
@@ -198,5 +198,5 @@ def test_short_code_makes_the_same_steps(name: str) -> None:
 
 
 def test_threads_make_the_same_bits() -> None:
-    x, found = start("sheet", (50, 90)), lattice_solver_of(compiled("sheet"), "c")
-    assert len({run.tobytes() for run in with_threads(lambda: found.step(x, 0.1))}) == 1
+    x, solver = start("sheet", (50, 90)), lattice_solver_of(compiled("sheet"), "c")
+    assert len({run.tobytes() for run in with_threads(lambda: solver.step(x, 0.1))}) == 1

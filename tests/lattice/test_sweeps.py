@@ -140,8 +140,8 @@ def disorder(name: str, x: np.ndarray) -> dict[str, Any]:
     about = solver(name).interface
     drawn = {p: np.random.default_rng(7).normal(size=x.shape[1:]) for p in about.at_sites}
     drawn |= {p: np.random.default_rng(8).normal(size=len(BONDS)) for p in about.at_bonds}
-    found = {p: np.abs(values) + 0.5 if p in about.positive else values for p, values in drawn.items()}
-    return found | ({"bonds": BONDS} if about.graph else {})
+    parameters = {p: np.abs(values) + 0.5 if p in about.positive else values for p, values in drawn.items()}
+    return parameters | ({"bonds": BONDS} if about.graph else {})
 
 
 def bonds_of(name: str) -> dict[str, Any]:
@@ -156,9 +156,9 @@ def values_of(whole: Expansion, x: np.ndarray, parameters: dict[str, Any]) -> di
 
 def poisson_at(whole: Expansion, x: np.ndarray, parameters: dict[str, Any]) -> np.ndarray:
     entries, index = whole.poisson(), {c: k for k, c in enumerate(whole.coordinates)}
-    found = evaluate(list(entries.values()), values_of(whole, x, parameters))
+    entry_values = evaluate(list(entries.values()), values_of(whole, x, parameters))
     matrix = np.zeros((len(index), len(index)))
-    for (a, b), value in zip(entries, found, strict=True):
+    for (a, b), value in zip(entries, entry_values, strict=True):
         matrix[index[a], index[b]] = float(value)
     return matrix
 
@@ -177,9 +177,9 @@ def test_field_and_energy_are_those_of_the_ordinary_system(name: str, target: st
 
     gradient = np.array(evaluate(slopes(ordinary.hamiltonian, whole.coordinates), values), dtype=float)
     field = poisson_at(whole, x, parameters) @ gradient
-    found = solver(name, target=target)
-    np.testing.assert_allclose(found.vector_field(x, **parameters).reshape(-1), field, atol=1e-13)
-    assert found.hamiltonian(x, **parameters) == pytest.approx(float(energy), rel=1e-13, abs=1e-13)
+    integrator = solver(name, target=target)
+    np.testing.assert_allclose(integrator.vector_field(x, **parameters).reshape(-1), field, atol=1e-13)
+    assert integrator.hamiltonian(x, **parameters) == pytest.approx(float(energy), rel=1e-13, abs=1e-13)
 
 
 @pytest.mark.thin(2)
@@ -206,9 +206,9 @@ def test_steps_are_those_of_the_ordinary_splitting_with_the_same_parts(name: str
 @pytest.mark.parametrize("name", sorted({*SERIES} - {"stretched"}))  # whose π ordinary systems follow paths for
 def test_steps_of_the_series_are_those_of_the_ordinary_system(name: str) -> None:
     x = start(name, FEW.get(name, (5,)))
-    found, parameters = solver(name, 4, "numpy"), disorder(name, x)
-    lattice = found.integrate(x, 0.1, 10, **parameters)
-    numbers = {p: parameters.get(p, v) for p, v in found.interface.parameters.items()}
+    integrator, parameters = solver(name, 4, "numpy"), disorder(name, x)
+    lattice = integrator.integrate(x, 0.1, 10, **parameters)
+    numbers = {p: parameters.get(p, v) for p, v in integrator.interface.parameters.items()}
     whole = expansion(name, x.shape[1:])
     choice = BirealisationChoice("product", of="cayley") if name == "twisted" else BirealisationChoice()
     from phigen.api import solver_of
@@ -233,11 +233,11 @@ def test_steps_of_the_series_are_those_of_the_ordinary_system(name: str) -> None
     ],
 )
 def test_order_is_that_of_the_method(name: str, order: int) -> None:
-    x, found = start(name), solver(name, order, "c")
+    x, integrator = start(name), solver(name, order, "c")
     parameters, span = disorder(name, x), 0.8
-    far = found.integrate(x, span / 512, 512, 512, **parameters).x[-1]
+    far = integrator.integrate(x, span / 512, 512, 512, **parameters).x[-1]
     counts = (8, 16) if order < 8 else (4, 8)  # beyond, the error is that of rounding
-    errors = [np.abs(found.integrate(x, span / n, n, n, **parameters).x[-1] - far).max() for n in counts]
+    errors = [np.abs(integrator.integrate(x, span / n, n, n, **parameters).x[-1] - far).max() for n in counts]
     assert np.log2(errors[0] / errors[1]) > order - 0.35
 
 
@@ -327,9 +327,9 @@ def test_spins_keep_their_lengths(name: str) -> None:
 @pytest.mark.parametrize("name", SERIES)
 @pytest.mark.parametrize("target", ["numpy", "c"])
 def test_steps_of_the_series_are_undone_by_steps_back(name: str, target: str) -> None:
-    x, found = start(name), solver(name, 4, target)
-    there = found.integrate(x, 0.1, 5, 5, **disorder(name, x)).x[-1]
-    back = found.integrate(there, -0.1, 5, 5, **disorder(name, x)).x[-1]
+    x, integrator = start(name), solver(name, 4, target)
+    there = integrator.integrate(x, 0.1, 5, 5, **disorder(name, x)).x[-1]
+    back = integrator.integrate(there, -0.1, 5, 5, **disorder(name, x)).x[-1]
     assert np.abs(there - x).max() > 0.05
     np.testing.assert_allclose(back, x, rtol=0, atol=5e-14)
 
@@ -361,23 +361,23 @@ def test_loops_say_which_rows_they_read() -> None:
 
 def test_each_sweep_says_what_it_moves_and_those_of_equal_code_are_one() -> None:
     text = emit(compiled("magnet").program, "c", "phigen")["magnet.c"]
-    found = re.findall(
+    comments = re.findall(
         r"/\* (The flow of [^/]*) \*/\nstatic inline void magnet_(sweep\w+)\([^{]*\{(.*?)\n\}", text, re.S
     )
-    for said, name, body in found:
+    for said, name, body in comments:
         moved = re.findall(r"^ *(\w)_row\[i\] =", body, re.M)
         assert all(line.endswith(f"{', '.join(moved)} turned.") for line in said.split("\n")), (name, said)
-    bodies = [body for *_, body in found]
-    assert len(bodies) == len(set(bodies)) < sum(said.count("The flow of") for said, *_ in found)
+    bodies = [body for *_, body in comments]
+    assert len(bodies) == len(set(bodies)) < sum(said.count("The flow of") for said, *_ in comments)
 
 
 def test_parts_that_differ_in_the_order_of_fields_have_one_loop_in_short_code() -> None:
     short = compile_spec(compiled("magnet", 2).spec, profile="small")
-    found, text = lattice_solver_of(short, "c"), emit(short.program, "c", "phigen")["magnet.c"]
+    integrator, text = lattice_solver_of(short, "c"), emit(short.program, "c", "phigen")["magnet.c"]
     assert re.findall(r"void magnet_(sweep\w*)\(const double", text) == ["sweep1", "sweep_x_z", "sweep3"]
     x = start("magnet", (4200,))
     ring = {"bonds": np.stack([np.arange(4200), (np.arange(4200) * 7 + 1) % 4200], axis=1)}
-    mine, *others = with_threads(lambda: found.integrate(x, 0.05, 2, 2, **ring).x[-1])
+    mine, *others = with_threads(lambda: integrator.integrate(x, 0.05, 2, 2, **ring).x[-1])
     assert all(np.array_equal(mine, other) for other in others)
     np.testing.assert_allclose(mine, solver("magnet", 2).integrate(x, 0.05, 2, 2, **ring).x[-1], rtol=0, atol=3e-14)
 
@@ -385,9 +385,9 @@ def test_parts_that_differ_in_the_order_of_fields_have_one_loop_in_short_code() 
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("name", ["sheet", "magnet", "dragged"])
 def test_threads_make_the_same_bits(name: str) -> None:
-    found, x = solver(name, 2, "c"), start(name, (70, 90) if name != "magnet" else (6300,))
+    integrator, x = solver(name, 2, "c"), start(name, (70, 90) if name != "magnet" else (6300,))
     ring = {"bonds": np.stack([np.arange(6300), (np.arange(6300) * 7 + 1) % 6300], axis=1)} if name == "magnet" else {}
-    assert len({run.tobytes() for run in with_threads(lambda: found.integrate(x, 0.05, 5, 5, **ring).x[-1])}) == 1
+    assert len({run.tobytes() for run in with_threads(lambda: integrator.integrate(x, 0.05, 5, 5, **ring).x[-1])}) == 1
 
 
 def test_long_rows_in_pieces_make_the_same_steps() -> None:
@@ -400,28 +400,28 @@ def test_long_rows_in_pieces_make_the_same_steps() -> None:
 def test_flows_that_are_made_at_once_make_the_steps_of_flow_after_flow(name: str, sizes: tuple[int, ...]) -> None:
     """Copies of a lattice side by side, too large for that, move as it does alone, with any number of threads."""
     order = 2 if name == "beyond" else 4
-    found = lattice_solver_of(compile_spec(specs.loads(BEYOND)), "c") if order == 2 else solver(name, order, "c")
-    x = np.abs(0.5 + 0.3 * np.random.default_rng(2).normal(size=(len(found.interface.coordinates), *sizes)))
-    alone = found.integrate(x, 0.05, 5, 5).x[-1]
+    integrator = lattice_solver_of(compile_spec(specs.loads(BEYOND)), "c") if order == 2 else solver(name, order, "c")
+    x = np.abs(0.5 + 0.3 * np.random.default_rng(2).normal(size=(len(integrator.interface.coordinates), *sizes)))
+    alone = integrator.integrate(x, 0.05, 5, 5).x[-1]
     copies = [1, 270_000 // alone.size, *[1] * (len(sizes) - 1)]
-    for together in with_threads(lambda: found.integrate(np.tile(x, copies), 0.05, 5, 5).x[-1]):
+    for together in with_threads(lambda: integrator.integrate(np.tile(x, copies), 0.05, 5, 5).x[-1]):
         assert np.array_equal(together, np.tile(alone, copies))
 
 
 def test_compensated_sums_keep_lengths_of_spins_and_the_bits_of_runs_in_pieces() -> None:
     text = f"phigen: 1\nname: rounding\norder: 2\nsolver: {{compensated: true}}\n{TEXTS['xxz']}"
-    found, x = lattice_solver_of(compile_spec(specs.loads(text)), "c"), start("xxz", (64,))
-    whole = found.integrate(x, 0.05, 50_000, 25_000).x
+    integrator, x = lattice_solver_of(compile_spec(specs.loads(text)), "c"), start("xxz", (64,))
+    whole = integrator.integrate(x, 0.05, 50_000, 25_000).x
     worst = np.abs(np.linalg.norm(whole, axis=1) - np.linalg.norm(x, axis=0)).max()
     plain = solver("xxz", 2, "c").integrate(x, 0.05, 50_000, 50_000).x[-1]
     assert worst < 8e-15 < np.abs(np.linalg.norm(plain, axis=0) - np.linalg.norm(x, axis=0)).max()
-    session = found.session(x)
+    session = integrator.session(x)
     session.step(0.05, 25_000)
     other = session.copy()
     other.step(0.05, 25_000)
     assert np.array_equal(session.x, whole[1])
     assert np.array_equal(other.x, whole[2])
-    np.testing.assert_allclose(found.step(x, 0.05), solver("xxz", 2).step(x, 0.05), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(integrator.step(x, 0.05), solver("xxz", 2).step(x, 0.05), rtol=0, atol=1e-15)
 
 
 #: Systems whose steps end with all their flows done, of one part and with noise; and one whose last flow is open.
@@ -448,9 +448,9 @@ noise: {bath: {hamiltonian: q, amplitude: 0.1}}
 @pytest.mark.parametrize("step", [0.05, 0.02])
 def test_copies_of_sessions_have_the_compensation_terms(name: str, step: float) -> None:
     text = f"phigen: 1\nname: rounding\norder: 2\nsolver: {{compensated: true}}\n{COMPENSATED[name]}"
-    found = lattice_solver_of(compile_spec(specs.loads(text)), "c")
-    x = np.random.default_rng(3).normal(size=(len(found.interface.coordinates), 16))
-    session = found.session(x).step(0.05, 400)
+    solver = lattice_solver_of(compile_spec(specs.loads(text)), "c")
+    x = np.random.default_rng(3).normal(size=(len(solver.interface.coordinates), 16))
+    session = solver.session(x).step(0.05, 400)
     other = session.copy()
     assert np.array_equal(other.step(step, 40).x, session.step(step, 40).x)
 
@@ -463,13 +463,13 @@ def test_sums_that_cannot_be_compensated_are_refused(asked: str) -> None:
 
 
 def test_frames_go_to_files(tmp_path: Any) -> None:
-    x, found = start("fput"), solver("fput", target="c")
-    plain = found.integrate(x, 0.1, 10, 4)
-    streamed = found.integrate(x, 0.1, 10, 4, output=tmp_path / "frames.npy")
+    x, integrator = start("fput"), solver("fput", target="c")
+    plain = integrator.integrate(x, 0.1, 10, 4)
+    streamed = integrator.integrate(x, 0.1, 10, 4, output=tmp_path / "frames.npy")
     assert np.array_equal(np.load(tmp_path / "frames.npy"), plain.x)
     assert np.array_equal(streamed.x, plain.x)
     assert plain.x.shape == (4, 2, 7)
-    found.integrate(x, 0.1, 10, 4, output=tmp_path / "run.npz", a=0.3)
+    integrator.integrate(x, 0.1, 10, 4, output=tmp_path / "run.npz", a=0.3)
     with np.load(tmp_path / "run.npz") as stored:
         assert stored["x"].shape == (4, 2, 7)
         assert stored["parameter_a"] == 0.3
@@ -477,47 +477,49 @@ def test_frames_go_to_files(tmp_path: Any) -> None:
 
 
 def test_a_run_goes_on_from_its_checkpoint(tmp_path: Any) -> None:
-    x, found = start("fput"), solver("fput", target="c")
-    whole = found.integrate(x, 0.1, 12, 3)
+    x, integrator = start("fput"), solver("fput", target="c")
+    whole = integrator.integrate(x, 0.1, 12, 3)
 
-    def stop(done: int) -> None:
-        if done == 6:
+    def stop(steps_done: int) -> None:
+        if steps_done == 6:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        found.integrate(x, 0.1, 12, 3, checkpoints=tmp_path / "state", progress=stop)
-    resumed = found.integrate(x, 0.1, 12, 3, checkpoints=tmp_path / "state")
+        integrator.integrate(x, 0.1, 12, 3, checkpoints=tmp_path / "state", progress=stop)
+    resumed = integrator.integrate(x, 0.1, 12, 3, checkpoints=tmp_path / "state")
     assert np.array_equal(resumed.x, whole.x)
     assert not (tmp_path / "state").exists()
 
 
 def test_files_of_interrupted_and_complete_runs_are_respected(tmp_path: Any) -> None:
-    x, found = start("fput"), solver("fput")
+    x, integrator = start("fput"), solver("fput")
     files = {"output": tmp_path / "frames.npy", "checkpoints": tmp_path / "state"}
 
-    def stop(done: int) -> None:
-        if done == 6:
+    def stop(steps_done: int) -> None:
+        if steps_done == 6:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        found.integrate(x, 0.1, 12, 3, progress=stop, **files)
+        integrator.integrate(x, 0.1, 12, 3, progress=stop, **files)
     left = {path: path.read_bytes() for path in tmp_path.iterdir()}
     with pytest.raises(ValueError, match="to an interrupted run: continue it with resume=True, or remove the file"):
-        found.integrate(x, 0.1, 12, 3, resume=False, **files)
+        integrator.integrate(x, 0.1, 12, 3, resume=False, **files)
     with pytest.raises(ValueError, match="the frames of an interrupted run: continue it with its checkpoints="):
-        found.integrate(x, 0.1, 12, 3, output=files["output"])
+        integrator.integrate(x, 0.1, 12, 3, output=files["output"])
     assert left == {path: path.read_bytes() for path in tmp_path.iterdir()}
-    whole = found.integrate(x, 0.1, 12, 3, **files)
+    whole = integrator.integrate(x, 0.1, 12, 3, **files)
     with pytest.raises(ValueError, match="its run is complete, and there is nothing to resume"):
-        found.integrate(x, 0.1, 12, 3, **files)
-    assert np.array_equal(found.integrate(x, 0.1, 12, 3, resume=False, **files).x, whole.x)
+        integrator.integrate(x, 0.1, 12, 3, **files)
+    assert np.array_equal(integrator.integrate(x, 0.1, 12, 3, resume=False, **files).x, whole.x)
     assert list(tmp_path.iterdir()) == [files["output"]]
 
 
 def test_a_run_that_fails_leaves_nothing_to_go_on_with(tmp_path: Any) -> None:
-    found = solver("fput")
+    integrator = solver("fput")
     with pytest.raises(StepError):
-        found.integrate(start("fput"), 1e200, 12, 3, output=tmp_path / "frames.npy", checkpoints=tmp_path / "state")
+        integrator.integrate(
+            start("fput"), 1e200, 12, 3, output=tmp_path / "frames.npy", checkpoints=tmp_path / "state"
+        )
     assert not list(tmp_path.iterdir())
 
 
@@ -536,13 +538,13 @@ NOTHING_MOVES = {
 @pytest.mark.parametrize("kind", NOTHING_MOVES)
 def test_without_brackets_or_forces_nothing_moves(kind: str, target: str) -> None:
     spec = specs.loads(f"phigen: 1\nname: nothing\n{NOTHING_MOVES[kind]}")
-    found = phigen.compile(spec, target, tangent=True, adjoint=True)
+    solver = phigen.compile(spec, target, tangent=True, adjoint=True)
     x = np.random.default_rng(1).normal(size=(len(spec.coordinates), 4))
     more = {"bonds": [[0, 1], [1, 2]]} if "graph" in kind else {}
-    assert np.array_equal(found.integrate(x, 0.1, 3, **more).x, [x] * 4)
+    assert np.array_equal(solver.integrate(x, 0.1, 3, **more).x, [x] * 4)
     vectors = np.random.default_rng(2).normal(size=(2, *x.shape))
-    assert np.array_equal(found.step_tangent(x, 0.1, vectors, **more)[1], vectors)
-    assert np.array_equal(found.pullback(x, 0.1, 3, vectors[0], **more).x0_bar, vectors[0])
+    assert np.array_equal(solver.step_tangent(x, 0.1, vectors, **more)[1], vectors)
+    assert np.array_equal(solver.pullback(x, 0.1, 3, vectors[0], **more).x0_bar, vectors[0])
 
 
 def test_colours_of_a_graph_part_the_ends_of_all_bonds() -> None:
@@ -555,25 +557,25 @@ def test_colours_of_a_graph_part_the_ends_of_all_bonds() -> None:
 
 
 def test_an_ensemble_has_disorder_of_its_own() -> None:
-    x, found = start("dnls"), solver("dnls", target="c")
+    x, integrator = start("dnls"), solver("dnls", target="c")
     energies = np.random.default_rng(3).normal(size=(3, 7))
-    final = found.ensemble(np.stack([x] * 3), 0.1, 20, e=energies)
+    final = integrator.ensemble(np.stack([x] * 3), 0.1, 20, e=energies)
     for member in range(3):
-        assert np.array_equal(final[member], found.integrate(x, 0.1, 20, 20, e=energies[member]).x[-1])
+        assert np.array_equal(final[member], integrator.integrate(x, 0.1, 20, 20, e=energies[member]).x[-1])
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_members_of_a_lattice_have_numbers_and_steps_of_their_own(target: str) -> None:
     """All start from one state; frames are those of `integrate`."""
-    x, found = start("fput"), solver("fput", target=target)
+    x, integrator = start("fput"), solver("fput", target=target)
     h, name = np.array([0.1, 0.05, 0.02]), "a"
     strengths = np.array([0.5, 1.0, 2.0])
-    frames = found.ensemble(x, h, 10, 4, threads=2, **{name: strengths})
+    frames = integrator.ensemble(x, h, 10, 4, threads=2, **{name: strengths})
     for member in range(3):
-        alone = found.integrate(x, h[member], 10, 4, **{name: strengths[member]})
+        alone = integrator.integrate(x, h[member], 10, 4, **{name: strengths[member]})
         assert np.array_equal(frames[:, member], alone.x)
     with pytest.raises(ValueError, match="has 2 members, not 3"):
-        found.ensemble(np.stack([x] * 3), 0.1, 10, **{name: strengths[:2]})
+        integrator.ensemble(np.stack([x] * 3), 0.1, 10, **{name: strengths[:2]})
 
 
 def test_members_of_a_lattice_fail_by_themselves() -> None:
@@ -598,8 +600,12 @@ def test_a_failing_step_leaves_the_state_before_it() -> None:
 def test_a_step_whose_coefficients_are_not_finite_fails_as_one_whose_state_is_not(target: str) -> None:
     text = f"phigen: 1\nname: pushed\n{TEXTS['fput']}\nforces: {{vector: {{p: -p}}}}\norder: 4\n"
     compilation = compile_spec(specs.loads(text), adjoint=True)
-    made, x = lattice_solver_of(compilation, target), np.ones((2, 4))
-    for act in (made.integrate, lambda *run: made.pullback(*run, x), lambda *run: made.ensemble(x[None], *run[1:])):
+    solver, x = lattice_solver_of(compilation, target), np.ones((2, 4))
+    for act in (
+        solver.integrate,
+        lambda *run: solver.pullback(*run, x),
+        lambda *run: solver.ensemble(x[None], *run[1:]),
+    ):
         with pytest.raises(StepError) as failure:
             act(x, -1e10, 3)
         assert failure.value.status == "NOT_FINITE"
@@ -609,9 +615,9 @@ def test_a_start_where_h_is_not_defined_is_said_with_its_site() -> None:
     x = np.ones((1, 8))
     x[0, 5] = -1.5
     text = "lattice: {axes: [i]}\ncoordinates: [a]\nhamiltonian: a + log(a)**2\n"
-    made = compile_text(f'{text}poisson: {{brackets: {{a: {{"a[i+1]": "a*a[i+1]"}}}}}}\n')
+    compilation = compile_text(f'{text}poisson: {{brackets: {{a: {{"a[i+1]": "a*a[i+1]"}}}}}}\n')
     with pytest.raises(StepError, match=r"H is not finite at the start: at the site \(5\), where a = -1.5"):
-        lattice_solver_of(made, "numpy").integrate(x, 0.1, 2)
+        lattice_solver_of(compilation, "numpy").integrate(x, 0.1, 2)
 
 
 @pytest.mark.parametrize(
@@ -651,9 +657,9 @@ def test_odd_sizes_do_not_fit_two_colours() -> None:
 def test_colours_are_such_as_all_runs_have_sizes_for(sizes: list[int], scheme: str, step: str) -> None:
     runs = "".join(f"  r{n}: {{sizes: [{n}], initial: {{x: 1 + i/9}}, step: 0.1, steps: 1}}\n" for n in sizes)
     text = f"lattice: {{axes: [i], boundary: periodic}}\nscheme: {scheme}\ncoordinates: [x]\nhamiltonian: x\n"
-    found = compile_text(f'{text}poisson: {{brackets: {{x: {{"x[i+1]": "x*x[i+1]"}}}}}}\nruns:\n{runs}')
-    assert any(fact.endswith(step) for fact in found.program.about.facts)
-    assert {s.verdict for group in lattice_statements.sweeps(found).values() for s in group} == {PROVED}
+    compilation = compile_text(f'{text}poisson: {{brackets: {{x: {{"x[i+1]": "x*x[i+1]"}}}}}}\nruns:\n{runs}')
+    assert any(fact.endswith(step) for fact in compilation.program.about.facts)
+    assert {s.verdict for group in lattice_statements.sweeps(compilation).values() for s in group} == {PROVED}
 
 
 @pytest.mark.parametrize(
@@ -697,20 +703,20 @@ UNEVEN = '"cos(i + 2*pi*i/N_i)"'
     ],
 )
 def test_defaults_are_made_at_the_sizes_of_the_state(value: str, e: np.ndarray) -> None:
-    x, found = start("dnls"), with_default(value)
-    run = found.integrate(x, 0.1, 2)
+    x, integrator = start("dnls"), with_default(value)
+    run = integrator.integrate(x, 0.1, 2)
     np.testing.assert_allclose(run.parameters["e"], e, rtol=1e-15)
     explicit = {"e": run.parameters["e"]}
-    assert np.array_equal(run.x, found.integrate(x, 0.1, 2, **explicit).x)
-    assert np.array_equal(run.x, found.run(sizes=[7], x0=x).x) or "[" in value
-    assert found.hamiltonian(x) == found.hamiltonian(x, **explicit)
+    assert np.array_equal(run.x, integrator.integrate(x, 0.1, 2, **explicit).x)
+    assert np.array_equal(run.x, integrator.run(sizes=[7], x0=x).x) or "[" in value
+    assert integrator.hamiltonian(x) == integrator.hamiltonian(x, **explicit)
     assert np.array_equal(
-        found.ensemble(np.stack([x, -x]), 0.1, 2), found.ensemble(np.stack([x, -x]), 0.1, 2, **explicit)
+        integrator.ensemble(np.stack([x, -x]), 0.1, 2), integrator.ensemble(np.stack([x, -x]), 0.1, 2, **explicit)
     )
-    gradients = [found.pullback(x, 0.1, 2, x, **given).parameters_bar["e"] for given in ({}, explicit)]
+    gradients = [integrator.pullback(x, 0.1, 2, x, **parameters).parameters_bar["e"] for parameters in ({}, explicit)]
     assert np.array_equal(*gradients)
     with pytest.raises(TypeError, match="'e' is given twice"):
-        found.integrate(x, 0.1, 1, e=0.2, parameters={"e": 0.1})
+        integrator.integrate(x, 0.1, 1, e=0.2, parameters={"e": 0.1})
 
 
 def test_defaults_of_other_sizes_are_refused(tmp_path: Path) -> None:
@@ -725,13 +731,13 @@ def test_defaults_of_other_sizes_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", TEXTS)
 def test_methods_are_proved(name: str) -> None:
     compilation = compiled(name)
-    ((group, found),) = lattice_statements.sweeps(compilation).items()
+    ((group, sweep_statements),) = lattice_statements.sweeps(compilation).items()
     if name in SERIES:
-        assert len(found) == 7
+        assert len(sweep_statements) == 7
     else:
         assert group == statements.SPLITTING
-        assert len(found) == 1 + len(compilation.program.step.parts)
-    assert {s.verdict for s in found} == {PROVED}
+        assert len(sweep_statements) == 1 + len(compilation.program.step.parts)
+    assert {s.verdict for s in sweep_statements} == {PROVED}
 
 
 def test_a_wrong_flow_is_refuted() -> None:

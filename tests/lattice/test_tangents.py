@@ -64,12 +64,12 @@ def test_tangent_vectors_are_carried_by_the_derivative_of_a_step(name: str) -> N
     parameters = disorder(name, x)
     after, expected = jacobian(module_of(name), x, H, parameters)
     few, near = np.eye(x.size)[::5].reshape(-1, *x.shape), 1e-11 if name in REAL_ONLY else 1e-13
-    found, carried = solver(name, "numpy").step_tangent(x, H, few, parameters=parameters)
-    np.testing.assert_allclose(found, after, rtol=0, atol=1e-13)
+    after_step, carried = solver(name, "numpy").step_tangent(x, H, few, parameters=parameters)
+    np.testing.assert_allclose(after_step, after, rtol=0, atol=1e-13)
     np.testing.assert_allclose(carried.reshape(-1, x.size), expected.T[::5], rtol=0, atol=near)
     if name in IN_C:
-        found, matrix = derivative(name, "c", x, parameters)
-        np.testing.assert_allclose(found, after, rtol=0, atol=1e-13)
+        after_step, matrix = derivative(name, "c", x, parameters)
+        np.testing.assert_allclose(after_step, after, rtol=0, atol=1e-13)
         np.testing.assert_allclose(matrix, expected, rtol=0, atol=near)
         whole = expansion(name, x.shape[1:])
         moved = matrix @ poisson_at(whole, x, parameters) @ matrix.T
@@ -94,19 +94,19 @@ def test_the_derivative_is_that_of_the_ordinary_system(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["sheet", "dragged"])
 def test_steps_with_tangent_vectors_are_those_without_on_any_number_of_threads(name: str) -> None:
-    x, found = start(name, (70, 90)), solver(name, "c")
+    x, integrator = start(name, (70, 90)), solver(name, "c")
     vectors = np.random.default_rng(4).normal(size=(2, *x.shape))
 
     def made() -> np.ndarray:
-        *_, (state, carried) = found.tangents(x, 0.05, 3, vectors)
-        *_, (again, in_pieces) = found.tangents(x, 0.05, 3, vectors, 2)
+        *_, (state, carried) = integrator.tangents(x, 0.05, 3, vectors)
+        *_, (again, in_pieces) = integrator.tangents(x, 0.05, 3, vectors, 2)
         np.testing.assert_allclose(again, state, rtol=0, atol=2e-14)
         np.testing.assert_allclose(in_pieces, carried, rtol=0, atol=2e-14)
         return np.concatenate([state[None], carried])
 
     first, *others = with_threads(made)
     assert all(np.array_equal(first, other) for other in others)
-    np.testing.assert_allclose(first[0], found.integrate(x, 0.05, 3).x[-1], rtol=0, atol=2e-14)
+    np.testing.assert_allclose(first[0], integrator.integrate(x, 0.05, 3).x[-1], rtol=0, atol=2e-14)
 
 
 def test_wrong_vectors_and_solvers_without_tangents_are_told() -> None:
@@ -118,9 +118,9 @@ def test_wrong_vectors_and_solvers_without_tangents_are_told() -> None:
 
 
 def test_a_step_that_cannot_be_made_is_told() -> None:
-    x, found = np.array([[0.0, 9.0, 0.0, -9.0, 3.0]] * 2), solver("charges", "c")
+    x, integrator = np.array([[0.0, 9.0, 0.0, -9.0, 3.0]] * 2), solver("charges", "c")
     with pytest.raises(StepError):
-        found.step_tangent(np.concatenate([x, 1e200 * x]), 1e300, np.ones((1, 4, 5)))
+        integrator.step_tangent(np.concatenate([x, 1e200 * x]), 1e300, np.ones((1, 4, 5)))
 
 
 PUSHED = """\
@@ -139,14 +139,14 @@ noise: {w: {hamiltonian: T*q**2/2}}
 
 def test_tangent_vectors_go_with_time_forces_and_noise() -> None:
     """The increments of the noise belong to the step: they are the same in both targets, and for all states."""
-    found = compile_spec(specs.loads(PUSHED), tangent=True)
+    compilation = compile_spec(specs.loads(PUSHED), tangent=True)
     x, draws = start("fput", (6,)), {"t0": 0.3, "seed": 3, "step0": 5}
     vectors, h, e = np.random.default_rng(0).normal(size=(2, 2, 6)), 0.1, 1e-5
     for target in ("c", "numpy"):
-        made = lattice_solver_of(found, target)
-        ahead, behind = (made.step(x + d * vectors[0], h, **draws) for d in (e, -e))
-        after, carried = made.step_tangent(x, h, vectors, **draws)
-        np.testing.assert_allclose(after, made.step(x, h, **draws), rtol=0, atol=1e-14)
+        solver = lattice_solver_of(compilation, target)
+        ahead, behind = (solver.step(x + d * vectors[0], h, **draws) for d in (e, -e))
+        after, carried = solver.step_tangent(x, h, vectors, **draws)
+        np.testing.assert_allclose(after, solver.step(x, h, **draws), rtol=0, atol=1e-14)
         np.testing.assert_allclose(carried[0], (ahead - behind) / (2 * e), rtol=0, atol=1e-9)
 
 
@@ -206,13 +206,13 @@ NOISY = "noise: {kicks: {hamiltonian: x, amplitude: 0.3}, turns: {hamiltonian: z
     ],
 )
 def test_verification_tells_poisson_maps_to_roundoff(kind: type[LatticeSolver], text: str, short: list[str]) -> None:
-    made = compile_spec(specs.loads(text), tangent=True)
-    plain = lattice_solver_of(made, "numpy")
+    compilation = compile_spec(specs.loads(text), tangent=True)
+    plain = lattice_solver_of(compilation, "numpy")
     x = np.random.default_rng(5).normal(size=(3, 6))
     begin = Start((6,), x, {}, np.empty((0, 2), dtype=np.int64))
     seed = 2 if "noise" in text else None
     solvers = {"numpy": kind(plain.backend, plain.interface)}
-    found = verify_lattice(made, solvers, "run", begin, 0.1, 20, seed=seed)
-    failed = {c.name for c in found.checks if not c.passed}
+    verification = verify_lattice(compilation, solvers, "run", begin, 0.1, 20, seed=seed)
+    failed = {c.name for c in verification.checks if not c.passed}
     assert [s for s in ("Poisson identity", "tangent map") if any(name.startswith(s) for name in failed)] == short
-    assert any(c.name.startswith("Poisson identity on 3 sites") for c in found.checks)
+    assert any(c.name.startswith("Poisson identity on 3 sites") for c in verification.checks)

@@ -41,21 +41,21 @@ def field(x):
 
 @pytest.mark.parametrize("target", ["numpy", "c"])
 def test_a_step_is_a_poisson_map(target):
-    made, x = lattice_solver_of(film(), target), spins()
+    solver, x = lattice_solver_of(film(), target), spins()
     units = np.eye(x.size).reshape(-1, *SHAPE)
-    after, carried = made.step_tangent(x, 0.3, units)
+    after, carried = solver.step_tangent(x, 0.3, units)
     matrix = carried.reshape(x.size, x.size).T
     np.testing.assert_allclose(matrix @ brackets(x) @ matrix.T, brackets(after), rtol=0, atol=1e-14)
 
 
 def test_it_solves_the_equations_of_motion_with_order_two():
-    made, x, time = lattice_solver_of(film(), "numpy"), spins(), 0.8
+    solver, x, time = lattice_solver_of(film(), "numpy"), spins(), 0.8
     exact, h = x, time / 400
     for _ in range(400):
         a = field(exact)
         b = field(exact + h / 2 * a)
         c = field(exact + h / 2 * b)
         exact = exact + h / 6 * (a + 2 * b + 2 * c + field(exact + h * c))
-    errors = [np.abs(made.integrate(x, time / n, n).x[-1] - exact).max() for n in (8, 16, 32)]
+    errors = [np.abs(solver.integrate(x, time / n, n).x[-1] - exact).max() for n in (8, 16, 32)]
     assert errors[-1] < 1e-2
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(2, abs=0.2)

@@ -101,14 +101,14 @@ def test_energy_and_field_are_those_of_the_expansion(name: str) -> None:
 @pytest.mark.parametrize("name", TEXTS)
 def test_steps_have_their_order(name: str, order: int) -> None:
     x, values = given(name)
-    found = solver(name, order)
+    integrator = solver(name, order)
 
     def rate(t: float, y: np.ndarray) -> np.ndarray:
         return solver(name).vector_field(y.reshape(x.shape), t, parameters=values).reshape(-1)
 
     exact = solve_ivp(rate, (T0, T0 + 0.4), x.reshape(-1), "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     errors = [
-        np.abs(found.integrate(x, 0.4 / n, n, n, t0=T0, parameters=values).x[-1].reshape(-1) - exact).max()
+        np.abs(integrator.integrate(x, 0.4 / n, n, n, t0=T0, parameters=values).x[-1].reshape(-1) - exact).max()
         for n in (4, 8)
     ]
     assert np.log2(errors[0] / errors[1]) > order - 0.3
@@ -118,36 +118,38 @@ def test_steps_have_their_order(name: str, order: int) -> None:
 @pytest.mark.parametrize("name", ["driven", "melting", "coloured"])
 def test_c_makes_the_steps_of_numpy_and_goes_on_with_the_same_bits(name: str, tmp_path: Path) -> None:
     x, values = given(name)
-    found = solver(name, 4, "c")
+    integrator = solver(name, 4, "c")
     asked: dict[str, Any] = {"t0": T0, "parameters": values}
-    run = found.integrate(x, 0.05, 9, 3, **asked)
+    run = integrator.integrate(x, 0.05, 9, 3, **asked)
     np.testing.assert_allclose(run.x[-1], solver(name, 4).integrate(x, 0.05, 9, 3, **asked).x[-1], rtol=0, atol=1e-13)
     np.testing.assert_allclose(run.t, T0 + 0.05 * np.array([0, 3, 6, 9]))
-    np.testing.assert_allclose(run.energy[-1], found.hamiltonian(run.x[-1], run.t[-1], parameters=values), rtol=1e-13)
-    kept = tmp_path / "kept"
+    np.testing.assert_allclose(
+        run.energy[-1], integrator.hamiltonian(run.x[-1], run.t[-1], parameters=values), rtol=1e-13
+    )
+    checkpoint = tmp_path / "kept"
 
-    def stop(done: int) -> None:
-        if done == 6:
+    def stop(steps_done: int) -> None:
+        if steps_done == 6:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        found.integrate(x, 0.05, 9, 3, checkpoints=kept, progress=stop, **asked)
-    again = found.integrate(x, 0.05, 9, 3, checkpoints=kept, **asked)
+        integrator.integrate(x, 0.05, 9, 3, checkpoints=checkpoint, progress=stop, **asked)
+    again = integrator.integrate(x, 0.05, 9, 3, checkpoints=checkpoint, **asked)
     assert again.x.tobytes() == run.x.tobytes()
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_states_at_times_are_steps_from_the_nearest_frame_at_its_time(target: str) -> None:
     x, values = given("driven")
-    found, h, asked = solver("driven", 4, target), 0.1, {"parameters": values}
-    run, every = (found.integrate(x, h, 10, stride, t0=T0, **asked) for stride in (4, 1))
+    integrator, h, asked = solver("driven", 4, target), 0.1, {"parameters": values}
+    run, every = (integrator.integrate(x, h, 10, stride, t0=T0, **asked) for stride in (4, 1))
     times = T0 + np.array([0.0, 0.3, 0.83, 1.0, 0.57])
     states = run.at(times)
     assert states.shape == (5, *x.shape)
     np.testing.assert_allclose(states[[0, 3]], run.x[[0, -1]], rtol=0, atol=0)
     np.testing.assert_allclose(states[1], every.x[3], rtol=0, atol=1e-13)  # a step back from the frame at 0.4
-    np.testing.assert_allclose(states[2], found.step(run.x[2], 0.03, t0=T0 + 0.8, **asked), rtol=0, atol=1e-14)
-    after = found.step(found.step(run.x[1], h, t0=T0 + 0.4, **asked), 0.07, t0=T0 + 0.5, **asked)
+    np.testing.assert_allclose(states[2], integrator.step(run.x[2], 0.03, t0=T0 + 0.8, **asked), rtol=0, atol=1e-14)
+    after = integrator.step(integrator.step(run.x[1], h, t0=T0 + 0.4, **asked), 0.07, t0=T0 + 0.5, **asked)
     np.testing.assert_allclose(states[4], after, rtol=0, atol=1e-14)
     with pytest.raises(ValueError, match=r"between 0\.7 and 1\.7"):
         run.at(2.0)
@@ -169,14 +171,14 @@ def test_states_at_times_go_back_too_and_with_noise_are_frames() -> None:
 
 def test_sweeps_by_hand_know_the_time() -> None:
     x, values = given("driven")
-    found = solver("driven", 4, "c")
-    session = found.started(Beginning(x, 0.05, values, T0))
+    integrator = solver("driven", 4, "c")
+    session = integrator.started(Beginning(x, 0.05, values, T0))
     session.begin(0.05)
     for step in range(2):
         session.passed(0.05, step)
-        for stage in range(len(found.backend.stages()) - 1):
+        for stage in range(len(integrator.backend.stages()) - 1):
             session.sweep(stage, 1, 0, x.shape[1])
-    one = found.step(found.step(x, 0.05, t0=T0, parameters=values), 0.05, t0=T0 + 0.05, parameters=values)
+    one = integrator.step(integrator.step(x, 0.05, t0=T0, parameters=values), 0.05, t0=T0 + 0.05, parameters=values)
     np.testing.assert_allclose(session.state(), one, rtol=0, atol=1e-14)
 
 
@@ -196,25 +198,27 @@ def test_integrals_along_steps_are_those_of_polynomials() -> None:
     t = np.arange(12) * 0.3
     for count in (12, 3):
         power = min(count, 8) - 1
-        found, _ = integral(t[:count] ** power, 0.3)
-        np.testing.assert_allclose(found, t[:count] ** (power + 1) / (power + 1), atol=1e-12)
+        cumulative, _ = integral(t[:count] ** power, 0.3)
+        np.testing.assert_allclose(cumulative, t[:count] ** (power + 1) / (power + 1), atol=1e-12)
 
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_parts_flows_and_dated_invariants_are_proved(name: str) -> None:
-    made = compiled(name)
-    groups = lattice_statements.lattice(made.cell) | lattice_statements.sweeps(made)
+    compilation = compiled(name)
+    groups = lattice_statements.lattice(compilation.cell) | lattice_statements.sweeps(compilation)
     assert [str(s) for group in groups.values() for s in group if s.verdict != PROVED] == []
 
 
 @pytest.mark.slow
 def test_verification_judges_the_balance_of_energy() -> None:
     x, values = given("pushed")
-    made = compile_spec(compiled("pushed").spec, order=4, tangent=True)
+    compilation = compile_spec(compiled("pushed").spec, order=4, tangent=True)
     start = Start(x.shape[1:], x, values, np.empty((0, 2), dtype=np.int64))
-    found = verify_lattice(made, {"numpy": lattice_solver_of(made, "numpy")}, "run", start, 0.1, 60, t0=T0)
-    rows = {c.name: c for c in found.checks}
-    assert found.failures == []
+    verification = verify_lattice(
+        compilation, {"numpy": lattice_solver_of(compilation, "numpy")}, "run", start, 0.1, 60, t0=T0
+    )
+    rows = {c.name: c for c in verification.checks}
+    assert verification.failures == []
     assert rows["energy balance: largest error"].value < 1e-5
     assert rows["invariant F: largest error"].value < 1e-13
     assert rows["Poisson identity on 3×3 sites"].value < 1e-14
