@@ -20,5 +20,5 @@ SPECS = {
 
 @pytest.mark.parametrize("name", SPECS)
 def test_the_page_of_a_system_is_what_was_read(name):
-    kept = Path(__file__).with_name(f"{name}.tex").read_text(encoding="utf-8")
-    assert document(compile_spec(spec.loads(f"phigen: 1\nname: {name}\n{SPECS[name]}")), most=4) + "\n" == kept
+    reviewed_text = Path(__file__).with_name(f"{name}.tex").read_text(encoding="utf-8")
+    assert document(compile_spec(spec.loads(f"phigen: 1\nname: {name}\n{SPECS[name]}")), most=4) + "\n" == reviewed_text

@@ -157,9 +157,9 @@ def test_name(identifier, shown):
 )
 def test_no_name_breaks_the_markup(name):
     e = symbol(name) ** 2 + 1
-    found = ElementTree.fromstring(mathml.math("".join(mathml.pieces(e))))
-    assert {child.tag for child in found.iter()} <= {"math", "mrow", "msup", "msub", "msubsup", "mi", "mn", "mo"}
-    assert "".join(found.itertext()).find(name.split(":")[-1]) >= 0
+    element = ElementTree.fromstring(mathml.math("".join(mathml.pieces(e))))
+    assert {child.tag for child in element.iter()} <= {"math", "mrow", "msup", "msub", "msubsup", "mi", "mn", "mo"}
+    assert "".join(element.itertext()).find(name.split(":")[-1]) >= 0
 
 
 def doubled(e, times=60):
@@ -189,14 +189,14 @@ def test_readable_realisation_says_what_alpha_is(name):
     realisation = realise(system, system.spec.birealisation)
     symbols = [*system.coordinates, *realisation.covector, *system.parameter_names]
     values = {s: 0.3 + 0.1 * i for i, s in enumerate(symbols)}
-    found = named_parts.readable(realisation.alpha)
+    formulas = named_parts.readable(realisation.alpha)
     known = dict(values)
     phi = {k: (lambda v, k=k: evaluate([call(k, symbol("s"))], {"s": v})[0]) for k in ("phi0", "phi1", "phi2")}
     functions = {"φ": phi["phi0"], "φ′": phi["phi1"], "φ″": phi["phi2"]}
     plain = {s.replace("p:", "p_"): v for s, v in values.items() if s.startswith("p:")}
-    for part, e in found.parts:
+    for part, e in formulas.parts:
         known[part] = value_of(mathml.expression(e), known, functions)
-    for form, e in zip(found.forms, realisation.alpha, strict=True):
+    for form, e in zip(formulas.forms, realisation.alpha, strict=True):
         got = joined_value(mathml.pieces(form), {**plain, **known}, functions)
         assert got == pytest.approx(evaluate([e], values)[0], rel=1e-12)
 

@@ -30,8 +30,8 @@ MEANINGS = {
 
 @pytest.fixture(scope="module")
 def damped_spin():
-    given = replace(load(resources.bundled_specs() / "landau_lifshitz.yaml"), scheme="splitting")
-    return compile_spec(given)
+    specification = replace(load(resources.bundled_specs() / "landau_lifshitz.yaml"), scheme="splitting")
+    return compile_spec(specification)
 
 
 def test_long_flows_are_written_by_what_they_share(damped_spin):
@@ -45,8 +45,8 @@ def test_long_flows_are_written_by_what_they_share(damped_spin):
         known = dict(POINT)
         for name, text in lines[len(images) :]:
             known[name] = eval(text, dict(MEANINGS), known)
-        found = [eval(text, dict(MEANINGS), known) for _, text in lines[: len(images)]]
-        assert found == pytest.approx(evaluate([*images.values()], POINT | {STEP: POINT["h"]}), rel=1e-13)
+        evaluated = [eval(text, dict(MEANINGS), known) for _, text in lines[: len(images)]]
+        assert evaluated == pytest.approx(evaluate([*images.values()], POINT | {STEP: POINT["h"]}), rel=1e-13)
 
 
 def test_parts_that_only_hidden_terms_mention_are_left_out():

@@ -59,10 +59,10 @@ def test_lattices_show_themselves_as_other_systems_do():
     assert [row[:2] for row in rows[1:]] == [["start", "0"], ["end", "0.3"], ["largest change", ""]]
     assert float(rows[3][6]) < 1e-14
     assert len(trajectory.plot().axes) == 3 * 2 + 1  # diagrams with their scales, and what was conserved
-    found = trajectory.to_xarray()
-    assert dict(found.sizes) == {"t": 3, "coordinate": 3, "i": 4}
-    assert (found.x.sel(coordinate="y").values[0] == states[1]).all()
-    assert (found.casimir_C.dims, found.parameter_B.values.tolist()) == (("t", "i"), field.tolist())
+    dataset = trajectory.to_xarray()
+    assert dict(dataset.sizes) == {"t": 3, "coordinate": 3, "i": 4}
+    assert (dataset.x.sel(coordinate="y").values[0] == states[1]).all()
+    assert (dataset.casimir_C.dims, dataset.parameter_B.values.tolist()) == (("t", "i"), field.tolist())
 
 
 def test_representations_fit_on_a_line(body):

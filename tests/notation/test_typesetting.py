@@ -61,10 +61,10 @@ def plain(text):
 )
 def test_long_formulas_are_broken_and_keep_every_part(e):
     markup, room = mathml.pieces(e), 20.0
-    found = lines(markup, room)
-    assert len(found) > 2
-    assert plain("".join(found)) == plain(latex(*markup))
-    for line in found:
+    broken = lines(markup, room)
+    assert len(broken) > 2
+    assert plain("".join(broken)) == plain(latex(*markup))
+    for line in broken:
         # A letter with an index takes about an em, the sign and the spaces around it another.
         assert len(re.findall(r"x_|\\mathit|[-+]", line)) <= room
 
@@ -80,10 +80,10 @@ def test_long_formulas_are_broken_and_keep_every_part(e):
     ids=["fraction", "root", "exponential", "denominator"],
 )
 def test_what_cannot_be_broken_is_opened(e, begins):
-    found = lines([mathml.expression(e)], 20.0)
-    assert found[0].startswith(begins)
-    assert max(line.count("x_") for line in found) < 14
-    assert sum(line.count("x_") for line in found) == len(NAMES)
+    broken = lines([mathml.expression(e)], 20.0)
+    assert broken[0].startswith(begins)
+    assert max(line.count("x_") for line in broken) < 14
+    assert sum(line.count("x_") for line in broken) == len(NAMES)
 
 
 def test_estimated_widths_are_those_of_lines():
@@ -106,7 +106,7 @@ def test_fragments_compile_and_fit_the_text_of_an_article(tmp_path, size):
     head = f"\\documentclass[{size}pt]{{article}}\\usepackage{{amsmath}}\\begin{{document}}"
     (tmp_path / "a.tex").write_text(f"{head}\n{body}\n\\end{{document}}\n", encoding="utf-8")
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "a.tex"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, check=False)
+    process = subprocess.run(command, cwd=tmp_path, capture_output=True, check=False)
     log = (tmp_path / "a.log").read_text(encoding="utf-8", errors="replace")
-    assert done.returncode == 0, log[-2000:]
+    assert process.returncode == 0, log[-2000:]
     assert re.findall(r"Overfull.*", log) == []
