@@ -62,9 +62,11 @@ LINEAR = ["rigid_body", "engel_geodesics", "maxwell_bloch", "lagrange_top", "gau
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("name", slow_but(["rigid_body", "engel_geodesics", "maxwell_bloch"], LINEAR))
 def test_paths_of_a_linear_bracket_are_the_exponential(name):
-    given = spec_of(name)
-    run = "reference" if "reference" in given.runs else next(iter(given.runs))
-    exponential = compile_spec(replace(given, birealisation=BirealisationChoice("exponential"), gauge="none"), order=4)
+    specification = spec_of(name)
+    run = "reference" if "reference" in specification.runs else next(iter(specification.runs))
+    exponential = compile_spec(
+        replace(specification, birealisation=BirealisationChoice("exponential"), gauge="none"), order=4
+    )
     paths = by_paths(name, 4)
     at = numbers(paths, run)
     assert exponential.realisation.kind == "exponential"
@@ -88,9 +90,9 @@ def test_paths_of_a_linear_hamiltonian_are_the_exact_flow(name):
         system = PreciseSystem(compilation, at.parameters)
         p = [h * v for v in values(_slope(compilation), system.at(at.x))]
         end = [float(v) for v in system.path([mpmath.mpf(v) for v in at.x], p)[0]]
-    found = solver(compilation, "c").step(at.x, h=h, parameters=at.parameters)
-    assert np.max(np.abs(found - end)) < 8 * EPS
-    assert np.max(np.abs(found - at.x)) > 1e-3
+    integrator = solver(compilation, "c").step(at.x, h=h, parameters=at.parameters)
+    assert np.max(np.abs(integrator - end)) < 8 * EPS
+    assert np.max(np.abs(integrator - at.x)) > 1e-3
 
 
 def _slope(compilation):

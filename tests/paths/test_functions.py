@@ -114,8 +114,8 @@ hamiltonian: 4*x + y**2/2 + 2*z
 """
     compilation, start = compile_paths(text, 2), (0.3, 0.0, 0.2)
     image = PrecisePathStep(compilation, {}, STEP)(start)
-    found = solver(compilation, target).step(start, h=STEP)
-    assert max(abs(a - b) for a, b in zip(found, image, strict=True)) <= 2 * EPS
+    integrator = solver(compilation, target).step(start, h=STEP)
+    assert max(abs(a - b) for a, b in zip(integrator, image, strict=True)) <= 2 * EPS
 
 
 @pytest.mark.thin(2)

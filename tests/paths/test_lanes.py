@@ -52,11 +52,11 @@ def test_steps_and_failures_of_blocks_are_those_of_single_steps(name):
     assert isinstance(in_lanes(compilation.program), Blocks)
     for k in (0, 5):
         begin = np.add(start, k * np.array(apart))
-        x, made, status = alone(compilation, begin, h, steps)
+        x, steps_made, status = alone(compilation, begin, h, steps)
         raw = RawC(compilation)
         raw.init(begin)
         assert raw.integrate(h, steps) == status
-        assert raw.counters[0] == made
+        assert raw.counters[0] == steps_made
         np.testing.assert_allclose(raw.x, x, rtol=1e-12, atol=1e-13)
 
 
