@@ -62,10 +62,12 @@ def verdicts(compilation, terms):
 
 
 def expect_equal(compilation, terms):
-    found = list(compare(compilation, terms))
-    assert [c.statement.verdict for c in found] == [PROVED] * len(found), [str(c.statement) for c in found]
-    assert [c.term for c in found if c.term] == [*range(1, terms + 1)]
-    others = {c.statement.name.split()[0] for c in found if not c.term}
+    agreements = list(compare(compilation, terms))
+    assert [c.statement.verdict for c in agreements] == [PROVED] * len(agreements), [
+        str(c.statement) for c in agreements
+    ]
+    assert [c.term for c in agreements if c.term] == [*range(1, terms + 1)]
+    others = {c.statement.name.split()[0] for c in agreements if not c.term}
     assert ("∇S_h" in others) == (compilation.scheme.terms <= terms)
     assert bool(others & {"α", "axioms"}) != compilation.realisation.path
 
@@ -122,11 +124,11 @@ def test_a_wrong_factor_in_the_recursion_is_refuted(monkeypatch):
     monkeypatch.setattr(hamilton_jacobi, "Fraction", lambda a, b: Fraction(a, max(b - 1, 1)))
     euler = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 + sin(q)\n"
     assert verdicts(compile_anew(euler + "birealisation: canonical-euler\n"), 3)["S_2"] == REFUTED
-    found = list(compare(compile_anew(BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: exponential\n"), 3))
-    assert [c.statement.verdict for c in found] == [PROVED, PROVED, REFUTED, REFUTED, PROVED]
-    assert ", not " in found[2].statement.detail
-    assert "x**" in found[2].statement.residual
-    assert found[3].statement.name == "∇S_h"
+    agreements = list(compare(compile_anew(BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: exponential\n"), 3))
+    assert [c.statement.verdict for c in agreements] == [PROVED, PROVED, REFUTED, REFUTED, PROVED]
+    assert ", not " in agreements[2].statement.detail
+    assert "x**" in agreements[2].statement.residual
+    assert agreements[3].statement.name == "∇S_h"
 
 
 def test_a_wrong_series_of_paths_is_refuted(monkeypatch):
@@ -149,9 +151,9 @@ class Misprinted:
         self._added = bracket * (Fraction(1, 6) - Fraction(1, 4))
 
     def polynomial(self, terms):
-        found = self._true.polynomial(terms)
-        added = [found.tower.convert(self._added) if i == 3 else found.tower.zero for i in range(terms)]
-        return replace(found, terms=tuple(s + a for s, a in zip(found.terms, added, strict=True)))
+        polynomial = self._true.polynomial(terms)
+        added = [polynomial.tower.convert(self._added) if i == 3 else polynomial.tower.zero for i in range(terms)]
+        return replace(polynomial, terms=tuple(s + a for s, a in zip(polynomial.terms, added, strict=True)))
 
 
 def test_the_misprint_of_the_paper_is_refuted():
@@ -215,8 +217,8 @@ def test_a_wrong_sign_in_the_program_is_refuted(text, form):
         return rebuild(node, args)
 
     wrong = replace(generating, slope=tuple(fold(generating.slope, visit)))
-    found = verdicts(replace(compilation, scheme=replace(compilation.scheme, generating=wrong)), 3)
-    assert [k for k, verdict in found.items() if verdict == REFUTED] == ["∇S_h"]
+    verdict_of = verdicts(replace(compilation, scheme=replace(compilation.scheme, generating=wrong)), 3)
+    assert [k for k, verdict in verdict_of.items() if verdict == REFUTED] == ["∇S_h"]
 
 
 # -- verdicts and limits
@@ -236,9 +238,9 @@ u, v = sympy.symbols("u v", real=True)
     ],
 )
 def test_verdicts(left, right, verdict):
-    found = decide("equality", [("", left, right)], [], "")
-    assert found.verdict == verdict
-    assert bool(found.residual) == (verdict == REFUTED)
+    statement = decide("equality", [("", left, right)], [], "")
+    assert statement.verdict == verdict
+    assert bool(statement.residual) == (verdict == REFUTED)
 
 
 def test_positive_symbols_stay_positive():
@@ -249,18 +251,18 @@ def test_positive_symbols_stay_positive():
 
 def test_the_time_is_kept_and_what_was_compared_is_said():
     """A machine that others use too gets more time for two terms."""
-    found, seconds = [], 0.5
-    while len(found) < 2:
-        found, seconds = [], 2 * seconds
+    agreements, seconds = [], 0.5
+    while len(agreements) < 2:
+        agreements, seconds = [], 2 * seconds
         with (
             processor_seconds_below(10 * seconds),
             pytest.raises(
                 LimitError, match=r"S_\d+ was not derived a second time: the time limit was reached; "
             ) as raised,
         ):
-            found.extend(compare(compiled("rigid_body"), 16, seconds=seconds))
+            agreements.extend(compare(compiled("rigid_body"), 16, seconds=seconds))
     assert re.search(r"S_1 … S_\d+ were compared", str(raised.value))
-    assert {c.statement.verdict for c in found} == {PROVED}
+    assert {c.statement.verdict for c in agreements} == {PROVED}
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
