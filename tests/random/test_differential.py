@@ -43,8 +43,8 @@ def test_everything_holds_for_a_random_system(kind, seed):
 def test_a_wrong_gradient_is_found_in_a_small_system(monkeypatch):
     right = Solver.pullback
 
-    def wrong(self, *given, **more):
-        x1, x0_bar, parameters_bar = right(self, *given, **more)
+    def wrong(self, *arguments, **more):
+        x1, x0_bar, parameters_bar = right(self, *arguments, **more)
         return Pullback(x1, x0_bar * (1 + 1e-6), parameters_bar)
 
     monkeypatch.setattr(Solver, "pullback", wrong)

@@ -30,17 +30,17 @@ Path_ = tuple[Any, ...]
 
 def accepted(base: str, seed: int) -> list[tuple[Path_, str, str]]:
     """Mutants that are specs: the place, the value, and the spec."""
-    tree, found = tree_of(BASES[base]), []
+    tree, accepted_changes = tree_of(BASES[base]), []
     for path, value in mutants(base, random.Random(f"{base} {seed}"), SAMPLE):
-        if path[0] in TEXTS or path[-1] == "description" or len(found) == MOST_RUNS:
+        if path[0] in TEXTS or path[-1] == "description" or len(accepted_changes) == MOST_RUNS:
             continue
         text = document(replaced(tree, path, value))
         try:
             loads(text)
         except SpecError:
             continue
-        found.append((path, value, text))
-    return found
+        accepted_changes.append((path, value, text))
+    return accepted_changes
 
 
 def complaint(path: Path_, text: str) -> str:

@@ -50,11 +50,11 @@ def scale_of(kind, seed):
 
 @pytest.mark.parametrize(("kind", "seed"), DRAWS)
 def test_mathematics_is_proved(kind, seed):
-    found = examine(spec.loads(f"phigen: 1\nname: t\n{draw(kind, seed).text}"), order=4)
-    assert found.obstacle is None
-    jacobi = [s for s in found.statements if s.name.startswith("Jacobi")]
+    examination = examine(spec.loads(f"phigen: 1\nname: t\n{draw(kind, seed).text}"), order=4)
+    assert examination.obstacle is None
+    jacobi = [s for s in examination.statements if s.name.startswith("Jacobi")]
     assert [s.verdict for s in jacobi] == [PROVED]
-    for statement in found.statements:
+    for statement in examination.statements:
         assert statement.verdict == PROVED or (statement.verdict == CHECKED and "rank" in statement.name), statement
 
 
