@@ -242,8 +242,8 @@ def broken(realisation):
 def test_what_the_symmetry_gives_is_not_multiplied_out_again():
     s = family("so", 4)
     realisation = realise(s, BirealisationChoice("cayley"))
-    found = check(s, realisation)
-    assert (found[BETA].verdict, found[BETA].detail) == (PROVED, "as for α, by β(x, p) = α(x, −p)")
+    statements = check(s, realisation)
+    assert (statements[BETA].verdict, statements[BETA].detail) == (PROVED, "as for α, by β(x, p) = α(x, −p)")
     assert verdicts(check(s, broken(realisation))[ALPHA:FORMS]) == [REFUTED] * 3
     wrong = replace(realisation, beta=tuple(realisation.alpha))  # whatever it says of itself
     assert verdicts(check(s, wrong)[ALPHA:FORMS]) == [PROVED, REFUTED, REFUTED]
@@ -253,9 +253,9 @@ def test_large_bi_realisations_are_checked_at_points(monkeypatch):
     monkeypatch.setattr(limits, "PROOF_PRODUCTS", 0)
     s = family("so", 4)
     realisation = realise(s, BirealisationChoice("cayley"))
-    found = check(s, realisation)
-    assert verdicts(found) == [PROVED, CHECKED, CHECKED, CHECKED, PROVED]
-    assert found[ALPHA].detail.startswith("3 points, exactly")
+    statements = check(s, realisation)
+    assert verdicts(statements) == [PROVED, CHECKED, CHECKED, CHECKED, PROVED]
+    assert statements[ALPHA].detail.startswith("3 points, exactly")
     assert verdicts(check(s, broken(realisation))[ALPHA:FORMS]) == [REFUTED] * 3
     assert verdicts(check(s, replace(realisation, beta=realisation.alpha))[ALPHA:FORMS]) == [CHECKED, REFUTED, REFUTED]
     exponential = family("so", 3)  # α is not rational
@@ -265,9 +265,9 @@ def test_large_bi_realisations_are_checked_at_points(monkeypatch):
 def test_a_path_whose_series_is_too_large_to_expand_is_undecided_and_not_refused(monkeypatch):
     s = system("x y z", "{nambu: [x**2*y + exp(z)]}", "x**2 + y*z")
     monkeypatch.setattr(budgets, "TAYLOR_BYTES", 1000)
-    found = check(s, realise(s))
-    assert verdicts(found[ALPHA:FORMS]) == [UNDECIDED] * 3
+    statements = check(s, realise(s))
+    assert verdicts(statements[ALPHA:FORMS]) == [UNDECIDED] * 3
     assert (
-        found[ALPHA].detail
+        statements[ALPHA].detail
         == "too many terms to expand; steps follow the exact path, for which Karasev's theorem is the proof"
     )

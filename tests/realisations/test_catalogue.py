@@ -27,12 +27,12 @@ from phigen.symbolic.symbols import momentum
     ],
 )
 def test_auto_picks_by_shape_and_explains(coordinates, poisson, kind):
-    found = realise(system(coordinates, poisson))
-    assert found.kind == kind
-    assert found.explanation.startswith(f"auto picked {kind}, since π is ")
-    assert found.exact
-    assert found.symmetric
-    assert found.reference
+    realisation = realise(system(coordinates, poisson))
+    assert realisation.kind == kind
+    assert realisation.explanation.startswith(f"auto picked {kind}, since π is ")
+    assert realisation.exact
+    assert realisation.symmetric
+    assert realisation.reference
 
 
 def test_refusals_carry_the_place_in_the_spec():
@@ -77,17 +77,17 @@ def test_custom_maps_of_the_wrong_size_or_with_unknown_symbols_are_refused():
 def test_custom_differences_do_not_cancel():
     x, y, p, r = (symbol(n) for n in ("x", "y", momentum("x"), momentum("y")))
     s = system("x y", "{brackets: {x: {y: 1}}}")
-    found = realise(s, BirealisationChoice("custom", (x + r, ONE * y), (x, y - p)))
-    assert [str(d) for d in found.displacement] == ["p:y", "0"]
-    assert [str(d) for d in found.increment] == ["-p:y", "-p:x"]
-    assert not found.symmetric
+    realisation = realise(s, BirealisationChoice("custom", (x + r, ONE * y), (x, y - p)))
+    assert [str(d) for d in realisation.displacement] == ["p:y", "0"]
+    assert [str(d) for d in realisation.increment] == ["-p:y", "-p:x"]
+    assert not realisation.symmetric
 
 
 def test_constant_displacement_and_increment():
-    found = realise(system("q p", "{canonical: {q: [q], p: [p]}}"))
-    assert [str(d) for d in found.displacement] == ["(-1/2)*p:p", "1/2*p:q"]
-    assert [str(d) for d in found.increment] == ["p:p", "-p:q"]
-    assert found.covector == (momentum("q"), momentum("p"))
+    realisation = realise(system("q p", "{canonical: {q: [q], p: [p]}}"))
+    assert [str(d) for d in realisation.displacement] == ["(-1/2)*p:p", "1/2*p:q"]
+    assert [str(d) for d in realisation.increment] == ["p:p", "-p:q"]
+    assert realisation.covector == (momentum("q"), momentum("p"))
 
 
 @pytest.mark.slow

@@ -31,10 +31,10 @@ def verdicts(s, realisation):
 @pytest.mark.parametrize(("name", "size"), NAMED)
 def test_axioms_are_proved_for_the_named_algebras(name, size, sign):
     s = typed(family(name, size, sign))
-    found = realise(s, EXPONENTIAL)
-    assert found.symmetric
-    assert not found.path
-    assert verdicts(s, found) == [PROVED] * 5
+    realisation = realise(s, EXPONENTIAL)
+    assert realisation.symmetric
+    assert not realisation.path
+    assert verdicts(s, realisation) == [PROVED] * 5
 
 
 @pytest.mark.parametrize(
@@ -55,20 +55,20 @@ def test_axioms_are_proved_for_the_named_algebras(name, size, sign):
 )
 def test_closed_forms_are_found_with_parameters_and_cocycles(coordinates, brackets, form):
     s = system(coordinates, f"{{brackets: {brackets}}}", extra="parameters: {a: 1, b: 2, c: 3}")
-    found = realise(s)
-    assert found.kind == "exponential"
-    assert form in found.explanation
-    assert verdicts(s, found) == [PROVED] * 5
+    realisation = realise(s)
+    assert realisation.kind == "exponential"
+    assert form in realisation.explanation
+    assert verdicts(s, realisation) == [PROVED] * 5
     assert verdicts(s, realise(s, EXPONENTIAL)) == [PROVED] * 5
 
 
 @pytest.mark.parametrize(("name", "size"), NAMED)
 def test_increment_is_the_hamiltonian_vector_field_of_the_covector(name, size):
     s = family(name, size)
-    found = realise(s, EXPONENTIAL)
-    momenta = [symbol(n) for n in found.covector]
+    realisation = realise(s, EXPONENTIAL)
+    momenta = [symbol(n) for n in realisation.covector]
     expected = hamiltonian_vector_field(s.poisson, momenta)
-    assert all((a - b).is_zero for a, b in zip(found.increment, expected, strict=True))
+    assert all((a - b).is_zero for a, b in zip(realisation.increment, expected, strict=True))
 
 
 def test_so3_is_the_formula_of_the_mathematics_page():
@@ -88,9 +88,9 @@ def test_so3_is_the_formula_of_the_mathematics_page():
 
 
 def test_so4_is_split_into_its_ideals_over_the_rationals():
-    found = realise(family("so", 4), EXPONENTIAL)
-    assert "φ(s)" in found.explanation
-    assert "phi1" not in str(found.alpha)
+    realisation = realise(family("so", 4), EXPONENTIAL)
+    assert "φ(s)" in realisation.explanation
+    assert "phi1" not in str(realisation.alpha)
 
 
 @pytest.mark.parametrize(("name", "size"), [("so", 3), ("sl", 2), ("se", 3), ("so", 4), ("aff", 1)])
@@ -131,16 +131,16 @@ def test_cayley_and_exponential_are_different_realisations_of_one_tensor():
     s = family("so", 3, -1)
     energy = total(symbol(c) ** 2 * number(Fraction(1, i + 2)) for i, c in enumerate(s.coordinates))
     s = replace(s, hamiltonian=energy)
-    found = []
+    expansions = []
     for choice in (CAYLEY, EXPONENTIAL):
         realisation = realise(s, choice)
         assert verdicts(s, realisation) == [PROVED] * 5
         series = series_of(s, realisation, 4)
         assert series.tower.is_zero(series.terms[1])
         assert series.tower.is_zero(series.terms[3])
-        found.append(series.tower.expression(series.terms[2]))
+        expansions.append(series.tower.expression(series.terms[2]))
     # Both vanish with H constant on orbits, but neither S_3 nor its vector field is the other's.
-    fields = [hamiltonian_vector_field(s.poisson, gradient(e, s.coordinates)) for e in found]
+    fields = [hamiltonian_vector_field(s.poisson, gradient(e, s.coordinates)) for e in expansions]
     residuals = [("", a - b) for a, b in zip(*fields, strict=True)]
     assert decide_zero("the same S_3", residuals).verdict == REFUTED
 
@@ -148,14 +148,14 @@ def test_cayley_and_exponential_are_different_realisations_of_one_tensor():
 @pytest.mark.parametrize("factor", [-1, 2])
 def test_a_wrong_quadratic_term_is_refuted(factor):
     s = family("so", 3)
-    found = realise(s, EXPONENTIAL)
+    realisation = realise(s, EXPONENTIAL)
     half = number(Fraction(1, 2))
-    curvature = [d + half * m for d, m in zip(found.displacement, found.increment, strict=True)]
+    curvature = [d + half * m for d, m in zip(realisation.displacement, realisation.increment, strict=True)]
     wrong = replace(
-        found,
-        alpha=tuple(a + (factor - 1) * c for a, c in zip(found.alpha, curvature, strict=True)),
-        beta=tuple(b + (factor - 1) * c for b, c in zip(found.beta, curvature, strict=True)),
-        displacement=tuple(d + (factor - 1) * c for d, c in zip(found.displacement, curvature, strict=True)),
+        realisation,
+        alpha=tuple(a + (factor - 1) * c for a, c in zip(realisation.alpha, curvature, strict=True)),
+        beta=tuple(b + (factor - 1) * c for b, c in zip(realisation.beta, curvature, strict=True)),
+        displacement=tuple(d + (factor - 1) * c for d, c in zip(realisation.displacement, curvature, strict=True)),
     )
     assert verdicts(s, wrong)[1:4] == [REFUTED] * 3
 
@@ -169,9 +169,9 @@ def test_a_nonlinear_tensor_is_refused():
 def test_without_a_closed_form_the_path_is_followed(name, size):
     s = family(name, size)
     assert exponential.closed_form(s) is None
-    found = realise(s, EXPONENTIAL)
-    assert found.path
-    assert found.kind == "exponential"
+    realisation = realise(s, EXPONENTIAL)
+    assert realisation.path
+    assert realisation.kind == "exponential"
 
 
 def test_auto_says_why_it_prefers_what():
@@ -183,7 +183,7 @@ def test_auto_says_why_it_prefers_what():
 
 def test_blocks_stay_apart():
     s = system("x y z u v w", "{brackets: {x: {y: -z, z: y}, y: {z: -x}, u: {v: w}}}")
-    found = realise(s)
-    for d in found.displacement[:3]:
+    realisation = realise(s)
+    for d in realisation.displacement[:3]:
         assert set(symbols_of(d)) <= {*"xyz", momentum("x"), momentum("y"), momentum("z")}
-    assert found.displacement[5].is_zero
+    assert realisation.displacement[5].is_zero

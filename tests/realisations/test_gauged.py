@@ -36,19 +36,19 @@ def tensor(coordinates, brackets):
 )
 def test_axioms_are_proved(coordinates, brackets):
     s = tensor(coordinates, brackets)
-    found = realise(s)
-    assert found.kind == "gauged"
-    assert found.symmetric
-    assert found.explanation.startswith("auto picked gauged, since π is constant in other coordinates")
-    assert [statement.verdict for statement in check(s, found)] == [PROVED] * 5
+    realisation = realise(s)
+    assert realisation.kind == "gauged"
+    assert realisation.symmetric
+    assert realisation.explanation.startswith("auto picked gauged, since π is constant in other coordinates")
+    assert [statement.verdict for statement in check(s, realisation)] == [PROVED] * 5
 
 
 @pytest.mark.parametrize("brackets", ["{x: {y: 2*exp(3*x)*y}}", "{x: {y: sqrt(x)*y**2}}"])
 def test_other_factors_hold_at_least_numerically(brackets):
     s = tensor("x y", brackets)
-    found = realise(s)
-    assert found.kind == "gauged"
-    assert {statement.verdict for statement in check(s, found)} <= {PROVED, CHECKED}
+    realisation = realise(s)
+    assert realisation.kind == "gauged"
+    assert {statement.verdict for statement in check(s, realisation)} <= {PROVED, CHECKED}
 
 
 def test_a_log_canonical_tensor_gives_the_log_canonical_maps():
@@ -64,7 +64,7 @@ def test_a_log_canonical_tensor_gives_the_log_canonical_maps():
 def test_the_displacement_is_the_flow_of_the_factor(factor):
     # β_x = x moved along ẋ = g(x) for the time ½u_x, u_x = p_y with {x, y} = g(x): by RK4 with small steps.
     s = tensor("x y", f"{{x: {{y: '{factor}'}}}}")
-    found = realise(s, GAUGED)
+    realisation = realise(s, GAUGED)
     start = {"x": 0.7, "y": 0.0, momentum("x"): 0.0, momentum("y"): 0.3, "a": 1.0, "b": 2.0, "c": 3.0}
     g = s.poisson[0][1]
 
@@ -77,29 +77,29 @@ def test_the_displacement_is_the_flow_of_the_factor(factor):
         k2 = slope(x + h / 2 * k1)
         k3 = slope(x + h / 2 * k2)
         x += h / 6 * (k1 + 2 * k2 + 2 * k3 + slope(x + h * k3))
-    assert evaluate([found.beta[0]], start)[0] == pytest.approx(x, rel=1e-12)
+    assert evaluate([realisation.beta[0]], start)[0] == pytest.approx(x, rel=1e-12)
 
 
 def test_small_momenta_lose_no_digits():
     s = tensor("x y", "{x: {y: x**2 + b*x + a}}")
-    found = realise(s)
+    realisation = realise(s)
     for size in (1e-3, 1e-9, 1e-15):
         point = {"x": 0.7, "y": 1.0, momentum("x"): 0.0, momentum("y"): size, "a": 1.0, "b": 2.0}
-        assert evaluate([found.increment[0]], point)[0] == pytest.approx(size * 2.89, rel=2 * size + 1e-15)
+        assert evaluate([realisation.increment[0]], point)[0] == pytest.approx(size * 2.89, rel=2 * size + 1e-15)
 
 
 def test_factors_are_found_up_to_constants():
     s = tensor("x y z", "{x: {y: 2*a*(x+1)*y, z: b*(x+1)}, y: {z: -y}}")
-    found = separated(s.coordinates, s.poisson)
-    assert [str(g) for g in found.factors] == ["1 + x", "y", "1"]
-    assert [str(e) for e in found.matrix[0]] == ["0", "2*a", "b"]
+    factors = separated(s.coordinates, s.poisson)
+    assert [str(g) for g in factors.factors] == ["1 + x", "y", "1"]
+    assert [str(e) for e in factors.matrix[0]] == ["0", "2*a", "b"]
 
 
 def test_factors_that_are_constant_by_an_identity_are_constants():
     s = tensor("x y z", "{x: {y: exp(x)*(1 + sin(y)**2 + cos(y)**2), z: a*exp(x)*(cosh(x)**2 - sinh(x)**2)}}")
-    found = separated(s.coordinates, s.poisson)
-    assert [str(g) for g in found.factors] == ["exp(x)", "1", "1"]
-    assert [str(e) for e in found.matrix[0]] == ["0", "2", "a"]
+    factors = separated(s.coordinates, s.poisson)
+    assert [str(g) for g in factors.factors] == ["exp(x)", "1", "1"]
+    assert [str(e) for e in factors.matrix[0]] == ["0", "2", "a"]
     assert realise(s).kind == "gauged"
 
 

@@ -38,8 +38,8 @@ def of_text(algebra, tau, coordinates="x, y, z"):
 @pytest.mark.parametrize(("name", "size"), [("so", 3), ("sl", 2), ("se", 2), ("se", 3), ("aff", 1), ("heisenberg", 1)])
 def test_the_cayley_transform_is_the_kind_cayley(name, size):
     s = family(name, size, -1)
-    found, expected = realise(s, mapped(CAYLEY)), realise(s, BirealisationChoice("cayley"))
-    pairs = zip((*found.alpha, *found.beta), (*expected.alpha, *expected.beta), strict=True)
+    realisation, expected = realise(s, mapped(CAYLEY)), realise(s, BirealisationChoice("cayley"))
+    pairs = zip((*realisation.alpha, *realisation.beta), (*expected.alpha, *expected.beta), strict=True)
     assert decide_zero("τ = Cayley", [("", a - b) for a, b in pairs]).verdict == PROVED
 
 
@@ -51,32 +51,32 @@ def test_the_cayley_transform_is_the_kind_cayley(name, size):
 )
 def test_other_symmetric_maps_are_proved(name, size, tau):
     s = family(name, size)
-    found = realise(s, mapped(tau))
-    assert found.symmetric
-    assert [statement.verdict for statement in check(s, found)] == [PROVED] * 5
+    realisation = realise(s, mapped(tau))
+    assert realisation.symmetric
+    assert [statement.verdict for statement in check(s, realisation)] == [PROVED] * 5
 
 
 @pytest.mark.parametrize("tau", [1 + P, 1 / (1 - P)])
 def test_one_sided_maps_are_proved_and_not_symmetric(tau):
     s = family("heisenberg", 1)
-    found = realise(s, mapped(tau))
-    assert not found.symmetric
-    assert "S_1 … S_k" in found.explanation
-    assert [statement.verdict for statement in check(s, found)] == [PROVED] * 5
+    realisation = realise(s, mapped(tau))
+    assert not realisation.symmetric
+    assert "S_1 … S_k" in realisation.explanation
+    assert [statement.verdict for statement in check(s, realisation)] == [PROVED] * 5
 
 
 def test_entries_may_be_given_one_by_one():
     # canonical coordinates of the second kind on the affine group: τ = exp(p_y b) exp(p_x a)
-    s, found = of_text("{name: aff(1)}", "[[exp(p_x), p_y], [0, 1]]", "x, y")
-    assert [statement.verdict for statement in check(s, found)] == [PROVED] * 5
-    assert not found.symmetric
+    s, realisation = of_text("{name: aff(1)}", "[[exp(p_x), p_y], [0, 1]]", "x, y")
+    assert [statement.verdict for statement in check(s, realisation)] == [PROVED] * 5
+    assert not realisation.symmetric
 
 
 def test_given_matrices_are_used_with_parameters():
     algebra = "{matrices: [[[0,a,0],[0,0,0],[0,0,0]], [[0,0,0],[0,0,1],[0,0,0]], [[0,0,1],[0,0,0],[0,0,0]]]}"
-    s, found = of_text(algebra, "1 + P + P**2/2")
-    assert found.symmetric
-    assert [statement.verdict for statement in check(s, found)] == [PROVED] * 5
+    s, realisation = of_text(algebra, "1 + P + P**2/2")
+    assert realisation.symmetric
+    assert [statement.verdict for statement in check(s, realisation)] == [PROVED] * 5
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,10 @@ PRODUCT = BirealisationChoice("product")
 SPIN = "x: {y: -z, z: y}, y: {z: -x}"
 
 
-def kinds_by_block(found):
-    return [part.split(": ")[1].split(",")[0] for part in found.explanation.split("block by block: ")[1].split("; (")]
+def kinds_by_block(realisation):
+    return [
+        part.split(": ")[1].split(",")[0] for part in realisation.explanation.split("block by block: ")[1].split("; (")
+    ]
 
 
 @pytest.mark.parametrize(
@@ -33,15 +35,15 @@ def kinds_by_block(found):
 )  # fmt: skip
 def test_blocks_are_found_and_proved(coordinates, brackets, kinds):
     s = system(coordinates, f"{{brackets: {brackets}}}")
-    found = realise(s)
-    assert found.kind == "product"
-    assert found.symmetric
-    assert kinds_by_block(found) == kinds
-    assert [statement.verdict for statement in check(s, found)] == [PROVED] * 5
+    realisation = realise(s)
+    assert realisation.kind == "product"
+    assert realisation.symmetric
+    assert kinds_by_block(realisation) == kinds
+    assert [statement.verdict for statement in check(s, realisation)] == [PROVED] * 5
     for indices in blocks(s.coordinates, s.poisson):
-        own = {s.coordinates[i] for i in indices}
+        block_names = {s.coordinates[i] for i in indices}
         for i in indices:
-            assert set(symbols_of(found.displacement[i])) <= own | {momentum(c) for c in own}
+            assert set(symbols_of(realisation.displacement[i])) <= block_names | {momentum(c) for c in block_names}
 
 
 def test_blocks_follow_brackets_and_what_they_depend_on():
@@ -87,9 +89,9 @@ def test_the_form_of_a_block_keeps_its_matrices():
 
 def test_the_kind_of_the_blocks_can_be_chosen():
     s = system("x y z a b c", f"{{brackets: {{{SPIN}, a: {{b: c}}}}}}")
-    found = realise(s, BirealisationChoice("product", of="cayley"))
-    assert kinds_by_block(found) == ["cayley", "cayley"]
-    assert [statement.verdict for statement in check(s, found)] == [PROVED] * 5
+    realisation = realise(s, BirealisationChoice("product", of="cayley"))
+    assert kinds_by_block(realisation) == ["cayley", "cayley"]
+    assert [statement.verdict for statement in check(s, realisation)] == [PROVED] * 5
 
 
 def test_a_block_without_closed_form_makes_the_whole_follow_paths():

@@ -39,29 +39,29 @@ def pulled(of, mapping, inverse="", coordinates="x y z"):
 def test_axioms_are_proved(of, mapping):
     s = pulled(of, mapping)
     assert {statement.verdict for statement in check_structure(s)[:-1]} == {PROVED}
-    found = realise(s, PULLBACK)
-    assert found.kind == "pullback"
-    assert found.symmetric
-    assert [statement.verdict for statement in axioms.check(s, found)] == [PROVED] * 5
+    realisation = realise(s, PULLBACK)
+    assert realisation.kind == "pullback"
+    assert realisation.symmetric
+    assert [statement.verdict for statement in axioms.check(s, realisation)] == [PROVED] * 5
 
 
 def test_proofs_in_the_other_coordinates_agree_with_direct_ones():
     s = pulled("{matrix: [[0, w, 0], [-w, 0, 0], [0, 0, 0]]}", "{u: x, v: y + x**2, w: z - x}")
-    found = realise(s, PULLBACK)
-    statements = axioms.check(s, found)
+    realisation = realise(s, PULLBACK)
+    statements = axioms.check(s, realisation)
     assert all("in the coordinates u, v, w" in statement.detail for statement in statements[1:4])
-    direct = axioms.check(s, replace(found, inner=None))
+    direct = axioms.check(s, replace(realisation, inner=None))
     assert [statement.verdict for statement in direct] == [PROVED] * 5
     assert not any("coordinates u" in statement.detail for statement in direct)
 
 
 def test_maps_that_are_not_the_pull_back_are_refuted():
     s = pulled(SO3, "{u: x, v: y + x, w: z}")
-    found = realise(s, PULLBACK)
-    wrong = replace(found, alpha=found.beta, beta=found.alpha)
+    realisation = realise(s, PULLBACK)
+    wrong = replace(realisation, alpha=realisation.beta, beta=realisation.alpha)
     assert REFUTED in [statement.verdict for statement in axioms.check(s, wrong)]
     other = replace(s, poisson=tuple(tuple(2 * e for e in row) for row in s.poisson))
-    assert REFUTED in [statement.verdict for statement in axioms.check(other, found)]
+    assert REFUTED in [statement.verdict for statement in axioms.check(other, realisation)]
 
 
 @pytest.mark.parametrize(
@@ -100,15 +100,15 @@ def test_a_singular_map_is_refused():
 
 
 def test_the_inner_kind_can_be_chosen():
-    found = realise(pulled(SO3, "{u: x, v: y + x**2, w: z}"), BirealisationChoice("pullback", of="cayley"))
-    assert "Cayley" in found.explanation
+    realisation = realise(pulled(SO3, "{u: x, v: y + x**2, w: z}"), BirealisationChoice("pullback", of="cayley"))
+    assert "Cayley" in realisation.explanation
 
 
 def test_auto_recognises_what_the_pull_back_is():
     # An orthogonal change of basis of so(3) is linear again: no pull-back is needed.
     assert realise(pulled(SO3, "{u: y, v: z, w: x}")).kind == "exponential"
-    found = realise(pulled(SO3, "{u: x, v: y + x**2, w: z}"))
-    assert found.explanation.startswith("auto picked pullback, since π is given in the coordinates u, v, w")
+    realisation = realise(pulled(SO3, "{u: x, v: y + x**2, w: z}"))
+    assert realisation.explanation.startswith("auto picked pullback, since π is given in the coordinates u, v, w")
 
 
 def test_casimirs_are_pulled_back():

@@ -91,11 +91,11 @@ def test_symplectic_example_flow_form_and_psi():
 
 
 def test_symplectic_example_is_what_the_kind_builds():
-    found = realise(system("q p", "{canonical: {q: [q], p: [p]}}"), BirealisationChoice("spray"))
-    assert found.exact
-    assert found.symmetric
-    assert same(found.alpha, [Q - HALF * B, P + HALF * A])
-    assert same(found.beta, [Q + HALF * B, P - HALF * A])
+    realisation = realise(system("q p", "{canonical: {q: [q], p: [p]}}"), BirealisationChoice("spray"))
+    assert realisation.exact
+    assert realisation.symmetric
+    assert same(realisation.alpha, [Q - HALF * B, P + HALF * A])
+    assert same(realisation.beta, [Q + HALF * B, P - HALF * A])
 
 
 def test_the_form_printed_in_the_paper_is_not_straightened_by_its_psi():
@@ -196,35 +196,35 @@ def test_the_printed_signs_belong_to_the_opposite_tensor():
 )
 def test_flat_spray_of_a_constant_tensor_is_the_constant_realisation(coordinates, poisson, parameters):
     s = system(coordinates, poisson, extra=parameters)
-    found, other = realise(s, BirealisationChoice("spray")), realise(s, BirealisationChoice("constant"))
-    assert (found.exact, found.symmetric, found.degree) == (True, True, None)
-    assert same(found.alpha, other.alpha)
-    assert same(found.increment, other.increment)
-    assert verdicts(check(s, found)) == [PROVED] * 5
+    realisation, other = realise(s, BirealisationChoice("spray")), realise(s, BirealisationChoice("constant"))
+    assert (realisation.exact, realisation.symmetric, realisation.degree) == (True, True, None)
+    assert same(realisation.alpha, other.alpha)
+    assert same(realisation.increment, other.increment)
+    assert verdicts(check(s, realisation)) == [PROVED] * 5
 
 
 @pytest.mark.parametrize("word", ["auto", "natural"])
 def test_natural_spray_of_a_log_canonical_tensor_is_the_formula_of_the_catalogue(word):
     s = system("x y z", "{log_canonical: [[0,a,b],[-a,0,1],[-b,-1,0]]}", extra="parameters: {a: 1, b: 2}")
-    found, other = realise(s, BirealisationChoice("spray", spray=word)), realise(s)
-    assert found.exact
-    assert same(found.alpha, other.alpha)
-    assert same(found.beta, other.beta)
-    assert verdicts(check(s, found)) == [PROVED] * 5
-    assert all("sinh" in str(e) for e in found.increment)
+    realisation, other = realise(s, BirealisationChoice("spray", spray=word)), realise(s)
+    assert realisation.exact
+    assert same(realisation.alpha, other.alpha)
+    assert same(realisation.beta, other.beta)
+    assert verdicts(check(s, realisation)) == [PROVED] * 5
+    assert all("sinh" in str(e) for e in realisation.increment)
 
 
 def test_natural_spray_typed_by_the_user_is_found_in_closed_form():
-    s, found = given("[-p_x*(y*p_y + z*p_z), p_y*(x*p_x - z*p_z), p_z*(x*p_x + y*p_y)]", poisson=LOG3)
-    assert found.exact
-    assert same(found.alpha, realise(s).alpha)
+    s, realisation = given("[-p_x*(y*p_y + z*p_z), p_y*(x*p_x - z*p_z), p_z*(x*p_x + y*p_y)]", poisson=LOG3)
+    assert realisation.exact
+    assert same(realisation.alpha, realise(s).alpha)
 
 
 def test_natural_spray_in_some_coordinates_and_constant_ones_in_others():
     poisson = "{brackets: {x: {y: 2*x*y}, q: {p: 1}}}"
-    s, found = given("[-2*p_x*p_y*y, 2*p_y*p_x*x, 0, 0]", coordinates="x y q p", poisson=poisson)
-    assert found.exact
-    assert verdicts(check(s, found)) == [PROVED] * 5
+    s, realisation = given("[-2*p_x*p_y*y, 2*p_y*p_x*x, 0, 0]", coordinates="x y q p", poisson=poisson)
+    assert realisation.exact
+    assert verdicts(check(s, realisation)) == [PROVED] * 5
     assert not realise(s, FLAT).exact
 
 
@@ -241,19 +241,19 @@ def test_flat_spray_of_a_nilpotent_algebra_is_exact_and_the_exponential_realisat
     n = int(max(c for c in constants if c.isdigit()))
     names = " ".join(f"x{i + 1}" for i in range(n))
     s = system(names, f"{{lie_algebra: {{structure_constants: {constants}}}}}")
-    found = realise(s, BirealisationChoice("spray"))
-    assert found.exact
-    assert verdicts(check(s, found)) == [PROVED] * 5
-    assert same(found.alpha, realise(s, BirealisationChoice("exponential")).alpha)
+    realisation = realise(s, BirealisationChoice("spray"))
+    assert realisation.exact
+    assert verdicts(check(s, realisation)) == [PROVED] * 5
+    assert same(realisation.alpha, realise(s, BirealisationChoice("exponential")).alpha)
 
 
 def test_nilpotent_flow_that_moves_the_covector():
     # Constant π with ṗ_y = p_x²: Φˢ*ω is quadratic in s, Moser's recursion ends.
-    s, found = given("[0, p_x**2]", coordinates="x y", poisson="{brackets: {x: {y: 1}}}")
-    assert found.exact
-    assert found.symmetric
-    assert verdicts(check(s, found)) == [PROVED] * 5
-    assert not same(found.alpha, realise(s).alpha)
+    s, realisation = given("[0, p_x**2]", coordinates="x y", poisson="{brackets: {x: {y: 1}}}")
+    assert realisation.exact
+    assert realisation.symmetric
+    assert verdicts(check(s, realisation)) == [PROVED] * 5
+    assert not same(realisation.alpha, realise(s).alpha)
 
 
 # -- the formal series ------------------------------------------------------------------------------------------------
@@ -270,22 +270,22 @@ SYSTEMS = [
 @pytest.mark.parametrize(("coordinates", "poisson"), SYSTEMS)
 def test_axioms_of_a_truncation_hold_up_to_its_degree(coordinates, poisson, degree):
     s = system(coordinates, poisson)
-    found = realise(s, replace(FLAT, degree=degree, order=1))
-    assert (found.exact, found.symmetric, found.degree) == (False, True, degree)
-    statements = check(s, found)
+    realisation = realise(s, replace(FLAT, degree=degree, order=1))
+    assert (realisation.exact, realisation.symmetric, realisation.degree) == (False, True, degree)
+    statements = check(s, realisation)
     assert verdicts(statements) == [PROVED] * 5
     assert statements[1].name.endswith(f"up to degree {degree - 1} in p")
-    assert found.label == f"spray (approximate, Poisson up to degree {degree})"
-    assert f"approximate, Poisson up to degree {degree}" in found.explanation
+    assert realisation.label == f"spray (approximate, Poisson up to degree {degree})"
+    assert f"approximate, Poisson up to degree {degree}" in realisation.explanation
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("coordinates", "poisson"), SYSTEMS)
 def test_axioms_of_a_truncation_fail_beyond_its_degree(coordinates, poisson):
     s = system(coordinates, poisson)
-    found = realise(s, replace(FLAT, degree=3))
-    assert REFUTED in verdicts(check(s, replace(found, degree=5)))
-    assert REFUTED in verdicts(check(s, replace(found, exact=True)))
+    realisation = realise(s, replace(FLAT, degree=3))
+    assert REFUTED in verdicts(check(s, replace(realisation, degree=5)))
+    assert REFUTED in verdicts(check(s, replace(realisation, exact=True)))
 
 
 @pytest.mark.parametrize(
@@ -294,16 +294,16 @@ def test_axioms_of_a_truncation_fail_beyond_its_degree(coordinates, poisson):
 )
 @pytest.mark.parametrize("poisson", [SO3, LOG3, CUBIC], ids=["so(3)", "log-canonical", "cubic"])
 def test_every_spray_gives_the_axioms(poisson, forces):
-    s, found = given(forces, poisson=poisson)
-    assert not found.exact
-    assert found.symmetric
-    assert verdicts(check(s, found)) == [PROVED] * 5
+    s, realisation = given(forces, poisson=poisson)
+    assert not realisation.exact
+    assert realisation.symmetric
+    assert verdicts(check(s, realisation)) == [PROVED] * 5
 
 
 def test_exchanged_maps_and_a_wrong_coefficient_are_refuted():
     s = system("x y z", SO3)
-    found = realise(s, BirealisationChoice("spray"))
-    swapped = replace(found, alpha=found.beta, beta=found.alpha)
+    realisation = realise(s, BirealisationChoice("spray"))
+    swapped = replace(realisation, alpha=realisation.beta, beta=realisation.alpha)
     assert verdicts(check(s, swapped)) == [PROVED, REFUTED, REFUTED, PROVED, REFUTED]
     # Half a flow without ψ₀, which is right in degree 1 only.
     spray = make_spray(s, "flat")
@@ -315,7 +315,7 @@ def test_exchanged_maps_and_a_wrong_coefficient_are_refuted():
         )
         for x in spray.space.variables[:3]
     ]
-    wrong = replace(found, alpha=tuple(half), degree=3)
+    wrong = replace(realisation, alpha=tuple(half), degree=3)
     assert verdicts(check(s, wrong))[1] == REFUTED
 
 
@@ -325,10 +325,10 @@ def test_flat_spray_is_karasevs_construction(coordinates, poisson):
     # ∫ Φˢ*ω ds = Σ d(mean_i) ∧ dp_i and p·(mean − x) = 0, so that Moser's ψ₀ keeps p.
     s = system(coordinates, poisson)
     degree = 4
-    found = realise(s, replace(FLAT, degree=degree))
+    realisation = realise(s, replace(FLAT, degree=degree))
     powers = dict(zip(s.coordinates, karasev.series(s, degree), strict=True))
-    for c, mine in zip(s.coordinates, found.alpha, strict=True):
-        scaled = {name: symbol(ELAPSED) * symbol(name) for name in found.covector}
+    for c, mine in zip(s.coordinates, realisation.alpha, strict=True):
+        scaled = {name: symbol(ELAPSED) * symbol(name) for name in realisation.covector}
         e = substitute([mine - powers[c]], scaled)[0]
         for _ in range(degree + 1):  # the coefficients of t⁰ … t^degree
             assert decide_zero("", [("", substitute([e], {ELAPSED: ZERO})[0])]).verdict == PROVED
@@ -338,7 +338,7 @@ def test_flat_spray_is_karasevs_construction(coordinates, poisson):
 def test_flat_spray_of_so3_is_the_exponential_series():
     # α = x + ½ p×x + φ(|p|²) p×(p×x), φ(s) = 1/12 + s/720 + s²/30240 + …
     s = system("x y z", SO3)
-    found = realise(s, replace(FLAT, degree=6))
+    realisation = realise(s, replace(FLAT, degree=6))
 
     def cross(a, b):
         return [a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3] for i in range(3)]
@@ -346,8 +346,8 @@ def test_flat_spray_of_so3_is_the_exponential_series():
     norm = total(p**2 for p in PX)
     once, twice = cross(PX, X), cross(PX, cross(PX, X))
     phi = number(Fraction(1, 12)) + norm / 720 + norm**2 / 30240
-    assert same(found.alpha, [x + HALF * a + phi * b for x, a, b in zip(X, once, twice, strict=True)])
-    assert same(found.increment, [-a for a in once])  # β − α = πp, with no further terms
+    assert same(realisation.alpha, [x + HALF * a + phi * b for x, a, b in zip(X, once, twice, strict=True)])
+    assert same(realisation.increment, [-a for a in once])  # β − α = πp, with no further terms
 
 
 # -- S_3 of different sprays ------------------------------------------------------------------------------------------
