@@ -37,16 +37,16 @@ runs:
 
 
 @pytest.fixture(scope="session")
-def made(tmp_path_factory, compiled_solvers):
+def page_path(tmp_path_factory, compiled_solvers):
     """The path of the page."""
     folder = tmp_path_factory.mktemp("report")
     (folder / "attack.yaml").write_text(SPEC, encoding="utf-8")
     arguments = ["report", str(folder / "attack.yaml"), "--lyapunov", "--quick", "-o", str(folder / "attack.html")]
-    done = CliRunner().invoke(group, arguments, prog_name="phigen")
-    assert done.exit_code == 0, done.output
+    result = CliRunner().invoke(group, arguments, prog_name="phigen")
+    assert result.exit_code == 0, result.output
     return folder / "attack.html"
 
 
 @pytest.fixture(scope="session")
-def html(made):
-    return made.read_text(encoding="utf-8")
+def html(page_path):
+    return page_path.read_text(encoding="utf-8")

@@ -68,23 +68,23 @@ def raced(tmp_path_factory):
     folder = tmp_path_factory.mktemp("captions")
 
     def race(compilation, run, share, parts, steps=120):
-        given = compilation.spec
-        if given.lattice:
-            live = gathered_lattice(compilation.by_sweeps(), None, run, start_of(given, run), ())
+        specification = compilation.spec
+        if specification.lattice:
+            live = gathered_lattice(compilation.by_sweeps(), None, run, start_of(specification, run), ())
             code, names = lattice_script(live), FIELDS[:-1]
             section = lattice_live_section(compilation.by_sweeps(), live)
         else:
-            live = gathered(compilation, None, run, given.parameters_of(run), ())
+            live = gathered(compilation, None, run, specification.parameters_of(run), ())
             code, names, section = script(live), CURVES[:-1], live_section(compilation, live)
         if not live.solvers:
             pytest.skip(f"it has no panel: {live.why_not}")
         data = re.search(r'id="live-data"[^>]*>(.*?)</script>', section, re.DOTALL)[1]
         sources = [(templates() / "report" / name).read_text(encoding="utf-8") for name in names]
-        path = folder / f"{given.name}.mjs"
+        path = folder / f"{specification.name}.mjs"
         path.write_text("\n".join([*sources, code, RACE.replace("DATA", data)]))
         race.path = path
-        told = asked(path, f"return module.raced({float(run.step) * share}, {parts}, {steps})")
-        return told, re.search(r'<p class="say">(.*?)</p>', section)[1]
+        race_result = asked(path, f"return module.raced({float(run.step) * share}, {parts}, {steps})")
+        return race_result, re.search(r'<p class="say">(.*?)</p>', section)[1]
 
     return race
 
@@ -94,12 +94,12 @@ def halves(errors, k):
     return max(values[: len(values) // 2], default=0.0), max(values[len(values) // 2 :], default=0.0)
 
 
-def expect_true(told, say):
+def expect_true(race_result, say):
     """What is said is what the errors are."""
-    sentences = told["said"].rstrip(".").split("; ") if told["said"] else []
-    for k, name in enumerate(told["names"]):
-        (begin, ours), (rk4_begin, theirs) = halves(told["ours"], k), halves(told["theirs"], k)
-        closer = not told["failed"] and theirs < ours and ours >= ROUNDING
+    sentences = race_result["said"].rstrip(".").split("; ") if race_result["said"] else []
+    for k, name in enumerate(race_result["names"]):
+        (begin, ours), (rk4_begin, theirs) = halves(race_result["ours"], k), halves(race_result["theirs"], k)
+        closer = not race_result["failed"] and theirs < ours and ours >= ROUNDING
         said = [s for s in sentences if s.startswith(f"{name}: ")]
         assert len(said) == closer, (name, ours, theirs)
         for sentence in said:
@@ -108,9 +108,9 @@ def expect_true(told, say):
         if "Casimir" in name:
             assert ("surface" in say) or ("Casimirs" in say)
             assert ours < 1e-9
-    assert len(told["ours"]) > 10
-    if told["names"]:
-        assert told["ours"][-1][0] < 1  # the panel is about a motion that phigen follows
+    assert len(race_result["ours"]) > 10
+    if race_result["names"]:
+        assert race_result["ours"][-1][0] < 1  # the panel is about a motion that phigen follows
     else:
         assert "Nothing is conserved" in say
 
@@ -119,16 +119,16 @@ def expect_true(told, say):
 @pytest.mark.parametrize(("share", "parts"), [(0, 0), (0.25, 3)])  # 0: as the panel begins
 def test_captions_of_systems_are_not_refuted_by_their_numbers(raced, name, share, parts):
     compilation = compiled(name)
-    told, say = raced(compilation, first_run(compilation), share, parts)
-    expect_true(told, say)
-    assert told["observed"] == len(spec_of(name).observables)
+    race_result, say = raced(compilation, first_run(compilation), share, parts)
+    expect_true(race_result, say)
+    assert race_result["observed"] == len(spec_of(name).observables)
 
 
 @pytest.mark.parametrize("name", slow_but(QUICK_LATTICES, LATTICES))
 def test_captions_of_lattices_are_not_refuted_by_their_numbers(raced, name):
-    given = load(bundled_specs() / "lattices" / f"{name}.yaml")
-    told, say = raced(compile_spec(given), next(iter(given.runs.values())), 0, 0, 60)
-    expect_true(told, say)
+    specification = load(bundled_specs() / "lattices" / f"{name}.yaml")
+    race_result, say = raced(compile_spec(specification), next(iter(specification.runs.values())), 0, 0, 60)
+    expect_true(race_result, say)
 
 
 def test_panel_begins_where_rk4_is_farther_off(raced):
@@ -136,13 +136,13 @@ def test_panel_begins_where_rk4_is_farther_off(raced):
     large."""
     compilation = compiled("henon_heiles")
     run = first_run(compilation)
-    told, _ = raced(compilation, run, 1, 3)
-    assert max(row[0] for row in told["theirs"]) < 1e-5
-    told, _ = raced(compilation, run, 0, 2, 300)
-    assert told["begins"]["share"] >= 4
-    assert max(row[0] for row in told["ours"]) < 0.03
-    assert told["failed"] or told["theirs"][-1][0] > 2 * told["ours"][-1][0]
-    assert told["said"] == ""
+    race_result, _ = raced(compilation, run, 1, 3)
+    assert max(row[0] for row in race_result["theirs"]) < 1e-5
+    race_result, _ = raced(compilation, run, 0, 2, 300)
+    assert race_result["begins"]["share"] >= 4
+    assert max(row[0] for row in race_result["ours"]) < 0.03
+    assert race_result["failed"] or race_result["theirs"][-1][0] > 2 * race_result["ours"][-1][0]
+    assert race_result["said"] == ""
 
 
 def test_panel_begins_with_the_step_of_the_run_where_there_is_no_time_for_trials(raced):

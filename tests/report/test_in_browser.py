@@ -21,20 +21,20 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def browser(made, tmp_path_factory):
-    found = Browser(tool("chromium"), tmp_path_factory.mktemp("profile"))
+def browser(page_path, tmp_path_factory):
+    chromium = Browser(tool("chromium"), tmp_path_factory.mktemp("profile"))
     try:
-        found.size(1100, 900)
-        found.load(made)
-        yield found
+        chromium.size(1100, 900)
+        chromium.load(page_path)
+        yield chromium
     finally:
-        found.close()
+        chromium.close()
 
 
-def test_nothing_complains_and_nothing_is_loaded(browser, made):
+def test_nothing_complains_and_nothing_is_loaded(browser, page_path):
     browser.value("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
     assert browser.complaints == []
-    assert browser.requests == [made.as_uri()]
+    assert browser.requests == [page_path.as_uri()]
     assert browser.value("window.broken") is None
 
 
@@ -102,10 +102,10 @@ def test_slider_moves_along_the_trajectory(browser):
 SET = "#live&h=0.3&order=2&p.I1=1.5&x.x1=0.25&compare=step"
 
 
-def settled(browser, made, fragment=""):
+def settled(browser, page_path, fragment=""):
     """The page of one who asks for less motion: nothing moves by itself."""
     browser.media(prefers_reduced_motion="reduce")
-    browser.load(made, fragment)
+    browser.load(page_path, fragment)
 
 
 def click(browser, name, times=1):
@@ -116,10 +116,10 @@ def told(browser, what):
     return json.loads(browser.value(f"document.getElementById('live-panel').dataset.{what}"))
 
 
-def test_panel_makes_the_steps_of_the_solver_and_of_rk4(browser, made):
-    settled(browser, made, SET)
+def test_panel_makes_the_steps_of_the_solver_and_of_rk4(browser, page_path):
+    settled(browser, page_path, SET)
     click(browser, "step", 5)
-    solver = phigen.compile(made.parent / "attack.yaml", target="numpy", order=2)
+    solver = phigen.compile(page_path.parent / "attack.yaml", target="numpy", order=2)
     start = np.array([0.25, 1, 0.2])
     ours, theirs, x = told(browser, "ours"), told(browser, "theirs"), start
     for _ in range(5):
@@ -135,45 +135,45 @@ def test_panel_makes_the_steps_of_the_solver_and_of_rk4(browser, made):
     assert shown == f"{mantissa}·10⁻{'⁰¹²³⁴⁵⁶⁷⁸⁹'[int(power)]}"
 
 
-def test_link_of_the_panel_holds_its_settings(browser, made):
-    settled(browser, made)
+def test_link_of_the_panel_holds_its_settings(browser, page_path):
+    settled(browser, page_path)
     sliders = "document.querySelectorAll('#live-panel input[type=range]')"
     browser.value(f"{sliders}.forEach(s => {{ s.value = Number(s.min) + 1; s.dispatchEvent(new Event('input')); }})")
     chosen, link = told(browser, "settings"), browser.value("document.getElementById('live-link').hash")
     assert chosen["order"] == 4
     assert chosen["params"]["I1"] < 0.2
     assert len(set(chosen["start"])) == 3
-    settled(browser, made, link)
+    settled(browser, page_path, link)
     assert told(browser, "settings") == chosen
 
 
-def test_what_is_not_used_of_a_link_is_told_as_text(browser, made):
+def test_what_is_not_used_of_a_link_is_told_as_text(browser, page_path):
     wrong = ("order=3", "h=", "p.I1=-1", "speed=fast", "x.y=1", "%3Cimg src=x onerror=broken=1%3E=1", "rk4=0")
-    settled(browser, made, "#live&x.x1=0.25&" + "&".join(wrong))
+    settled(browser, page_path, "#live&x.x1=0.25&" + "&".join(wrong))
     unused = browser.value("document.getElementById('live-unused').textContent")
     assert set(unused.partition(": ")[2].split(", ")) == {w.replace("%3C", "<").replace("%3E", ">") for w in wrong}
     assert browser.value("document.querySelector('#live-unused').children.length") == 0
     assert told(browser, "settings")["start"][0] == 0.25
     assert told(browser, "settings")["params"]["I1"] == 1
-    settled(browser, made, SET)
+    settled(browser, page_path, SET)
     assert browser.value("document.getElementById('live-unused').hidden")
 
 
-def test_a_failing_step_is_told_with_its_status(browser, made):
-    settled(browser, made, "#live&h=1e9&order=2&compare=step")
+def test_a_failing_step_is_told_with_its_status(browser, page_path):
+    settled(browser, page_path, "#live&h=1e9&order=2&compare=step")
     assert browser.value("document.getElementById('live-ours-told').textContent") == ""
     click(browser, "step")
     message = browser.value("document.getElementById('live-ours-told').textContent")
     assert message in ("Failed after 0 steps: NO_CONVERGENCE.", "Failed after 0 steps: NOT_FINITE.")
-    settled(browser, made, SET)
+    settled(browser, page_path, SET)
     click(browser, "step")
     assert browser.value("document.getElementById('live-steps').textContent") == "1 step"
 
 
-def test_equal_work_gives_rk4_as_many_steps_as_the_link_says(browser, made):
-    settled(browser, made, SET.replace("compare=step", "rk4=3"))
+def test_equal_work_gives_rk4_as_many_steps_as_the_link_says(browser, page_path):
+    settled(browser, page_path, SET.replace("compare=step", "rk4=3"))
     click(browser, "step", 5)
-    solver = phigen.compile(made.parent / "attack.yaml", target="numpy", order=2)
+    solver = phigen.compile(page_path.parent / "attack.yaml", target="numpy", order=2)
     x = np.array([0.25, 1, 0.2])
     for _ in range(15):
         x = rk4(lambda y: solver.vector_field(y, I1=1.5), x, 0.1)
@@ -181,12 +181,12 @@ def test_equal_work_gives_rk4_as_many_steps_as_the_link_says(browser, made):
     assert told(browser, "theirs")["t"] == pytest.approx(1.5)
     about = browser.value("document.getElementById('live-cost').textContent")
     assert about == "3 steps for each step of phigen: equal work in this browser"
-    settled(browser, made, "#live&order=4")
+    settled(browser, page_path, "#live&order=4")
     assert 1 <= told(browser, "settings")["parts"] <= 64
 
 
-def test_address_bar_follows_the_settings(browser, made):
-    settled(browser, made)
+def test_address_bar_follows_the_settings(browser, page_path):
+    settled(browser, page_path)
     assert browser.value("location.hash") == ""
     browser.value(
         "{const s = document.querySelector('[data-kind=h]'); s.value = 3; s.dispatchEvent(new Event('input'))}"
@@ -206,7 +206,7 @@ CLOSER = [
 
 
 @pytest.mark.parametrize(("ours", "theirs", "said"), CLOSER)
-def test_where_rk4_is_closer_the_panel_says_so(browser, made, ours, theirs, said):
+def test_where_rk4_is_closer_the_panel_says_so(browser, page_path, ours, theirs, said):
     histories = ", ".join(
         f"{side}: {{histories: [{{values: {v}}}]}}" for side, v in (("ours", ours), ("theirs", theirs))
     )
@@ -237,14 +237,14 @@ def test_panels_of_the_corpus_begin_with_half_of_a_step_that_works(browser, tmp_
     assert browser.complaints == []
 
 
-def test_panel_moves_by_itself_unless_less_motion_is_asked_for(browser, made):
+def test_panel_moves_by_itself_unless_less_motion_is_asked_for(browser, page_path):
     waited = "new Promise(done => setTimeout(() => done(document.getElementById('live-steps').textContent), 400))"
-    settled(browser, made)
+    settled(browser, page_path)
     assert browser.value(waited) == "0 steps"
     click(browser, "play")
     assert browser.value(waited) == "100 steps"
     browser.media()
-    browser.load(made)
+    browser.load(page_path)
     browser.value("document.getElementById('live-ours').scrollIntoView()")  # out of sight it rests
     moving = "document.getElementById('live-steps').textContent !== '0 steps'"
     assert browser.value(f"new Promise(d => {{ const wait = () => {moving} ? d(1) : setTimeout(wait, 20); wait(); }})")
@@ -254,8 +254,8 @@ def test_panel_moves_by_itself_unless_less_motion_is_asked_for(browser, made):
     assert "After" in browser.value("document.getElementById('live-told').textContent")
 
 
-def test_panel_is_used_by_keys(browser, made):
-    settled(browser, made)
+def test_panel_is_used_by_keys(browser, page_path):
+    settled(browser, page_path)
     before = told(browser, "settings")["h"]
     browser.value("document.querySelector('[data-kind=h]').focus()")
     browser.key("ArrowRight")
@@ -269,14 +269,14 @@ def test_panel_is_used_by_keys(browser, made):
     assert browser.value(turned) != picture
 
 
-def test_panel_fits_a_telephone(browser, made):
+def test_panel_fits_a_telephone(browser, page_path):
     browser.size(375, 800)
-    settled(browser, made)
+    settled(browser, page_path)
     assert browser.value("document.documentElement.scrollWidth <= innerWidth")
     assert browser.value("[...document.querySelectorAll('#live-panel canvas')].every(c => c.clientWidth > 140)")
     browser.size(1100, 900)
     browser.media()
-    browser.load(made)
+    browser.load(page_path)
 
 
 # -- the live panel of lattices
@@ -323,22 +323,22 @@ COLOURS = (
 @pytest.fixture(scope="module")
 def panels(tmp_path_factory):
     """Panels alone, by the name of the lattice."""
-    folder, made = tmp_path_factory.mktemp("panels"), {}
+    folder, pages = tmp_path_factory.mktemp("panels"), {}
     for name in LATTICE_PANELS:
         compilation = compile_spec(spec.loads(LATTICE_PANELS[name]))
-        made[name] = folder / f"{name}.html"
+        pages[name] = folder / f"{name}.html"
         text = panel_page(compilation, next(iter(compilation.spec.runs.values())))
-        made[name].write_text(text, encoding="utf-8")
-    return made
+        pages[name].write_text(text, encoding="utf-8")
+    return pages
 
 
 @pytest.mark.parametrize("name", LATTICE_PANELS)
 def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name):
     settled(browser, panels[name], "#live&h=0.05&compare=step")
-    given = spec.loads(LATTICE_PANELS[name])
-    start = start_of(given, next(iter(given.runs.values())))
-    t0 = 0.5 if given.time else None
-    solver = phigen.compile(given, target="numpy")
+    specification = spec.loads(LATTICE_PANELS[name])
+    start = start_of(specification, next(iter(specification.runs.values())))
+    t0 = 0.5 if specification.time else None
+    solver = phigen.compile(specification, target="numpy")
     begin = np.reshape(told(browser, "ours")["x"], start.state.shape)
     if "spins" in name:  # they start at random
         assert np.linalg.norm(begin, axis=0) == pytest.approx(np.ones(start.sizes))
@@ -347,7 +347,7 @@ def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name
     click(browser, "step", 4)
 
     def field(at):  # of the state with the time after it
-        time = float(at[-1]) if given.time else None
+        time = float(at[-1]) if specification.time else None
         slope = solver.vector_field(at[:-1].reshape(begin.shape), time, parameters=start.arguments)
         return np.append(slope, 1)
 
@@ -355,23 +355,23 @@ def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name
     for _ in range(4):
         at = rk4(field, at, 0.05)
     x = at[:-1].reshape(begin.shape)
-    made = solver.integrate(begin, 0.05, 4, t0=t0, parameters=start.arguments)
-    assert told(browser, "ours")["x"] == pytest.approx(made.x[-1].ravel(), rel=1e-12, abs=1e-14)
+    run = solver.integrate(begin, 0.05, 4, t0=t0, parameters=start.arguments)
+    assert told(browser, "ours")["x"] == pytest.approx(run.x[-1].ravel(), rel=1e-12, abs=1e-14)
     assert told(browser, "theirs")["x"] == pytest.approx(x.ravel(), rel=1e-12, abs=1e-14)
     errors = []
-    if not given.time:
-        errors = [abs(solver.hamiltonian(x, parameters=start.arguments) - made.energy[0]) / made.energy_scale]
-    if given.casimirs:
+    if not specification.time:
+        errors = [abs(solver.hamiltonian(x, parameters=start.arguments) - run.energy[0]) / run.energy_scale]
+    if specification.casimirs:
         first, last = ((s**2).sum(axis=0) for s in (begin, x))
         errors.append(np.abs(last - first).max() / first.mean())
-    cell, changes = compile_spec(given).by_sweeps().cell, []
+    cell, changes = compile_spec(specification).by_sweeps().cell, []
     for density in cell.invariants.values():
         (first, terms), (last, _) = (summed(cell, density, state, start.parameters) for state in (begin, x))
         changes.append(abs(last - first) / (abs(first) if abs(first) > 1e-3 * terms else terms))
-    for side, state in (("ours", made.x[-1]), ("theirs", x)):
-        times = {"t": float(at[-1])} if given.time else {}
+    for side, state in (("ours", run.x[-1]), ("theirs", x)):
+        times = {"t": float(at[-1])} if specification.time else {}
         observed = solver.observables(state, parameters=start.arguments, **times)
-        expected = [observed[n] for n in given.recorded]
+        expected = [observed[n] for n in specification.recorded]
         assert told(browser, side)["observed"] == pytest.approx(expected, rel=1e-10, abs=1e-12)
     shown = told(browser, "theirs")["errors"]
     assert shown[: len(errors)] == pytest.approx(errors, rel=1e-6, abs=1e-15)
@@ -400,14 +400,14 @@ def test_settings_of_a_lattice_are_in_its_link_and_make_it_larger(browser, panel
     assert browser.complaints == []
 
 
-def test_lattices_fit_a_telephone(browser, made, panels):
+def test_lattices_fit_a_telephone(browser, page_path, panels):
     browser.size(375, 800)
     settled(browser, panels["spins_2"])
     assert browser.value("document.documentElement.scrollWidth <= innerWidth")
     assert browser.value("[...document.querySelectorAll('.race canvas')].every(c => c.clientWidth > 140)")
     browser.size(1100, 900)
     browser.media()
-    browser.load(made)
+    browser.load(page_path)
 
 
 # -- the page as a whole

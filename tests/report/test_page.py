@@ -53,22 +53,22 @@ def test_page_is_sound_html_that_loads_nothing(html):
 
 
 def test_page_has_all_its_sections(html):
-    found = [given["id"] for given in Page(html).all("section")]
-    assert found == ["live", "brief", "system", "choices", "method", "proofs", "measured", "modified", "run",
+    section_names = [attributes["id"] for attributes in Page(html).all("section")]
+    assert section_names == ["live", "brief", "system", "choices", "method", "proofs", "measured", "modified", "run",
                      "precision", "provenance"]  # fmt: skip
-    figures = {given["id"] for given in Page(html).all("figure")}
+    figures = {attributes["id"] for attributes in Page(html).all("figure")}
     assert figures == {
         f"figure-{n}" for n in ("constancy", "trajectory", "errors", "section", "lyapunov", "convergence", "work")
     }
 
 
 def test_texts_of_the_spec_stay_texts(html):
-    found = Page(html)
-    assert [given for given in found.all("script") if given.get("type") != "application/json"] == [{}]
+    page = Page(html)
+    assert [attributes for attributes in page.all("script") if attributes.get("type") != "application/json"] == [{}]
     assert "<script>window" not in html
-    assert "javascript:broken" not in str([given for _, given in found.elements])
-    assert any("</title></style></script>" in text for text in found.texts["h1"])
-    assert any("{{ 7*7 }}" in text for text in found.texts["p"])
+    assert "javascript:broken" not in str([attributes for _, attributes in page.elements])
+    assert any("</title></style></script>" in text for text in page.texts["h1"])
+    assert any("{{ 7*7 }}" in text for text in page.texts["p"])
 
 
 def test_policy_allows_the_own_style_and_scripts_and_nothing_else(html):
@@ -81,10 +81,10 @@ def test_policy_allows_the_own_style_and_scripts_and_nothing_else(html):
         assert rules[rule] == f"'sha256-{digest}'"
 
 
-def test_page_says_how_to_make_it_again(html, made):
-    assert hashlib.sha256((made.parent / "attack.yaml").read_bytes()).hexdigest() in html
+def test_page_says_how_to_make_it_again(html, page_path):
+    assert hashlib.sha256((page_path.parent / "attack.yaml").read_bytes()).hexdigest() in html
     assert "phigen report attack.yaml --lyapunov --quick -o attack.html" in html
-    assert str(made.parent) not in html
+    assert str(page_path.parent) not in html
 
 
 def test_figures_are_named_and_take_their_colours_from_the_page(html):
@@ -96,9 +96,9 @@ def test_figures_are_named_and_take_their_colours_from_the_page(html):
 
 
 def test_measured_times_are_marked(html):
-    found = Page(html)
-    assert sum("measured" in given.get("class", "") for given in found.all("td")) > 10
-    assert any("measured" in text for text in found.texts["caption"])
+    page = Page(html)
+    assert sum("measured" in attributes.get("class", "") for attributes in page.all("td")) > 10
+    assert any("measured" in text for text in page.texts["caption"])
 
 
 # -- systems of every kind, without measurements
@@ -334,9 +334,9 @@ def luminance(colour):
 @pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
 @pytest.mark.parametrize("ground", ["paper", "raised"])
 def test_texts_and_curves_have_contrast(theme, ground):
-    given = colours()
-    for name in set(given) - {"paper", "raised", "grid", "leaf"}:
-        a, b = sorted((luminance(given[n][theme]) for n in (name, ground)), reverse=True)
+    palette = colours()
+    for name in set(palette) - {"paper", "raised", "grid", "leaf"}:
+        a, b = sorted((luminance(palette[n][theme]) for n in (name, ground)), reverse=True)
         assert (a + 0.05) / (b + 0.05) >= 4.5, name
 
 
