@@ -35,11 +35,11 @@ def cache_directory(tmp_path, monkeypatch):
 def solvers(oscillator_files, tmp_path_factory):
     """The same system on every back end."""
     source = (HERE / "oscillator_module.py").read_text(encoding="utf-8")
-    made = {"numpy": Solver(NumpySolver(source, OSCILLATOR), OSCILLATOR)}
+    by_target = {"numpy": Solver(NumpySolver(source, OSCILLATOR), OSCILLATOR)}
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PHIGEN_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
-        made["c"] = Solver(CSolver(oscillator_files, OSCILLATOR), OSCILLATOR)
-    return made
+        by_target["c"] = Solver(CSolver(oscillator_files, OSCILLATOR), OSCILLATOR)
+    return by_target
 
 
 @pytest.fixture(params=["c", "numpy"])

@@ -47,12 +47,14 @@ def integrate(x0, h, steps, stride=1, **parameters):
     shape, x = x.shape, x.reshape(-1, DIM)
     coef = _coefficients(_values(parameters), x, h, None)[0]
     rows = [x]
-    for done in range(1, steps + 1):
+    for step_number in range(1, steps + 1):
         following, _, _, status = _advance(coef, x, 0 * x, None)
         if (failed := np.flatnonzero(status != "")).size:
-            raise StepError(done - 1, "NO_CONVERGENCE", tuple(failed), np.array([*rows, x]).reshape((-1, *shape)))
+            raise StepError(
+                step_number - 1, "NO_CONVERGENCE", tuple(failed), np.array([*rows, x]).reshape((-1, *shape))
+            )
         x = following
-        if done % stride == 0 or done == steps:
+        if step_number % stride == 0 or step_number == steps:
             rows.append(x)
     return np.array(rows).reshape((-1, *shape))
 

@@ -19,10 +19,10 @@ def entries(folder):
 
 @pytest.fixture
 def compilations(monkeypatch):
-    made = []
+    commands = []
     real = toolchain.compile_library
-    monkeypatch.setattr(toolchain, "compile_library", lambda *a, **k: (made.append(1), real(*a, **k)))
-    return made
+    monkeypatch.setattr(toolchain, "compile_library", lambda *a, **k: (commands.append(1), real(*a, **k)))
+    return commands
 
 
 def test_second_request_does_not_compile(cache_directory, compilations):
@@ -60,8 +60,8 @@ def test_concurrent_processes_share_one_directory(cache_directory):
         return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
 
     with ThreadPoolExecutor(6) as pool:
-        for done in pool.map(run, range(6)):
-            assert (done.returncode, done.stderr) == (0, "")
+        for process in pool.map(run, range(6)):
+            assert (process.returncode, process.stderr) == (0, "")
     assert len(entries(cache_directory)) == 1
     assert len(list(cache_directory.iterdir())) == 1
 

@@ -134,7 +134,7 @@ def test_a_step_in_a_block_of_its_own_changes_nothing():
     session = oscillator("c").backend.start(np.array([1.0, 0.0]), {"m": 1.0, "k": 1.0})
     finder = CrossingFinder(lambda x: x[:, 0], 0.1)
     blocks = [next(finder.follow(session, 1, lambda: session.advance(0.1, 1))) for _ in range(1000)]
-    pieces = [crossing for _, found in blocks for crossing in found]
+    pieces = [crossing for _, crossings in blocks for crossing in crossings]
     whole = oscillator("c").section([1, 0], 0.1, 1000, lambda x: x[:, 0])
     assert [t for t, _ in pieces] == whole.t.tolist()
     assert [x.tolist() for _, x in pieces] == whole.x.tolist()
@@ -214,6 +214,6 @@ def test_tables_of_crossings(tmp_path):
                                          (lambda x: np.sign(x - 0.3), 0.3), (lambda x: x**9, 0.0)])  # fmt: skip
 def test_roots_are_found_to_the_last_bits(f, zero):
     asked = []
-    found = root(lambda x: asked.append(x) or f(x), -0.5, f(-0.5), 1.0, f(1.0))
-    assert abs(found - zero) < 1e-15
+    root_value = root(lambda x: asked.append(x) or f(x), -0.5, f(-0.5), 1.0, f(1.0))
+    assert abs(root_value - zero) < 1e-15
     assert len(asked) < 90

@@ -39,8 +39,8 @@ def propagator(solver, **options):
     return make(solver, h=H, steps=STEPS, **options)
 
 
-def close(found, expected):
-    return np.allclose(np.asarray(found), np.asarray(expected), rtol=1e-13, atol=0)
+def close(actual, expected):
+    return np.allclose(np.asarray(actual), np.asarray(expected), rtol=1e-13, atol=0)
 
 
 def cubes(f):
@@ -49,33 +49,33 @@ def cubes(f):
 
 
 def test_values_are_those_of_the_solver(solver):
-    made, rows = propagator(solver), propagator(solver, stride=3)
-    assert np.array_equal(made(X[0]), solver.integrate(X[0], H, STEPS).x[-1])
-    assert np.array_equal(made(X), solver.ensemble(X, H, STEPS))
+    propagate, rows = propagator(solver), propagator(solver, stride=3)
+    assert np.array_equal(propagate(X[0]), solver.integrate(X[0], H, STEPS).x[-1])
+    assert np.array_equal(propagate(X), solver.ensemble(X, H, STEPS))
     assert np.array_equal(rows(X, {"I2": 1.5})[1], solver.integrate(X[1], H, STEPS, 3, I2=1.5).x)
-    assert made(X[0].astype(np.float32)).dtype == np.float32
+    assert propagate(X[0].astype(np.float32)).dtype == np.float32
 
 
 def test_gradient_is_that_of_the_pull_back(solver):
-    made = cubes(propagator(solver))
-    gradient = jax.jit(jax.value_and_grad(made, argnums=(0, 1)))
+    function = cubes(propagator(solver))
+    gradient = jax.jit(jax.value_and_grad(function, argnums=(0, 1)))
     value, (by_x, by_i2) = gradient(X[0], 2.2)
     x1 = solver.integrate(X[0], H, STEPS, I2=2.2).x[-1]
-    _, x0_bar, found = solver.pullback(X[0], H, STEPS, 3 * x1**2, I2=2.2)
+    _, x0_bar, parameters_bar = solver.pullback(X[0], H, STEPS, 3 * x1**2, I2=2.2)
     assert close(value, np.sum(x1**3))
     assert close(by_x, x0_bar)
-    assert close(by_i2, found["I2"])
+    assert close(by_i2, parameters_bar["I2"])
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("axes", [(0, None), (None, 0)])
 def test_vmap_is_a_loop(solver, axes):
-    made = cubes(propagator(solver))
+    function = cubes(propagator(solver))
     arguments = (X if axes[0] == 0 else X[0], np.array([1.8, 2.3]) if axes[1] == 0 else 2.2)
-    values, slopes = jax.vmap(jax.value_and_grad(made, argnums=(0, 1)), in_axes=axes)(*arguments)
+    values, slopes = jax.vmap(jax.value_and_grad(function, argnums=(0, 1)), in_axes=axes)(*arguments)
     for m in range(2):
-        own = [a[m] if axis == 0 else a for a, axis in zip(arguments, axes, strict=True)]
-        value, (by_x, by_i2) = jax.value_and_grad(made, argnums=(0, 1))(*own)
+        member_arguments = [a[m] if axis == 0 else a for a, axis in zip(arguments, axes, strict=True)]
+        value, (by_x, by_i2) = jax.value_and_grad(function, argnums=(0, 1))(*member_arguments)
         assert close(values[m], value)
         assert close(slopes[0][m], by_x)
         assert close(slopes[1][m], by_i2)
@@ -84,12 +84,12 @@ def test_vmap_is_a_loop(solver, axes):
 @pytest.mark.slow
 def test_members_share_a_parameter_in_any_way(solver):
     """As leading axes, by vmap inside the derivative, by vmap outside, and with an axis of vmap before their own."""
-    made = propagator(solver)
-    expected = sum(jax.grad(cubes(made), argnums=1)(x, 2.2) for x in X)
-    assert close(jax.grad(cubes(made), argnums=1)(X, 2.2), expected)
-    inside = lambda i2: jnp.sum(jax.vmap(made, in_axes=(0, None))(X, {"I2": i2}) ** 3)  # noqa: E731
+    propagate = propagator(solver)
+    expected = sum(jax.grad(cubes(propagate), argnums=1)(x, 2.2) for x in X)
+    assert close(jax.grad(cubes(propagate), argnums=1)(X, 2.2), expected)
+    inside = lambda i2: jnp.sum(jax.vmap(propagate, in_axes=(0, None))(X, {"I2": i2}) ** 3)  # noqa: E731
     assert close(jax.grad(inside)(2.2), expected)
-    both = jax.vmap(jax.grad(cubes(made), argnums=1), in_axes=(None, 0))(X, jnp.array([2.2, 1.5]))
+    both = jax.vmap(jax.grad(cubes(propagate), argnums=1), in_axes=(None, 0))(X, jnp.array([2.2, 1.5]))
     assert close(both[0], expected)
 
 
@@ -107,16 +107,16 @@ def test_derivatives_both_ways_agree(solver, forward):
 def test_a_gradient_takes_one_run_back_and_a_jvp_the_tangent_map(solver, monkeypatch):
     from phigen.runtime.propagation import Propagation
 
-    made, along = propagator(solver), jnp.array([0.3, -0.2, 0.5])
-    _, slope = jax.jvp(lambda x: made(x, {"I2": 2.2}), (X[0],), (along,))
+    propagate, along = propagator(solver), jnp.array([0.3, -0.2, 0.5])
+    _, slope = jax.jvp(lambda x: propagate(x, {"I2": 2.2}), (X[0],), (along,))
     assert close(slope, solver.jacobian(X[0], H, STEPS, I2=2.2).by_x0 @ along)
     monkeypatch.delattr(Propagation, "jacobian")
     x1 = solver.integrate(X[0], H, STEPS, I2=2.2).x[-1]
-    found = solver.pullback(X[0], H, STEPS, 3 * x1**2, I2=2.2)
-    by = jax.grad(lambda p: jnp.sum(made(X[0], p) ** 3))({"I2": 2.2, "I3": 3.0})
-    assert all(close(by[name], found.parameters_bar[name]) for name in by)
-    rows = jax.vmap(jax.vmap(jax.grad(cubes(made)), (None, 0)), (0, None))(X, jnp.array([1.8, 2.2]))
-    assert close(rows[0, 1], found.x0_bar)
+    gradient = solver.pullback(X[0], H, STEPS, 3 * x1**2, I2=2.2)
+    by = jax.grad(lambda p: jnp.sum(propagate(X[0], p) ** 3))({"I2": 2.2, "I3": 3.0})
+    assert all(close(by[name], gradient.parameters_bar[name]) for name in by)
+    rows = jax.vmap(jax.vmap(jax.grad(cubes(propagate)), (None, 0)), (0, None))(X, jnp.array([1.8, 2.2]))
+    assert close(rows[0, 1], gradient.x0_bar)
 
 
 @pytest.mark.thin(2)
@@ -139,9 +139,9 @@ def test_arguments_of_no_run_are_told_by_the_call_itself(solver):
         run(X[0], {"I7": 2.0})
     with pytest.raises(ValueError, match=r"x0 must have shape \(…, 3\)"):
         run(X[0][:2])
-    for x, own in ((X, 3), (X[0], 1)):
+    for x, initial in ((X, 3), (X[0], 1)):
         with pytest.raises(ValueError, match="'I2' must have a shape that broadcasts"):
-            run(x, {"I2": np.ones(own)})
+            run(x, {"I2": np.ones(initial)})
     with pytest.raises(TypeError, match="x0 must be real"):
         run(1j * X[0])
     with pytest.raises(TypeError, match="'I2' must be real"):
@@ -188,9 +188,9 @@ def test_a_propagator_of_a_graph_needs_bonds():
 
 
 def test_members_may_be_none_and_states_lists(solver):
-    made = propagator(solver)
-    assert np.array_equal(made([1, 0.5, 0.3]), made(X[0] * 0 + np.array([1, 0.5, 0.3])))
-    by_x, by_i2 = jax.grad(cubes(made), argnums=(0, 1))(np.empty((0, 3)), 2.2)
+    propagate = propagator(solver)
+    assert np.array_equal(propagate([1, 0.5, 0.3]), propagate(X[0] * 0 + np.array([1, 0.5, 0.3])))
+    by_x, by_i2 = jax.grad(cubes(propagate), argnums=(0, 1))(np.empty((0, 3)), 2.2)
     assert (by_x.shape, float(by_i2)) == ((0, 3), 0)
 
 
@@ -200,21 +200,21 @@ def test_lattices_have_gradients_along_disorder(stride):
     """Members by `vmap`, each with fields of its own at the sites; J is shared."""
     chain, rng = phigen.compile("xxz_disorder", target="numpy", adjoint=True), np.random.default_rng(1)
     many, fields = rng.normal(size=(2, 3, 5)), rng.normal(size=(2, 5))
-    made = propagator(chain, stride=stride)
+    propagate = propagator(chain, stride=stride)
 
     def loss(x, field, j):
-        return jnp.sum(made(x, {"B": field, "J": j}) ** 3)
+        return jnp.sum(propagate(x, {"B": field, "J": j}) ** 3)
 
     gradient = jax.jit(jax.vmap(jax.grad(loss, argnums=(0, 1, 2)), in_axes=(0, 0, None)))
     x_bar, field_bar, j_bar = gradient(many, fields, 0.9)
     for m in range(2):
         frames = chain.integrate(many[m], H, STEPS, stride or STEPS, B=fields[m], J=0.9).x
         bar = 3 * (frames if stride else frames[-1]) ** 2
-        own = chain.pullback(many[m], H, STEPS, bar, stride, B=fields[m], J=0.9)
-        assert close(x_bar[m], own.x0_bar)
-        assert close(field_bar[m], own.parameters_bar["B"])
-        assert close(j_bar[m], own.parameters_bar["J"])
+        pulled_back = chain.pullback(many[m], H, STEPS, bar, stride, B=fields[m], J=0.9)
+        assert close(x_bar[m], pulled_back.x0_bar)
+        assert close(field_bar[m], pulled_back.parameters_bar["B"])
+        assert close(j_bar[m], pulled_back.parameters_bar["J"])
     one = chain.pullback(
-        many, H, STEPS, np.ones(made(many, {"B": 0.5}).swapaxes(0, 1 if stride else 0).shape), stride, B=0.5
+        many, H, STEPS, np.ones(propagate(many, {"B": 0.5}).swapaxes(0, 1 if stride else 0).shape), stride, B=0.5
     )
-    assert close(jax.grad(lambda b: jnp.sum(made(many, {"B": b})))(0.5), one.parameters_bar["B"])
+    assert close(jax.grad(lambda b: jnp.sum(propagate(many, {"B": b})))(0.5), one.parameters_bar["B"])

@@ -21,7 +21,7 @@ def session_of(name, target):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_kicked_sessions_of_c_and_numpy_are_one_trajectory(name):
-    found = []
+    states = []
     for target in TARGETS:
         session, at = session_of(name, target)
         kick = 1e-2 * np.array(at.x)
@@ -29,10 +29,10 @@ def test_kicked_sessions_of_c_and_numpy_are_one_trajectory(name):
         session.x = 0.7 * session.x
         session.step(at.h, 3).set_parameters({name: 1.1 * value for name, value in session.parameters.items()})
         session.step(at.h, 10)
-        found.append([*session.x, session.t, session.energy, *session.casimirs.values()])
-        found[-1] += [] if session.attitude is None else session.attitude.tolist()
+        states.append([*session.x, session.t, session.energy, *session.casimirs.values()])
+        states[-1] += [] if session.attitude is None else session.attitude.tolist()
         assert session.steps == 44
-    assert np.allclose(found[0], found[1], rtol=1e-11, atol=1e-12)
+    assert np.allclose(states[0], states[1], rtol=1e-11, atol=1e-12)
 
 
 @pytest.mark.thin(2)
@@ -142,8 +142,8 @@ def test_after_a_change_of_parameters_a_session_goes_on_as_one_that_starts_there
         session.set_parameters(unknown)
     with pytest.raises(ValueError, match=r"must be finite|nan"):
         session.set_parameters(dict.fromkeys(before, np.nan))
-    found = session.set_parameters(changed).step(at.h, 30)
-    assert found.parameters == changed
-    off, size = np.abs(found.x - fresh.x).max(), np.abs(fresh.x - still.x).max()
+    final = session.set_parameters(changed).step(at.h, 30)
+    assert final.parameters == changed
+    off, size = np.abs(final.x - fresh.x).max(), np.abs(fresh.x - still.x).max()
     assert off < 1e-8 * size
-    assert found.attitude is None or found.attitude == pytest.approx(fresh.attitude, abs=1e-8)
+    assert final.attitude is None or final.attitude == pytest.approx(fresh.attitude, abs=1e-8)

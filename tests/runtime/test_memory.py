@@ -49,10 +49,10 @@ def test_groups_count_what_they_use_but_for_pages_of_files(tmp_path):
 
 def test_a_run_that_cannot_fit_ends_with_what_to_do(chain):
     asked = ["run", str(chain), "--sizes", "9999999999", "-t", "numpy"]
-    done = CliRunner().invoke(group, asked, prog_name="phigen")
-    assert done.exit_code == 3
-    assert "9999999999 sites take 224 GiB of memory at least" in done.stderr
-    assert "phigen.mpi on several machines" in done.stderr
+    result = CliRunner().invoke(group, asked, prog_name="phigen")
+    assert result.exit_code == 3
+    assert "9999999999 sites take 224 GiB of memory at least" in result.stderr
+    assert "phigen.mpi on several machines" in result.stderr
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])

@@ -137,13 +137,13 @@ def test_averages_are_over_the_rows_that_the_run_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "driven.yaml").write_text(DRIVEN)
     result = CliRunner().invoke(group, ["run", "driven.yaml", "--json"], prog_name="phigen")
-    told = json.loads(result.stdout)["observables"]
+    averages = json.loads(result.stdout)["observables"]
     trajectory = phigen.compile("driven.yaml").run()
     late = trajectory.t >= 12
     for name, values in trajectory.observables.items():
-        assert told[name]["mean"] == pytest.approx(values[late].mean(), rel=1e-12, abs=1e-14)
-        assert told[name]["variance"] == pytest.approx(values[late].var(ddof=1), rel=1e-12, abs=1e-14)
-        assert told[name]["largest"] == pytest.approx(values[late].max())
+        assert averages[name]["mean"] == pytest.approx(values[late].mean(), rel=1e-12, abs=1e-14)
+        assert averages[name]["variance"] == pytest.approx(values[late].var(ddof=1), rel=1e-12, abs=1e-14)
+        assert averages[name]["largest"] == pytest.approx(values[late].max())
     plain = CliRunner().invoke(group, ["run", "driven.yaml"], prog_name="phigen").stdout
     assert f"means over {late.sum()} rows from t = " in plain
 

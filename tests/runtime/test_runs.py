@@ -101,7 +101,7 @@ def test_arguments_take_the_place_of_settings():
 
 
 @pytest.mark.parametrize(
-    ("settings", "told"),
+    ("settings", "message"),
     [
         ({"name": "strided_"}, "did you mean 'strided'?"),
         ({"steps": 3, "until": 3.0}, "either steps or until"),
@@ -118,9 +118,9 @@ def test_arguments_take_the_place_of_settings():
         ({"seed": 1}, "seed"),
     ],
 )
-def test_wrong_settings_are_told(settings, told):
+def test_wrong_settings_are_told(settings, message):
     solver = phigen.compile(phigen.spec.loads(DRIVEN), target="numpy")
-    with pytest.raises((ValueError, TypeError), match=told.replace("?", r"\?")):
+    with pytest.raises((ValueError, TypeError), match=message.replace("?", r"\?")):
         solver.run(**settings)
 
 

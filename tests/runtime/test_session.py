@@ -62,8 +62,8 @@ def test_progress_does_not_change_a_trajectory():
     from phigen import api, resources
 
     numpy = api.compile(resources.bundled_specs() / "rigid_body.yaml", target="numpy")
-    told = [numpy.integrate([0.01, 1, 0.01], 0.1, 300, progress=p) for p in (None, lambda done: None)]
-    assert told[0].x.tolist() == told[1].x.tolist()
+    trajectories = [numpy.integrate([0.01, 1, 0.01], 0.1, 300, progress=p) for p in (None, lambda done: None)]
+    assert trajectories[0].x.tolist() == trajectories[1].x.tolist()
 
 
 def test_bytes_of_another_solver_are_refused():
@@ -78,7 +78,7 @@ def test_a_trajectory_that_fails_ends_with_its_last_good_state(target):
     lotka = solver(compiled("lotka_volterra"), target)
     with pytest.raises(StepError) as caught:
         lotka.integrate([-3, 5, 0.001], 0.01, 1000, stride=7)
-    found = caught.value.trajectory
-    assert found.t[-1] == 0.01 * caught.value.step
+    partial_run = caught.value.trajectory
+    assert partial_run.t[-1] == 0.01 * caught.value.step
     again = lotka.integrate([-3, 5, 0.001], 0.01, caught.value.step, stride=7)
-    assert found.x.tolist() == again.x.tolist()
+    assert partial_run.x.tolist() == again.x.tolist()

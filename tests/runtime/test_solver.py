@@ -182,8 +182,12 @@ def test_errors_can_be_pickled(solver):
     assert (str(twin), twin.step, twin.status, twin.members) == (str(error), error.step, error.status, error.members)
     assert twin.trajectory.x.tolist() == error.trajectory.x.tolist()
     diagnostics = [Diagnostic("one"), Diagnostic("two", Location(1, 2))]
-    found = pickle.loads(pickle.dumps(LimitError(diagnostics)))
-    assert (type(found), found.diagnostics, str(found)) == (LimitError, diagnostics, str(LimitError(diagnostics)))
+    restored = pickle.loads(pickle.dumps(LimitError(diagnostics)))
+    assert (type(restored), restored.diagnostics, str(restored)) == (
+        LimitError,
+        diagnostics,
+        str(LimitError(diagnostics)),
+    )
 
 
 def test_parameters_can_be_a_mapping(solver):

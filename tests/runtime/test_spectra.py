@@ -42,12 +42,12 @@ def test_spin_waves_of_the_page_have_the_dispersion_of_linear_theory():
         .replace("after: 100", "after: 0")
     )
     run = phigen.compile(phigen.spec.loads(text.replace("up to: 32", "up to: 8")), target="numpy").run()
-    found = run.structure_factor
-    assert len(repr(found)) < 120
-    assert found.values.shape == (16, 513)
-    apart = found.omega[1] - found.omega[0]
-    for q, values in zip(found.q[0], found.values, strict=True):
-        peak = abs(found.omega[np.argmax(values)])
+    structure_factor = run.structure_factor
+    assert len(repr(structure_factor)) < 120
+    assert structure_factor.values.shape == (16, 513)
+    apart = structure_factor.omega[1] - structure_factor.omega[0]
+    for q, values in zip(structure_factor.q[0], structure_factor.values, strict=True):
+        peak = abs(structure_factor.omega[np.argmax(values)])
         assert peak == pytest.approx(0.2 + 2 * (1 - np.cos(q)), abs=0.6 * apart)
 
 
@@ -56,26 +56,26 @@ def test_a_wave_is_where_it_is_said_to_be():
     run = solver.integrate(near_the_ground_state(8, 0.1), 0.1, 64)
     t, r = run.t[:, None], np.arange(8.0)[None]
     run.x[:, 0] = 0.7 * np.cos(2 * np.pi / 8 * 3 * r - 2.0 * t)
-    found = spectrum(run, "x")
-    k, n = np.unravel_index(np.argmax(found.values), found.values.shape)
-    assert np.sign(found.q[0][k]) == np.sign(found.omega[n])
-    assert abs(found.q[0][k]) == pytest.approx(2 * np.pi / 8 * 3)
-    assert abs(found.omega[n]) == pytest.approx(2.0, abs=np.pi / (65 * 0.1))
+    exponents = spectrum(run, "x")
+    k, n = np.unravel_index(np.argmax(exponents.values), exponents.values.shape)
+    assert np.sign(exponents.q[0][k]) == np.sign(exponents.omega[n])
+    assert abs(exponents.q[0][k]) == pytest.approx(2 * np.pi / 8 * 3)
+    assert abs(exponents.omega[n]) == pytest.approx(2.0, abs=np.pi / (65 * 0.1))
     window = np.hanning(len(run) + 2)[1:-1] ** 2
     weighted = (run.x[:, 0] ** 2 * (window / window.mean())[:, None]).mean()
-    assert found.values.sum() == pytest.approx(weighted, rel=1e-12)
+    assert exponents.values.sum() == pytest.approx(weighted, rel=1e-12)
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "open"])
 def test_correlations_are_those_of_the_definition(boundary):
     text = FERROMAGNET.replace("boundary: periodic", f"boundary: {boundary}")
     run = phigen.compile(phigen.spec.loads(text), target="numpy").integrate(near_the_ground_state(6, 0.3), 0.1, 4)
-    found = run.correlation("x", "y", up_to=3, after=0.1)
+    correlation = run.correlation("x", "y", up_to=3, after=0.1)
     f, g = run.x[1:, 0], run.x[1:, 1]
     for d in range(4):
         places = range(6) if boundary == "periodic" else range(6 - d)
         products = [f[:, r] * g[:, (r + d) % 6] for r in places]
-        assert found[d] == pytest.approx(np.mean(products) - f.mean() * g.mean(), rel=1e-12, abs=1e-15)
+        assert correlation[d] == pytest.approx(np.mean(products) - f.mean() * g.mean(), rel=1e-12, abs=1e-15)
 
 
 def test_what_has_no_spectrum_is_told():
@@ -97,12 +97,12 @@ def test_a_spectrum_goes_to_zarr_and_pictures(tmp_path):
     run = phigen.compile(phigen.spec.loads(FERROMAGNET), target="numpy").integrate(
         near_the_ground_state(6, 0.3), 0.1, 9
     )
-    found = run.spectrum(["x"])
-    found.save(tmp_path / "s.zarr")
+    computed = run.spectrum(["x"])
+    computed.save(tmp_path / "s.zarr")
     stored = xarray.open_zarr(tmp_path / "s.zarr", consolidated=False)
-    np.testing.assert_array_equal(stored.S.transpose("q_i", "omega"), found.values)
-    np.testing.assert_array_equal(stored.q_i, found.q[0])
-    found.plot("chain").savefig(tmp_path / "s.png")
+    np.testing.assert_array_equal(stored.S.transpose("q_i", "omega"), computed.values)
+    np.testing.assert_array_equal(stored.q_i, computed.q[0])
+    computed.plot("chain").savefig(tmp_path / "s.png")
 
 
 #: The same chain, whose run asks for both; waves along a plane.

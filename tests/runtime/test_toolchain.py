@@ -108,13 +108,13 @@ def test_without_any_that_works_numpy_is_chosen_and_the_reasons_told(compiler, t
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(toolchain, "find_spec", lambda name: None)
-    told = []
+    messages = []
     assert not toolchain.available()
-    assert chosen_target("auto", told.append) == "numpy"
+    assert chosen_target("auto", messages.append) == "numpy"
     compiler("exit 5", name="gcc")
-    assert chosen_target("auto", told.append) == "numpy"
-    assert "using NumPy, which is slower: no C compiler works: none of cc, gcc, clang was found" in told[0]
-    assert "cc was not found; gcc failed with exit code 5 without a message; clang was not found" in told[1]
+    assert chosen_target("auto", messages.append) == "numpy"
+    assert "using NumPy, which is slower: no C compiler works: none of cc, gcc, clang was found" in messages[0]
+    assert "cc was not found; gcc failed with exit code 5 without a message; clang was not found" in messages[1]
 
 
 def test_numpy_needs_no_compiler(monkeypatch):

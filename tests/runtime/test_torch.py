@@ -20,9 +20,9 @@ def solver():
 def test_values_and_gradients_are_those_of_the_solver(solver, stride):
     from phigen.torch import propagator
 
-    made = propagator(solver, h=H, steps=STEPS, stride=stride)
+    propagate = propagator(solver, h=H, steps=STEPS, stride=stride)
     x, i2 = torch.tensor(X, requires_grad=True), torch.tensor(2.2, dtype=torch.float64, requires_grad=True)
-    states = made(x, {"I2": i2})
+    states = propagate(x, {"I2": i2})
     (states**3).sum().backward()
     slope = 0.0
     for m in range(2):
@@ -30,11 +30,11 @@ def test_values_and_gradients_are_those_of_the_solver(solver, stride):
         rows = solver.integrate(X[m], H, STEPS, width, I2=2.2).x
         rows = rows[-1] if stride is None else rows
         assert states[m].detach().numpy() == pytest.approx(rows, abs=1e-15)
-        _, x0_bar, found = solver.pullback(X[m], H, STEPS, 3 * rows**2, stride, I2=2.2)
+        _, x0_bar, parameters_bar = solver.pullback(X[m], H, STEPS, 3 * rows**2, stride, I2=2.2)
         assert x.grad[m].numpy() == pytest.approx(x0_bar, rel=1e-13)
-        slope += found["I2"]
+        slope += parameters_bar["I2"]
     assert i2.grad.item() == pytest.approx(slope, rel=1e-12)
-    assert made(x.float()).dtype == torch.float32
+    assert propagate(x.float()).dtype == torch.float32
 
 
 @pytest.mark.parametrize("stride", [None, 3])
@@ -51,8 +51,8 @@ def test_lattices_have_gradients_along_disorder(stride):
     for m in range(2):
         frames = chain.integrate(many[m], H, STEPS, stride or STEPS, B=fields[m], J=0.9).x
         bar = 3 * (frames if stride else frames[-1]) ** 2
-        _, x0_bar, found = chain.pullback(many[m], H, STEPS, bar, stride, B=fields[m], J=0.9)
+        _, x0_bar, parameters_bar = chain.pullback(many[m], H, STEPS, bar, stride, B=fields[m], J=0.9)
         assert x.grad[m].numpy() == pytest.approx(x0_bar, rel=1e-12)
-        assert field.grad[m].numpy() == pytest.approx(found["B"], rel=1e-12)
-        slope += found["J"]
+        assert field.grad[m].numpy() == pytest.approx(parameters_bar["B"], rel=1e-12)
+        slope += parameters_bar["J"]
     assert j.grad.item() == pytest.approx(slope, rel=1e-12)

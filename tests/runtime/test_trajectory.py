@@ -54,10 +54,10 @@ def test_no_two_columns_have_one_name():
 
 
 def test_xarray_has_names_for_all_axes(trajectory):
-    found = trajectory.to_xarray()
-    assert found.x.sel(coordinate="p").values.tolist() == trajectory.x[:, 1].tolist()
-    assert found.casimir_C.sel(t=0.1).item() == trajectory.casimirs["C"][1]
-    assert found.attrs == {"h": 0.1, "steps": 2, "parameter_k": 2.0}
+    dataset = trajectory.to_xarray()
+    assert dataset.x.sel(coordinate="p").values.tolist() == trajectory.x[:, 1].tolist()
+    assert dataset.casimir_C.sel(t=0.1).item() == trajectory.casimirs["C"][1]
+    assert dataset.attrs == {"h": 0.1, "steps": 2, "parameter_k": 2.0}
 
 
 def test_pandas_has_the_columns_of_the_csv(trajectory):
