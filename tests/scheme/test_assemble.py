@@ -68,9 +68,12 @@ def test_generating_function_is_the_cheapest_of_its_forms_and_all_are_equal(name
         at = {c: mpmath.mpf(7 + k) / 11 for k, c in enumerate([*coordinates, *system.parameter_names])} | {
             STEP: mpmath.mpf(1) / 8
         }
-        found = [evaluated(form, at) for form in forms]
-        for other in found[1:]:
-            assert all(abs(u - v) <= mpmath.mpf(10) ** -25 * (1 + abs(u)) for u, v in zip(found[0], other, strict=True))
+        values_of_forms = [evaluated(form, at) for form in forms]
+        for other in values_of_forms[1:]:
+            assert all(
+                abs(u - v) <= mpmath.mpf(10) ** -25 * (1 + abs(u))
+                for u, v in zip(values_of_forms[0], other, strict=True)
+            )
 
 
 def evaluated(form, at):

@@ -46,8 +46,8 @@ def test_elimination_solves_linear_systems(name):
         at = {Symbol("J", i, j): matrix[i, j] for i in range(n) for j in range(n) if pattern[i][j]}
         at |= {Symbol("r", i): side[i] for i in range(n)}
         solution, reciprocals = elimination(pattern)
-        found = mpmath.matrix(values(solution, at))
-        assert mpmath.norm(matrix * found - side) < mpmath.mpf(10) ** -25
+        computed = mpmath.matrix(values(solution, at))
+        assert mpmath.norm(matrix * computed - side) < mpmath.mpf(10) ** -25
         pivots = mpmath.mpf(1)
         for r in values(reciprocals, at):
             pivots /= r
@@ -60,9 +60,11 @@ def test_factors_solve_as_elimination_does(name):
     n = len(PATTERNS[name])
     at = {Symbol("J", i, j): float(entry(i, j)) for i in range(n) for j in range(n)}
     at |= {Symbol("r", i): i - 2.5 for i in range(n)}
-    kept = dict(zip([str(e.value) for e in factors.named("f").values], evaluate(list(factors.values), at), strict=True))
+    factor_values = dict(
+        zip([str(e.value) for e in factors.named("f").values], evaluate(list(factors.values), at), strict=True)
+    )
     side = [symbol(Symbol("r", i)) for i in range(n)]
-    assert evaluate(factors.named("f").solved(side), at | kept) == pytest.approx(
+    assert evaluate(factors.named("f").solved(side), at | factor_values) == pytest.approx(
         evaluate(elimination(PATTERNS[name])[0], at), rel=1e-13
     )
 

@@ -27,9 +27,9 @@ CASES = {
 @pytest.mark.parametrize(("e", "least"), CASES.values(), ids=CASES)
 def test_gathered_expressions_have_the_same_value_and_no_more_operations(e, least):
     coefficients, plain = Coefficients(["h", "k"]), Coefficients(["h", "k"])
-    (found,) = gather(coefficients, [e])
+    (gathered,) = gather(coefficients, [e])
     values = evaluate(coefficients.values, POINT)
     slots = dict(zip(coefficients.slots, values, strict=True))
-    assert evaluate([found], POINT | slots) == pytest.approx(evaluate([e], POINT), rel=1e-15)
-    assert not {"h", "k"} & set(text(found).replace("*", " ").split())
-    assert cost([found]) <= min(least, cost(plain.hoist([e])))
+    assert evaluate([gathered], POINT | slots) == pytest.approx(evaluate([e], POINT), rel=1e-15)
+    assert not {"h", "k"} & set(text(gathered).replace("*", " ").split())
+    assert cost([gathered]) <= min(least, cost(plain.hoist([e])))

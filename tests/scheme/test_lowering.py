@@ -101,8 +101,8 @@ def test_assignments_compute_the_roots(name):
         for kernel in compilation.program.kernels:
             expanded = expand_powers(kernel.roots)
             assignments, trees = assign(expanded)
-            found, expected = evaluated(assignments, trees, at), values(kernel.roots, at)
-            for left, right in zip(found, expected, strict=True):
+            computed, expected = evaluated(assignments, trees, at), values(kernel.roots, at)
+            for left, right in zip(computed, expected, strict=True):
                 assert abs(left - right) <= mpmath.mpf(10) ** -25 * (1 + abs(right))
             operations = [sum(1 for e in topological([s.value]) if e.args) for s in assignments]
             assert max(operations, default=0) <= 2 * MAX_STATEMENT_OPERATIONS + 1

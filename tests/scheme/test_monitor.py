@@ -57,20 +57,20 @@ def kepler():
 
 @pytest.mark.parametrize("order", slow_but([2], [2, 4]))
 def test_it_is_the_system_with_the_pair_typed_by_hand(order):
-    own = solver_of(compiled_text(KEPLER, order), "numpy").integrate(START, STEP, 60)
+    run = solver_of(compiled_text(KEPLER, order), "numpy").integrate(START, STEP, 60)
     by_hand = solver_of(compiled_text(BY_HAND, order), "numpy")
     full = by_hand.integrate([*START[:2], 0.0, *START[2:], E], STEP, 60).x
-    np.testing.assert_allclose(own.x, full[:, [0, 1, 3, 4]], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(own.t, full[:, 2], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(own.tau, STEP * np.arange(61))
+    np.testing.assert_allclose(run.x, full[:, [0, 1, 3, 4]], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(run.t, full[:, 2], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(run.tau, STEP * np.arange(61))
 
 
 def test_a_hundred_steps_a_period_keep_the_energy_of_an_eccentric_orbit_without_drift(kepler):
-    found = kepler[1]["c"].integrate(START, STEP, 2000)
-    errors = np.abs(found.energy + E) / E
+    run = kepler[1]["c"].integrate(START, STEP, 2000)
+    errors = np.abs(run.energy + E) / E
     assert errors.max() < 1e-5  # with steps equal in t these do not even converge
     assert errors[-500:].max() < 1.1 * errors[:500].max()
-    assert abs(found.t[-1] / 2000 / STEP - found.t[1000] / 1000 / STEP) < 0.02
+    assert abs(run.t[-1] / 2000 / STEP - run.t[1000] / 1000 / STEP) < 0.02
 
 
 def test_all_targets_make_the_same_steps_and_take_the_same_time(kepler):
@@ -88,9 +88,9 @@ def test_all_targets_make_the_same_steps_and_take_the_same_time(kepler):
 def test_verification_finds_the_order_in_tau_and_of_the_time_and_no_poisson_defect(extra):
     compilation = compiled_text(f"{BODY}order: 4\n{extra}\n")
     solvers = {target: solver_of(compilation, target) for target in ("c", "numpy")}
-    found = verification.verify(compilation, solvers, "tumbling", BODY_START, {}, 0.2, 400, (), quick=True)
-    assert not found.failures
-    assert "observed order, with the time" in [c.name for c in found.checks]
+    measured = verification.verify(compilation, solvers, "tumbling", BODY_START, {}, 0.2, 400, (), quick=True)
+    assert not measured.failures
+    assert "observed order, with the time" in [c.name for c in measured.checks]
 
 
 @pytest.mark.slow
@@ -133,43 +133,43 @@ def test_the_time_of_s_1_alone_has_order_2(kepler):
 
 @pytest.mark.slow
 def test_states_at_times_are_on_the_orbit_and_until_ends_there():
-    made = solver_of(compiled_text(BODY, 8), "c")
-    found = made.integrate(BODY_START, 0.02, 300, stride=25)
-    times = np.linspace(0, found.t[-1], 17)
+    solver = solver_of(compiled_text(BODY, 8), "c")
+    run = solver.integrate(BODY_START, 0.02, 300, stride=25)
+    times = np.linspace(0, run.t[-1], 17)
 
     def field(t, x):
         return np.cross([x[0], x[1] / 2, x[2] / 3], x)
 
-    sign = np.sign(made.vector_field(BODY_START)[0] / field(0, BODY_START)[0])
+    sign = np.sign(solver.vector_field(BODY_START)[0] / field(0, BODY_START)[0])
     there = solve_ivp(
         lambda t, x: sign * field(t, x), (0, times[-1]), BODY_START, "DOP853", times, rtol=1e-13, atol=1e-14
     )
-    np.testing.assert_allclose(found.at(times), there.y.T, rtol=0, atol=1e-12)
-    ended = made.integrate(BODY_START, 0.02, until=times[5], stride=10_000)
+    np.testing.assert_allclose(run.at(times), there.y.T, rtol=0, atol=1e-12)
+    ended = solver.integrate(BODY_START, 0.02, until=times[5], stride=10_000)
     assert ended.t.tolist() == [0, times[5]]
     np.testing.assert_allclose(ended.x[-1], there.y.T[5], rtol=0, atol=1e-12)
     assert ended.steps - 1 < ended.tau[-1] / 0.02 < ended.steps
-    back = made.integrate(ended.x[-1], -0.02, until=-times[5])
+    back = solver.integrate(ended.x[-1], -0.02, until=-times[5])
     np.testing.assert_allclose(back.x[-1], BODY_START, rtol=0, atol=1e-12)
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_until_and_at_without_a_monitor(target):
-    made = solver_of(compiled_text(BODY.replace("monitor: 1/(1 + x1**2)\n", ""), 4), target)
-    whole = made.integrate(BODY_START, 0.01, until=0.5)
+    solver = solver_of(compiled_text(BODY.replace("monitor: 1/(1 + x1**2)\n", ""), 4), target)
+    whole = solver.integrate(BODY_START, 0.01, until=0.5)
     assert (whole.steps, len(whole)) == (50, 51)
-    part = made.integrate(BODY_START, 0.01, until=0.503, stride=20)
+    part = solver.integrate(BODY_START, 0.01, until=0.503, stride=20)
     assert part.t.tolist() == [0, 0.2, 0.4, 0.503]
     np.testing.assert_array_equal(part.tau, part.t)
     np.testing.assert_allclose(part.at([0.503, 0.2, 0.31])[:2], part.x[[3, 1]], rtol=0, atol=1e-15)
     np.testing.assert_allclose(whole.at([0.31])[0], part.at([0.31])[0], rtol=0, atol=1e-10)
     with pytest.raises(ValueError, match="never reached"):
-        made.integrate(BODY_START, -0.01, until=0.5)
+        solver.integrate(BODY_START, -0.01, until=0.5)
     with pytest.raises(TypeError, match="needs the number of steps, or the time"):
-        made.integrate(BODY_START, 0.01)
+        solver.integrate(BODY_START, 0.01)
     with pytest.raises(TypeError, match="either steps or until, not both"):
-        made.integrate(BODY_START, 0.01, 3, until=0.5)
+        solver.integrate(BODY_START, 0.01, 3, until=0.5)
     with pytest.raises(ValueError, match="between"):
         part.at([0.6])
 
@@ -198,12 +198,12 @@ order: 2
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_where_the_monitor_vanishes_the_motion_stops_and_beyond_it_none_begins(target):
-    made = solver_of(compiled_text(LEAVING), target)
-    found = made.integrate([1, 0], 0.1, 400)
-    assert -0.5 < found.x[:, 0].min() < -0.49
-    assert np.all(np.diff(found.t) > 0)
+    solver = solver_of(compiled_text(LEAVING), target)
+    run = solver.integrate([1, 0], 0.1, 400)
+    assert -0.5 < run.x[:, 0].min() < -0.49
+    assert np.all(np.diff(run.t) > 0)
     with pytest.raises(StepError, match="the monitor is not positive"):
-        made.integrate([-1, 0], 0.1, 1)
+        solver.integrate([-1, 0], 0.1, 1)
 
 
 @pytest.mark.thin(2)
@@ -211,11 +211,11 @@ def test_where_the_monitor_vanishes_the_motion_stops_and_beyond_it_none_begins(t
 def test_in_single_precision_until_and_at_are_right_to_its_rounding(order):
     single = solver_of(compiled_text(BODY + "real: float\n", order), "c")
     double = solver_of(compiled_text(BODY + "gauge: none\n", order), "c")
-    found, times = single.integrate(BODY_START, 0.2, until=7.7), [0.3, 1.0, 5.5]
-    assert found.t[-1] == pytest.approx(7.7, rel=1e-6)
+    run, times = single.integrate(BODY_START, 0.2, until=7.7), [0.3, 1.0, 5.5]
+    assert run.t[-1] == pytest.approx(7.7, rel=1e-6)
     exact = double.integrate(BODY_START, 0.2, until=7.7)
-    np.testing.assert_allclose(found.x[-1], exact.x[-1], rtol=0, atol=1e-5)
-    np.testing.assert_allclose(found.at(times), exact.at(times), rtol=0, atol=1e-5)
+    np.testing.assert_allclose(run.x[-1], exact.x[-1], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(run.at(times), exact.at(times), rtol=0, atol=1e-5)
 
 
 def test_a_failure_tells_the_physical_time_of_the_last_good_state(kepler):
@@ -233,15 +233,15 @@ def test_without_parameters_a_start_is_refused_for_its_monitor_alone():
 
 
 def test_a_step_that_fails_is_made_in_parts_only_where_that_is_asked(kepler):
-    made = kepler[1]["c"]
+    integrator = kepler[1]["c"]
     with pytest.raises(StepError):
-        made.integrate(START, 3.5, 6)
-    found = made.integrate(START, 3.5, 6, retry=6)
-    assert found.retried
-    assert found.steps == 6
-    assert made.integrate(START, 3.5, until=found.t[-1], retry=6).retried[: len(found.retried)] == found.retried
-    assert np.ptp(found.x[:, 0] * found.x[:, 3] - found.x[:, 1] * found.x[:, 2]) < 1e-13
-    assert made.integrate(START, STEP, 10, retry=3).retried == ()
+        integrator.integrate(START, 3.5, 6)
+    run = integrator.integrate(START, 3.5, 6, retry=6)
+    assert run.retried
+    assert run.steps == 6
+    assert integrator.integrate(START, 3.5, until=run.t[-1], retry=6).retried[: len(run.retried)] == run.retried
+    assert np.ptp(run.x[:, 0] * run.x[:, 3] - run.x[:, 1] * run.x[:, 2]) < 1e-13
+    assert integrator.integrate(START, STEP, 10, retry=3).retried == ()
 
 
 @pytest.mark.parametrize(
@@ -299,9 +299,9 @@ def test_without_a_monitor_nothing_is_said_of_it():
 @pytest.mark.parametrize("forces", ["", "forces: {covector: {x1: x2}, vector: {x3: x1}}\n"])
 def test_sympy_derives_the_same_with_a_monitor(forces):
     """K has e among its symbols; with forces p is g(∇H + ζ), and no gradient."""
-    found = list(compare(compile_spec(spec.loads(BODY + forces), order=2)))
-    assert all(c.statement.holds for c in found if c.term is None)
-    assert any(c.statement.name == GRADIENT for c in found)
+    agreements = list(compare(compile_spec(spec.loads(BODY + forces), order=2)))
+    assert all(c.statement.holds for c in agreements if c.term is None)
+    assert any(c.statement.name == GRADIENT for c in agreements)
 
 
 def test_events_are_told_the_physical_time():
@@ -310,9 +310,9 @@ def test_events_are_told_the_physical_time():
     def event(t, x):
         return x[0] - 0.1 * t + 0.05
 
-    found = solve(solver, (0.0, 9.0), BODY_START, h=0.05, events=event)
+    solution = solve(solver, (0.0, 9.0), BODY_START, h=0.05, events=event)
     exact = solve_ivp(
         lambda t, x: solver.vector_field(x), (0, 9), BODY_START, events=event, rtol=1e-12, atol=1e-12, method="DOP853"
     )
-    assert len(found.t_events[0]) > 0
-    np.testing.assert_allclose(found.t_events[0], exact.t_events[0], rtol=0, atol=1e-7)
+    assert len(solution.t_events[0]) > 0
+    np.testing.assert_allclose(solution.t_events[0], exact.t_events[0], rtol=0, atol=1e-7)
