@@ -40,10 +40,10 @@ def planar(hamiltonian, alpha, terms, *, symmetric=False):
     return polynomial_series(hamiltonian, alpha, ("q", "p"), ("g",), terms, symmetric=symmetric)
 
 
-def same(found, index, expected):
+def same(terms, index, expected):
     """Whether S_index is the expression, exactly."""
-    tower = found.tower
-    return tower.is_zero(found.terms[index - 1] - tower.convert(expected))
+    tower = terms.tower
+    return tower.is_zero(terms.terms[index - 1] - tower.convert(expected))
 
 
 def tangent_coefficients(count):
@@ -59,51 +59,51 @@ def tangent_coefficients(count):
 def test_oscillator_in_the_midpoint_chart_is_a_tangent():
     """S_t = 2 tan(t/2) H, so S_3 = (q² + p²)/24 and S_5 = (q² + p²)/240."""
     energy = (q**2 + p**2) / 2
-    found = planar(energy, MIDPOINT, 9)
-    assert same(found, 3, (q**2 + p**2) / 24)
-    assert same(found, 5, (q**2 + p**2) / 240)
+    algebra = planar(energy, MIDPOINT, 9)
+    assert same(algebra, 3, (q**2 + p**2) / 24)
+    assert same(algebra, 5, (q**2 + p**2) / 240)
     for k, c in enumerate(tangent_coefficients(5)):
-        assert same(found, 2 * k + 1, number(c) * energy)
+        assert same(algebra, 2 * k + 1, number(c) * energy)
 
 
 def test_linear_hamiltonian_on_so3_in_the_cayley_chart_is_a_tangent():
     """S_t = (2/|a|) tan(t|a|/2) H for H = a·x, so S_3 = |a|² H/12."""
     body = compile_text(BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1/2 - 3*x2 + 2*x3/7") + CAYLEY)
     energy, square = body.system.hamiltonian, Fraction(1, 4) + 9 + Fraction(4, 49)
-    found = series(body, 7, symmetric=False)
-    assert same(found, 3, number(square / 12) * energy)
+    expansion = series(body, 7, symmetric=False)
+    assert same(expansion, 3, number(square / 12) * energy)
     for k, c in enumerate(tangent_coefficients(4)):
-        assert same(found, 2 * k + 1, number(c * square**k) * energy)
+        assert same(expansion, 2 * k + 1, number(c * square**k) * energy)
 
 
 def test_linear_hamiltonian_on_so3_in_the_exponential_chart_is_its_own_series():
     """S_t = tH: the exponential is exact for linear Hamiltonians."""
     text = BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1/2 - 3*x2 + 2*x3/7")
-    found = series(compile_text(text + "birealisation: exponential\norder: 2\n"), 5, symmetric=False)
-    assert all(found.tower.is_zero(term) for term in found.terms[1:])
+    expansion = series(compile_text(text + "birealisation: exponential\norder: 2\n"), 5, symmetric=False)
+    assert all(expansion.tower.is_zero(term) for term in expansion.terms[1:])
 
 
 def test_third_term_of_the_rigid_body():
-    found = series(compile_text(BODY + CAYLEY), 4, symmetric=False)
+    expansion = series(compile_text(BODY + CAYLEY), 4, symmetric=False)
     x1, x2, x3 = symbols("x1 x2 x3")
     quartic = 216 * x1**4 + 171 * x1**2 * x2**2 + 120 * x1**2 * x3**2 + 27 * x2**4 + 33 * x2**2 * x3**2 + 8 * x3**4
-    assert same(found, 1, x1**2 / 2 + x2**2 / 4 + x3**2 / 6)
-    assert same(found, 3, quartic / 2592)
-    assert found.terms[1] == 0
-    assert found.terms[3] == 0
+    assert same(expansion, 1, x1**2 / 2 + x2**2 / 4 + x3**2 / 6)
+    assert same(expansion, 3, quartic / 2592)
+    assert expansion.terms[1] == 0
+    assert expansion.terms[3] == 0
 
 
 def test_third_term_of_the_log_canonical_system_with_linear_hamiltonian():
-    found = series(compile_text(SPECIES + "order: 2\n"), 3, symmetric=False)
+    expansion = series(compile_text(SPECIES + "order: 2\n"), 3, symmetric=False)
     x1, x2, x3 = symbols("x1 x2 x3")
-    assert same(found, 3, (x1 + x2) * (x1 + x3) * (x2 + x3) / 24)
+    assert same(expansion, 3, (x1 + x2) * (x1 + x3) * (x2 + x3) / 24)
 
 
 def test_logarithmic_hamiltonian_of_a_log_canonical_system_is_its_own_series():
     """S_t = tH for H = Σ c_i log x_i, since α only multiplies the coordinates by constants."""
     text = SPECIES.replace("x1 + x2 + x3", "3*log(x1) - log(x2)/2 + 5*log(x3)")
-    found = series(compile_text(text + "order: 2\n"), 4, symmetric=False)
-    assert all(found.tower.is_zero(term) for term in found.terms[1:])
+    expansion = series(compile_text(text + "order: 2\n"), 4, symmetric=False)
+    assert all(expansion.tower.is_zero(term) for term in expansion.terms[1:])
 
 
 # -- structure
@@ -113,9 +113,9 @@ def test_logarithmic_hamiltonian_of_a_log_canonical_system_is_its_own_series():
 def test_even_terms_vanish_in_symmetric_realisations(name):
     """The parity theorem, with a series computed without using it."""
     compilation = compiled(name)
-    found = series(compilation, 4, symmetric=False)
-    assert found.tower.is_zero(found.terms[1])
-    assert found.tower.is_zero(found.terms[3])
+    expansion = series(compilation, 4, symmetric=False)
+    assert expansion.tower.is_zero(expansion.terms[1])
+    assert expansion.tower.is_zero(expansion.terms[3])
 
 
 def test_even_terms_of_a_one_sided_realisation_do_not_vanish():
@@ -125,16 +125,16 @@ def test_even_terms_of_a_one_sided_realisation_do_not_vanish():
 @pytest.mark.parametrize("name", NAMES)
 def test_series_solves_the_equation(name):
     compilation = compiled(name)
-    found = series(compilation, min(compilation.order.terms, 5), symmetric=compilation.realisation.symmetric)
+    expansion = series(compilation, min(compilation.order.terms, 5), symmetric=compilation.realisation.symmetric)
     rest = residual(
-        found, compilation.system.hamiltonian, compilation.realisation.alpha, compilation.system.coordinates
+        expansion, compilation.system.hamiltonian, compilation.realisation.alpha, compilation.system.coordinates
     )
-    assert all(found.tower.is_zero(r) for r in rest)
+    assert all(expansion.tower.is_zero(r) for r in rest)
 
 
 def test_residual_of_a_wrong_series_does_not_vanish():
-    found = planar((q**2 + p**2) / 2, MIDPOINT, 3)
-    wrong = type(found)(found.tower, (*found.terms[:2], 2 * found.terms[2]))
+    algebra = planar((q**2 + p**2) / 2, MIDPOINT, 3)
+    wrong = type(algebra)(algebra.tower, (*algebra.terms[:2], 2 * algebra.terms[2]))
     assert residual(wrong, (q**2 + p**2) / 2, MIDPOINT, ("q", "p"))[2] != 0
 
 
@@ -154,11 +154,11 @@ def test_polynomials_and_graphs_give_the_same_series(name):
     terms = min(compilation.order.terms, 5)
     symmetric = realisation.symmetric
     graph = graph_series(system.hamiltonian, realisation.alpha, system.coordinates, terms, symmetric=symmetric)
-    found = series(compilation, terms, symmetric=symmetric)
+    expansion = series(compilation, terms, symmetric=symmetric)
     with mpmath.workdps(40):
         at = point_of(compilation)
         left = values(graph, at)
-        right = values([found.tower.expression(t) for t in found.terms], at)
+        right = values([expansion.tower.expression(t) for t in expansion.terms], at)
         assert all(abs(x - y) <= mpmath.mpf(10) ** -30 * (1 + abs(x)) for x, y in zip(left, right, strict=True))
 
 
@@ -201,16 +201,16 @@ def by_sympy(text, one_sided, terms):
     names = {n: sympy.Symbol(n, positive=True) for n in ("q", "p", "g", "t")}
     sq, sp, t = names["q"], names["p"], names["t"]
     energy = sympy.sympify(text, locals={**names, "abs": sympy.Abs}, rational=True)
-    found = [energy]
+    series_terms = [energy]
     for i in range(1, terms):
-        partial = sum((t ** (k + 1) * s for k, s in enumerate(found)), sympy.Integer(0))
+        partial = sum((t ** (k + 1) * s for k, s in enumerate(series_terms)), sympy.Integer(0))
         slope_q, slope_p = partial.diff(sq), partial.diff(sp)
         half = sympy.Rational(1, 2)
         moved = (sq, sp + slope_q) if one_sided else (sq - half * slope_p, sp + half * slope_q)
         inside = energy.subs({sq: moved[0], sp: moved[1]}, simultaneous=True)
-        found.append(inside.diff(t, i).subs(t, 0) / sympy.factorial(i) / (i + 1))
+        series_terms.append(inside.diff(t, i).subs(t, 0) / sympy.factorial(i) / (i + 1))
     at = {names[k]: sympy.Rational(v.numerator, v.denominator) for k, v in VALUES.items()}
-    return [str(sympy.N(s.subs(at), 32)) for s in found]
+    return [str(sympy.N(s.subs(at), 32)) for s in series_terms]
 
 
 #: In the one-sided chart every function is differentiated twice already; sympy takes many times longer in the other,
@@ -229,8 +229,8 @@ def test_series_of_other_functions_agrees_with_sympy(text, chart):
     energy, alpha = parsed(text), ONE_SIDED if one_sided else MIDPOINT
     with mpmath.workdps(30):
         at = {k: mpmath.mpf(v.numerator) / v.denominator for k, v in VALUES.items()}
-        found = planar(energy, alpha, 3)
-        in_tower = values([found.tower.expression(t) for t in found.terms], at)
+        algebra = planar(energy, alpha, 3)
+        in_tower = values([algebra.tower.expression(t) for t in algebra.terms], at)
         as_graph = values(graph_series(energy, alpha, ("q", "p"), 3, symmetric=False), at)
         for i, value in enumerate(map(mpmath.mpf, expected)):
             bound = mpmath.mpf(10) ** -25 * (1 + abs(value))
@@ -254,10 +254,10 @@ FREE_OF_MOMENTUM = [
 @pytest.mark.parametrize(("function", "exact"), FREE_OF_MOMENTUM, ids=[str(f) for f, _ in FREE_OF_MOMENTUM])
 def test_series_of_a_shift_is_a_taylor_expansion(function, exact):
     """For H = f(q) + p in the one-sided chart α = (q, p + a): S_t = (F(q + t) − F(q)) + tp, so S_i = f^(i−1)(q)/i!."""
-    found = planar(function + p, ONE_SIDED, 7)
+    algebra = planar(function + p, ONE_SIDED, 7)
     with mpmath.workdps(50):
         at = {"q": mpmath.mpf(13) / 11, "p": mpmath.mpf(2), "g": mpmath.mpf(1)}
-        computed = values([found.tower.expression(t) for t in found.terms], at)
+        computed = values([algebra.tower.expression(t) for t in algebra.terms], at)
         expansion = mpmath.taylor(exact, at["q"], 6)
         expected = [c / (i + 1) for i, c in enumerate(expansion)]
         expected[0] += at["p"]
@@ -270,16 +270,16 @@ def test_series_of_a_shift_is_a_taylor_expansion(function, exact):
 def test_order_twelve_of_the_rigid_body_is_quick():
     compilation = compiled("rigid_body")
     with processor_seconds_below(30):  # a matter of a second; expression trees would take minutes
-        found = series_of(compilation.system, compilation.realisation, 11)
-    assert found.terms[10].total_degree() > 0
-    assert all(term == 0 for term in found.terms[1::2])
+        expansion = series_of(compilation.system, compilation.realisation, 11)
+    assert expansion.terms[10].total_degree() > 0
+    assert all(term == 0 for term in expansion.terms[1::2])
 
 
 @pytest.mark.parametrize("terms", [1, 2, 5])
 def test_as_many_terms_as_were_asked_for(terms):
-    found = planar((q**2 + p**2) / 2, MIDPOINT, terms, symmetric=True)
-    assert len(found.terms) == terms
-    assert isinstance(found.tower, Tower)
+    algebra = planar((q**2 + p**2) / 2, MIDPOINT, terms, symmetric=True)
+    assert len(algebra.terms) == terms
+    assert isinstance(algebra.tower, Tower)
     graph = graph_series((q**2 + p**2) / 2, MIDPOINT, ("q", "p"), terms, symmetric=True)
     assert all(isinstance(term, Expression) for term in graph)
     assert all(term is ZERO for term in graph[1::2])

@@ -39,18 +39,20 @@ def arctangent(power):
 
 
 def test_midpoint_rule_for_the_harmonic_oscillator():
-    found = modified(compile_text(f"{SWING}order: 2\n"), 8)
-    h = found.terms[0]
-    for coefficient, term in zip(arctangent(8), found.terms, strict=True):
-        assert term == h * found.tower.constant(coefficient)
+    corrections = modified(compile_text(f"{SWING}order: 2\n"), 8)
+    h = corrections.terms[0]
+    for coefficient, term in zip(arctangent(8), corrections.terms, strict=True):
+        assert term == h * corrections.tower.constant(coefficient)
 
 
 def test_symplectic_euler_for_the_harmonic_oscillator():
     """H̃ = arcsin(h/2)/(h/2)/√(1 − h²/4) (H ∓ h qp/2): the invariant ellipse, run through with the right period."""
-    found = modified(compile_text(f"{SWING}order: 1\nbirealisation: canonical-euler\n"), 6)
+    corrections = modified(compile_text(f"{SWING}order: 1\nbirealisation: canonical-euler\n"), 6)
     h = 0.3
     at = {"q": 0.7, "p": -0.4, FRACTION: 0.0}
-    value = sum(h**j * float(evaluate([found.tower.expression(t)], at)[0]) for j, t in enumerate(found.terms))
+    value = sum(
+        h**j * float(evaluate([corrections.tower.expression(t)], at)[0]) for j, t in enumerate(corrections.terms)
+    )
     factor = 2 / h * math.asin(h / 2) / math.sqrt(1 - h * h / 4)
     both = [factor * ((0.49 + 0.16) / 2 + sign * h / 2 * 0.7 * -0.4) for sign in (1, -1)]
     assert min(abs(value - b) for b in both) < 1e-6
@@ -59,21 +61,21 @@ def test_symplectic_euler_for_the_harmonic_oscillator():
 def test_linear_hamiltonian_with_cayley():
     """One step of the Cayley method turns by the angle 2 arctan(h|a|/2)."""
     text = BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1 + 2*x2 + 2*x3")
-    found = modified(compile_text(f"{text}order: 2\nbirealisation: cayley\n"), 6)
-    h = found.terms[0]
-    for j, (coefficient, term) in enumerate(zip(arctangent(6), found.terms, strict=True)):
-        assert term == h * found.tower.constant(coefficient * 3**j)
+    corrections = modified(compile_text(f"{text}order: 2\nbirealisation: cayley\n"), 6)
+    h = corrections.terms[0]
+    for j, (coefficient, term) in enumerate(zip(arctangent(6), corrections.terms, strict=True)):
+        assert term == h * corrections.tower.constant(coefficient * 3**j)
 
 
 @pytest.mark.parametrize(("text", "terms"), [(BODY, 1), (BODY, 3), (SWING + "birealisation: canonical-euler\n", 2)])
 def test_first_correction_is_minus_the_first_term_left_out(text, terms):
     compilation = compile_text(f"{text}terms: {terms}\n")
     power = compilation.order.order
-    found = modified(compilation, power)
+    corrections = modified(compilation, power)
     series = series_of(compilation.system, compilation.realisation, power + 1)
     expected = {tuple(m)[:2]: rational(c) for m, c in (-series.terms[power]).to_dict().items()}
-    assert {tuple(m)[:2]: rational(c) for m, c in found.terms[power].to_dict().items()} == expected
-    assert all(t == 0 for t in found.terms[1:power])
+    assert {tuple(m)[:2]: rational(c) for m, c in corrections.terms[power].to_dict().items()} == expected
+    assert all(t == 0 for t in corrections.terms[1:power])
 
 
 @pytest.mark.thin(3)
@@ -94,15 +96,15 @@ def test_constant_to_higher_order_for_each_term(name, order):
     at = setting(compilation)
     stride = 2 if compilation.realisation.symmetric else 1
     powers = [order + stride * k for k in range(3)]
-    found = modified(compilation, powers[-1])
-    made = solver(compilation, "c")
-    speed = float(np.max(np.abs(made.vector_field(at.x, parameters=at.parameters))))
+    corrections = modified(compilation, powers[-1])
+    integrator = solver(compilation, "c")
+    speed = float(np.max(np.abs(integrator.vector_field(at.x, parameters=at.parameters))))
     h = min(20 * at.h, 0.2 * max(map(abs, at.x)) / speed)
     spreads = []
     for step in (h, h / 2):
-        x = made.integrate(at.x, step, round(8 * h / step), parameters=at.parameters).x
+        x = integrator.integrate(at.x, step, round(8 * h / step), parameters=at.parameters).x
         known = {**at.parameters, **{c: x[:, i] for i, c in enumerate(compilation.system.coordinates)}}
-        terms = evaluate([found.tower.expression(t) for t in found.terms], known)
+        terms = evaluate([corrections.tower.expression(t) for t in corrections.terms], known)
         sums = [sum(step**j * terms[j] for j in range(p)) for p in powers]
         spreads.append([np.ptp(s) / np.max(np.abs(s)) for s in sums])
     for power, coarse, fine in zip(powers, *spreads, strict=True):

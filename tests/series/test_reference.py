@@ -51,8 +51,8 @@ def tangents(terms):
 def test_midpoint_rule_for_the_oscillator():
     (q, u), (a, b) = x[:2], p[:2]
     energy = (q**2 + u**2) / 2
-    found = series(energy, closed_form([q - b / 2, u + a / 2], (a, b)), (q, u), 7)
-    assert all(sympy.expand(S - c * energy) == 0 for S, c in zip(found, tangents(7), strict=True))
+    expansion = series(energy, closed_form([q - b / 2, u + a / 2], (a, b)), (q, u), 7)
+    assert all(sympy.expand(S - c * energy) == 0 for S, c in zip(expansion, tangents(7), strict=True))
 
 
 def test_linear_hamiltonian_on_so3():
@@ -60,37 +60,37 @@ def test_linear_hamiltonian_on_so3():
     energy = sum(ai * xi for ai, xi in zip(a, x, strict=True))
     v, m = vector(*p), vector(*x)
     cayley = m + v.cross(m) / 2 + v * v.dot(m) / 4
-    found = series(energy, closed_form(list(cayley), p), x, 6)
+    expansion = series(energy, closed_form(list(cayley), p), x, 6)
     assert all(
-        sympy.expand(S - c * 3**i * energy) == 0 for i, (S, c) in enumerate(zip(found, tangents(6), strict=True))
+        sympy.expand(S - c * 3**i * energy) == 0 for i, (S, c) in enumerate(zip(expansion, tangents(6), strict=True))
     )
     assert series(energy, source_of_paths(so3(x), x, p), x, 5) == [energy, 0, 0, 0, 0]
 
 
 def test_log_canonical_series_of_a_sum():
     alpha = [xi * exp(u / 2) for xi, u in zip(x, exponents(x, p), strict=True)]
-    found = series(sum(x), closed_form(alpha, p), x, 3)
-    assert found[1] == 0
-    assert sympy.expand(24 * found[2] - (x[0] + x[1]) * (x[0] + x[2]) * (x[1] + x[2])) == 0
+    expansion = series(sum(x), closed_form(alpha, p), x, 3)
+    assert expansion[1] == 0
+    assert sympy.expand(24 * expansion[2] - (x[0] + x[1]) * (x[0] + x[2]) * (x[1] + x[2])) == 0
 
 
 @pytest.mark.parametrize("f", [exp, log, sqrt, lambda q: 1 / q, lambda q: tan(q) * pi, lambda q: Abs(q) * q])
 def test_series_of_a_shift_is_a_taylor_expansion(f):
     """H = f(q) + u and α = (q, u + a): S_t = F(q + t) − F(q) + tu."""
     (q, u), (a, b) = x[:2], p[:2]
-    found = series(f(q) + u, closed_form([q, u + a], (a, b)), (q, u), 5)
+    expansion = series(f(q) + u, closed_form([q, u + a], (a, b)), (q, u), 5)
     g = f(sympy.Symbol("g", positive=True))
     (at,) = g.free_symbols
     expected = [sympy.diff(g, at, i).subs(at, Rational(13, 11)) / sympy.factorial(i + 1) for i in range(5)]
-    values = [S.subs({q: Rational(13, 11), u: 0}) for S in found]
+    values = [S.subs({q: Rational(13, 11), u: 0}) for S in expansion]
     assert all(abs(sympy.N(v - e, 40)) < 1e-30 for v, e in zip(values, expected, strict=True))
 
 
 def test_taylor_reaches_each_multi_index_once():
     f = x[0] ** 2 * x[1] + x[1] ** 3
     shift = {q: q + d for q, d in zip(x, p, strict=True)}
-    found = sum(c * prod(d**e for d, e in zip(p, mu, strict=True)) for mu, c in taylor(f, x, 3).items())
-    assert sympy.expand(f.subs(shift, simultaneous=True) - found) == 0
+    taylor_sum = sum(c * prod(d**e for d, e in zip(p, mu, strict=True)) for mu, c in taylor(f, x, 3).items())
+    assert sympy.expand(f.subs(shift, simultaneous=True) - taylor_sum) == 0
 
 
 # -- paths
@@ -187,6 +187,6 @@ def test_terms_of_even_index_are_zero_as_they_are_written():
     """Not only after relations are used: else they would grow into all that follows."""
     (q, w), (a, b) = x[:2], p[:2]
     energy = w**2 / (1 + sqrt(q**2 + 1) ** 3) + Abs(q) * tan(w)
-    found = series(energy, closed_form([q - b / 2, w + a / 2], (a, b)), (q, w), 4)
-    assert (found[1], found[3]) == (0, 0)
-    assert found[2] != 0
+    expansion = series(energy, closed_form([q - b / 2, w + a / 2], (a, b)), (q, w), 4)
+    assert (expansion[1], expansion[3]) == (0, 0)
+    assert expansion[2] != 0
