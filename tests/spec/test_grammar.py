@@ -176,10 +176,10 @@ def test_printed_expression_parses_to_equal_values(tree: Expression, point: tupl
     at = dict(zip(NAMES, point, strict=True))
     try:
         expected = value(tree, at)
-        found = value(again, at)
+        parsed_value = value(again, at)
     except (ValueError, ArithmeticError):
         return
-    assert found == pytest.approx(expected, rel=1e-6, abs=1e-6), printed
+    assert parsed_value == pytest.approx(expected, rel=1e-6, abs=1e-6), printed
 
 
 @given(st.text(alphabet="x12.e+-*/(), \nsinqrt^_'\"[]{}=λ0abs", max_size=40))

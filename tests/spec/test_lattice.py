@@ -68,8 +68,10 @@ def test_a_casimir_is_one_of_each_site_unless_it_names_neighbours_or_says_so() -
 
 @pytest.mark.parametrize("scale", [0, -2, 0.5])
 def test_random_values_have_their_scale_and_mean(scale: float) -> None:
-    given = f"{{random: uniform, seed: 3, scale: {scale}, mean: 1 + i}}"
-    spec = loads(TODA.replace("{a: 1 + i/N_i, b: {random: normal, seed: 3, scale: 0.1}}", f"{{a: {given}, b: 0}}"))
+    random_entry = f"{{random: uniform, seed: 3, scale: {scale}, mean: 1 + i}}"
+    spec = loads(
+        TODA.replace("{a: 1 + i/N_i, b: {random: normal, seed: 3, scale: 0.1}}", f"{{a: {random_entry}, b: 0}}")
+    )
     drawn = np.random.default_rng(3).uniform(-1, 1, 16)
     assert np.array_equal(start_of(spec, spec.runs["waves"]).state[0], scale * drawn + 1 + np.arange(16))
 

@@ -39,7 +39,7 @@ def complaint(base: str, path: tuple[Any, ...], value: str) -> str:
     tree = tree_of(BASES[base])
     text = document(replaced(tree, path, value))
     try:
-        found = meaning(text)
+        message = meaning(text)
     except SpecError as error:
         placed = [d.location is not None and d.source_line in text.split("\n") for d in error.diagnostics]
         return "" if placed and all(placed) else f"an error without a place: {error}"
@@ -49,7 +49,7 @@ def complaint(base: str, path: tuple[Any, ...], value: str) -> str:
         without = meaning(document(replaced(tree, path, None)))
     except SpecError:
         return ""
-    return "accepted, and ignored" if found == without else ""
+    return "accepted, and ignored" if message == without else ""
 
 
 @pytest.mark.parametrize("base", BASES)

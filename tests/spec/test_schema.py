@@ -84,9 +84,9 @@ def fields_below(kind: Kind) -> list[RecordKey]:
 
 
 def test_every_key_is_described_for_editors() -> None:
-    found: list[Any] = fields_below(SPEC)
-    assert len(found) > 40
-    assert all(f.description for f in found)
+    described_fields: list[Any] = fields_below(SPEC)
+    assert len(described_fields) > 40
+    assert all(f.description for f in described_fields)
 
 
 def test_what_words_of_other_programs_are_said_to_mean_are_keys() -> None:

@@ -38,33 +38,42 @@ def form(written: str) -> PoissonForm:
 
 
 def test_defaults() -> None:
-    found = spec()
-    assert (found.order, found.terms, found.license, found.targets) == (4, None, "0BSD", ("c", "numpy"))
-    assert (found.composition, found.gauge, found.scheme, found.birealisation.kind) == (
+    specification = spec()
+    assert (specification.order, specification.terms, specification.license, specification.targets) == (
+        4,
+        None,
+        "0BSD",
+        ("c", "numpy"),
+    )
+    assert (specification.composition, specification.gauge, specification.scheme, specification.birealisation.kind) == (
         "auto",
         "auto",
         "series",
         "auto",
     )
-    assert (found.solver.method, found.solver.tolerance, found.solver.max_iterations) == ("auto", None, 20)
-    assert not found.runs
-    assert found.dimension == 3
+    assert (specification.solver.method, specification.solver.tolerance, specification.solver.max_iterations) == (
+        "auto",
+        None,
+        20,
+    )
+    assert not specification.runs
+    assert specification.dimension == 3
 
 
 def test_terms_replace_order() -> None:
-    found = spec(terms="3")
-    assert (found.order, found.terms) == (None, 3)
+    specification = spec(terms="3")
+    assert (specification.order, specification.terms) == (None, 3)
 
 
 def test_matrix_is_pi() -> None:
-    found = form('[[0, -x3, "x2"], [x3, 0, -x1], [-x2, x1, 0]]'.join(["{matrix: ", "}"]))
-    assert found == MatrixForm(((ZERO, neg(X3), X2), (X3, ZERO, neg(X1)), (neg(X2), X1, ZERO)))
+    structure = form('[[0, -x3, "x2"], [x3, 0, -x1], [-x2, x1, 0]]'.join(["{matrix: ", "}"]))
+    assert structure == MatrixForm(((ZERO, neg(X3), X2), (X3, ZERO, neg(X1)), (neg(X2), X1, ZERO)))
 
 
 def test_brackets_are_completed_by_skew_symmetry() -> None:
-    found = form("{brackets: {x1: {x2: -x3}, x3: {x1: k*x2}}}")
+    structure = form("{brackets: {x1: {x2: -x3}, x3: {x1: k*x2}}}")
     kx2 = mul(symbol("k"), X2)
-    assert found == MatrixForm(((ZERO, neg(X3), neg(kx2)), (X3, ZERO, ZERO), (kx2, ZERO, ZERO)))
+    assert structure == MatrixForm(((ZERO, neg(X3), neg(kx2)), (X3, ZERO, ZERO), (kx2, ZERO, ZERO)))
 
 
 def test_brackets_may_be_stated_twice_as_exact_negatives() -> None:
@@ -76,9 +85,9 @@ def test_canonical_pairs() -> None:
 
 
 def test_log_canonical_matrix_with_parameters() -> None:
-    found = form("{log_canonical: [[0, k, 1], [-k, 0, 0], [-1, 0, 0]]}")
+    structure = form("{log_canonical: [[0, k, 1], [-k, 0, 0], [-1, 0, 0]]}")
     k, one = symbol("k"), number(1)
-    assert found == LogCanonicalForm(((ZERO, k, one), (neg(k), ZERO, ZERO), (neg(one), ZERO, ZERO)))
+    assert structure == LogCanonicalForm(((ZERO, k, one), (neg(k), ZERO, ZERO), (neg(one), ZERO, ZERO)))
 
 
 def test_nambu_casimirs() -> None:
@@ -95,14 +104,14 @@ def test_lie_algebra_by_its_name_alone() -> None:
 
 
 def test_structure_constants_count_from_0_and_stay_as_given() -> None:
-    found = form("{lie_algebra: {structure_constants: {E1: {E2: {E3: 1}}, E3: {E1: {E2: k}}}}}")
-    assert found == LieAlgebraForm(structure_constants={0: {1: {2: ONE}}, 2: {0: {1: symbol("k")}}})
+    structure = form("{lie_algebra: {structure_constants: {E1: {E2: {E3: 1}}, E3: {E1: {E2: k}}}}}")
+    assert structure == LieAlgebraForm(structure_constants={0: {1: {2: ONE}}, 2: {0: {1: symbol("k")}}})
 
 
 def test_matrices_of_a_lie_algebra() -> None:
     rows = ((ZERO, ONE), (ZERO, ZERO))
-    found = form("{lie_algebra: {matrices: [[[0, 1], [0, 0]], [[0, 1], [0, 0]], [[0, 1], [0, 0]]]}}")
-    assert found == LieAlgebraForm(matrices=(rows, rows, rows))
+    structure = form("{lie_algebra: {matrices: [[[0, 1], [0, 0]], [[0, 1], [0, 0]], [[0, 1], [0, 0]]]}}")
+    assert structure == LieAlgebraForm(matrices=(rows, rows, rows))
 
 
 @pytest.mark.parametrize(
@@ -115,21 +124,21 @@ def test_matrices_of_a_lie_algebra() -> None:
 )  # fmt: skip
 def test_dimension_of_a_family_is_the_number_of_coordinates(name: str, dimension: int) -> None:
     coordinates = ", ".join(f"x{i + 1}" for i in range(dimension))
-    found = spec(coordinates=f"[{coordinates}]", poisson=f"{{lie_algebra: {{name: {name}}}}}").poisson
-    assert isinstance(found, LieAlgebraForm)
-    assert found.family in FAMILIES
+    structure = spec(coordinates=f"[{coordinates}]", poisson=f"{{lie_algebra: {{name: {name}}}}}").poisson
+    assert isinstance(structure, LieAlgebraForm)
+    assert structure.family in FAMILIES
 
 
 def test_definitions_are_substituted() -> None:
-    found = spec(definitions="{a: b**2, b: x1 + x2}", hamiltonian="a*x3")
-    assert found.hamiltonian is mul(power(X1 + X2, 2), X3)
+    specification = spec(definitions="{a: b**2, b: x1 + x2}", hamiltonian="a*x3")
+    assert specification.hamiltonian is mul(power(X1 + X2, 2), X3)
 
 
 def test_momenta_of_a_custom_birealisation_are_symbols_of_their_own() -> None:
     halves = "[x1 - p_x1/2, x2, x3]", "[x1 + p_x1/2, x2, x3]"
-    found = spec(birealisation=f"{{kind: custom, alpha: {halves[0]}, beta: {halves[1]}}}").birealisation
-    assert found.alpha == (X1 - symbol(momentum("x1")) / 2, X2, X3)
-    assert found.beta == (X1 + symbol(momentum("x1")) / 2, X2, X3)
+    choice = spec(birealisation=f"{{kind: custom, alpha: {halves[0]}, beta: {halves[1]}}}").birealisation
+    assert choice.alpha == (X1 - symbol(momentum("x1")) / 2, X2, X3)
+    assert choice.beta == (X1 + symbol(momentum("x1")) / 2, X2, X3)
 
 
 def test_a_spray_is_a_name_or_quadratic_forms_in_the_momenta() -> None:
@@ -140,8 +149,8 @@ def test_a_spray_is_a_name_or_quadratic_forms_in_the_momenta() -> None:
 
 
 def test_names_with_p_are_free_without_a_custom_birealisation() -> None:
-    found = spec(coordinates="[x, p_x]", poisson="{canonical: {q: [x], p: [p_x]}}", hamiltonian="p_x**2")
-    assert found.hamiltonian is power(symbol("p_x"), 2)
+    specification = spec(coordinates="[x, p_x]", poisson="{canonical: {q: [x], p: [p_x]}}", hamiltonian="p_x**2")
+    assert specification.hamiltonian is power(symbol("p_x"), 2)
 
 
 RUN = "step: 0.1, initial: [1, 1/3, sqrt(2)/2]"
@@ -178,11 +187,11 @@ def test_text_keeps_what_comments_of_c_would_end() -> None:
 
 
 def test_locations_are_those_of_the_parts() -> None:
-    found = loads(starter("body"), "body.yaml")
-    lines = found.source.split("\n")
+    specification = loads(starter("body"), "body.yaml")
+    lines = specification.source.split("\n")
 
     def there(*path: Any) -> str:
-        place = found.locations[path]
+        place = specification.locations[path]
         assert place.file == "body.yaml"
         return lines[place.line - 1][place.column - 1 :]
 
@@ -195,11 +204,11 @@ def test_locations_are_those_of_the_parts() -> None:
 
 
 def test_diagnostic_cites_the_nearest_part() -> None:
-    found = spec()
-    exact = found.diagnostic(("hamiltonian",), "wrong", "mend it")
+    specification = spec()
+    exact = specification.diagnostic(("hamiltonian",), "wrong", "mend it")
     assert (exact.location, exact.source_line) == (Location(5, 14, "<string>"), "hamiltonian: x1**2")
-    assert found.diagnostic(("hamiltonian", "anything"), "wrong", "mend it") == exact
-    assert found.diagnostic(("casimirs", "C"), "wrong").location is None
+    assert specification.diagnostic(("hamiltonian", "anything"), "wrong", "mend it") == exact
+    assert specification.diagnostic(("casimirs", "C"), "wrong").location is None
 
 
 def test_digest_does_not_depend_on_line_ends(tmp_path: Path) -> None:

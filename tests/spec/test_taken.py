@@ -24,21 +24,21 @@ def reached(compiler, language, names):
     """The headers of the search path that these reach, without folder and suffix; those that are not there left out."""
     text = "".join(f"#if __has_include(<{name}>)\n#include <{name}>\n#endif\n" for name in names)
     command = [tool(compiler), "-x", language, "-E", "-M", "-v", "-"]
-    done = subprocess.run(command, input=text, capture_output=True, text=True, check=True)
-    searched = re.search(r"#include <\.\.\.> search starts here:\n(.*?)End of search list", done.stderr, re.DOTALL)
+    process = subprocess.run(command, input=text, capture_output=True, text=True, check=True)
+    searched = re.search(r"#include <\.\.\.> search starts here:\n(.*?)End of search list", process.stderr, re.DOTALL)
     # Headers in backward/ are included by that name, not by their own.
     folders = {line.strip() for line in searched[1].splitlines() if not line.endswith("/backward")}
-    paths = [path.rpartition("/") for path in done.stdout.split() if path.endswith(".h")]
+    paths = [path.rpartition("/") for path in process.stdout.split() if path.endswith(".h")]
     return {file.removesuffix(".h") for folder, _, file in paths if folder in folders}
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_no_name_of_a_spec_hides_a_header_that_others_include(compiler):
     plus = {"gcc": "g++", "clang": "clang++"}[compiler]
-    found = reached(compiler, "c", [f"{n}.h" for n in [*_STANDARD.split(), *_POSIX.split()]])
-    found |= reached(plus, "c++", _CPP.split())
-    assert {"features", "stdio", "stddef", "pthread"} <= found
-    assert [n for n in sorted(found) if re.fullmatch(SPEC_NAME, n) and objection(n) is None] == []
+    headers = reached(compiler, "c", [f"{n}.h" for n in [*_STANDARD.split(), *_POSIX.split()]])
+    headers |= reached(plus, "c++", _CPP.split())
+    assert {"features", "stdio", "stddef", "pthread"} <= headers
+    assert [n for n in sorted(headers) if re.fullmatch(SPEC_NAME, n) and objection(n) is None] == []
 
 
 def test_no_name_of_a_spec_hides_a_module_of_python_or_what_is_imported_beside_it():
@@ -58,15 +58,15 @@ def declared():
         "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: q**2 + p**2\norder: 1\n"
         "tangent: true\nadjoint: true\nmodified_hamiltonian: 1\n"
     )
-    found = symbols("t", files(asked, "c")["t.h"])
+    declared_names = symbols("t", files(asked, "c")["t.h"])
     root = resources.bundled_specs().parent
     for header in (root / "generated").glob("*/*.h"):
-        found |= symbols(header.stem, header.read_text())
+        declared_names |= symbols(header.stem, header.read_text())
     for golden in (root / "tests" / "golden").glob("*.txt"):
         header_text = golden.read_text().partition(f"==== {golden.stem}.h ====")[2].partition("\n==== ")[0]
-        found |= symbols(golden.stem, header_text)
-    assert {"attitude", "init", "init_gauge", "default_params", "step_tangent", "modified_hamiltonian"} < found
-    return found
+        declared_names |= symbols(golden.stem, header_text)
+    assert {"attitude", "init", "init_gauge", "default_params", "step_tangent", "modified_hamiltonian"} < declared_names
+    return declared_names
 
 
 def test_no_two_specs_share_a_symbol(declared):

@@ -40,9 +40,9 @@ def errors_of(text: str) -> str:
 def cases() -> list[tuple[str, str, str]]:
     """Title, spec and expected errors of every case."""
     text = Path(__file__).with_name("errors.txt").read_text(encoding="utf-8")
-    found = []
+    pairs = []
     for part in re.split(r"^== ", text, flags=re.MULTILINE)[1:]:
         title, _, rest = part.partition("\n")
         spec, _, expected = rest.partition("\n--\n")
-        found.append((title, spec + "\n", expected.rstrip("\n") + "\n" if expected.strip() else ""))
-    return found
+        pairs.append((title, spec + "\n", expected.rstrip("\n") + "\n" if expected.strip() else ""))
+    return pairs
