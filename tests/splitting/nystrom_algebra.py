@@ -17,11 +17,11 @@ def extended(word, letter):
     """The normal form of a word with a letter after it."""
     if letter == "V" or not word.endswith("VVV"):
         return {word + letter: 1}
-    found = defaultdict(int)
+    coefficients = defaultdict(int)
     for factor, end in ((3, "VVTV"), (-3, "VTVV"), (1, "TVVV")):
         for w, c in _written(word[:-3], end).items():
-            found[w] += factor * c
-    return dict(found)
+            coefficients[w] += factor * c
+    return dict(coefficients)
 
 
 def _written(word, letters):
@@ -42,11 +42,11 @@ def times(element, letter):
 
 def combined(*terms):
     """The sum of multiples of elements."""
-    found = defaultdict(int)
+    coefficients = defaultdict(int)
     for factor, element in terms:
         for word, value in element.items():
-            found[word] += factor * value
-    return found
+            coefficients[word] += factor * value
+    return coefficients
 
 
 def gradient(element):

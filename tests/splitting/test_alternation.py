@@ -28,9 +28,9 @@ def word_coefficients(flows, parts, degree):
 def defects(method, parts, degree):
     """For each degree the largest difference from exp(A_1 + … + A_m)."""
     steps = schedule(method, parts)
-    found = word_coefficients([(part, steps.times[row]) for part, row in steps.flows], parts, degree)
+    coefficients = word_coefficients([(part, steps.times[row]) for part, row in steps.flows], parts, degree)
     words = {d: product(range(parts), repeat=d) for d in range(1, degree + 1)}
-    return {d: max(abs(found.get(w, 0.0) - 1 / factorial(d)) for w in listed) for d, listed in words.items()}
+    return {d: max(abs(coefficients.get(w, 0.0) - 1 / factorial(d)) for w in listed) for d, listed in words.items()}
 
 
 CASES = [(m, 2) for m in ALTERNATIONS if m.order <= 8] + [(m, 3) for m in ALTERNATIONS if m.order <= 6]
@@ -38,9 +38,9 @@ CASES = [(m, 2) for m in ALTERNATIONS if m.order <= 8] + [(m, 3) for m in ALTERN
 
 @pytest.mark.parametrize(("method", "parts"), CASES, ids=lambda c: f"{c.name}-{c.order}" if hasattr(c, "name") else c)
 def test_order_conditions_hold_up_to_the_order_and_not_beyond(method, parts):
-    found = defects(method, parts, method.order + 1)
-    assert max(found[d] for d in range(1, method.order + 1)) < TOLERANCE
-    assert found[method.order + 1] > 1e-7
+    residuals = defects(method, parts, method.order + 1)
+    assert max(residuals[d] for d in range(1, method.order + 1)) < TOLERANCE
+    assert residuals[method.order + 1] > 1e-7
 
 
 @pytest.mark.parametrize("method", ALTERNATIONS, ids=lambda m: f"{m.name}-{m.order}")

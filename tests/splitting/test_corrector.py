@@ -56,23 +56,24 @@ def test_a_run_of_one_step_is_a_quadrature_of_the_stated_order(name):
 
 @pytest.mark.parametrize(("name", "power"), [("wisdom-holman", 2), ("wisdom-holman-3", 4), ("wisdom-holman-7", 8)])
 def test_the_error_in_the_first_power_of_epsilon_has_its_order(name, power):
-    made = solver(compilation(name), "c")
+    integrator = solver(compilation(name), "c")
     coarse, fine = (
-        np.ptp(made.integrate(START, h, round(24 / h), stride=round(2.4 / h), eps=1e-7).energy) for h in (0.6, 0.4)
+        np.ptp(integrator.integrate(START, h, round(24 / h), stride=round(2.4 / h), eps=1e-7).energy)
+        for h in (0.6, 0.4)
     )
     assert np.log(coarse / fine) / np.log(1.5) == pytest.approx(power, abs=1)
 
 
 def test_the_error_in_the_second_power_of_epsilon_is_left():
-    made = solver(compilation("wisdom-holman-17"), "c")
-    errors = [np.ptp(made.integrate(START, 0.2, 120, stride=12, eps=eps).energy) for eps in (0.01, 0.001)]
+    integrator = solver(compilation("wisdom-holman-17"), "c")
+    errors = [np.ptp(integrator.integrate(START, 0.2, 120, stride=12, eps=eps).energy) for eps in (0.01, 0.001)]
     assert errors[0] / errors[1] == pytest.approx(100, rel=0.2)
 
 
 def test_the_modified_flow_removes_the_error_of_the_second_power_of_the_step():
     """The corrector is balanced: otherwise an error of ε² h³ would be left."""
-    made = solver(compilation("wisdom-holman-modified-17"), "c")
-    errors = [np.ptp(made.integrate(START, h, round(48 / h), stride=1).energy) for h in (0.2, 0.1)]
+    integrator = solver(compilation("wisdom-holman-modified-17"), "c")
+    errors = [np.ptp(integrator.integrate(START, h, round(48 / h), stride=1).energy) for h in (0.2, 0.1)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.3)
 
 
@@ -81,9 +82,9 @@ def test_the_modified_flow_removes_the_error_of_the_second_power_of_the_step():
     ("text", "name"), [(SMALL, "wisdom-holman-modified-7"), (TOP, "wisdom-holman-7")], ids=["canonical", "top"]
 )
 def test_a_corrected_step_is_a_poisson_map_with_an_exact_tangent(text, name, target):
-    made = solver(compilation(name, text, tangent=True), target)
+    integrator = solver(compilation(name, text, tangent=True), target)
     x, h, d, eps = np.array([0.9, 0.2, 0.3, 1.1][: 4 if text is SMALL else 3]), 0.4, 1e-5, 0.3
-    end, tangent = made.step_tangent(x, h, eps=eps)
+    end, tangent = integrator.step_tangent(x, h, eps=eps)
 
     def poisson(x):
         if text is SMALL:
@@ -91,7 +92,9 @@ def test_a_corrected_step_is_a_poisson_map_with_an_exact_tangent(text, name, tar
         return np.array([[0, -x[2], x[1]], [x[2], 0, -x[0]], [-x[1], x[0], 0]])
 
     assert np.abs(tangent @ poisson(x) @ tangent.T - poisson(end)).max() < 2e-14
-    ends = [[made.integrate(x + s * d * row, h, 1, eps=eps).x[-1] for s in (2, 1, -1, -2)] for row in np.eye(len(x))]
+    ends = [
+        [integrator.integrate(x + s * d * row, h, 1, eps=eps).x[-1] for s in (2, 1, -1, -2)] for row in np.eye(len(x))
+    ]
     slopes = np.array([(8 * (b - c) - (a - e)) / (12 * d) for a, b, c, e in ends]).T
     np.testing.assert_allclose(tangent, slopes, atol=1e-9)
 
@@ -100,8 +103,8 @@ def test_a_corrected_step_is_a_poisson_map_with_an_exact_tangent(text, name, tar
 def test_states_do_not_depend_on_the_outputs(profile):
     text = SMALL + f"profile: {profile}\n"
     for target in TARGETS:
-        made = solver(compilation("wisdom-holman-11", text), target)
-        ends = [made.integrate(START, 0.3, 24, stride=stride).x[-1] for stride in (1, 5, 24)]
+        integrator = solver(compilation("wisdom-holman-11", text), target)
+        ends = [integrator.integrate(START, 0.3, 24, stride=stride).x[-1] for stride in (1, 5, 24)]
         np.testing.assert_allclose(ends, ends[:1] * 3, rtol=0, atol=1e-13)
 
 
@@ -110,17 +113,17 @@ def test_states_do_not_depend_on_the_outputs(profile):
 @pytest.mark.parametrize(("stride", "kernel"), [(1, ""), (4, ""), (9, "modified-"), (None, "")])
 def test_gradients_of_runs_are_differences(target, stride, kernel):
     """Along states and parameters, with rows at which runs end and begin anew; the last run is shorter."""
-    made = solver(compilation(f"wisdom-holman-{kernel}7", adjoint=True), target)
+    integrator = solver(compilation(f"wisdom-holman-{kernel}7", adjoint=True), target)
     x, h, steps, d, eps = np.array(START) + 0.1, 0.3, 9, 1e-4, 0.02
     source = np.random.default_rng(1)
-    rows = 1 if stride is None else len(made.integrate(x, h, steps, stride).x)
+    rows = 1 if stride is None else len(integrator.integrate(x, h, steps, stride).x)
     bars = source.normal(size=(rows, 4))
 
     def value(x, eps):
-        states = made.integrate(x, h, steps, steps if stride is None else stride, eps=eps).x
+        states = integrator.integrate(x, h, steps, steps if stride is None else stride, eps=eps).x
         return float(np.sum(bars * states[-rows:]))
 
-    pulled = made.pullback(x, h, steps, bars[0] if stride is None else bars, stride, eps=eps)
+    pulled = integrator.pullback(x, h, steps, bars[0] if stride is None else bars, stride, eps=eps)
 
     def slope(of):
         a, b, c, e = (of(s * d) for s in (2, 1, -1, -2))
@@ -132,11 +135,11 @@ def test_gradients_of_runs_are_differences(target, stride, kernel):
 
 
 def test_gradients_of_members_are_those_of_single_runs():
-    made = solver(compilation("wisdom-holman-5", adjoint=True), "c")
+    integrator = solver(compilation("wisdom-holman-5", adjoint=True), "c")
     states = np.array([[1, 0, 0, 1 + k / 10] for k in range(5)])
     bars = np.random.default_rng(2).normal(size=(5, 4))
-    together = made.pullback(states, 0.3, 7, bars).x0_bar
-    alone = [made.pullback(x, 0.3, 7, bar).x0_bar for x, bar in zip(states, bars, strict=True)]
+    together = integrator.pullback(states, 0.3, 7, bars).x0_bar
+    alone = [integrator.pullback(x, 0.3, 7, bar).x0_bar for x, bar in zip(states, bars, strict=True)]
     np.testing.assert_allclose(together, alone, rtol=0, atol=1e-12)
 
 
@@ -148,20 +151,20 @@ def test_targets_agree():
 
 
 def test_the_tangent_in_javascript_is_that_of_c():
-    made = compilation("wisdom-holman-5", tangent=True)
-    _, tangent = solver(made, "c").step_tangent(START, 0.3)
-    js = javascript(made, f"x0: {START}", "s.d = s.stepTangent(0.3)", "[...s.d]")
+    compiled = compilation("wisdom-holman-5", tangent=True)
+    _, tangent = solver(compiled, "c").step_tangent(START, 0.3)
+    js = javascript(compiled, f"x0: {START}", "s.d = s.stepTangent(0.3)", "[...s.d]")
     np.testing.assert_allclose(js, tangent.ravel(), rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_failed_step_leaves_the_last_good_state(target):
     """A radial orbit falls into the centre."""
-    made = solver(compilation("wisdom-holman-5", RADIAL), target)
+    integrator = solver(compilation("wisdom-holman-5", RADIAL), target)
     fall = [1, 0, 0, 0]
     for h, steps in ((3.0, 1), (0.3, 3)):  # a corrector fails, that before the first step or that after the last
         with pytest.raises(StepError, match="NOT_FINITE") as failed:
-            made.integrate(fall, h, steps, stride=steps)
+            integrator.integrate(fall, h, steps, stride=steps)
         np.testing.assert_array_equal(failed.value.trajectory.x[-1], fall)
         assert failed.value.step == 0
     first = solver(compilation("wisdom-holman", RADIAL), target)
@@ -169,10 +172,10 @@ def test_a_failed_step_leaves_the_last_good_state(target):
         first.integrate(fall, 1.2, 1)  # the first step fails, after half a flow of A
     np.testing.assert_array_equal(failed.value.trajectory.x[-1], fall)
     with pytest.raises(StepError, match="NOT_FINITE") as failed:
-        made.integrate(fall, 0.25, 20, stride=20)
+        integrator.integrate(fall, 0.25, 20, stride=20)
     good = failed.value.step
     assert 0 < good < 5
-    expected = made.integrate(fall, 0.25, good).x[-1]
+    expected = integrator.integrate(fall, 0.25, good).x[-1]
     np.testing.assert_allclose(failed.value.trajectory.x[-1], expected, rtol=0, atol=1e-12)
 
 
@@ -186,14 +189,14 @@ def test_a_failed_run_in_javascript_leaves_the_state():
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_members_are_single_runs(target):
-    made = solver(compilation("wisdom-holman-7", RADIAL), target)
+    integrator = solver(compilation("wisdom-holman-7", RADIAL), target)
     states = np.array([[1, 0, 0, 1 + k / 10] for k in range(9)])
-    together = made.ensemble(states, 0.3, 20)
-    alone = [made.integrate(x, 0.3, 20).x[-1] for x in states]
+    together = integrator.ensemble(states, 0.3, 20)
+    alone = [integrator.integrate(x, 0.3, 20).x[-1] for x in states]
     np.testing.assert_allclose(together, alone, rtol=0, atol=1e-12)
     states[4] = [1, 0, 0, 0]
     with pytest.raises(StepError, match="NOT_FINITE") as failed:
-        made.ensemble(states, 0.3, 20)
+        integrator.ensemble(states, 0.3, 20)
     assert failed.value.members == (4,)
 
 

@@ -23,8 +23,10 @@ def earth_moon():
     return compile_spec(SPEC)
 
 
-def energy_error(made, steps_of_month, months=40):
-    run = solver(made, "c").integrate(START, MONTH / steps_of_month, months * steps_of_month, stride=steps_of_month)
+def energy_error(integrator, steps_of_month, months=40):
+    run = solver(integrator, "c").integrate(
+        START, MONTH / steps_of_month, months * steps_of_month, stride=steps_of_month
+    )
     return np.abs(run.energy - run.energy[0]).max() / ORBIT
 
 
@@ -55,8 +57,8 @@ def test_spin_and_total_angular_momentum_are_kept_to_rounding():
 
 
 def test_a_step_is_a_poisson_map():
-    made = solver(compile_spec(SPEC, tangent=True), "c")
-    end, tangent = made.step_tangent(START, 5.0)
+    integrator = solver(compile_spec(SPEC, tangent=True), "c")
+    end, tangent = integrator.step_tangent(START, 5.0)
 
     def poisson(x):
         s1, s2, s3 = x[6:]
@@ -76,12 +78,12 @@ def test_targets_agree():
 
 @pytest.mark.slow
 def test_gradients_are_differences():
-    made = solver(compile_spec(SPEC, adjoint=True), "c")
+    integrator = solver(compile_spec(SPEC, adjoint=True), "c")
     bar, d = np.random.default_rng(3).normal(size=9), 1e-4
 
     def value(oblateness):
-        return float(bar @ made.integrate(START, 3, 30, J2=oblateness).x[-1])
+        return float(bar @ integrator.integrate(START, 3, 30, J2=oblateness).x[-1])
 
     points = [value(0.00108263 + s * d) for s in (2, 1, -1, -2)]
     slope = (8 * (points[1] - points[2]) - (points[0] - points[3])) / (12 * d)
-    assert made.pullback(START, 3, 30, bar).parameters_bar["J2"] == pytest.approx(slope, rel=1e-7)
+    assert integrator.pullback(START, 3, 30, bar).parameters_bar["J2"] == pytest.approx(slope, rel=1e-7)

@@ -80,8 +80,8 @@ def test_a_step_of_any_size_ends_on_the_orbit_to_rounding(moments):
 def test_small_increments_have_all_digits():
     """Compensated sums add them to the state: a relative error of the increment, not of the state, counts."""
     x, h = np.array([0.3, -0.5, 0.8]), 1e-6
-    made = solver(compile_text(BODY.replace("scheme", "profile: small\nscheme"), 4), "c")
-    session = made.session(np.array(x))
+    integrator = solver(compile_text(BODY.replace("scheme", "profile: small\nscheme"), 4), "c")
+    session = integrator.session(np.array(x))
     session.step(h, 1000)
     np.testing.assert_allclose(session.x - x, expected(x, (1, 2, 3), 1000 * h) - x, rtol=1e-12)
 
@@ -96,27 +96,27 @@ def test_targets_agree_and_javascript_has_the_flow():
 
 def test_members_in_lanes_are_those_one_by_one():
     """Steps beyond the range of the lanes among them, and states where nothing moves."""
-    made = solver(body("adjoint: true\n"), "c")
+    integrator = solver(body("adjoint: true\n"), "c")
     states = np.concatenate([np.array(STARTS), np.random.default_rng(2).normal(size=(29, 3))])
     for h in (0.05, 0.7, 6.0):
-        together = made.ensemble(states, h, 4)
-        alone = [made.integrate(x, h, 4).x[-1] for x in states]
+        together = integrator.ensemble(states, h, 4)
+        alone = [integrator.integrate(x, h, 4).x[-1] for x in states]
         np.testing.assert_allclose(np.asarray(together).reshape(len(states), 3), alone, rtol=0, atol=1e-14)
     weights = np.tile([1.0, -2.0, 0.5], (len(states), 1))
-    found = made.pullback(states, 0.3, 3, weights).x0_bar
-    alone = [made.pullback(x, 0.3, 3, w).x0_bar for x, w in zip(states, weights, strict=True)]
-    np.testing.assert_allclose(found, alone, rtol=0, atol=1e-13)
+    batched = integrator.pullback(states, 0.3, 3, weights).x0_bar
+    alone = [integrator.pullback(x, 0.3, 3, w).x0_bar for x, w in zip(states, weights, strict=True)]
+    np.testing.assert_allclose(batched, alone, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_the_derivative_of_the_flow_is_exact_and_poisson(target):
-    made, d = solver(body("tangent: true\n"), target), 1e-5
+    integrator, d = solver(body("tangent: true\n"), target), 1e-5
     for start, h in product(STARTS[:-1], (0.1, 2.0, 9.0)):
         x = np.array(start)
-        end, tangent = made.step_tangent(x, h)
+        end, tangent = integrator.step_tangent(x, h)
         moved = tangent @ _bracket(x) @ tangent.T
         assert np.abs(moved - _bracket(end)).max() < 1e-15 * (1 + np.abs(tangent).max() ** 2)
-        ends = [[made.integrate(x + s * d * row, h, 1).x[-1] for s in (2, 1, -1, -2)] for row in np.eye(3)]
+        ends = [[integrator.integrate(x + s * d * row, h, 1).x[-1] for s in (2, 1, -1, -2)] for row in np.eye(3)]
         slopes = np.array([(8 * (b - c) - (a - e)) / (12 * d) for a, b, c, e in ends]).T
         np.testing.assert_allclose(tangent, slopes, atol=1e-9 * max(1, np.abs(slopes).max() ** 3))
 
@@ -127,39 +127,39 @@ def _bracket(x):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_gradients_along_state_and_moments_are_differences(target):
-    made = solver(body("adjoint: true\n"), target)
+    integrator = solver(body("adjoint: true\n"), target)
     x, weights, d = np.array([0.3, -0.5, 0.8]), np.array([1, -2, 0.5]), 1e-5
     for h in (0.7, 5.0):
-        found = made.pullback(x, h, 3, weights)
+        gradient = integrator.pullback(x, h, 3, weights)
         for name, value in (("A", 1.0), ("B", 2.0), ("C", 3.0)):
-            above, below = (weights @ made.integrate(x, h, 3, **{name: value + s}).x[-1] for s in (d, -d))
-            assert found.parameters_bar[name] == pytest.approx((above - below) / (2 * d), rel=1e-7)
+            above, below = (weights @ integrator.integrate(x, h, 3, **{name: value + s}).x[-1] for s in (d, -d))
+            assert gradient.parameters_bar[name] == pytest.approx((above - below) / (2 * d), rel=1e-7)
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_derivatives_are_exact_where_the_state_is_on_the_separatrix_to_the_last_digit(target):
     """Two of the E_i are equal there, in floating point too, but their derivatives are not."""
     x, weights, moments, d = np.array([0.5, 0, 1]), np.array([1, -2, 0.5]), np.array([0.25, 1, 4]), 1e-3
-    made = solver(body("adjoint: true\n"), target)
+    integrator = solver(body("adjoint: true\n"), target)
 
     def value(*shifts):
-        ends = made.integrate(x + shifts[:3], 0.2, 3, **dict(zip("ABC", moments + shifts[3:], strict=True)))
+        ends = integrator.integrate(x + shifts[:3], 0.2, 3, **dict(zip("ABC", moments + shifts[3:], strict=True)))
         return weights @ ends.x[-1]
 
-    found = made.pullback(x, 0.2, 3, weights, **dict(zip("ABC", moments, strict=True)))
+    gradient = integrator.pullback(x, 0.2, 3, weights, **dict(zip("ABC", moments, strict=True)))
     f = [[value(*(s * d * row)) for s in (2, 1, -1, -2)] for row in np.eye(6) * ([1] * 3 + [*moments / 4])]
     slopes = np.array([(8 * (b - c) - (a - e)) / (12 * d) for a, b, c, e in f]) / ([1] * 3 + [*moments / 4])
     assert np.abs(slopes).min() > 0.01
-    np.testing.assert_allclose([*found.x0_bar, *found.parameters_bar.values()], slopes, rtol=0, atol=1e-7)
+    np.testing.assert_allclose([*gradient.x0_bar, *gradient.parameters_bar.values()], slopes, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_a_body_about_its_middle_axis_does_not_turn_over_by_rounding(target):
-    made = solver(body("adjoint: true\n"), target)
+    integrator = solver(body("adjoint: true\n"), target)
     for h, y in product((100.0, -100.0, 1e3), (1.0, 2 / 3, 0.3, *np.linspace(0.7, 2, 30))):
         x = np.array([0.0, y, 0.0])
         for moments in ((0.25, 1, 4), (1, 2, 3), (5, 3, 2)):
-            end = made.integrate(x, h, 1, **dict(zip("ABC", moments, strict=True))).x[-1]
+            end = integrator.integrate(x, h, 1, **dict(zip("ABC", moments, strict=True))).x[-1]
             np.testing.assert_array_equal(end, x)
 
 
@@ -216,11 +216,13 @@ def test_the_attitude_of_the_exact_flow_is_exact(sign, kind):
     for moments, start, h in ((MOMENTS[0], 2, 0.7), ((3, 1, 2), 6, -4.0), ((2, 3, 1), 0, 30.0), ((2, 2, 2), 6, 2.0),
                               (MOMENTS[1], 5, 9.0), (MOMENTS[0], 7, 1.0), (MOMENTS[3], 6, 0.01)):  # fmt: skip
         x, values = np.array(STARTS[start]), dict(zip("ABC", moments, strict=True))
-        found = [solver(compiled, target).integrate(x, h, 1, **values).attitude[-1] for target in ("c", "numpy")]
+        final_attitudes = [
+            solver(compiled, target).integrate(x, h, 1, **values).attitude[-1] for target in ("c", "numpy")
+        ]
         if start == 2:
-            found.append(javascript(compiled, f"x0: {x.tolist()}", f"s.integrate({h}, 1)", "[...s.attitude]"))
+            final_attitudes.append(javascript(compiled, f"x0: {x.tolist()}", f"s.integrate({h}, 1)", "[...s.attitude]"))
         exact = _attitude(x, moments, h, sign)
-        for q in found:
+        for q in final_attitudes:
             np.testing.assert_allclose(_matrix(q), exact, rtol=0, atol=1e-12 if abs(h) < 10 else 1e-11)
 
 
@@ -239,8 +241,8 @@ def test_attitudes_lose_digits_only_where_the_momentum_turns_over(target):
 def test_quaternions_of_long_steps_keep_their_length(target):
     """Their real parts may be negative, where a correction of the length would lengthen it."""
     x = np.array([0.3, 0.2, 1.0])
-    found = solver(body("reconstruct: quaternion\n"), target).integrate(x, -50.0, 40)
-    space = [_matrix(q) @ y for q, y in zip(found.attitude, found.x, strict=True)]
+    run = solver(body("reconstruct: quaternion\n"), target).integrate(x, -50.0, 40)
+    space = [_matrix(q) @ y for q, y in zip(run.attitude, run.x, strict=True)]
     np.testing.assert_allclose(space, np.broadcast_to(x, (41, 3)), rtol=0, atol=1e-14)
 
 
@@ -277,8 +279,8 @@ def test_the_amplitude_is_that_of_jacobi(p):
         kappa = elliptic.value(math, t, p, (1 - m) * p)
         s, c, square = elliptic.functions_of(kappa, p, (1 - m) * p)
         sn, cn, dn, _ = special.ellipj(u, m)
-        found = [np.sqrt(p) * s, c, np.sqrt(square)]
-        np.testing.assert_allclose(found, [sn, cn, dn], rtol=0, atol=1e-14 * (1 + abs(u)))
+        computed = [np.sqrt(p) * s, c, np.sqrt(square)]
+        np.testing.assert_allclose(computed, [sn, cn, dn], rtol=0, atol=1e-14 * (1 + abs(u)))
 
 
 def test_the_integrals_are_those_of_the_second_kind():

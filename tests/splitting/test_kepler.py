@@ -98,12 +98,12 @@ def test_targets_agree_and_javascript_has_the_flow():
 
 @pytest.mark.parametrize("eccentricity", [0, 0.9, 1.5])
 def test_the_derivative_of_the_flow_is_exact_and_symplectic(eccentricity):
-    made = solver(orbit("tangent: true\n"), "c")
+    integrator = solver(orbit("tangent: true\n"), "c")
     x, h, d = start(eccentricity), 0.9, 1e-5
-    _, tangent = made.step_tangent(x, h)
+    _, tangent = integrator.step_tangent(x, h)
     pi = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.eye(3), np.zeros((3, 3))]])
     assert np.abs(tangent @ pi @ tangent.T - pi).max() < 1e-14 * np.abs(tangent).max() ** 2
-    ends = [[made.integrate(x + s * d * row, h, 1).x[-1] for s in (2, 1, -1, -2)] for row in np.eye(6)]
+    ends = [[integrator.integrate(x + s * d * row, h, 1).x[-1] for s in (2, 1, -1, -2)] for row in np.eye(6)]
     slopes = np.array([(8 * (b - c) - (a - e)) / (12 * d) for a, b, c, e in ends]).T
     np.testing.assert_allclose(tangent, slopes, atol=1e-7 * np.abs(slopes).max())
 
@@ -111,19 +111,19 @@ def test_the_derivative_of_the_flow_is_exact_and_symplectic(eccentricity):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_gradients_along_state_mass_and_strength_are_differences(target):
-    made = solver(orbit("adjoint: true\n"), target)
+    integrator = solver(orbit("adjoint: true\n"), target)
     x, weights = start(0.6), np.array([1, -2, 0.5, 0.3, 1, -1.0])
 
     def loss(x, **parameters):
-        return weights @ made.integrate(x, 0.7, 3, **parameters).x[-1]
+        return weights @ integrator.integrate(x, 0.7, 3, **parameters).x[-1]
 
-    found = made.pullback(x, 0.7, 3, weights)
+    gradient = integrator.pullback(x, 0.7, 3, weights)
     d = 1e-5
     slopes = [(loss(x + d * row) - loss(x - d * row)) / (2 * d) for row in np.eye(6)]
-    np.testing.assert_allclose(found.x0_bar, slopes, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(gradient.x0_bar, slopes, rtol=1e-6, atol=1e-6)
     for name, value in (("m", 2), ("k", 3)):
         slope = (loss(x, **{name: value + d}) - loss(x, **{name: value - d})) / (2 * d)
-        assert found.parameters_bar[name] == pytest.approx(slope, rel=1e-6)
+        assert gradient.parameters_bar[name] == pytest.approx(slope, rel=1e-6)
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
@@ -151,23 +151,23 @@ RADIAL = {
 @pytest.mark.parametrize("case", RADIAL)
 def test_a_collision_is_a_failed_step_that_leaves_the_state(case, target):
     x, h, possible = RADIAL[case]
-    made = solver(orbit(), target)
+    integrator = solver(orbit(), target)
     if possible:
-        end = made.integrate(x, h, 1)
+        end = integrator.integrate(x, h, 1)
         assert np.ptp(end.energy) < 1e-12 * abs(end.energy[0])
-        assert made.integrate(end.x[-1], -h, 1).x[-1] == pytest.approx(x, abs=1e-11)
+        assert integrator.integrate(end.x[-1], -h, 1).x[-1] == pytest.approx(x, abs=1e-11)
         return
     with pytest.raises(StepError, match="NOT_FINITE") as failed:
-        made.integrate(x, h, 1)
+        integrator.integrate(x, h, 1)
     np.testing.assert_array_equal(failed.value.trajectory.x[-1], x)
 
 
 def test_repulsion_and_two_dimensions():
     text = ORBIT.replace("k: 3", "k: -3").replace(", z,", ",").replace(", pz]", "]").replace(" + pz**2", "")
     text = text.replace(" + z**2", "").replace("[x, y, z]", "[x, y]").replace("0, 0.1, 0, 2, 0.3", "0, -1, 0.5")
-    made = compile_text(text, 4)
-    run = solver(made, "c").integrate([1, 0, -3, 0.5], 0.5, 8)
-    assert len(made.splitting.flows) == 1
+    compilation = compile_text(text, 4)
+    run = solver(compilation, "c").integrate([1, 0, -3, 0.5], 0.5, 8)
+    assert len(compilation.splitting.flows) == 1
     assert np.ptp(run.energy) < 1e-13
     assert run.x[-1, 0] > 1
 

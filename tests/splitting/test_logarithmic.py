@@ -36,20 +36,22 @@ def kepler():
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("order", [2, 4, 8])
 def test_the_orbit_of_a_kepler_motion_is_exact_however_eccentric(order):
-    found = solver_of(compiled_text(KEPLER, order), "c").integrate(START, 0.05, 4000)
-    r = np.hypot(found.x[:, 0], found.x[:, 1])
-    ellipse = r + ECCENTRICITY * found.x[:, 0] - (1 - ECCENTRICITY**2)
+    run = solver_of(compiled_text(KEPLER, order), "c").integrate(START, 0.05, 4000)
+    r = np.hypot(run.x[:, 0], run.x[:, 1])
+    ellipse = r + ECCENTRICITY * run.x[:, 0] - (1 - ECCENTRICITY**2)
     assert np.abs(ellipse).max() < 1e-12
-    assert np.abs(found.energy + 0.5).max() < 1e-12
+    assert np.abs(run.energy + 0.5).max() < 1e-12
     assert r.max() > 1.9
-    assert found.t[-1] > 100
+    assert run.t[-1] > 100
 
 
 @pytest.mark.slow
 def test_verification_finds_the_order_in_tau_and_of_the_time_and_no_poisson_defect(kepler):
     compilation, solvers = kepler
-    found = verification.verify(compilation, solvers, "comet", np.array([0.5, 0, 0, 1.7]), {}, 0.1, 60, (), quick=True)
-    assert not found.failures
+    measured = verification.verify(
+        compilation, solvers, "comet", np.array([0.5, 0, 0, 1.7]), {}, 0.1, 60, (), quick=True
+    )
+    assert not measured.failures
 
 
 def test_all_targets_make_the_same_steps_and_take_the_same_time(kepler):
@@ -62,13 +64,13 @@ def test_all_targets_make_the_same_steps_and_take_the_same_time(kepler):
 
 
 def test_until_ends_at_a_time_and_the_bytes_of_a_session_go_on(kepler):
-    made = kepler[1]["c"]
-    ended = made.integrate(START, 0.01, until=2 * np.pi, stride=10_000)
+    integrator = kepler[1]["c"]
+    ended = integrator.integrate(START, 0.01, until=2 * np.pi, stride=10_000)
     assert ended.t[-1] == pytest.approx(2 * np.pi, rel=1e-15)
-    whole, first = made.backend.start(START, {}), made.backend.start(START, {})
+    whole, first = integrator.backend.start(START, {}), integrator.backend.start(START, {})
     whole.advance(0.05, 40)
     first.advance(0.05, 20)
-    resumed = made.backend.restored(first.saved(), {})
+    resumed = integrator.backend.restored(first.saved(), {})
     resumed.advance(0.05, 20)
     assert resumed.time() == whole.time()
     assert np.array_equal(resumed.state(), whole.state())
@@ -87,12 +89,12 @@ runs: {near: {initial: [0.1, 0], step: 0.05, steps: 10}}
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_where_minus_b_is_not_positive_nothing_starts_and_a_step_fails(target):
-    made = solver_of(compiled_text(TRAP), target)
-    assert np.ptp(made.integrate([0.1, 0], 0.05, 100).energy) < 1e-6
+    solver = solver_of(compiled_text(TRAP), target)
+    assert np.ptp(solver.integrate([0.1, 0], 0.05, 100).energy) < 1e-6
     with pytest.raises(StepError, match="monitor is not positive"):
-        made.integrate([2, 0], 0.05, 1)
+        solver.integrate([2, 0], 0.05, 1)
     with pytest.raises(StepError, match="NOT_FINITE"):
-        made.integrate([0.1, 3.0], 0.05, 100)
+        solver.integrate([0.1, 3.0], 0.05, 100)
 
 
 def test_without_runs_the_form_of_a_part_shows_that_it_is_negative():
@@ -120,12 +122,12 @@ def test_what_does_not_apply_is_an_error_of_the_spec(change, said):
 
 
 def test_the_eccentric_orbit_of_the_corpus_is_that_of_dop853():
-    found = spec.load(resources.bundled()["kepler_eccentric"])
-    run = found.runs["orbits"]
-    made, x0 = solver_of(compile_spec(found), "c"), np.array([float(v) for v in run.initial])
+    specification = spec.load(resources.bundled()["kepler_eccentric"])
+    run = specification.runs["orbits"]
+    solver, x0 = solver_of(compile_spec(specification), "c"), np.array([float(v) for v in run.initial])
     times = np.linspace(0, 12.5, 7)
     h = float(run.step)
-    here, finer = (made.integrate(x0, step, until=times[-1], stride=50).at(times) for step in (h, h / 2))
+    here, finer = (solver.integrate(x0, step, until=times[-1], stride=50).at(times) for step in (h, h / 2))
     np.testing.assert_allclose(here, finer, rtol=0, atol=1e-11)
-    there = solve_ivp(lambda t, x: made.vector_field(x), (0, 12.5), x0, "DOP853", times, rtol=3e-14, atol=1e-15)
+    there = solve_ivp(lambda t, x: solver.vector_field(x), (0, 12.5), x0, "DOP853", times, rtol=3e-14, atol=1e-15)
     np.testing.assert_allclose(here, there.y.T, rtol=0, atol=3e-10)  # what DOP853 loses near the planet

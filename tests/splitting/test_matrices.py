@@ -62,38 +62,38 @@ def field_matrix(system, parameters):
 
 @pytest.mark.parametrize("name", LINEAR)
 def test_the_flow_is_one_part_and_proved_to_round_off(name):
-    found = compilation(LINEAR[name])
-    (flow,) = found.splitting.flows
+    compiled = compilation(LINEAR[name])
+    (flow,) = compiled.splitting.flows
     assert len(flow.exponentials) == 1
-    assert [s.verdict for s in check(found.system, found.splitting)] == [PROVED, PROVED, CHECKED]
+    assert [s.verdict for s in check(compiled.system, compiled.splitting)] == [PROVED, PROVED, CHECKED]
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", LINEAR)
 def test_steps_of_any_size_are_the_exponential(name, target):
-    found = compilation(LINEAR[name])
-    a = field_matrix(found.system, {p.name: float(p.value) for p in found.system.parameters})
+    compiled = compilation(LINEAR[name])
+    a = field_matrix(compiled.system, {p.name: float(p.value) for p in compiled.system.parameters})
     x = np.linspace(-0.7, 0.9, len(a) - 1)
     for h in (1e-12, 0.3, -0.3, 4.0, 100.0):
         if h == 100.0 and np.linalg.eigvals(a).real.max() > 1e-9:
             continue
         exact = (expm(h * a) @ [*x, 1.0])[:-1]
-        moved = solver(found, target).step(x, h)
+        moved = solver(compiled, target).step(x, h)
         assert np.abs(moved - exact).max() <= 2e-14 * (1 + np.abs(h * a).sum(axis=1).max()) * np.abs(exact).max()
-    slow = solver(found, target).step(x, 1e-12) - x
+    slow = solver(compiled, target).step(x, 1e-12) - x
     assert slow == pytest.approx(1e-12 * (a @ [*x, 1.0])[:-1], abs=3e-16)
 
 
 @pytest.mark.parametrize("name", ["oscillators", "a charge in crossed fields"])
 def test_steps_are_poisson_maps_with_the_gradients_of_differences(name):
-    found = compilation(LINEAR[name])
-    at, bar = np.linspace(-0.7, 0.9, found.program.dimension), np.linspace(0.4, -1, found.program.dimension)
+    compiled = compilation(LINEAR[name])
+    at, bar = np.linspace(-0.7, 0.9, compiled.program.dimension), np.linspace(0.4, -1, compiled.program.dimension)
     for target in TARGETS:
-        solve = solver(found, target)
-        parameters = {p.name: float(p.value) for p in found.system.parameters}
+        solve = solver(compiled, target)
+        parameters = {p.name: float(p.value) for p in compiled.system.parameters}
         method = of_solver(solve, parameters, None)
-        assert measures.poisson_defect(found.system, parameters, method, at, 0.7) < 1e-14
+        assert measures.poisson_defect(compiled.system, parameters, method, at, 0.7) < 1e-14
         assert measures.tangent_error(method, at, 0.7) < 1e-8
         pulled = solve.pullback(at, 0.7, 3, bar)
         for key, value in parameters.items():
@@ -122,12 +122,12 @@ NONLINEAR = {
 @pytest.mark.parametrize("name", NONLINEAR)
 def test_composed_with_other_parts_they_have_the_order_of_the_method(name):
     text, moved = NONLINEAR[name]
-    found = compilation(text)
-    (by_matrix,) = [f for f in found.splitting.flows if f.exponentials]
+    compiled = compilation(text)
+    (by_matrix,) = [f for f in compiled.splitting.flows if f.exponentials]
     assert f"{moved} moved by exp(tA), computed before the steps" in by_matrix.manner
-    assert {s.verdict for s in check(found.system, found.splitting)} == {PROVED, CHECKED}
+    assert {s.verdict for s in check(compiled.system, compiled.splitting)} == {PROVED, CHECKED}
     x = np.array([0.4, -0.3, 0.8, 0.5, 0.2, -0.6])
-    solve = solver(found, "c")
+    solve = solver(compiled, "c")
     ends = [solve.integrate(x, 1.6 / n, n).x[-1] for n in (8, 16, 128)]
     errors = [np.abs(e - ends[-1]).max() for e in ends[:2]]
     assert 12 < errors[0] / errors[1] < 22
@@ -146,11 +146,11 @@ CONSTANT = {
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("parameters", CONSTANT)
 def test_exponentials_that_no_parameter_enters_are_not_transposed(parameters):
-    found = compilation(CONSTANT[parameters])
-    assert [len(f.exponentials) for f in found.splitting.flows if f.exponentials] == [1]
-    at, bar = np.linspace(-0.7, 0.9, found.program.dimension), np.linspace(0.4, -1, found.program.dimension)
+    compiled = compilation(CONSTANT[parameters])
+    assert [len(f.exponentials) for f in compiled.splitting.flows if f.exponentials] == [1]
+    at, bar = np.linspace(-0.7, 0.9, compiled.program.dimension), np.linspace(0.4, -1, compiled.program.dimension)
     for target in TARGETS:
-        solve = solver(found, target)
+        solve = solver(compiled, target)
         pulled = solve.pullback(at, 0.7, 3, bar)
         for key, value in pulled.parameters_bar.items():
             ends = [solve.integrate(at, 0.7, 3, parameters={key: 0.3 + d}).x[-1] @ bar for d in (1e-5, -1e-5)]
@@ -158,37 +158,43 @@ def test_exponentials_that_no_parameter_enters_are_not_transposed(parameters):
 
 
 def test_javascript_computes_the_same_numbers():
-    found = without_adjoint(LINEAR["oscillators"])
+    compiled_system = without_adjoint(LINEAR["oscillators"])
     x = [0.4, -0.3, 0.8, 0.5]
-    there = javascript(found, f"x0: {x}", "s.integrate(3.5, 2)", "Array.from(s.x)")
-    assert there == pytest.approx(solver(found, "c").integrate(x, 3.5, 2).x[-1], rel=1e-14)
+    there = javascript(compiled_system, f"x0: {x}", "s.integrate(3.5, 2)", "Array.from(s.x)")
+    assert there == pytest.approx(solver(compiled_system, "c").integrate(x, 3.5, 2).x[-1], rel=1e-14)
 
 
 def test_printed_formulas_are_the_flow():
     """The printed entries of A give the exponential whose entries move the coordinates."""
-    made = without_adjoint(LINEAR["a saddle and a field"])
-    listed = dict(flows.formulas(made, None))
+    compiled_system = without_adjoint(LINEAR["a saddle and a field"])
+    listed = dict(flows.formulas(compiled_system, None))
     values = {"k": 0.7, "c": 1.3, "q1": 0.3, "q2": -0.2, "p1": 0.5, "p2": 0.1}
     entries = {name: eval(text, {}, dict(values)) for name, text in listed.items() if name.startswith("A_")}
     size = max(int(name[-1]) for name in entries)
     a = np.array([[entries.get(f"A_{i}{j}", 0.0) for j in range(1, size + 1)] for i in range(1, size + 1)])
     e = expm(0.4 * a) - np.eye(size)
     known = values | {f"E_{i + 1}{j + 1}": e[i, j] for i in range(size) for j in range(size)}
-    end = solver(made, "numpy").integrate([values[c] for c in made.system.coordinates], 0.4, 1).x[-1]
-    assert [eval(listed[f"Φ_1: {c}"], {}, known) for c in made.system.coordinates] == pytest.approx(end, abs=1e-14)
+    end = (
+        solver(compiled_system, "numpy")
+        .integrate([values[c] for c in compiled_system.system.coordinates], 0.4, 1)
+        .x[-1]
+    )
+    assert [eval(listed[f"Φ_1: {c}"], {}, known) for c in compiled_system.system.coordinates] == pytest.approx(
+        end, abs=1e-14
+    )
     assert listed["E"] == "exp(h*A) - 1"
-    assert "E_{12}" in latex.document(made)
-    assert "A_{41}" in latex.document(made)
+    assert "E_{12}" in latex.document(compiled_system)
+    assert "A_{41}" in latex.document(compiled_system)
 
 
 def test_a_wrong_row_and_wrong_numbers_are_refuted(monkeypatch):
-    found = compilation(LINEAR["oscillators"])
-    (flow,) = found.splitting.flows
+    compiled = compilation(LINEAR["oscillators"])
+    (flow,) = compiled.splitting.flows
     first, second, *others = flow.increment
-    planted = replace(found.splitting, flows=(replace(flow, increment=(second, first, *others)),))
-    assert [s.verdict for s in check(found.system, planted)] == [PROVED, REFUTED, CHECKED]
+    planted = replace(compiled.splitting, flows=(replace(flow, increment=(second, first, *others)),))
+    assert [s.verdict for s in check(compiled.system, planted)] == [PROVED, REFUTED, CHECKED]
     monkeypatch.setattr(enclosures, "exponential_less_one", lambda a: exponential_less_one(a) * (1 + 1e-12))
-    assert [s.verdict for s in check(found.system, found.splitting)] == [PROVED, PROVED, REFUTED]
+    assert [s.verdict for s in check(compiled.system, compiled.splitting)] == [PROVED, PROVED, REFUTED]
 
 
 @pytest.mark.parametrize("rows", [1, 7, 64])

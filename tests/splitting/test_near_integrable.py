@@ -27,8 +27,8 @@ def defects(method):
     for k, m in combinations(range(method.generalised[1]), 2):
         if k + m + 2 <= method.generalised[1]:
             pairs = combinations(zip(method.b, c, strict=True), 2)
-            found = sum(b * d * (x**k * y**m - x**m * y**k) for (b, x), (d, y) in pairs)
-            squared.append(found - (Fraction(1, k + 1) - Fraction(1, m + 1)) / (k + m + 2))
+            weighted_sum = sum(b * d * (x**k * y**m - x**m * y**k) for (b, x), (d, y) in pairs)
+            squared.append(weighted_sum - (Fraction(1, k + 1) - Fraction(1, m + 1)) / (k + m + 2))
     return linear, squared
 
 
@@ -47,8 +47,8 @@ def test_conditions_hold_to_50_digits_and_the_next_one_does_not(method):
 
 
 def worst_energy(name, order, eps, h):
-    made = solver(compile_text(SMALL + f"composition: {name}\n", order), "c")
-    energy = made.integrate(START, h, round(24 / h), eps=eps).energy
+    integrator = solver(compile_text(SMALL + f"composition: {name}\n", order), "c")
+    energy = integrator.integrate(START, h, round(24 / h), eps=eps).energy
     return np.abs(energy - energy[0]).max()
 
 
@@ -88,18 +88,18 @@ CHOICES = {
 @pytest.mark.parametrize("case", CHOICES)
 def test_what_is_small_chooses_the_method(case):
     text, name, parts = CHOICES[case]
-    made = compile_text(text, 4)
-    assert (len(made.splitting.flows), made.program.step.composition) == (parts, name)
+    compilation = compile_text(text, 4)
+    assert (len(compilation.splitting.flows), compilation.program.step.composition) == (parts, name)
     if name == "aba-10-6-4":
-        assert made.splitting.small == 1
-        assert any("ε h^10" in fact for fact in made.program.about.facts)
+        assert compilation.splitting.small == 1
+        assert any("ε h^10" in fact for fact in compilation.program.about.facts)
 
 
 def test_a_time_in_the_perturbation_is_allowed_and_one_in_the_motion_is_not():
     dated = "time: t\n" + SMALL.replace("eps*x**2", "eps*x**2*cos(t)")
-    made = compile_text(dated, 4)
-    assert made.program.step.composition == "aba-10-6-4"
-    ends = [solver(made, "c").integrate(START, h, round(6 / h)).x[-1] for h in (0.5, 0.25, 0.05)]
+    compilation = compile_text(dated, 4)
+    assert compilation.program.step.composition == "aba-10-6-4"
+    ends = [solver(compilation, "c").integrate(START, h, round(6 / h)).x[-1] for h in (0.5, 0.25, 0.05)]
     errors = [np.abs(end - ends[-1]).max() for end in ends[:2]]
     assert errors[0] < 1e-6
     assert errors[0] / errors[1] > 2**5
@@ -141,6 +141,6 @@ def test_planets_about_a_star_are_motions_and_a_perturbation_that_is_one_part(ma
 
     A mass that is declared to be small divides p²/2m, so the potential of the star is no small part beside it.
     """
-    made = compile_text(planets(3, mass), 4)
-    assert [len(flow.pieces) for flow in made.splitting.flows] == [3, 0]
-    assert made.program.step.composition == "aba-10-6-4"
+    compilation = compile_text(planets(3, mass), 4)
+    assert [len(flow.pieces) for flow in compilation.splitting.flows] == [3, 0]
+    assert compilation.program.step.composition == "aba-10-6-4"

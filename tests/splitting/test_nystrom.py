@@ -44,9 +44,9 @@ METHODS = pytest.mark.parametrize("method", nystrom.METHODS, ids=named)
 @pytest.mark.thin(2)
 @METHODS
 def test_order_conditions_hold_to_thirty_digits_up_to_the_order_and_not_beyond(method):
-    found = algebra.defects(method, method.order + 1)
-    assert max(found[d] for d in range(1, method.order + 1)) < 1e-30
-    assert found[method.order + 1] == pytest.approx(method.error, rel=0.01)
+    residuals = algebra.defects(method, method.order + 1)
+    assert max(residuals[d] for d in range(1, method.order + 1)) < 1e-30
+    assert residuals[method.order + 1] == pytest.approx(method.error, rel=0.01)
 
 
 @METHODS
@@ -95,9 +95,9 @@ def test_the_price_of_kicks_decides_whether_they_are_modified():
 
 
 def test_either_part_may_be_the_one_that_kicks():
-    found = compile_text(PLANE + "hamiltonian: p**2/2 + p*q**2\n", 4, "splitting")
-    assert found.program.step.composition in nystrom.NAMES
-    v = found.splitting.flows[found.splitting.kick].hamiltonian
+    compilation = compile_text(PLANE + "hamiltonian: p**2/2 + p*q**2\n", 4, "splitting")
+    assert compilation.program.step.composition in nystrom.NAMES
+    v = compilation.splitting.flows[compilation.splitting.kick].hamiltonian
     assert derivatives([v], "p")[0] != 0
 
 
@@ -139,11 +139,18 @@ def test_three_parts_and_orders_that_a_name_lacks_are_refused():
 @cache
 def forced(name, method):
     """A system of the corpus with a method, and its tangent map; without packs of members, in short C."""
-    found = small(compiled(name, method.order, "splitting"))
-    (kick,) = [k for k in kicks(found.system, split(found.system)) if k.modified or not method.multiples]
-    choice = choosing.chosen(split(found.system), Order(method.order, 0), method, kick)
-    program = build_splitting(found.system, choice, found.gauge, found.spec.overridden(tangent=True, profile="small"))
-    return replace(found, program=program, splitting=choice.splitting)
+    compiled_system = small(compiled(name, method.order, "splitting"))
+    (kick,) = [
+        k for k in kicks(compiled_system.system, split(compiled_system.system)) if k.modified or not method.multiples
+    ]
+    choice = choosing.chosen(split(compiled_system.system), Order(method.order, 0), method, kick)
+    program = build_splitting(
+        compiled_system.system,
+        choice,
+        compiled_system.gauge,
+        compiled_system.spec.overridden(tangent=True, profile="small"),
+    )
+    return replace(compiled_system, program=program, splitting=choice.splitting)
 
 
 @cache
@@ -160,8 +167,8 @@ SPANS = {"kowalevski_top": 6, "henon_heiles": 8, "nambu_pendulum": 4}
 @METHODS
 @pytest.mark.parametrize("name", slow_but(["kowalevski_top"], SPANS))
 def test_observed_order_is_the_stated_one(name, method):
-    found = forced(name, method)
-    at, solve, span = setting(found), solver(found, "c"), SPANS[name]
+    compiled_system = forced(name, method)
+    at, solve, span = setting(compiled_system), solver(compiled_system, "c"), SPANS[name]
     fine = reference(name).integrate(at.x, span / 512, 512, parameters=at.parameters).x[-1]
 
     def error(steps):
@@ -177,15 +184,15 @@ def test_observed_order_is_the_stated_one(name, method):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("method", slow_but(nystrom.METHODS[::3], nystrom.METHODS), ids=named)
 def test_step_is_a_reversible_poisson_map_in_both_targets(method):
-    found = forced("kowalevski_top", method)
-    at = setting(found)
+    compiled_system = forced("kowalevski_top", method)
+    at = setting(compiled_system)
     images = []
     for target in TARGETS:
-        step, x = of_solver(solver(found, target), at.parameters, None), np.array(at.x)
-        assert measures.poisson_defect(found.system, at.parameters, step, x, 0.3) < 1e-14
+        step, x = of_solver(solver(compiled_system, target), at.parameters, None), np.array(at.x)
+        assert measures.poisson_defect(compiled_system.system, at.parameters, step, x, 0.3) < 1e-14
         assert measures.tangent_error(step, x, 0.3) < 1e-8
         assert measures.reversal(step, x, 0.3) < 1e-14
-        run = solver(found, target).integrate(x, 0.3, 200, parameters=at.parameters)
+        run = solver(compiled_system, target).integrate(x, 0.3, 200, parameters=at.parameters)
         for values in run.casimirs.values():
             assert np.ptp(values) <= 2e-14 * max(1, np.max(np.abs(values)))
         images.append(run.x[10])
@@ -193,28 +200,30 @@ def test_step_is_a_reversible_poisson_map_in_both_targets(method):
 
 
 def test_a_wrong_multiple_of_the_gradient_is_refuted():
-    found = compiled("kowalevski_top", 8, "splitting")
-    v = found.splitting.flows[found.splitting.kick]
+    compilation = compiled("kowalevski_top", 8, "splitting")
+    v = compilation.splitting.flows[compilation.splitting.kick]
     wrong = replace(v, hamiltonian=substitute([v.hamiltonian], {KICK: 2 * symbol(KICK)})[0])
-    flows = tuple(wrong if f is v else f for f in found.splitting.flows)
-    verdicts = {s.name: s.verdict for s in check(found.system, replace(found.splitting, flows=flows))}
+    flows = tuple(wrong if f is v else f for f in compilation.splitting.flows)
+    verdicts = {s.name: s.verdict for s in check(compilation.system, replace(compilation.splitting, flows=flows))}
     assert verdicts["dH_1/dκ = {H_1, {H_1, H_2}}"] == REFUTED
     assert verdicts["{H_1, {H_1, {H_1, H_2}}} = 0"] != REFUTED
 
 
 def test_a_condition_that_does_not_hold_is_refuted():
-    found = compiled("spin_chain5", 6, "splitting")
-    refuted = [s.name for s in check(found.system, replace(found.splitting, kick=0)) if s.verdict == REFUTED]
+    compilation = compiled("spin_chain5", 6, "splitting")
+    refuted = [
+        s.name for s in check(compilation.system, replace(compilation.splitting, kick=0)) if s.verdict == REFUTED
+    ]
     assert refuted == ["{H_1, {H_1, {H_1, H_2}}} = 0"]
 
 
 def test_the_multiple_of_the_gradient_has_its_letter_in_formulas_and_files():
-    found = compiled("kowalevski_top", 8, "splitting")
-    assert r"H_{1} &= G_{1} + \kappa" in document(found)
-    assert dict(formulas(found, None))["H_1"] == "G1 + κ*(G2**2 + 1/2*G3**2)"
+    compilation = compiled("kowalevski_top", 8, "splitting")
+    assert r"H_{1} &= G_{1} + \kappa" in document(compilation)
+    assert dict(formulas(compilation, None))["H_1"] == "G1 + κ*(G2**2 + 1/2*G3**2)"
     assert (
         "The flow of H_1 = G1 + κ*(G2**2 + 1/2*G3**2)"
-        in emit(found.program, "c", "", single_file=True)["kowalevski_top.c"]
+        in emit(compilation.program, "c", "", single_file=True)["kowalevski_top.c"]
     )
 
 

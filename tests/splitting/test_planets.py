@@ -47,8 +47,8 @@ def test_they_obey_the_equations_of_newton():
         :, -1
     ]
     q, _ = exact.reshape(2, PLANETS + 1, 3)
-    found, _ = bodies(planets().integrate(START, 5, 20).x[-1])
-    np.testing.assert_allclose(found, q, rtol=0, atol=1e-10)
+    positions, _ = bodies(planets().integrate(START, 5, 20).x[-1])
+    np.testing.assert_allclose(positions, q, rtol=0, atol=1e-10)
 
 
 def test_steps_of_five_days_keep_energy_and_angular_momentum_to_rounding():
@@ -64,7 +64,7 @@ def test_a_corrector_removes_what_is_of_first_order():
     """At one flow of each part for a step."""
     errors = {}
     for name in ("wisdom-holman", "wisdom-holman-17"):
-        made = solver(compile_spec(replace(SPEC, composition=name, order=2, profile="small")), "c")
-        energy = made.integrate(START, 5, 1460, stride=73).energy
+        integrator = solver(compile_spec(replace(SPEC, composition=name, order=2, profile="small")), "c")
+        energy = integrator.integrate(START, 5, 1460, stride=73).energy
         errors[name] = np.ptp(energy) / abs(energy[0])
     assert errors["wisdom-holman-17"] < errors["wisdom-holman"] / 500

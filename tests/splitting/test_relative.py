@@ -73,16 +73,16 @@ def reference(count, axes, until):
 @pytest.mark.parametrize("change", RELATIVE)
 @pytest.mark.parametrize(("count", "axes"), [(3, 2), (3, 3), pytest.param(5, 3, marks=pytest.mark.slow)])
 def test_states_are_cartesian_and_follow_newton(change, count, axes):
-    made = solver(compiled(count, change, "aba-10-6-4", axes=axes), "c")
-    end = made.integrate(start(count, axes), 0.1, 60).x[-1]
+    integrator = solver(compiled(count, change, "aba-10-6-4", axes=axes), "c")
+    end = integrator.integrate(start(count, axes), 0.1, 60).x[-1]
     np.testing.assert_allclose(end, reference(count, axes, 6), rtol=0, atol=2e-11)
 
 
 @pytest.mark.parametrize("change", RELATIVE)
 def test_targets_agree(change):
-    made = compiled(3, change, "saba-8-2", order=2)
-    ends = [solver(made, target).integrate(start(3), 0.2, 50).x[-1] for target in TARGETS]
-    ends.append(javascript(made, f"x0: {start(3).tolist()}", "s.integrate(0.2, 50)", "[...s.x]"))
+    compilation = compiled(3, change, "saba-8-2", order=2)
+    ends = [solver(compilation, target).integrate(start(3), 0.2, 50).x[-1] for target in TARGETS]
+    ends.append(javascript(compilation, f"x0: {start(3).tolist()}", "s.integrate(0.2, 50)", "[...s.x]"))
     np.testing.assert_allclose(ends, ends[:1] * len(ends), rtol=0, atol=1e-13)
 
 
@@ -107,18 +107,18 @@ def test_a_wrong_change_of_coordinates_is_refuted():
 
 @pytest.mark.parametrize("change", RELATIVE)
 def test_a_step_is_a_poisson_map(change):
-    made = solver(compiled(3, change, "wisdom-holman-5", order=2, tangent=True), "c")
+    integrator = solver(compiled(3, change, "wisdom-holman-5", order=2, tangent=True), "c")
     n = 6
     canonical = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
-    _, tangent = made.step_tangent(start(3), 0.3)
+    _, tangent = integrator.step_tangent(start(3), 0.3)
     assert np.abs(tangent @ canonical @ tangent.T - canonical).max() < 2e-13 * np.abs(tangent).max() ** 2
 
 
 def test_two_bodies_in_jacobi_coordinates_move_exactly():
     """Along a conic section and with their centre of mass, in one step of any size."""
-    made = compiled(2, "jacobi")
-    assert len(made.splitting.flows) == 1
-    once, often = (solver(made, "c").integrate(start(2), 50 / n, n).x[-1] for n in (1, 500))
+    compilation = compiled(2, "jacobi")
+    assert len(compilation.splitting.flows) == 1
+    once, often = (solver(compilation, "c").integrate(start(2), 50 / n, n).x[-1] for n in (1, 500))
     np.testing.assert_allclose(once, often, rtol=0, atol=1e-12)
 
 
@@ -134,8 +134,8 @@ def test_jacobi_coordinates_have_the_smaller_errors():
     """The star's momentum is a part of B in the others: 10 times the error, with a corrector."""
     errors = {}
     for change in RELATIVE:
-        made = solver(compiled(3, change, "wisdom-holman-17", order=2), "c")
-        energy = made.integrate(start(3), 0.2, 4000, stride=100).energy
+        integrator = solver(compiled(3, change, "wisdom-holman-17", order=2), "c")
+        energy = integrator.integrate(start(3), 0.2, 4000, stride=100).energy
         errors[change] = np.ptp(energy)
     assert errors["jacobi"] < errors["democratic_heliocentric"] / 5
 
@@ -153,14 +153,14 @@ def test_a_body_that_rotates_has_its_rotation_among_the_motions():
         + ", ".join(f"{c}: {{p{c}: 1}}" for c in q.split(", "))
         + ", L1: {L2: -L3, L3: L2}, L2: {L3: -L1}}}",
     )
-    made = compile_text(lines, 4)
-    a, b = made.splitting.flows
+    compilation = compile_text(lines, 4)
+    a, b = compilation.splitting.flows
     assert sorted(bool(piece.motion) for piece in a.pieces) == [False, True]
-    assert made.program.step.composition == "aba-10-6-4"
-    verdicts = [s.verdict for s in check(made.system, made.splitting)]
+    assert compilation.program.step.composition == "aba-10-6-4"
+    verdicts = [s.verdict for s in check(compilation.system, compilation.splitting)]
     assert verdicts == ["proved"] * len(verdicts)
     x = [*start(2, 3), 0.3, -0.2, 0.5]
-    run = solver(made, "c").integrate(x, 0.1, 400, stride=40)
+    run = solver(compilation, "c").integrate(x, 0.1, 400, stride=40)
     assert np.ptp(run.energy) < 1e-9
     assert np.ptp(np.linalg.norm(run.x[:, -3:], axis=1)) < 1e-15
     assert b.moving == 1 + 2
@@ -200,15 +200,15 @@ IMPOSSIBLE = {
 @pytest.mark.parametrize("case", IMPOSSIBLE)
 def test_a_step_without_an_end_is_not_finite_and_changes_nothing(case):
     x, h = IMPOSSIBLE[case]
-    made = compiled(2, "jacobi")
+    compilation = compiled(2, "jacobi")
     for target in TARGETS:
         with pytest.raises(StepError, match="NOT_FINITE") as failed:
-            solver(made, target).integrate(x, h, 2)
+            solver(compilation, target).integrate(x, h, 2)
         np.testing.assert_array_equal(failed.value.trajectory.x[-1], x)
         assert failed.value.step == 0
     calls = f"try {{ s.integrate({h!r}, 2) }} catch (error) {{ s.status = error.status }}"
     shown = "[...s.x, s.steps, s.status === 'NOT_FINITE' ? 1 : 0]"
-    assert javascript(made, f"x0: {x}", calls, shown) == [*x, 0, 1]
+    assert javascript(compilation, f"x0: {x}", calls, shown) == [*x, 0, 1]
 
 
 #: The speed of a parabola at the distance 1 from both masses 1.5 and 0.001.
@@ -221,11 +221,11 @@ PARABOLA = 0.001 * np.sqrt(2 * 1.501) / 1.501 * 1.5
 def test_orbits_of_any_kind_are_followed_past_the_pericentre_and_back(momentum):
     """In one step there and one back, about the centre of mass."""
     start_of_orbit = [0, 0, 1, 0, 0, -momentum, 0, momentum]
-    made = compiled(2, "jacobi")
-    ends = [solver(made, target).integrate(start_of_orbit, 1.5, 1).x[-1] for target in TARGETS]
-    ends.append(javascript(made, f"x0: {[float(v) for v in start_of_orbit]}", "s.step(1.5)", "[...s.x]"))
+    compilation = compiled(2, "jacobi")
+    ends = [solver(compilation, target).integrate(start_of_orbit, 1.5, 1).x[-1] for target in TARGETS]
+    ends.append(javascript(compilation, f"x0: {[float(v) for v in start_of_orbit]}", "s.step(1.5)", "[...s.x]"))
     np.testing.assert_allclose(ends, ends[:1] * len(ends), rtol=0, atol=1e-13)
-    back = solver(made, "c").integrate(ends[0], -1.5, 1).x[-1]
+    back = solver(compilation, "c").integrate(ends[0], -1.5, 1).x[-1]
     np.testing.assert_allclose(back, start_of_orbit, rtol=0, atol=1e-12)
 
 

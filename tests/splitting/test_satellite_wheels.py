@@ -33,8 +33,8 @@ def equations(_, x):
 def test_it_solves_the_equations_of_the_body_with_order_four():
     """A Runge–Kutta method solves equations that are written down by hand."""
     exact = solve_ivp(equations, (0, 4), START, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
-    made = solver(satellite(), "c")
-    errors = [np.abs(made.integrate(START, 4 / n, n).x[-1] - exact).max() for n in (20, 40, 80)]
+    integrator = solver(satellite(), "c")
+    errors = [np.abs(integrator.integrate(START, 4 / n, n).x[-1] - exact).max() for n in (20, 40, 80)]
     assert errors[-1] < 1e-6
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.3)
 

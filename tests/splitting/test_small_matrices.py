@@ -66,59 +66,59 @@ def test_every_number_of_rows_up_to_four(rows):
         f"{n}: {{z: {' + '.join(f'({c})*{m}' for c, m in zip(row, names, strict=True))}}}"
         for n, row in zip(names, a, strict=True)
     )
-    made = compile_text(
+    compilation = compile_text(
         f"coordinates: [{', '.join(names)}, z, c]\npoisson: {{brackets: {{{brackets}}}}}\nhamiltonian: exp(c)*z\n"
         "scheme: splitting\n",
         2,
     )
-    assert small_matrices.BY_CAYLEY_HAMILTON in made.splitting.flows[0].manner
-    assert {s.verdict for s in check(made.system, made.splitting)} == {PROVED}
+    assert small_matrices.BY_CAYLEY_HAMILTON in compilation.splitting.flows[0].manner
+    assert {s.verdict for s in check(compilation.system, compilation.splitting)} == {PROVED}
     x = np.arange(1.0, rows + 3) / 4
-    end = solver(made, "c").integrate(x, 0.6, 1).x[-1]
+    end = solver(compilation, "c").integrate(x, 0.6, 1).x[-1]
     with mpmath.workdps(40):  # scipy's exponential has errors of 7e-13 here
         exact = mpmath.expm(mpmath.mpf(0.6) * mpmath.exp(x[-1]) * mpmath.matrix(a.tolist())) * mpmath.matrix(x[:rows])
     np.testing.assert_allclose(end[:rows], [float(e) for e in exact], rtol=2e-13)
 
 
 def test_targets_and_lanes_agree():
-    x, made = np.array(STATES["generic"]), solver(coupled(), "c")
+    x, integrator = np.array(STATES["generic"]), solver(coupled(), "c")
     for h in (0.3, 6.0):
         js = javascript(coupled(), f"x0: {x.tolist()}", f"s.integrate({h}, 5)", "[...s.x]")
-        np.testing.assert_allclose(js, made.integrate(x, h, 5).x[-1], rtol=1e-13)
+        np.testing.assert_allclose(js, integrator.integrate(x, h, 5).x[-1], rtol=1e-13)
     states = np.random.default_rng(3).normal(size=(21, 6))
     for h in (0.05, 0.6, 3.0):
-        together = np.asarray(made.ensemble(states, h, 4)).reshape(states.shape)
-        alone = np.array([made.integrate(x, h, 4).x[-1] for x in states])
+        together = np.asarray(integrator.ensemble(states, h, 4)).reshape(states.shape)
+        alone = np.array([integrator.integrate(x, h, 4).x[-1] for x in states])
         np.testing.assert_allclose(together, alone, rtol=0, atol=1e-14 * np.abs(alone).max())
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_the_derivative_is_exact_and_poisson(target):
-    made, d = solver(coupled("tangent: true\n"), target), 1e-3
+    integrator, d = solver(coupled("tangent: true\n"), target), 1e-3
     for x in map(np.array, STATES.values()):
         for h in (0.1, 3.0):
-            _, tangent = made.step_tangent(x, h)
+            _, tangent = integrator.step_tangent(x, h)
             assert np.abs(tangent @ PI @ tangent.T - PI).max() < 1e-14 * np.abs(tangent).max() ** 2
-            ends = [[made.integrate(x + s * d * row, h, 1).x[-1] for s in (2, 1, -1, -2)] for row in np.eye(6)]
+            ends = [[integrator.integrate(x + s * d * row, h, 1).x[-1] for s in (2, 1, -1, -2)] for row in np.eye(6)]
             slopes = np.array([(8 * (b - c) - (a - e)) / (12 * d) for a, b, c, e in ends]).T
             np.testing.assert_allclose(tangent, slopes, atol=1e-7 * np.abs(slopes).max())
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_gradients_are_differences(target):
-    made = solver(coupled("adjoint: true\n"), target)
+    integrator = solver(coupled("adjoint: true\n"), target)
     x, weights, d = np.array(STATES["generic"]), np.arange(1.0, 7), 1e-5
-    found = made.pullback(x, 0.7, 3, weights).parameters_bar
+    gradient = integrator.pullback(x, 0.7, 3, weights).parameters_bar
     for name, value in (("k", 1.3), ("l", 0.7)):
-        above, below = (weights @ made.integrate(x, 0.7, 3, **{name: value + s}).x[-1] for s in (d, -d))
-        assert found[name] == pytest.approx((above - below) / (2 * d), rel=1e-7)
+        above, below = (weights @ integrator.integrate(x, 0.7, 3, **{name: value + s}).x[-1] for s in (d, -d))
+        assert gradient[name] == pytest.approx((above - below) / (2 * d), rel=1e-7)
 
 
 def test_a_wrong_relation_is_refuted(monkeypatch):
     genuine = small_matrices._relation
     monkeypatch.setattr(small_matrices, "_relation", lambda ring, a: (2 * c for c in genuine(ring, a)))
-    made = compile_text(COUPLED + "title: wrong\n", 2)
-    assert REFUTED in {s.verdict for s in check(made.system, made.splitting)}
+    compilation = compile_text(COUPLED + "title: wrong\n", 2)
+    assert REFUTED in {s.verdict for s in check(compilation.system, compilation.splitting)}
 
 
 def test_the_derivatives_of_the_functions_are_differences():

@@ -77,16 +77,16 @@ def test_observed_order_is_the_stated_one(name, order):
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_step_is_a_reversible_poisson_map_that_keeps_casimirs_in_both_targets(name):
-    found = splitting_of(name, 4)
-    at = setting(found)
+    compiled_system = splitting_of(name, 4)
+    at = setting(compiled_system)
     images = []
     for target in TARGETS:
-        method = of_solver(solver(found, target), at.parameters, None)
+        method = of_solver(solver(compiled_system, target), at.parameters, None)
         x = np.array(at.x)
-        assert measures.poisson_defect(found.system, at.parameters, method, x, at.h) < 1e-14
+        assert measures.poisson_defect(compiled_system.system, at.parameters, method, x, at.h) < 1e-14
         assert measures.tangent_error(method, x, at.h) < 1e-8
         assert measures.reversal(method, x, at.h) < 1e-14
-        run = solver(found, target).integrate(x, at.h, 500, parameters=at.parameters)
+        run = solver(compiled_system, target).integrate(x, at.h, 500, parameters=at.parameters)
         for values in run.casimirs.values():
             assert np.ptp(values) <= 2e-14 * max(1, np.max(np.abs(values)))
         images.append(run.x[20])
@@ -117,23 +117,23 @@ def test_a_step_that_leaves_the_numbers_fails_and_the_state_before_it_stands(tar
 
 def test_exact_flow_is_followed_in_one_piece():
     text = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}}}\nhamiltonian: x**2\n"
-    found = compile_text(text, 2, "splitting")
-    assert [len(found.splitting.flows), len(found.program.step.schedule.flows)] == [1, 1]
-    x = solver(found, "c").step([0.3, 0.4, 1.2], 7.0)
+    compilation = compile_text(text, 2, "splitting")
+    assert [len(compilation.splitting.flows), len(compilation.program.step.schedule.flows)] == [1, 1]
+    x = solver(compilation, "c").step([0.3, 0.4, 1.2], 7.0)
     turned = 0.4 * np.cos(4.2) + 1.2 * np.sin(4.2)
     assert x[:2] == pytest.approx([0.3, turned], abs=1e-15)
 
 
 @pytest.mark.slow
 def test_a_wrong_sign_in_one_flow_falls_short_of_the_order():
-    found = compiled("kowalevski_top", 4, "splitting")
-    at = setting(found)
-    flow = found.splitting.flows[0]
+    compilation = compiled("kowalevski_top", 4, "splitting")
+    at = setting(compilation)
+    flow = compilation.splitting.flows[0]
     wrong = replace(flow, increment=tuple(-e for e in flow.increment))
-    planted = replace(found.splitting, flows=(wrong, *found.splitting.flows[1:]))
-    choice = replace(plan(found.system, split(found.system), 4, "auto"), splitting=planted)
-    program = build_splitting(found.system, choice, found.gauge, found.spec.overridden(tangent=True))
-    bad = replace(found, program=program, splitting=planted)
+    planted = replace(compilation.splitting, flows=(wrong, *compilation.splitting.flows[1:]))
+    choice = replace(plan(compilation.system, split(compilation.system), 4, "auto"), splitting=planted)
+    program = build_splitting(compilation.system, choice, compilation.gauge, compilation.spec.overridden(tangent=True))
+    bad = replace(compilation, program=program, splitting=planted)
     solvers = {target: solver(bad, target) for target in TARGETS}
     verified = verify(bad, solvers, "planted", at.x, at.parameters, at.h, 100, quick=True)
     assert any(f.startswith("observed order") for f in verified.failures)
@@ -143,7 +143,7 @@ def test_refuted_flows_are_not_compiled(monkeypatch):
     from phigen.proofs import statements
 
     genuine = statements.check_splitting
-    found = compiled("kowalevski_top", 4, "splitting")
+    compilation = compiled("kowalevski_top", 4, "splitting")
 
     def planted(system, splitting, noise):
         flow = splitting.flows[1]
@@ -151,9 +151,9 @@ def test_refuted_flows_are_not_compiled(monkeypatch):
         return genuine(system, replace(splitting, flows=(splitting.flows[0], wrong, *splitting.flows[2:])), noise)
 
     monkeypatch.setattr(statements, "check_splitting", planted)
-    assert [s.name[:19] for s in examine(found.spec, scheme="splitting").refuted] == ["the flow Φ of H_2: "]
+    assert [s.name[:19] for s in examine(compilation.spec, scheme="splitting").refuted] == ["the flow Φ of H_2: "]
     with pytest.raises(CheckError, match="H_2"):
-        compile_proved(found.spec, scheme="splitting")
+        compile_proved(compilation.spec, scheme="splitting")
 
 
 @pytest.mark.thin(2)
