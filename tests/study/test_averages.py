@@ -19,9 +19,9 @@ def autoregressive(rng, count, a):
 
 
 def averages(values, **options):
-    found = Averages(1, **options)
-    found.see(np.arange(float(len(values))), values[:, np.newaxis])
-    return found
+    accumulator = Averages(1, **options)
+    accumulator.see(np.arange(float(len(values))), values[:, np.newaxis])
+    return accumulator
 
 
 def test_moments_are_those_of_the_rows_however_they_come():
@@ -43,11 +43,11 @@ def test_moments_are_those_of_the_rows_however_they_come():
 def test_standard_errors_are_the_spread_of_means(a):
     """The mean of n rows has the variance (1 + a)/(1 − a)/n, and blocks must tell it within what 20 blocks can."""
     rng = np.random.default_rng(2)
-    count, found = 4000, []
+    count, standard_errors = 4000, []
     for _ in range(60):
         (average,) = averages(autoregressive(rng, count, a)).results()
-        found.append((average.error**2, average.correlation_time))
-    error, time = np.mean(found, axis=0)
+        standard_errors.append((average.error**2, average.correlation_time))
+    error, time = np.mean(standard_errors, axis=0)
     ratio = (1 + a) / (1 - a)
     assert error == pytest.approx(ratio / count, rel=0.15)  # 60 estimates of relative spread √(2/19…39)
     assert time == pytest.approx(ratio / 2, rel=0.15)
@@ -60,19 +60,19 @@ def test_a_mean_without_blocks_would_be_too_sure():
 
 @pytest.mark.parametrize("blocks", [2, 5, 20])
 def test_the_number_of_blocks_is_the_one_asked_for(blocks):
-    found = averages(np.random.default_rng(4).normal(size=1000), blocks=blocks)
-    assert blocks <= len(found.state["sums"]) < 2 * blocks
-    assert len(found.state["sums"]) * int(found.state["size"]) <= 1000
+    accumulator = averages(np.random.default_rng(4).normal(size=1000), blocks=blocks)
+    assert blocks <= len(accumulator.state["sums"]) < 2 * blocks
+    assert len(accumulator.state["sums"]) * int(accumulator.state["size"]) <= 1000
 
 
 @pytest.mark.parametrize("backwards", [False, True])
 def test_rows_before_a_time_are_left_out(backwards):
     values = np.arange(10.0)[:, np.newaxis]
     t = -np.arange(10.0) if backwards else np.arange(10.0)
-    found = Averages(1, after=-6.0 if backwards else 6.0, backwards=backwards)
-    found.see(t, values)
-    assert found.results()[0].mean == pytest.approx(7.5)
-    assert found.times == (t[6], t[9])
+    accumulator = Averages(1, after=-6.0 if backwards else 6.0, backwards=backwards)
+    accumulator.see(t, values)
+    assert accumulator.results()[0].mean == pytest.approx(7.5)
+    assert accumulator.times == (t[6], t[9])
 
 
 def test_too_few_rows_are_no_numbers():

@@ -30,32 +30,32 @@ def subject(name):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", ["rigid_body", "predator_prey"])
 def test_each_correction_makes_the_modified_hamiltonian_two_orders_more_constant(name):
-    found, method, x, h = subject(name)
-    measured = backward.constancy(found, method, x, h)
-    assert measured.powers == (found.powers[0], found.powers[0] + 2, found.powers[0] + 4)
+    corrections, method, x, h = subject(name)
+    measured = backward.constancy(corrections, method, x, h)
+    assert measured.powers == (corrections.powers[0], corrections.powers[0] + 2, corrections.powers[0] + 4)
     assert measured.observed == pytest.approx(measured.powers, abs=0.3)
     assert (measured.errors.max(axis=1)[1:] < 0.3 * measured.errors.max(axis=1)[:-1]).all()
     assert measured.times[-1] == pytest.approx(measured.end)
 
 
 def test_wrong_corrections_are_noticed():
-    found, method, x, h = subject("predator_prey")
-    p, q = found.powers[:2]
-    wrong = replace(found, terms=tuple(2 * t if p <= j < q else t for j, t in enumerate(found.terms)))
+    corrections, method, x, h = subject("predator_prey")
+    p, q = corrections.powers[:2]
+    wrong = replace(corrections, terms=tuple(2 * t if p <= j < q else t for j, t in enumerate(corrections.terms)))
     assert backward.observed_powers(wrong, method, x, h)[1] < p + 0.5
 
 
 def test_another_method_does_not_keep_it():
-    found, _, x, h = subject("predator_prey")
-    rk4 = of_classical("rk4", solver_of(compiled("predator_prey"), "numpy"), dict(found.values))
-    assert backward.observed_powers(found, rk4, x, h)[1] < 5.5
+    corrections, _, x, h = subject("predator_prey")
+    rk4 = of_classical("rk4", solver_of(compiled("predator_prey"), "numpy"), dict(corrections.values))
+    assert backward.observed_powers(corrections, rk4, x, h)[1] < 5.5
 
 
 def test_what_is_conserved_exactly_tells_no_order():
-    found, method, x, h = subject("harmonic_oscillator")
-    assert backward.observed_powers(found, method, x, h) == [np.inf] * 3
+    corrections, method, x, h = subject("harmonic_oscillator")
+    assert backward.observed_powers(corrections, method, x, h) == [np.inf] * 3
     with pytest.raises(backward.NotOfferedError, match="rounding"):
-        backward.constancy(found, method, x, h)
+        backward.constancy(corrections, method, x, h)
 
 
 @pytest.mark.parametrize(
@@ -87,5 +87,5 @@ def test_numbers_for_the_parameters_make_a_formula_that_would_be_too_large():
     values, x = {"J1": 1.0, "J2": 2.0, "J3": 3.5, "k": 0.7}, np.array([0.2, 1, 0.1])
     gauge = gauge_at(compilation, x, values)
     method = of_solver(solver_of(compilation, "c"), values, gauge)
-    found = backward.modified(compilation, values, gauge)
-    assert backward.observed_powers(found, method, x, 0.1) == pytest.approx([6, 8, 10], abs=0.7)
+    modified_series = backward.modified(compilation, values, gauge)
+    assert backward.observed_powers(modified_series, method, x, 0.1) == pytest.approx([6, 8, 10], abs=0.7)

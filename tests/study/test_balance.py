@@ -42,9 +42,9 @@ def test_powers_are_derivatives_along_the_motion():
     t = np.arange(0, 4.0, 0.25)
     free = "time: t\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 - q*t"
     x = np.stack([t**3 / 6, t**2 / 2], axis=1)  # q¨ = t, and the power is −q
-    found = summarise("exact", system_from_spec(loads(f"phigen: 1\nname: t\n{free}\n")), None, {}, t, x)
-    assert found.energy.error < 1e-14
-    assert found.off < 1e-14
+    summary = summarise("exact", system_from_spec(loads(f"phigen: 1\nname: t\n{free}\n")), None, {}, t, x)
+    assert summary.energy.error < 1e-14
+    assert summary.off < 1e-14
 
 
 def test_the_balance_is_kept_to_the_order_of_the_method_and_has_no_drift():
@@ -52,9 +52,9 @@ def test_the_balance_is_kept_to_the_order_of_the_method_and_has_no_drift():
     errors = []
     for h in (0.1, 0.05):
         rows = solver(compilation, "c").integrate([1.2, 0], h, round(100 / h), t0=0.4)
-        found = summarise("phigen", compilation.system, None, {}, rows.t, rows.x)
-        errors.append(found.energy.error)
-        assert found.energy.growth < 4
+        summary = summarise("phigen", compilation.system, None, {}, rows.t, rows.x)
+        errors.append(summary.energy.error)
+        assert summary.energy.growth < 4
     assert np.log2(errors[0] / errors[1]) == pytest.approx(6, abs=0.5)
     work = quad(lambda t: 0.36 * np.interp(t, rows.t, rows.x[:, 0]) * np.sin(1.2 * t), 0.4, 10.4, limit=500)[0]
     assert rows.energy[200] - rows.energy[0] == pytest.approx(work, abs=2e-3)
@@ -64,12 +64,12 @@ def test_the_balance_is_kept_to_the_order_of_the_method_and_has_no_drift():
 def test_all_checks_hold_from_any_time_on():
     compilation = compile_text(DUFFING)
     solvers = {target: solver(compilation, target) for target in ("c", "numpy")}
-    found = verify(compilation, solvers, "r", [1.2, 0], {}, 0.1, 100, t0=0.7, quick=True)
-    assert found.failures == []
-    named = {c.name: c for c in found.checks}
+    verification = verify(compilation, solvers, "r", [1.2, 0], {}, 0.1, 100, t0=0.7, quick=True)
+    assert verification.failures == []
+    named = {c.name: c for c in verification.checks}
     assert named["observed order"].value > 5.7
     assert named["Poisson defect, exact tangent"].value < 1e-13
-    assert all(meaning_of(c.name) for c in found.checks)
+    assert all(meaning_of(c.name) for c in verification.checks)
     assert named["energy balance: largest error"].value < named["energy balance: largest error"].others["rk4"]
 
 
@@ -78,19 +78,19 @@ def test_a_run_begins_at_its_time(tmp_path):
     path = tmp_path / "duffing.yaml"
     run = "{initial: [1.2, 0], step: 0.1, steps: 60, start: 0.7, section: q - cos(t), compare: [rk4]}"
     path.write_text(f"phigen: 1\nname: duffing\n{DUFFING}runs: {{r: {run}}}\n", encoding="utf-8")
-    done = runner.invoke(group, ["run", str(path), "--json", "--output", str(tmp_path / "o.npz")])
-    assert done.exit_code == 0, done.output
-    told = json.loads(done.stdout)
+    result = runner.invoke(group, ["run", str(path), "--json", "--output", str(tmp_path / "o.npz")])
+    assert result.exit_code == 0, result.output
+    document = json.loads(result.stdout)
     stored = np.load(tmp_path / "o.npz")
-    assert told["start"] == 0.7
+    assert document["start"] == 0.7
     assert stored["t"][[0, -1]].tolist() == [0.7, 0.7 + 60 * 0.1]
-    mine, other = (m["energy"]["error"] for m in told["methods"])
+    mine, other = (m["energy"]["error"] for m in document["methods"])
     assert 0 < mine < other
     shown = runner.invoke(group, ["run", str(path)])
     rows = dict(line.strip().split("  ", 1) for line in shown.output.splitlines() if " of the energy" in line[:30])
     assert [*rows] == ["change of the energy", "error of the energy balance"]
     assert "largest error" not in shown.output
-    changes = told["methods"][0]["change"]["error"]
+    changes = document["methods"][0]["change"]["error"]
     assert changes == pytest.approx(np.abs(stored["energy"] - stored["energy"][0]).max() / abs(stored["energy"][0]))
     assert "t = 0.7 … 6.7" in shown.output
 
@@ -102,9 +102,9 @@ def test_figures_and_reports_show_the_balance(tmp_path):
         "tangent: true", "runs: {r: {initial: [1.2, 0], step: 0.1, steps: 40, start: 0.7, compare: [rk4]}}"
     )
     path.write_text(f"phigen: 1\nname: duffing\n{text}", encoding="utf-8")
-    done = CliRunner().invoke(group, ["run", str(path), "--plot", str(tmp_path / "d.svg"), "--target", "numpy"])
-    assert done.exit_code == 0, done.output
+    result = CliRunner().invoke(group, ["run", str(path), "--plot", str(tmp_path / "d.svg"), "--target", "numpy"])
+    assert result.exit_code == 0, result.output
     assert (tmp_path / "d.svg").stat().st_size > 10_000
-    done = CliRunner().invoke(group, ["report", str(path), "-o", str(tmp_path / "d.html"), "--quick"])
-    assert done.exit_code == 0, done.output
+    result = CliRunner().invoke(group, ["report", str(path), "-o", str(tmp_path / "d.html"), "--quick"])
+    assert result.exit_code == 0, result.output
     assert "largest error of the energy balance" in (tmp_path / "d.html").read_text(encoding="utf-8")

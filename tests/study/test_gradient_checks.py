@@ -50,7 +50,7 @@ def checked(text, change=None, target="numpy", **options):
     solver = (lattice_solver_of if compilation.spec.lattice else solver_of)(compilation, target)
     if change:
         pullback = solver.backend.pullback
-        solver.backend.pullback = lambda *given: change(given, *pullback(*given))
+        solver.backend.pullback = lambda *run_arguments: change(run_arguments, *pullback(*run_arguments))
     return {check.name: check.passed for check in checks(compilation, solver, run)}
 
 
@@ -61,8 +61,8 @@ def checks(compilation, solver, run):
         subject = lattice_verification._Subject(
             compilation, {solver.target: solver}, start_of(compilation.spec, run), h
         )
-        made = solver.integrate(subject.start.state, h, 4, parameters=subject.start.arguments)
-        return list(lattice_verification._gradients(compilation.cell, subject, made))
+        trajectory = solver.integrate(subject.start.state, h, 4, parameters=subject.start.arguments)
+        return list(lattice_verification._gradients(compilation.cell, subject, trajectory))
     values, x = compilation.spec.parameters_of(run), np.array([float(v) for v in run.initial])
     subject = verification.Subject(compilation, {solver.target: solver}, {}, {}, values, x, h, 40, 0.0, None)
     states = solver.integrate(x, h, 40, 10, parameters=values).x
@@ -76,16 +76,16 @@ def test_right_gradients_pass(target, more):
     assert checked(SWING + more, target=target) == {TANGENTS: True, DIFFERENCES: True, MEMBERS: True}
 
 
-def slightly(given, rows, x_bar, found):
-    return rows, x_bar * (1 + 1e-9), found
+def slightly(run, rows, x_bar, derivatives):
+    return rows, x_bar * (1 + 1e-9), derivatives
 
 
-def of_a_parameter(given, rows, x_bar, found):
-    return rows, x_bar, found * np.array([[1.0], [1.00001]])
+def of_a_parameter(run, rows, x_bar, derivatives):
+    return rows, x_bar, derivatives * np.array([[1.0], [1.00001]])
 
 
-def of_several(given, rows, x_bar, found):
-    return rows, x_bar * (1 + 1e-9 * (len(x_bar) > 1)), found
+def of_several(run, rows, x_bar, derivatives):
+    return rows, x_bar * (1 + 1e-9 * (len(x_bar) > 1)), derivatives
 
 
 @pytest.mark.thin(2)
@@ -105,21 +105,21 @@ def test_the_energy_of_a_monitor_must_be_followed():
     gauge = solver.backend.module.gauge(np.array([0.4, 0.3]), g=1.5, m=0.7)
     held = solver.backend.with_gauge(gauge)
 
-    def at_one_level(given, rows, x_bar, found):
-        return held.pullback(*given)
+    def at_one_level(run, rows, x_bar, derivatives):
+        return held.pullback(*run)
 
     assert {name for name, passed in checked(text, at_one_level).items() if not passed} >= {DIFFERENCES}
 
 
-def of_sites(given, rows, x_bar, found):
-    return rows, x_bar, found | {"B": np.roll(found["B"], 1)}
+def of_sites(run, rows, x_bar, derivatives):
+    return rows, x_bar, derivatives | {"B": np.roll(derivatives["B"], 1)}
 
 
 @pytest.mark.parametrize(("change", "failed"), [(None, set()), (slightly, {TANGENTS}), (of_sites, {DIFFERENCES})])
 def test_gradients_of_lattices_are_checked_on_few_sites_and_on_those_of_the_run(change, failed):
-    found = checked(SPINS, change)
-    assert set(found) == {f"{name} on {where} sites" for name in (TANGENTS, DIFFERENCES) for where in ("3", "all")}
-    assert {name for name, passed in found.items() if not passed} == {
+    checks = checked(SPINS, change)
+    assert set(checks) == {f"{name} on {where} sites" for name in (TANGENTS, DIFFERENCES) for where in ("3", "all")}
+    assert {name for name, passed in checks.items() if not passed} == {
         f"{name} on {where} sites" for name in failed for where in ("3", "all")
     }
 

@@ -26,29 +26,29 @@ def solver(source, target="c", order=None):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_a_linear_saddle_has_its_eigenvalues(target):
-    found = spectrum(solver(spec.loads(SADDLE), target), [0, 0, 0, 0, 1], 0.05, 2000)
+    exponents = spectrum(solver(spec.loads(SADDLE), target), [0, 0, 0, 0, 1], 0.05, 2000)
     # The frame that starts along the axes is the exact one; the order of the method is all there is.
-    assert np.max(np.abs(found.exponents - [1.5, 0.25, 0, -0.25, -1.5])) < 1e-12
-    assert found.t == 100
+    assert np.max(np.abs(exponents.exponents - [1.5, 0.25, 0, -0.25, -1.5])) < 1e-12
+    assert exponents.t == 100
 
 
 def test_backwards_in_time_growth_and_decay_change_places():
-    found = spectrum(solver(spec.loads(SADDLE)), [0, 0, 0, 0, 1], -0.05, 500)
-    assert np.max(np.abs(found.exponents - [1.5, 0.25, 0, -0.25, -1.5])) < 1e-12
+    exponents = spectrum(solver(spec.loads(SADDLE)), [0, 0, 0, 0, 1], -0.05, 500)
+    assert np.max(np.abs(exponents.exponents - [1.5, 0.25, 0, -0.25, -1.5])) < 1e-12
 
 
 def test_strongly_unstable_steps_lose_no_direction():
     """A step multiplies lengths by e^4 and e^-4: without a new frame in time the small ones drown in rounding."""
-    found = spectrum(solver(spec.loads(SADDLE)), [0, 0, 0, 0, 1], 0.4, 400, {"a": 10.0, "b": 0.1})
-    assert np.max(np.abs(found.exponents[[1, 2, 3]] - [0.1, 0, -0.1])) < 1e-10
-    assert abs(found.pairing) < 1e-10
+    exponents = spectrum(solver(spec.loads(SADDLE)), [0, 0, 0, 0, 1], 0.4, 400, {"a": 10.0, "b": 0.1})
+    assert np.max(np.abs(exponents.exponents[[1, 2, 3]] - [0.1, 0, -0.1])) < 1e-10
+    assert abs(exponents.pairing) < 1e-10
 
 
 def test_exponents_of_an_integrable_system_fall_like_log_t_over_t():
-    found = spectrum(solver(compiled("rigid_body").spec), [0.45, 0.0, 0.89], 0.05, 8000)
-    bound = 3 * np.log(found.times) / found.times
-    assert np.all(np.abs(found.history[found.times > 20]) < bound[found.times > 20, None])
-    assert found.uncertainty < 0.05
+    exponents = spectrum(solver(compiled("rigid_body").spec), [0.45, 0.0, 0.89], 0.05, 8000)
+    bound = 3 * np.log(exponents.times) / exponents.times
+    assert np.all(np.abs(exponents.history[exponents.times > 20]) < bound[exponents.times > 20, None])
+    assert exponents.uncertainty < 0.05
 
 
 @pytest.mark.slow
@@ -66,10 +66,10 @@ def test_a_chaotic_orbit_has_a_positive_exponent_and_its_mirror_image():
 @pytest.mark.parametrize(("target", "steps"), [("c", 400), ("numpy", 100)])
 def test_directions_across_the_leaves_add_zeros(target, steps):
     """Two Casimirs of the top: their differentials are carried along unchanged, so two exponents vanish like 1/t."""
-    found = spectrum(solver(compiled("lagrange_top").spec, target), [0.2, -0.1, 3.0, 0.6, 0.0, 0.8], 0.05, steps)
-    middle = np.sort(np.abs(found.exponents))[:2]
-    assert np.all(middle < 0.3 / found.t)
-    assert abs(found.total) < 1e-12  # se(3) is unimodular: volume is conserved
+    exponents = spectrum(solver(compiled("lagrange_top").spec, target), [0.2, -0.1, 3.0, 0.6, 0.0, 0.8], 0.05, steps)
+    middle = np.sort(np.abs(exponents.exponents))[:2]
+    assert np.all(middle < 0.3 / exponents.t)
+    assert abs(exponents.total) < 1e-12  # se(3) is unimodular: volume is conserved
 
 
 def test_growth_is_followed_along_the_trajectory_that_is_integrated():
@@ -97,10 +97,10 @@ order: 6
 
 
 def test_a_lattice_has_the_exponents_of_its_waves():
-    found = lattice_spectrum(solver(spec.loads(UPSIDE_DOWN), "numpy"), np.zeros((2, 6)), 0.25, 400, 4)
-    grown = found.history * found.times[:, np.newaxis]
-    late = np.flatnonzero(found.times > 60)[0]  # by then the frame has turned
-    rates = (grown[-1] - grown[late]) / (found.t - found.times[late])
+    exponents = lattice_spectrum(solver(spec.loads(UPSIDE_DOWN), "numpy"), np.zeros((2, 6)), 0.25, 400, 4)
+    grown = exponents.history * exponents.times[:, np.newaxis]
+    late = np.flatnonzero(exponents.times > 60)[0]  # by then the frame has turned
+    rates = (grown[-1] - grown[late]) / (exponents.t - exponents.times[late])
     assert np.max(np.abs(rates - np.sqrt([1, 0.8, 0.8, 0.4]))) < 1e-4
     with pytest.raises(ValueError, match="1 to 12 exponents, not 13"):
         lattice_spectrum(solver(spec.loads(UPSIDE_DOWN), "numpy"), np.zeros((2, 6)), 0.1, 400, 13)

@@ -25,11 +25,11 @@ def in_c(body):
 
 def test_times_of_the_solver_do_not_contain_its_set_up(body):
     start = START.copy()
-    found = race.compiled(body, ["rk4"], start, PARAMETERS)
-    own, rk4 = (found.runners[name](0.05, 10, 1) for name in (race.OWN, "rk4"))
+    methods = race.compiled(body, ["rk4"], start, PARAMETERS)
+    of_phigen, rk4 = (methods.runners[name](0.05, 10, 1) for name in (race.OWN, "rk4"))
     start *= 2  # what is set up for each measurement would begin here
-    assert (found.runners[race.OWN](0.05, 10, 1) == own).all()
-    assert not np.allclose(found.runners["rk4"](0.05, 10, 1), rk4)
+    assert (methods.runners[race.OWN](0.05, 10, 1) == of_phigen).all()
+    assert not np.allclose(methods.runners["rk4"](0.05, 10, 1), rk4)
 
 
 @pytest.mark.parametrize("method", race.TABLEAUX)
@@ -47,12 +47,12 @@ def test_solver_in_the_race_is_the_solver(body, in_c):
 @pytest.mark.parametrize("make", ["c", "python"])
 def test_with_a_monitor_all_methods_make_their_steps_in_tau(make):
     """So that they end where the solver does."""
-    made = compiled("kepler_eccentric", 8)
+    compilation = compiled("kepler_eccentric", 8)
     start, at = np.array([0.3, 0.0, 0.0, 2.3]), {"oblateness": 1e-3}
-    found = race.compiled(made, ["rk4"], start, at) if make == "c" else race.interpreted(
-        solver(made, "numpy"), ["rk4"], start, at)  # fmt: skip
-    assert found.clock == "τ"
-    assert found.runners["rk4"](0.005, 400, 1) == pytest.approx(found.runners[race.OWN](0.01, 200, 1), abs=1e-8)
+    methods = race.compiled(compilation, ["rk4"], start, at) if make == "c" else race.interpreted(
+        solver(compilation, "numpy"), ["rk4"], start, at)  # fmt: skip
+    assert methods.clock == "τ"
+    assert methods.runners["rk4"](0.005, 400, 1) == pytest.approx(methods.runners[race.OWN](0.01, 200, 1), abs=1e-8)
 
 
 def test_a_step_that_cannot_be_made_has_no_result(in_c):
@@ -66,13 +66,13 @@ def test_orders_of_a_study_are_the_stated_ones(body, in_c, make, monkeypatch):
     monkeypatch.setattr(precision, "MOST_SECONDS", math.inf)  # a busy machine would measure larger steps only
     methods = ["rk4", "dop853"]
     other = race.interpreted(solver(body, "numpy"), methods, START, PARAMETERS)
-    found = precision.study(in_c if make == "c" else other, 4, 0.4, 3, rounds=1)
-    slopes = {c.label: c.slope for c in found.curves}
+    measured = precision.study(in_c if make == "c" else other, 4, 0.4, 3, rounds=1)
+    slopes = {c.label: c.slope for c in measured.curves}
     assert slopes["phigen"] == pytest.approx(4, abs=0.2)
     assert slopes["rk4"] == pytest.approx(4, abs=0.2)
-    assert found.floor < 1e-13
-    assert all(p.seconds > 0 for c in found.curves for p in c.points)
-    assert not found.has_casimirs
+    assert measured.floor < 1e-13
+    assert all(p.seconds > 0 for c in measured.curves for p in c.points)
+    assert not measured.has_casimirs
 
 
 def test_closed_form_is_the_reference_where_there_is_one():
@@ -110,8 +110,8 @@ def test_time_is_that_of_the_fastest_repetition(monkeypatch):
     now = iter(range(10**6))
     monkeypatch.setattr(precision.time, "perf_counter", lambda: 0.01 * next(now) ** 1.1)
     runner = {race.OWN: lambda h, n, repeats: START}
-    found = precision._times(race.Race(runner, lambda repeats: None, "C"), {race.OWN: [1]}, 1.0, 3)
-    assert found[race.OWN, 1] == pytest.approx(0.01 * (3**1.1 - 2**1.1))
+    times = precision._times(race.Race(runner, lambda repeats: None, "C"), {race.OWN: [1]}, 1.0, 3)
+    assert times[race.OWN, 1] == pytest.approx(0.01 * (3**1.1 - 2**1.1))
 
 
 def study(casimirs=1e-16):

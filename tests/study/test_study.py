@@ -72,8 +72,8 @@ def test_functions_on_arrays_agree_with_those_on_numbers(name):
     arguments = [symbol("x"), symbol("y")][: FUNCTIONS[name].arity]
     e = call(name, *arguments) * PI - power(symbol("x"), Fraction(-1, 2)) / number(3)
     (expected,) = evaluate([e], {"x": x, "y": 0.7})
-    (found,) = arrays.evaluate([e], {"x": np.array([x, x]), "y": 0.7})
-    assert found == pytest.approx([expected] * 2, rel=1e-14)
+    (values,) = arrays.evaluate([e], {"x": np.array([x, x]), "y": 0.7})
+    assert values == pytest.approx([expected] * 2, rel=1e-14)
 
 
 def oscillator():
@@ -131,8 +131,8 @@ def test_turns_are_counted_across_pieces_of_a_run():
     ],
 )
 def test_errors_are_relative_to_the_value_at_the_start_or_to_the_terms_that_cancel_there(value, terms, kind, size):
-    found = conservation.unit_of(value, terms)
-    assert (found.kind, found.size) == (kind, size)
+    unit = conservation.unit_of(value, terms)
+    assert (unit.kind, unit.size) == (kind, size)
 
 
 @pytest.mark.parametrize("constant", [0, 5])
@@ -140,18 +140,18 @@ def test_energy_that_is_zero_at_the_start_is_measured_in_its_terms_whatever_cons
     """H = p²/2 − cos q, from q = π/2 at rest."""
     q, p = symbol("q"), symbol("p")
     h = p**2 / 2 - call("cos", q) + constant
-    (found,) = conservation.units([h], ["q", "p"], {}, np.array([math.pi / 2, 0.0]))
-    assert found.size == pytest.approx(constant or math.pi / 2)
-    assert ("since H is nearly 0" in conservation.stated({"energy": found})) == (constant == 0)
+    (unit,) = conservation.units([h], ["q", "p"], {}, np.array([math.pi / 2, 0.0]))
+    assert unit.size == pytest.approx(constant or math.pi / 2)
+    assert ("since H is nearly 0" in conservation.stated({"energy": unit})) == (constant == 0)
 
 
 def test_summary_of_a_run_that_failed_is_about_its_finite_rows():
     system = compile_spec(spec.load(SPECS / "harmonic_oscillator.yaml")).system
     x = np.array([[1.0, 0.0], [0.0, 1.0], [np.nan, np.nan]])
     parameters = {p.name: 1.0 for p in system.parameters}
-    found = summary.summarise("a", system, None, parameters, np.arange(3.0), x)
-    assert (found.good, found.rows) == (2, 3)
-    assert math.isfinite(found.energy.error)
+    errors = summary.summarise("a", system, None, parameters, np.arange(3.0), x)
+    assert (errors.good, errors.rows) == (2, 3)
+    assert math.isfinite(errors.energy.error)
 
 
 @pytest.mark.parametrize("name", ["rigid_body", "kepler", "pendulum", "predator_prey"])
@@ -200,9 +200,9 @@ def test_starter_spec_summary_agrees_with_the_solver():
     run = next(iter(system.spec.runs.values()))
     solver = phigen.compile(system, "numpy", 2)
     trajectory = solver.integrate([float(v) for v in run.initial], float(run.step), 100)
-    found = summary.summarise("phigen", system, run, trajectory.parameters, trajectory.t, trajectory.x)
+    errors = summary.summarise("phigen", system, run, trajectory.parameters, trajectory.t, trajectory.x)
     expected = np.max(np.abs(trajectory.energy / trajectory.energy[0] - 1))
-    assert found.energy.error == pytest.approx(expected, rel=1e-6)
+    assert errors.energy.error == pytest.approx(expected, rel=1e-6)
 
 
 def test_spec_of_the_demo_still_has_its_run():

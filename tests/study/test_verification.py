@@ -51,8 +51,8 @@ def verified(compilation, solvers, steps=400, h=0.2):
     return verification.verify(compilation, solvers, "tumbling", START, {}, h, steps, ("rk4",))
 
 
-def failed(found):
-    return {check.name for check in found.checks if not check.passed}
+def failed(checks):
+    return {check.name for check in checks.checks if not check.passed}
 
 
 def test_rounding_is_seen_as_such_where_all_terms_of_a_casimir_vanish():
@@ -67,10 +67,10 @@ casimirs: {casimirs}
 """
     compilation = compilation_of(text)
     start = np.array([0.3, 1.2, 0.0, 0.0, 0.0, -1.0])
-    made = solver_of(compilation, "c")
-    rows = made.integrate(start, h=0.02, steps=10_000).x
+    solver = solver_of(compilation, "c")
+    rows = solver.integrate(start, h=0.02, steps=10_000).x
     subject = verification.Subject(
-        compilation, made, {"c": of_solver(made, {})}, {}, {}, start, 0.02, 10_000, 0.0, field_of(made, {})
+        compilation, solver, {"c": of_solver(solver, {})}, {}, {}, start, 0.02, 10_000, 0.0, field_of(solver, {})
     )
     assert all(check.passed for check in verification.conservation_checks(subject, rows))
     rows[5000:, 0] += 1e-9
@@ -81,17 +81,17 @@ casimirs: {casimirs}
 @pytest.mark.slow
 def test_modified_hamiltonian_is_constant_to_higher_order_for_each_correction():
     compilation = compilation_of()
-    found = verified(compilation, {"c": solver_of(compilation, "c")})
-    orders = {c.name: c.value for c in found.checks if c.name.startswith("modified")}
+    verification = verified(compilation, {"c": solver_of(compilation, "c")})
+    orders = {c.name: c.value for c in verification.checks if c.name.startswith("modified")}
     assert len(orders) == backward.CORRECTIONS
     assert orders["modified H, 1 correction: order"] == pytest.approx(6, abs=0.2)
 
 
 def test_a_good_solver_passes_and_rk4_stands_beside_it():
     compilation = compilation_of()
-    found = verified(compilation, {t: solver_of(compilation, t) for t in ("c", "numpy")}, steps=2000)
-    assert found.failures == []
-    checks = {c.name: c for c in found.checks}
+    measured = verified(compilation, {t: solver_of(compilation, t) for t in ("c", "numpy")}, steps=2000)
+    assert measured.failures == []
+    checks = {c.name: c for c in measured.checks}
     assert checks["observed order"].value == pytest.approx(4, abs=0.1)
     assert checks["observed order"].others["rk4"] == pytest.approx(4, abs=0.1)
     assert checks["Casimir C: largest error"].value < 1e-14 < 1e-6 < checks["Casimir C: largest error"].others["rk4"]
@@ -114,10 +114,10 @@ def test_rk4_posing_as_the_step_is_found_out():
         )
         return source + fake
 
-    found = verified(compilation, {"c": solver_of(compilation, "c"), "numpy": from_source(compilation, change)})
-    assert "agreement of c and numpy" in failed(found)
-    assert "reversibility: a step there and back" in failed(found)
-    assert "tangent map against differences" in failed(found)
+    verification = verified(compilation, {"c": solver_of(compilation, "c"), "numpy": from_source(compilation, change)})
+    assert "agreement of c and numpy" in failed(verification)
+    assert "reversibility: a step there and back" in failed(verification)
+    assert "tangent map against differences" in failed(verification)
     alone = verified(compilation, {"numpy": from_source(compilation, change)})
     assert "Casimir C: largest error" in failed(alone)
     assert "observed order" not in failed(alone)  # it is a fine method of order 4
@@ -130,44 +130,44 @@ def test_a_wrong_sign_of_the_quadratic_term_is_found_out():
     names = {momentum(c): -symbol(momentum(c)) for c in compilation.system.coordinates}
     wrong = tuple(-e for e in substitute(compilation.realisation.displacement, names))
     realisation = replace(compilation.realisation, displacement=wrong)
-    found = (compilation.system, realisation, compilation.order, compilation.gauged, compilation.scheme)
-    program = build_program(*found, compilation.spec.overridden(tangent=True))
+    arguments = (compilation.system, realisation, compilation.order, compilation.gauged, compilation.scheme)
+    program = build_program(*arguments, compilation.spec.overridden(tangent=True))
     bad = replace(compilation, program=program)
-    found = verified(bad, {"c": solver_of(bad, "c")})
-    assert {"Poisson defect, exact tangent", "observed order"} <= failed(found)
-    assert any("is not round-off" in f for f in found.failures)
+    arguments = verified(bad, {"c": solver_of(bad, "c")})
+    assert {"Poisson defect, exact tangent", "observed order"} <= failed(arguments)
+    assert any("is not round-off" in f for f in arguments.failures)
 
 
 def test_a_loose_tolerance_is_found_out():
     text = TEXT.replace("order: 4", "order: 4\nsolver: {tolerance: 1e-6}")
     compilation = compilation_of(text)
-    found = verified(compilation, {"c": solver_of(compilation, "c")})
-    assert "reversibility: a step there and back" in failed(found)
-    assert any("a step back misses by" in f for f in found.failures)
+    verification = verified(compilation, {"c": solver_of(compilation, "c")})
+    assert "reversibility: a step there and back" in failed(verification)
+    assert any("a step back misses by" in f for f in verification.failures)
 
 
 def test_a_lower_order_than_stated_is_found_out():
     compilation = compilation_of()
     low = compilation_of(TEXT.replace("order: 4", "order: 2"))
     posing = replace(low, order=compilation.order)
-    found = verified(posing, {"c": solver_of(low, "c")})
-    assert "observed order: 2.00 instead of 4" in found.failures
+    verification = verified(posing, {"c": solver_of(low, "c")})
+    assert "observed order: 2.00 instead of 4" in verification.failures
 
 
 def test_targets_that_disagree_are_found_out():
     compilation, low = compilation_of(), compilation_of(TEXT.replace("order: 4", "order: 2"))
-    found = verified(compilation, {"c": solver_of(compilation, "c"), "numpy": solver_of(low, "numpy")})
-    assert "agreement of c and numpy" in failed(found)
+    verification = verified(compilation, {"c": solver_of(compilation, "c"), "numpy": solver_of(low, "numpy")})
+    assert "agreement of c and numpy" in failed(verification)
 
 
 def test_energy_drift_of_dissipative_methods_is_judged():
     """Whatever is judged must tell RK4 from a good method."""
     compilation = compilation_of()
-    made = solver_of(compilation, "c")
-    rk4 = of_classical("rk4", made, {}).rows(START, 0.4, 2000, 1)
-    own = of_solver(made, {}).rows(START, 0.4, 2000, 1)
+    solver = solver_of(compilation, "c")
+    rk4 = of_classical("rk4", solver, {}).rows(START, 0.4, 2000, 1)
+    states = of_solver(solver, {}).rows(START, 0.4, 2000, 1)
     times = 0.4 * np.arange(2001)
-    growth = [summarise("", compilation.system, None, {}, times, rows).energy.growth for rows in (own, rk4)]
+    growth = [summarise("", compilation.system, None, {}, times, rows).energy.growth for rows in (states, rk4)]
     assert growth[0] < 1.5 < verification.GROWTH < growth[1]
 
 
@@ -176,10 +176,10 @@ def test_approximate_realisations_are_labelled_and_held_to_their_order():
     text = TEXT.replace("order: 4", "order: 4\nbirealisation: {kind: spray}")
     compilation = compilation_of(text)
     assert not compilation.realisation.exact
-    found = verified(compilation, {"c": solver_of(compilation, "c"), "numpy": solver_of(compilation, "numpy")})
-    assert "approximate" in found.label
-    assert found.failures == []
-    assert "approximate" in {c.name: c for c in found.checks}["Poisson defect, exact tangent"].limit
+    verification = verified(compilation, {"c": solver_of(compilation, "c"), "numpy": solver_of(compilation, "numpy")})
+    assert "approximate" in verification.label
+    assert verification.failures == []
+    assert "approximate" in {c.name: c for c in verification.checks}["Poisson defect, exact tangent"].limit
 
 
 def test_differences_are_good_to_ten_digits():
@@ -192,8 +192,8 @@ def test_differences_are_good_to_ten_digits():
 def test_a_gauge_is_held_fixed():
     compilation = compilation_of(TEXT.replace("gauge: none", "gauge: auto"))
     assert compilation.program.gauge
-    found = verified(compilation, {t: solver_of(compilation, t) for t in ("c", "numpy")})
-    assert found.failures == []
+    verification = verified(compilation, {t: solver_of(compilation, t) for t in ("c", "numpy")})
+    assert verification.failures == []
 
 
 # -- the command
@@ -241,9 +241,9 @@ def test_every_row_has_a_meaning_which_the_documentation_gives(name):
     values = compilation.spec.parameters_of(run)
     solvers = {"numpy": solver_of(compilation, "numpy")}
     start = [float(v) for v in run.initial]
-    found = verification.verify(compilation, solvers, run.name, start, values, float(run.step), 8, quick=True)
+    measured = verification.verify(compilation, solvers, run.name, start, values, float(run.step), 8, quick=True)
     page = (resources.bundled_specs().parent / "docs" / "commands.md").read_text(encoding="utf-8")
-    for check in found.checks:
+    for check in measured.checks:
         meaning = meaning_of(check.name)
         assert f"| {meaning.row} | {meaning.measures} | {meaning.failure or '–'} |" in page
         assert meaning.failure or not check.limit, check.name
@@ -261,10 +261,10 @@ def test_command_draws_the_modified_hamiltonian_of_one_spec(tmp_path):
 
     assert verify("a.yaml", "b.yaml").exit_code == 2
     assert not picture.exists()
-    done = verify("a.yaml")
-    assert done.exit_code == 0
+    verification = verify("a.yaml")
+    assert verification.exit_code == 0
     assert picture.read_text(encoding="utf-8").count("<path") > 10
-    assert f"wrote {picture}" in done.stderr
+    assert f"wrote {picture}" in verification.stderr
     assert str(read_origin(picture)).endswith(" by verify")
 
 
