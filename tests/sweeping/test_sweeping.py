@@ -60,9 +60,9 @@ def cluster(request):
     several = request.config.option.all
     with distributed.LocalCluster(
         n_workers=1 + several, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
-    ) as made:
-        made.scheduler.allowed_failures = clusters.TRIES
-        yield made
+    ) as local_cluster:
+        local_cluster.scheduler.allowed_failures = clusters.TRIES
+        yield local_cluster
 
 
 @pytest.fixture(autouse=True)
@@ -95,11 +95,11 @@ def test_chunks_hold_every_member_once_in_order(members):
     plan = grid()
     plan = replace(plan, chunk=chunk_of(plan, members))
     assert Plan.from_json(plan.as_json()) == plan
-    made = [plan.varied(plan.region(k), {}) for k in range(int(np.prod(plan.boxes)))]
-    assert max(len(chunk["a0"]) for chunk in made) <= members
-    found = np.array([np.concatenate([chunk[f"a{k}"] for chunk in made]) for k in range(3)])
+    chunks = [plan.varied(plan.region(k), {}) for k in range(int(np.prod(plan.boxes)))]
+    assert max(len(chunk["a0"]) for chunk in chunks) <= members
+    concatenated = np.array([np.concatenate([chunk[f"a{k}"] for chunk in chunks]) for k in range(3)])
     expected = np.meshgrid(*(values_of(axis) for axis in plan.axes), indexing="ij")
-    assert sorted(map(tuple, found.T)) == sorted(zip(*map(np.ravel, expected), strict=True))
+    assert sorted(map(tuple, concatenated.T)) == sorted(zip(*map(np.ravel, expected), strict=True))
 
 
 @pytest.mark.parametrize("members", [3, 10, 64, 1000])
@@ -125,9 +125,9 @@ def test_what_is_kept_of_members_is_that_of_single_runs(spec, cluster, tmp_path,
 
     store = tmp_path / "s.zarr"
     arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(store), "--scheduler", cluster.scheduler_address]
-    done = CliRunner().invoke(group, [*arguments, "--plot", str(tmp_path / "map.svg")])
-    assert done.exit_code == 0, done.output
-    assert "6 members (I2 2 × x1 3), 6 made now" in done.output
+    result = CliRunner().invoke(group, [*arguments, "--plot", str(tmp_path / "map.svg")])
+    assert result.exit_code == 0, result.output
+    assert "6 members (I2 2 × x1 3), 6 made now" in result.output
     assert "<svg" in (tmp_path / "map.svg").read_text()
     assert str(read_origin(tmp_path / "map.svg")).endswith(" by sweep")
     data = xarray.open_zarr(store).load()
@@ -151,10 +151,10 @@ def test_a_member_that_fails_costs_itself_and_says_why(spec, cluster, tmp_path):
     data = phigen.sweep(spec, over={"I2": [2.0, -1.0, 2.5], "step": [0.1, 1e3, 0.0]}, keep=["final", "energy_error"],
                         output=tmp_path / "s.zarr", scheduler=cluster.scheduler_address)  # fmt: skip
     names = data.status.attrs["flag_meanings"].split()
-    found = [[names[int(v)] for v in row] for row in data.status.values]
-    assert [row[0] for row in found] == ["OK"] * 3
-    assert found[0][1] in ("NO_CONVERGENCE", "NOT_FINITE", "SINGULAR")
-    assert found[2][2] == "BAD_ARGUMENT"
+    status_names = [[names[int(v)] for v in row] for row in data.status.values]
+    assert [row[0] for row in status_names] == ["OK"] * 3
+    assert status_names[0][1] in ("NO_CONVERGENCE", "NOT_FINITE", "SINGULAR")
+    assert status_names[2][2] == "BAD_ARGUMENT"
     for name in ("final", "energy_error"):
         failed = np.isnan(data[name].values.reshape(9, -1)).any(axis=1)
         assert (failed == (data.status.values.ravel() != 0)).all()
@@ -163,8 +163,8 @@ def test_a_member_that_fails_costs_itself_and_says_why(spec, cluster, tmp_path):
 def test_members_with_noise_take_the_seed_of_the_run_and_paths_of_their_own(cluster):
     noisy = specs.loads(BODY.replace("order: 2", "order: 2\nnoise: {kick: {hamiltonian: x1, amplitude: 0.3}}").replace(
         "section: x2", "seed: 7"))  # fmt: skip
-    given = {"over": {"I2": [2.0, 2.5], "seed": {"count": 2}}, "keep": ["final", "lyapunov"], "target": "numpy"}
-    data = phigen.sweep(noisy, **given, scheduler=cluster.scheduler_address)
+    options = {"over": {"I2": [2.0, 2.5], "seed": {"count": 2}}, "keep": ["final", "lyapunov"], "target": "numpy"}
+    data = phigen.sweep(noisy, **options, scheduler=cluster.scheduler_address)
     solver = phigen.compile(noisy, target="numpy", tangent=True)
     for place in range(4):
         about = {"seed": 7, "member": place, "parameters": {"I2": [2.0, 2.5][place // 2]}}
@@ -197,7 +197,7 @@ def test_runs_that_do_not_end_with_the_same_whole_step_are_refused(spec, end, ov
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("options", "said"),
     [
         ({"parameters": {"I9": 1}}, "unknown parameter 'I9'"),
         ({"parameters": {"I2": np.nan}}, "'I2' must be finite"),
@@ -221,9 +221,9 @@ def test_runs_that_do_not_end_with_the_same_whole_step_are_refused(spec, end, ov
         ({"over": {n: {"from": 1, "to": 2, "count": 10**6} for n in ("I2", "I3")}}, "members, the limit is"),
     ],
 )
-def test_what_cannot_be_swept_is_told_before_anything_is_started(given, said):
+def test_what_cannot_be_swept_is_told_before_anything_is_started(options, said):
     with pytest.raises((TypeError, ValueError), match=said):
-        phigen.sweep("rigid_body", **{"over": {"I2": [1, 2]}, **given})
+        phigen.sweep("rigid_body", **{"over": {"I2": [1, 2]}, **options})
 
 
 @pytest.mark.parametrize("name", ["status", "final", "coordinate", "frame"])
@@ -264,7 +264,7 @@ def test_killed_workers_cost_no_member(spec, cluster, tmp_path, small_chunks):
 
 
 def test_an_interrupted_sweep_goes_on_where_it_stopped_and_another_is_refused(spec, cluster, tmp_path, small_chunks):
-    given = {"over": OVER, "output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
+    options = {"over": OVER, "output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
     first, second = [], []
 
     def interrupt(members, failed):
@@ -273,12 +273,12 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped_and_another_is_refused(sp
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        phigen.sweep(spec, **given, progress=interrupt)
-    data = phigen.sweep(spec, **given, progress=lambda members, failed: second.append(members))
+        phigen.sweep(spec, **options, progress=interrupt)
+    data = phigen.sweep(spec, **options, progress=lambda members, failed: second.append(members))
     assert sum(second) <= 480 - sum(first)
     assert (data.status == 0).all()
     with pytest.raises(FileError, match=r"holds another sweep: number of steps 60, not 61\n"):
-        phigen.sweep(spec, **given, steps=61)
+        phigen.sweep(spec, **options, steps=61)
     with pytest.raises(FileError, match="not a sweep of phigen"):
         phigen.sweep(spec, over=OVER, output=tmp_path)
 
@@ -286,23 +286,23 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped_and_another_is_refused(sp
 @pytest.mark.slow
 def test_a_full_disk_is_told_and_nothing_is_lost(spec, cluster, tmp_path, small_chunks):
     """Files of workers cannot grow, after the second chunk."""
-    given = {"over": OVER, "output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
-    made = []
+    options = {"over": OVER, "output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
+    chunks_made = []
     with distributed.Client(cluster) as client:
 
         def full(members, failed):
-            made.append(members)
-            if len(made) == 2:
+            chunks_made.append(members)
+            if len(chunks_made) == 2:
                 client.run(setattr, sys, "dont_write_bytecode", True)  # as in full_disk.py
                 client.run(resource.setrlimit, resource.RLIMIT_FSIZE, (64, resource.RLIM_INFINITY))
 
         try:
             with pytest.raises(clusters.SweepError, match="File too large"):
-                phigen.sweep(spec, **given, progress=full)
+                phigen.sweep(spec, **options, progress=full)
         finally:
             client.run(resource.setrlimit, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     rest = []
-    data = phigen.sweep(spec, **given, progress=lambda members, failed: rest.append(members))
+    data = phigen.sweep(spec, **options, progress=lambda members, failed: rest.append(members))
     assert (data.status == 0).all()
     assert sum(rest) < 480
 
@@ -312,13 +312,15 @@ def test_a_scheduler_that_goes_away_is_told(spec, tmp_path, small_chunks, monkey
     monkeypatch.setattr(clusters, "PATIENCE", "0.5s")
     patience = dask.config.set({"distributed.comm.timeouts.connect": "500ms", "distributed.scheduler.worker-ttl": None})
     local = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0")
-    with patience, local as own:
+    with patience, local as own_cluster:
 
         def leave(members, failed):
-            own.sync(own.scheduler.close)
+            own_cluster.sync(own_cluster.scheduler.close)
 
         with pytest.raises(clusters.SweepError, match="scheduler went away"):
-            phigen.sweep(spec, over=OVER, output=tmp_path / "s.zarr", scheduler=own.scheduler_address, progress=leave)
+            phigen.sweep(
+                spec, over=OVER, output=tmp_path / "s.zarr", scheduler=own_cluster.scheduler_address, progress=leave
+            )
     with pytest.raises(clusters.SweepError, match="no scheduler answers"):
         phigen.sweep(spec, over=OVER, output=tmp_path / "s.zarr", scheduler="tcp://127.0.0.1:1")
 
@@ -461,8 +463,8 @@ def test_the_target_of_a_sweep_is_that_of_the_spec_unless_another_is_requested(c
     command = ["sweep", str(tmp_path / "s.yaml"), "--scheduler", setting["scheduler"]]
     for options, expected in [([], "numpy"), (["-t", "c"], "c")]:
         output = str(tmp_path / f"{expected}.zarr")
-        done = CliRunner().invoke(group, [*command, "-o", output, *options])
-        assert done.exit_code == 0, done.output
+        result = CliRunner().invoke(group, [*command, "-o", output, *options])
+        assert result.exit_code == 0, result.output
         assert xarray.open_zarr(output).attrs["target"] == expected
 
 
@@ -567,9 +569,9 @@ def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path
     )
     (tmp_path / "s.yaml").write_text(changed)
     arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "s.zarr"), "--plot", str(tmp_path / "s.svg")]
-    done = CliRunner().invoke(group, [*arguments, "-t", "numpy", "--scheduler", cluster.scheduler_address])
-    assert done.exit_code == 0, done.output
-    assert "4 members (J 2 × step 2), 4 made now, of which 2 failed" in done.output
+    result = CliRunner().invoke(group, [*arguments, "-t", "numpy", "--scheduler", cluster.scheduler_address])
+    assert result.exit_code == 0, result.output
+    assert "4 members (J 2 × step 2), 4 made now, of which 2 failed" in result.output
     data = xarray.open_zarr(tmp_path / "s.zarr").load()
     assert (np.isnan(data.energy_error) == [[False, True]] * 2).all()
     shown = CliRunner().invoke(group, [*arguments, "--show", "final"])
@@ -590,15 +592,15 @@ def test_exponents_of_lattices_are_the_growth_of_a_vector(noise):
 
     ring = CHAIN.partition("sweeps:")[0] + noise
     solver, rng = phigen.compile(specs.loads(ring + "tangent: true\n"), target="numpy"), np.random.default_rng(4)
-    x, given = rng.normal(size=(3, 4)), {"B": rng.normal(size=4), "W": 1.0}
+    x, parameters = rng.normal(size=(3, 4)), {"B": rng.normal(size=4), "W": 1.0}
     draws = Draws(3) if noise else FIRST_DRAWS
-    session = solver.backend.start(x, solver.values(given, {}, (4,)), 0.0, draws)
-    found = exponent(session, 0.05, 130)
+    session = solver.backend.start(x, solver.values(parameters, {}, (4,)), 0.0, draws)
+    computed = exponent(session, 0.05, 130)
     vector, grown = np.random.default_rng(0).normal(size=(1, 3, 4)), 0.0
     start = np.linalg.norm(vector)
-    for _, carried in solver.tangents(x, 0.05, 130, vector, parameters=given, **({"seed": 3} if noise else {})):
+    for _, carried in solver.tangents(x, 0.05, 130, vector, parameters=parameters, **({"seed": 3} if noise else {})):
         grown = np.log(np.linalg.norm(carried) / start) / (130 * 0.05)
-    assert found == pytest.approx(grown, rel=1e-12)
+    assert computed == pytest.approx(grown, rel=1e-12)
 
 
 PENDULUM = """\
@@ -630,14 +632,14 @@ def test_logarithmic_axes_and_large_energy_errors_are_seen(cluster, tmp_path, mo
 
     (tmp_path / "s.yaml").write_text(PENDULUM)
     arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "s.zarr"), "-t", "numpy"]
-    done = CliRunner().invoke(group, [*arguments, "--scheduler", cluster.scheduler_address])
-    assert done.exit_code == 0, done.output
+    result = CliRunner().invoke(group, [*arguments, "--scheduler", cluster.scheduler_address])
+    assert result.exit_code == 0, result.output
     data = xarray.open_zarr(tmp_path / "s.zarr").load()
     scale = np.abs(data.k * np.cos(data.q))
     assert (scale > 1e-3 * data.k * data.q * np.sin(data.q)).all()
     large = int((data.energy_error / scale > 0.1).sum())
     assert large > 0
-    assert f"warning: {large} of 15 members have an energy error above 10% of their energy" in done.stderr
+    assert f"warning: {large} of 15 members have an energy error above 10% of their energy" in result.stderr
     axes = drawn(tmp_path / "s.zarr", monkeypatch)[0]
     assert (axes.get_xlabel(), axes.get_xscale()) == ("q", "linear")
     assert (axes.get_ylabel(), axes.get_yscale()) == ("k", "log")
@@ -665,8 +667,8 @@ def test_large_energy_errors_of_lattices_are_counted_in_the_unit_of_runs(cluster
 
     (tmp_path / "s.yaml").write_text(QUARTIC_CHAIN)
     arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "s.zarr"), "-t", "numpy"]
-    done = CliRunner().invoke(group, [*arguments, "--scheduler", cluster.scheduler_address])
-    assert done.exit_code == 0, done.output
+    result = CliRunner().invoke(group, [*arguments, "--scheduler", cluster.scheduler_address])
+    assert result.exit_code == 0, result.output
     data, large, largest = xarray.open_zarr(tmp_path / "s.zarr").load(), 0, 0.0
     for number, seed in enumerate((3, 4)):
         text = QUARTIC_CHAIN.replace("seed: 3", f"seed: {seed}")
@@ -678,18 +680,18 @@ def test_large_energy_errors_of_lattices_are_counted_in_the_unit_of_runs(cluster
     expected = (
         f"warning: {large} of 6 members have an energy error above 10% of their energy, the largest {largest:.0%}"
     )
-    assert expected in done.stderr
+    assert expected in result.stderr
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("varied", ["g", "q"])
 def test_members_on_a_device_are_those_of_c(cluster, varied):
     pytest.importorskip("pyopencl")
-    given = {"scheduler": cluster.scheduler_address, "profile": "small"}
+    options = {"scheduler": cluster.scheduler_address, "profile": "small"}
     pendulum = Path(resources.file_of("pendulum_euler")).read_text().partition("sweeps:")[0]
     one = f"sweeps: {{one: {{over: {{{varied}: [0.9, 1.0, 1.1]}}, keep: [final], target: opencl}}}}\n"
     spec = specs.loads(pendulum + one)
-    ours, theirs = (phigen.sweep(spec, **given, steps=200, target=target) for target in (None, "c"))
+    ours, theirs = (phigen.sweep(spec, **options, steps=200, target=target) for target in (None, "c"))
     assert (ours.attrs["target"], theirs.attrs["target"]) == ("opencl", "c")
     names = [name for name in ours.data_vars if name in ("q", "p", "final")]
     assert names
