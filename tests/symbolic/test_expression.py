@@ -22,8 +22,8 @@ def parsed(text):
 def test_sparse_derivatives_are_the_derivatives_that_are_not_zero(text):
     roots = [parsed(text), parsed("x*y + z")]
     dense = [dict(zip(NAMES, row, strict=True)) for row in zip(*(derivatives(roots, n) for n in NAMES), strict=True)]
-    kept = [{n: d for n, d in row.items() if not d.is_zero} for row in dense]
-    assert sparse_derivatives(roots, NAMES) == kept
+    nonzero = [{n: d for n, d in row.items() if not d.is_zero} for row in dense]
+    assert sparse_derivatives(roots, NAMES) == nonzero
 
 
 @pytest.mark.parametrize("places", [[], [0], [3], [0, 1], [2, 5, 6], [1, 2, 3, 4, 7], list(range(9))])
@@ -34,18 +34,18 @@ def test_a_sum_without_its_zeros_is_the_same_tree(places):
 
 def test_equal_formulas_are_one_node_which_is_forgotten_with_its_last_use():
     x, before = symbol("forgotten"), {*expression._NODES}
-    made = x * (x + 3) ** 2
-    assert made is x * (x + 3) ** 2
+    formula = x * (x + 3) ** 2
+    assert formula is x * (x + 3) ** 2
     assert not {*expression._NODES} <= before
-    del made
+    del formula
     assert {*expression._NODES} <= before
 
 
 def test_order_of_terms_is_that_of_their_contents_whichever_is_made_first():
     """What is as deep is told apart by a hash of the content, found when it is asked for."""
-    given = {}
+    texts = {}
     for turn in (1, -1):
-        made = {n: symbol("x") ** n * symbol("y") for n in (2, 3, 4, 5)[::turn]}
-        given[turn] = [str(made[n] + made[m]) for n in made for m in made if n < m]
-        del made
-    assert sorted(given[1]) == sorted(given[-1])
+        terms = {n: symbol("x") ** n * symbol("y") for n in (2, 3, 4, 5)[::turn]}
+        texts[turn] = [str(terms[n] + terms[m]) for n in terms for m in terms if n < m]
+        del terms
+    assert sorted(texts[1]) == sorted(texts[-1])

@@ -86,9 +86,9 @@ def test_composition_with_series(order):
         taylor = Taylor([target], ring, ["t"])
         for level in range(7):
             taylor.advance({"t": ring.constant(1 if level == 1 else 0)})
-        for found, wanted in zip(taylor.coefficients(target), expected, strict=True):
-            value = found if isinstance(ring, ExpressionRing) else ring.expression(found)
-            assert decide_zero("", [("", value - wanted)]).verdict == PROVED
+        for computed, expected_coefficient in zip(taylor.coefficients(target), expected, strict=True):
+            value = computed if isinstance(ring, ExpressionRing) else ring.expression(computed)
+            assert decide_zero("", [("", value - expected_coefficient)]).verdict == PROVED
 
 
 def test_no_series_about_other_points():

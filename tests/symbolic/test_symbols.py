@@ -36,9 +36,9 @@ def test_plain_text_is_never_taken_for_a_symbol_of_phigens_own(name):
 
 
 def test_a_symbol_keeps_its_kind_between_processes():
-    (found,) = pickle.loads(pickle.dumps([symbol(Symbol("J", 2, 3))]))
-    assert found is symbol(Symbol("J", 2, 3))
-    assert (found.value.kind, found.value.key) == ("J", (2, 3))
+    (restored,) = pickle.loads(pickle.dumps([symbol(Symbol("J", 2, 3))]))
+    assert restored is symbol(Symbol("J", 2, 3))
+    assert (restored.value.kind, restored.value.key) == ("J", (2, 3))
 
 
 def test_names_for_readers():

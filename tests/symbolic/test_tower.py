@@ -38,5 +38,5 @@ def test_a_root_found_after_the_reciprocal_of_its_square_stands_for_it():
     q = 1 + x**2
     e = 1 / (power(q, Fraction(1, 2)) + 2 * (y / q)) * (1 + y * (power(q, Fraction(-3, 2)) * (x * (1 + q))))
     tower = Tower(["x", "y"], [e])
-    found, expected = (float(v) for v in evaluate([tower.expression(tower.convert(e)), e], {"x": 0.3, "y": 0.7}))
-    assert found == pytest.approx(expected, rel=1e-14)
+    in_tower, expected = (float(v) for v in evaluate([tower.expression(tower.convert(e)), e], {"x": 0.3, "y": 0.7}))
+    assert in_tower == pytest.approx(expected, rel=1e-14)
