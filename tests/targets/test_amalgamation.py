@@ -96,33 +96,33 @@ def with_derivatives(name, composition):
 @pytest.mark.parametrize("profile", ["fast", "small"])
 def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, profile, tmp_path):
     """Names are those of the solver from the beginning, so that printed macros are of use to the runtime too."""
-    made, _, code = runtime_of(replace(with_derivatives(name, composition), profile=profile))
-    own = {str(f.relative_to(RUNTIME)): f.read_text(encoding="utf-8") for f in RUNTIME.rglob("*.[ch]")}
+    source, _, code = runtime_of(replace(with_derivatives(name, composition), profile=profile))
+    runtime_files = {str(f.relative_to(RUNTIME)): f.read_text(encoding="utf-8") for f in RUNTIME.rglob("*.[ch]")}
     (tmp_path / "none").mkdir()
-    write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{made.name}_", text) for f, text in own.items()})
+    write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{source.name}_", text) for f, text in runtime_files.items()})
     printed = {"phrases.h": phrases.header(), **{file: states.header(file) for file in states.PARTS}}
-    write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{made.name}_", text) for f, text in printed.items()})
-    spelt = {f: re.sub(r"\bPHI_", f"{made.name}_", text) for f, text in made.printed.items()}
+    write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{source.name}_", text) for f, text in printed.items()})
+    spelt = {f: re.sub(r"\bPHI_", f"{source.name}_", text) for f, text in source.printed.items()}
     write(tmp_path, {f: f"#ifndef {f[:-2]}_h\n#define {f[:-2]}_h\n{text}\n#endif" for f, text in spelt.items()})
-    made_text = made.text(code)
+    made_text = source.text(code)
     write(tmp_path, {"made.c": made_text})
-    write(tmp_path / "none", dict.fromkeys(re.findall("#include <(.*)>", "".join(own.values())), ""))
-    switches = [f"-D{made.name}_{switch}={int(on)}" for switch, on in made.switches.items()]
-    switches += [f"-D{guard.replace('PHI_', made.name + '_')}" for guard in made.left_out.values()]
-    left_out = calls_left_out(made.switches)
-    switches += [f"-D{function.replace('phi_', made.name + '_')}(...)=" for function in left_out]
+    write(tmp_path / "none", dict.fromkeys(re.findall("#include <(.*)>", "".join(runtime_files.values())), ""))
+    switches = [f"-D{source.name}_{switch}={int(on)}" for switch, on in source.switches.items()]
+    switches += [f"-D{guard.replace('PHI_', source.name + '_')}" for guard in source.left_out.values()]
+    left_out = calls_left_out(source.switches)
+    switches += [f"-D{function.replace('phi_', source.name + '_')}(...)=" for function in left_out]
 
     def tokens(file):
         lines = run([tool("gcc"), "-E", "-P", "-nostdinc", "-I", "none", *switches, file], tmp_path).split("\n")
         lines = [line for line in lines if not re.fullmatch(r" *((if|for) \(.*\) )?;", line)]  # statements left out
-        text = "\n".join(without_unused(lines, f"{made.name}_"))
+        text = "\n".join(without_unused(lines, f"{source.name}_"))
         return re.findall(r"\w+|[^\w\s{}]", re.sub("^#.*$", "", text, flags=re.MULTILINE))
 
-    found = tokens("made.c")
-    assert found == tokens(code)
-    assert made.switches["COMPOSED"] or not {"stage", f"{made.name}_STAGES"} & set(found)
-    assert made.switches.get("HALO", True) or f"{made.name}_LEAD" not in found
-    assert not made.switches.get("ONE_ROW") or "r < s->rows" not in made_text
+    preprocessed = tokens("made.c")
+    assert preprocessed == tokens(code)
+    assert source.switches["COMPOSED"] or not {"stage", f"{source.name}_STAGES"} & set(preprocessed)
+    assert source.switches.get("HALO", True) or f"{source.name}_LEAD" not in preprocessed
+    assert not source.switches.get("ONE_ROW") or "r < s->rows" not in made_text
 
 
 USED = """\
@@ -206,8 +206,8 @@ def test_phrases_have_a_text_for_each_condition_and_no_name_of_sizes():
     for choice in phrases.ALL:
         assert {len(texts) for texts in choice.phrases.values()} == {len(choice.conditions) + 1}
     for system in ("rigid_body", "heisenberg_plane"):
-        made, header, code = runtime_of(with_derivatives(system, "auto"))
-        enumerators = re.findall(rf"\b{system}_([A-Z_]+) =", made.text(header) + made.text(code))
+        source, header, code = runtime_of(with_derivatives(system, "auto"))
+        enumerators = re.findall(rf"\b{system}_([A-Z_]+) =", source.text(header) + source.text(code))
         assert not set(names) & set(enumerators)
 
 

@@ -144,8 +144,8 @@ def everything():
 
 def size_of_operands(e, at):
     """The magnitude that rounding is relative to: the value, or the operands of its outermost sum."""
-    found, *operands = values([e, *e.args], at)
-    return max([abs(found), *(abs(v) for v in operands)]) if e.op in ("add", "sub") else abs(found)
+    value, *operands = values([e, *e.args], at)
+    return max([abs(value), *(abs(v) for v in operands)]) if e.op in ("add", "sub") else abs(value)
 
 
 @pytest.mark.thin(2)
@@ -153,16 +153,16 @@ def size_of_operands(e, at):
 def test_everything_that_can_be_written_is_computed_right(everything, target):
     compilation, named = everything
     assert {e.op for _, e in named} >= {*FUNCTIONS, "number", "pi", "E", "add", "sub", "neg", "mul", "pow"}
-    found = solver(compilation, target).casimirs(POINTS)
+    integrator = solver(compilation, target).casimirs(POINTS)
     wrong = []
     with mpmath.workdps(40):
         for i, point in enumerate(POINTS):
             at = dict(zip("xyz", map(mpmath.mpf, point), strict=True))
             for k, (name, e) in enumerate(named):
                 (exact,) = values([e], at)
-                error = abs(mpmath.mpf(float(found[f"C{k}"][i])) - exact)
+                error = abs(mpmath.mpf(float(integrator[f"C{k}"][i])) - exact)
                 if not error <= BOUNDS.get(e.op, 1e-15) * size_of_operands(e, at):
-                    wrong.append(f"{name} at {dict(at)}: {found[f'C{k}'][i]!r} instead of {exact}")
+                    wrong.append(f"{name} at {dict(at)}: {integrator[f'C{k}'][i]!r} instead of {exact}")
     assert not wrong, "\n".join(wrong)
 
 

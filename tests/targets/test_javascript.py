@@ -96,7 +96,7 @@ VARIED = {
     "explicit": lambda: _varied(f"{PENDULUM}birealisation: canonical-euler\norder: 1\n{PENDULUM_RUN}"),
     "splitting": lambda: _varied(f"{PENDULUM}scheme: splitting\norder: 4\n{PENDULUM_RUN}"),
 }
-VARIANTS |= {f"{case}, varied": made for case, made in VARIED.items()}
+VARIANTS |= {f"{case}, varied": variant for case, variant in VARIED.items()}
 
 
 def _by_paths(name, order):
@@ -112,8 +112,8 @@ def _varied(text):
     return compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"), tangent=True)
 
 
-def _modified(given, order):
-    return compile_spec(given, order=order, modified_hamiltonian=1)
+def _modified(options, order):
+    return compile_spec(options, order=order, modified_hamiltonian=1)
 
 
 @cache
@@ -152,59 +152,59 @@ def answers(tmp_path_factory):
     return Answers(tmp_path_factory, lambda case: (compilation_of(case), None, STEPS))
 
 
-def apart(found, expected):
+def apart(actual, expected):
     """The largest difference, in sizes of the largest expected number."""
-    found, expected = np.asarray(found, dtype=float), np.asarray(expected, dtype=float)
-    return float(np.max(np.abs(found - expected), initial=0.0) / (np.max(np.abs(expected), initial=0.0) or 1.0))
+    actual, expected = np.asarray(actual, dtype=float), np.asarray(expected, dtype=float)
+    return float(np.max(np.abs(actual - expected), initial=0.0) / (np.max(np.abs(expected), initial=0.0) or 1.0))
 
 
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
 def test_steps_are_those_of_numpy_to_roundoff(case, answers):
-    at, found, numpy = setting(compilation_of(case)), answers[case], solver(compilation_of(case), "numpy")
+    at, answer, numpy = setting(compilation_of(case)), answers[case], solver(compilation_of(case), "numpy")
     expected = numpy.integrate(at.x, at.h, STEPS, **at.parameters).x[-1]
-    assert (found["done"], found["steps"]) == ({"value": STEPS}, STEPS)
-    assert found["t"] == STEPS * at.h
-    assert apart(found["x"], expected) < 1e-13
-    assert np.max(np.abs(found["carry"])) < 1e-15 * np.max(np.abs(expected))
-    assert np.any(found["carry"]) or case == "path, in pieces"  # of changes larger than the state all sums are exact
+    assert (answer["done"], answer["steps"]) == ({"value": STEPS}, STEPS)
+    assert answer["t"] == STEPS * at.h
+    assert apart(answer["x"], expected) < 1e-13
+    assert np.max(np.abs(answer["carry"])) < 1e-15 * np.max(np.abs(expected))
+    assert np.any(answer["carry"]) or case == "path, in pieces"  # of changes larger than the state all sums are exact
 
 
 @pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
 def test_kicked_solvers_go_on_as_ones_that_start_there(case, answers):
-    found = answers[case]["moved"]
-    assert apart(found["x"], found["fresh"]) < 1e-13
-    assert (found["failure"]["status"], found["steps"]) == ("BAD_ARGUMENT", 3)
+    answer = answers[case]["moved"]
+    assert apart(answer["x"], answer["fresh"]) < 1e-13
+    assert (answer["failure"]["status"], answer["steps"]) == ("BAD_ARGUMENT", 3)
 
 
 @pytest.mark.parametrize("case", [*NAMES, *VARIANTS, "duffing", "kepler_eccentric", "thruster_body"])
 def test_copies_go_on_by_themselves(case, answers):
-    found = answers[case]["copied"]
-    assert found["alone"]
-    assert apart(found["ends"][1], found["ends"][0]) < 1e-14
+    answer = answers[case]["copied"]
+    assert answer["alone"]
+    assert apart(answer["ends"][1], answer["ends"][0]) < 1e-14
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("case", slow_but(QUICK, [*NAMES, *VARIANTS, "duffing", "kepler_eccentric", "thruster_body"]))
 def test_parts_of_steps_find_events_where_sections_do(case, answers):
     """With time, a monitor, forces, attitude, and every kind of step."""
-    at, found = setting(compilation_of(case)), answers[case]["crossings"]
+    at, answer = setting(compilation_of(case)), answers[case]["crossings"]
 
     def g(x, *_):
-        return x[:, 0] - found["level"]
+        return x[:, 0] - answer["level"]
 
     numpy = solver(compilation_of(case), "numpy")
     expected = numpy.section(at.x, at.h, 12, g, direction="both", parameters=at.parameters)
-    assert len(found["found"]) == len(expected) > 0
-    for there, t, x in zip(found["found"], expected.t, expected.x, strict=True):
+    assert len(answer["found"]) == len(expected) > 0
+    for there, t, x in zip(answer["found"], expected.t, expected.x, strict=True):
         assert abs(there["t"] - t) < 1e-11 * abs(12 * at.h)
         assert apart(there["x"], x) < 1e-13
 
 
 @pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
 def test_a_step_of_another_size_is_guessed_from_none_before(case, answers):
-    found = answers[case]["remembered"]
-    assert set(found) == ({1} if isinstance(compilation_of(case).program.step, kinds.Newton | kinds.Path) else set())
+    answer = answers[case]["remembered"]
+    assert set(answer) == ({1} if isinstance(compilation_of(case).program.step, kinds.Newton | kinds.Path) else set())
 
 
 @pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
@@ -216,9 +216,9 @@ def test_what_rounding_took_from_the_state_is_part_of_it(case, answers):
 
 def test_a_step_that_leads_elsewhere_is_tried_again(tmp_path):
     """The equation of step 12 has a solution of 280 times the energy too, which the guess for it leads to."""
-    (found,) = node(tmp_path, [(compile_text(RATTLEBACK), {"x0": [0.02, 0.3, -1]}, 0.42, 15)])
-    assert found["done"] == {"value": 15}
-    assert found["growth"] < 2
+    (answer,) = node(tmp_path, [(compile_text(RATTLEBACK), {"x0": [0.02, 0.3, -1]}, 0.42, 15)])
+    assert answer["done"] == {"value": 15}
+    assert answer["growth"] < 2
 
 
 @pytest.mark.slow
@@ -232,14 +232,14 @@ def test_steps_are_those_of_c_to_roundoff(case, answers):
 
 @pytest.mark.parametrize("case", NAMES)
 def test_observables_and_facts_are_those_of_the_system(case, answers):
-    at, found, numpy = setting(compilation_of(case)), answers[case], solver(compilation_of(case), "numpy")
-    program, x = compilation_of(case).program, np.array(found["x"])
+    at, answer, numpy = setting(compilation_of(case)), answers[case], solver(compilation_of(case), "numpy")
+    program, x = compilation_of(case).program, np.array(answer["x"])
     backend = numpy.backend
     scale = 1e-13 * np.max(np.abs(x))
-    assert found["energy"] == pytest.approx(backend.hamiltonian(x[np.newaxis], at.parameters)[0], rel=1e-13, abs=scale)
-    assert found["casimirs"] == pytest.approx(backend.casimirs(x[np.newaxis], at.parameters)[0], rel=1e-13, abs=scale)
-    assert apart(found["field"], backend.vector_field(x[np.newaxis], at.parameters)[0]) < 1e-13
-    assert found["facts"] == {
+    assert answer["energy"] == pytest.approx(backend.hamiltonian(x[np.newaxis], at.parameters)[0], rel=1e-13, abs=scale)
+    assert answer["casimirs"] == pytest.approx(backend.casimirs(x[np.newaxis], at.parameters)[0], rel=1e-13, abs=scale)
+    assert apart(answer["field"], backend.vector_field(x[np.newaxis], at.parameters)[0]) < 1e-13
+    assert answer["facts"] == {
         "NAME": program.name,
         "VERSION": phigen.__version__,
         "SPEC_SHA256": program.about.spec_sha256,
@@ -259,8 +259,8 @@ def test_the_gauge_is_chosen_as_in_numpy_or_given(case, answers, tmp_path):
     assert answers[case]["gauge"] == pytest.approx(module.gauge(at.x, **at.parameters), rel=1e-12)
     multiples = [0.25, -0.5][: len(answers[case]["gauge"])]
     jobs = [{"x0": at.x, "gauge": multiples}, {"x0": [1e200] * len(at.x)}]
-    given, far = node(tmp_path, [(compilation, options, at.h, 3) for options in jobs])
-    assert apart(given["x"], module.integrate(at.x, at.h, 3, gauge=multiples)[-1]) < 1e-14
+    prescribed, far = node(tmp_path, [(compilation, options, at.h, 3) for options in jobs])
+    assert apart(prescribed["x"], module.integrate(at.x, at.h, 3, gauge=multiples)[-1]) < 1e-14
     if "formula" not in case:  # of states so large the leading error is infinite
         assert not np.any(far["gauge"])
         assert not np.any(module.gauge([1e200] * len(at.x)))
@@ -268,20 +268,20 @@ def test_the_gauge_is_chosen_as_in_numpy_or_given(case, answers, tmp_path):
 
 @pytest.mark.parametrize("case", ["modified", "modified, not symmetric"])
 def test_the_modified_hamiltonian_is_that_of_numpy(case, answers):
-    compilation, found = compilation_of(case), answers[case]
+    compilation, answer = compilation_of(case), answers[case]
     at = setting(compilation)
     module = solver(compilation, "numpy").backend.module
-    assert found["modified"] == pytest.approx(module.modified_hamiltonian(at.x, at.h, **at.parameters), rel=1e-14)
+    assert answer["modified"] == pytest.approx(module.modified_hamiltonian(at.x, at.h, **at.parameters), rel=1e-14)
 
 
 @pytest.mark.parametrize("case", [f"{case}, varied" for case in VARIED])
 def test_the_derivative_of_a_step_is_that_of_numpy(case, answers):
-    compilation, found = compilation_of(case), answers[case]["tangent"]
-    at, made = setting(compilation), solver(compilation, "numpy")
-    image, tangent = made.step_tangent(at.x, at.h, parameters=at.parameters)
-    assert apart(np.reshape(found["derivative"], tangent.shape), tangent) < 1e-14
-    assert (apart(found["x"], image) < 1e-15, found["t"]) == (True, at.h)
-    assert (found["failure"]["name"], found["untouched"]) == ("StepError", True)
+    compilation, answer = compilation_of(case), answers[case]["tangent"]
+    at, integrator = setting(compilation), solver(compilation, "numpy")
+    image, tangent = integrator.step_tangent(at.x, at.h, parameters=at.parameters)
+    assert apart(np.reshape(answer["derivative"], tangent.shape), tangent) < 1e-14
+    assert (apart(answer["x"], image) < 1e-15, answer["t"]) == (True, at.h)
+    assert (answer["failure"]["name"], answer["untouched"]) == ("StepError", True)
 
 
 def test_code_that_was_not_asked_for_derivatives_has_none(answers):
@@ -291,23 +291,23 @@ def test_code_that_was_not_asked_for_derivatives_has_none(answers):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("case", NAMES)
 def test_an_ensemble_is_its_members_one_by_one(case, answers):
-    found, at = answers[case]["many"], setting(compilation_of(case))
-    assert found["status"] == ["OK", "OK", "BAD_ARGUMENT"]
-    assert found["x"][0] == answers[case]["x"]
+    answer, at = answers[case]["many"], setting(compilation_of(case))
+    assert answer["status"] == ["OK", "OK", "BAD_ARGUMENT"]
+    assert answer["x"][0] == answers[case]["x"]
     members = np.multiply.outer([1.0, 1.01], at.x)
     expected = solver(compilation_of(case), "numpy").ensemble(members, at.h, STEPS, **at.parameters)
-    assert apart(found["x"][:2], expected) < 1e-13
+    assert apart(answer["x"][:2], expected) < 1e-13
 
 
 @pytest.mark.parametrize("case", NAMES)
 def test_members_may_have_parameters_steps_and_times_of_their_own(case, answers):
-    compilation, found = compilation_of(case), answers[case]["each"]
+    compilation, answer = compilation_of(case), answers[case]["each"]
     at, factors = setting(compilation), np.array([1, 1.01, 1.02])
     defaults = {p.name: float(p.value) * factors for p in compilation.spec.parameters}
     more = {"t0": factors - 1} if compilation.program.time else {}
-    assert found["status"] == ["OK"] * 3
+    assert answer["status"] == ["OK"] * 3
     expected = solver(compilation, "numpy").ensemble([at.x] * 3, at.h / factors, 5, **defaults, **more)
-    assert apart(found["x"], expected) < 1e-13
+    assert apart(answer["x"], expected) < 1e-13
 
 
 #: Systems and steps that end in an error: far too large ones for each kind of step, and what leads to another energy.
@@ -331,17 +331,17 @@ def failures(tmp_path_factory):
 
 @pytest.mark.parametrize(("name", "h"), FAILING)
 def test_a_failing_step_is_an_exception_and_keeps_the_state(name, h, failures):
-    found, at, numpy = failures[name], setting(failing(name)), solver(failing(name), "numpy")
+    answer, at, numpy = failures[name], setting(failing(name)), solver(failing(name), "numpy")
     with pytest.raises(phigen.StepError) as expected:
         numpy.integrate(at.x, h, 50, **at.parameters)
-    assert found["done"]["name"] == "StepError"
-    assert found["done"]["status"] == expected.value.status
-    assert found["done"]["steps"] == found["steps"] == expected.value.step
-    if found["steps"] == 0:
-        assert found["x"] == list(at.x)
-        assert not np.any(found["carry"])
+    assert answer["done"]["name"] == "StepError"
+    assert answer["done"]["status"] == expected.value.status
+    assert answer["done"]["steps"] == answer["steps"] == expected.value.step
+    if answer["steps"] == 0:
+        assert answer["x"] == list(at.x)
+        assert not np.any(answer["carry"])
     else:
-        assert apart(found["x"], expected.value.trajectory.x[-1]) < 1e-9
+        assert apart(answer["x"], expected.value.trajectory.x[-1]) < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -362,10 +362,10 @@ def test_a_failing_step_is_an_exception_and_keeps_the_state(name, h, failures):
     ],
 )
 def test_bad_arguments_are_told(options, said, tmp_path):
-    (found,) = node(tmp_path, [(compiled("rigid_body"), options, 0.1, 1)])
-    assert found["isStepError"]
-    assert found["made"]["status"] == "BAD_ARGUMENT"
-    assert said in found["made"]["message"]
+    (answer,) = node(tmp_path, [(compiled("rigid_body"), options, 0.1, 1)])
+    assert answer["isStepError"]
+    assert answer["made"]["status"] == "BAD_ARGUMENT"
+    assert said in answer["made"]["message"]
 
 
 @pytest.mark.parametrize(
@@ -386,9 +386,9 @@ def test_bad_arguments_of_ensembles_are_told(options, said, tmp_path):
 
 @pytest.mark.parametrize(("h", "steps"), [("NaN", 1), (0.1, -1), (0.1, 1.5)])
 def test_bad_steps_are_told(h, steps, tmp_path):
-    (found,) = node(tmp_path, [(compiled("rigid_body"), {"x0": [1, 1, 1]}, h, steps)])
-    assert found["done"]["status"] == "BAD_ARGUMENT"
-    assert found["x"] == [1, 1, 1]
+    (answer,) = node(tmp_path, [(compiled("rigid_body"), {"x0": [1, 1, 1]}, h, steps)])
+    assert answer["done"]["status"] == "BAD_ARGUMENT"
+    assert answer["x"] == [1, 1, 1]
 
 
 def test_names_of_the_user_may_be_words_of_javascript(tmp_path):
@@ -398,9 +398,9 @@ def test_names_of_the_user_may_be_words_of_javascript(tmp_path):
     text += f"poisson: {{matrix: {json.dumps(pi)}}}\norder: 4\nhamiltonian: "
     text += "class**2/__proto__ + Math**2/constructor + Solver*arguments**4/NaN\n"
     compilation = compile_text(text)
-    (found,) = node(tmp_path, [(compilation, {"x0": [1, 0.5, -0.25], "params": {"NaN": 4}}, 0.1, 5)])
+    (answer,) = node(tmp_path, [(compilation, {"x0": [1, 0.5, -0.25], "params": {"NaN": 4}}, 0.1, 5)])
     expected = solver(compilation, "numpy").integrate([1, 0.5, -0.25], 0.1, 5, NaN=4)
-    assert apart(found["x"], expected.x[-1]) < 1e-14
+    assert apart(answer["x"], expected.x[-1]) < 1e-14
 
 
 #: Reads modules without running them.
@@ -469,9 +469,9 @@ def test_edits_are_noticed():
 def test_an_example_of_the_documentation_prints_what_it_says(example, name, tmp_path):
     root = resources.bundled_specs().parent
     text = (root / "docs" / "javascript.md").read_text(encoding="utf-8")
-    found = (re.findall(rf"```{kind}\n(.*?)```", text, re.DOTALL) for kind in ("js", "text"))
-    code, printed = (blocks[example] for blocks in found)
+    examples = (re.findall(rf"```{kind}\n(.*?)```", text, re.DOTALL) for kind in ("js", "text"))
+    code, printed = (blocks[example] for blocks in examples)
     (tmp_path / "example.mjs").write_text(code, encoding="utf-8")
     copy(root / "generated" / name / f"{name}.mjs", tmp_path)
-    done = subprocess.run([tool("node"), "example.mjs"], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout == printed
+    process = subprocess.run([tool("node"), "example.mjs"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert process.stdout == printed

@@ -95,15 +95,15 @@ def test_what_is_not_reserved_can_stand_in_c(compiler, standard, tmp_path):
 
 
 def test_what_is_not_reserved_can_stand_in_python():
-    given = identifiers([*keyword.kwlist, *keyword.softkwlist, *AWKWARD], PYTHON_RESERVED)
-    for identifier in given.values():
+    changed = identifiers([*keyword.kwlist, *keyword.softkwlist, *AWKWARD], PYTHON_RESERVED)
+    for identifier in changed.values():
         exec(f"def function(a):\n    {identifier} = a\n    return {identifier}", {})
 
 
 def test_what_is_not_reserved_can_stand_in_javascript(tmp_path):
-    given = identifiers([*keyword.kwlist, *AWKWARD, *JAVASCRIPT_RESERVED.words], JAVASCRIPT_RESERVED)
-    assert given["gamma"] == "gamma"
-    write(tmp_path, {"all.mjs": "".join(f"{{ const {i} = 1; }}\n" for i in given.values())})
+    changed = identifiers([*keyword.kwlist, *AWKWARD, *JAVASCRIPT_RESERVED.words], JAVASCRIPT_RESERVED)
+    assert changed["gamma"] == "gamma"
+    write(tmp_path, {"all.mjs": "".join(f"{{ const {i} = 1; }}\n" for i in changed.values())})
     run([tool("node"), "--check", "all.mjs"], tmp_path)
 
 
@@ -179,8 +179,10 @@ def macros_of_solvers(name):
     runtime = (resources.templates() / "c/runtime").glob("*.[ch]")
     defined = {m for file in runtime for m in re.findall(r"#define (PHI_\w+)", file.read_text("utf-8"))}
     every = {m for m in defined | phrases.names() if not m.startswith("PHI_FILE_")}
-    own = {m.replace("PHI_", f"{name}_") for m in every}
-    return sorted(every | own | {f"{name}_DIM", f"{name}_TOLERANCE", f"{name.upper()}_H", f"{name.upper()}_DEVICE_H"})
+    of_solver = {m.replace("PHI_", f"{name}_") for m in every}
+    return sorted(
+        every | of_solver | {f"{name}_DIM", f"{name}_TOLERANCE", f"{name.upper()}_H", f"{name.upper()}_DEVICE_H"}
+    )
 
 
 @pytest.mark.slow
@@ -245,21 +247,21 @@ def test_no_parameter_has_the_name_of_an_argument_of_the_generated_module():
 
 def test_names_that_can_stand_stand_and_others_change_as_documented():
     names = ["int", "int_", "k", "_X", "v_X", "M_1", "M_E", "SIGMA", "E1", "gamma"]
-    given = identifiers(names, C_RESERVED)
+    safe_names = identifiers(names, C_RESERVED)
     changed = {"int": "int__", "_X": "v_X_", "M_E": "M_E_"}
-    assert list(given.items()) == [(n, changed.get(n, n)) for n in names]
+    assert list(safe_names.items()) == [(n, changed.get(n, n)) for n in names]
 
 
 def test_scope_gives_distinct_identifiers_that_are_not_reserved():
     scope = Scope(C_RESERVED | ["x"])
     temporaries = [Symbol(TEMPORARY, 1), Symbol(TEMPORARY, 2)]
     names = ["int", "int_", "t1", *temporaries, "x", "x_", Symbol("a", "b"), "a_b", "I", "_X", "v_X"]
-    given = [scope[n] for n in names]
-    assert len(set(given)) == len(names)
-    assert not [g for g in given if g in C_RESERVED or g == "x"]
-    assert all(re.fullmatch(r"[A-Za-z_]\w*", g) for g in given)
+    chosen_names = [scope[n] for n in names]
+    assert len(set(chosen_names)) == len(names)
+    assert not [g for g in chosen_names if g in C_RESERVED or g == "x"]
+    assert all(re.fullmatch(r"[A-Za-z_]\w*", g) for g in chosen_names)
     assert scope[Symbol(TEMPORARY, 1)] == "t1"
-    assert [scope[n] for n in names] == given
+    assert [scope[n] for n in names] == chosen_names
 
 
 TITLES = [
@@ -301,8 +303,8 @@ def titled(title):
 
 def without_comments(compilation, folder):
     """The tokens of the C after its comments are gone, with trigraphs replaced, and the syntax tree of the Python."""
-    found = files(compilation, "c") | files(compilation, "numpy")
-    texts = {name: re.sub(r"[0-9a-f]{64}", "", text) for name, text in found.items()}
+    sources = files(compilation, "c") | files(compilation, "numpy")
+    texts = {name: re.sub(r"[0-9a-f]{64}", "", text) for name, text in sources.items()}
     write(folder, texts)
     command = [tool("gcc"), "-std=c99", "-Wall", "-Werror", "-E", "-P", "t.c"]
     tree = ast.parse(texts["t.py"])

@@ -148,7 +148,7 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
     kinds |= dict.fromkeys(("path_lanes.c", "expansion_lanes.c", "adjoint_lanes.c"), "PATH")
     kinds |= dict.fromkeys(("gauss.c", "adjoint_gauss.c"), "GAUSS")
     kinds |= {f"tangent_{kind.lower()}.c": kind for kind in ("EXPLICIT", "GAUSS", "PATH", "SPLITTING")}
-    own = {
+    structs = {
         "gauge.c": ["GAUGE"],
         "level.c": ["GAUGE"],
         "attitude.c": ["ATTITUDE"],
@@ -157,7 +157,7 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
         "philox.c": ["NOISE"],
     }
     kind = kinds.get(path.name, "NEWTON")
-    switches = defined((kind, "FAST", "TANGENT", "ADJOINT", *own.get(path.name, ())))
+    switches = defined((kind, "FAST", "TANGENT", "ADJOINT", *structs.get(path.name, ())))
     run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, path], tmp_path)
 
 

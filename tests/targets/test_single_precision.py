@@ -47,16 +47,16 @@ DOUBLE = re.compile(
 
 @pytest.mark.parametrize("case", WRITTEN)
 def test_what_is_written(case):
-    given, wanted = WRITTEN[case]
-    assert FLOAT.spelt(given) == wanted
+    number, expected = WRITTEN[case]
+    assert FLOAT.spelt(number) == expected
 
 
 @cache
 def in_single(name, **extras):
     """The compilation of a system of the corpus in single precision, and in double with the same short code."""
-    found = small(as_given(name)) if not extras else compile_spec(spec_of(name), **extras, profile="small")
-    program = replace(found.program, extras=replace(found.program.extras, real="float"))
-    return replace(found, program=program), found
+    double_compilation = small(as_given(name)) if not extras else compile_spec(spec_of(name), **extras, profile="small")
+    program = replace(double_compilation.program, extras=replace(double_compilation.program.extras, real="float"))
+    return replace(double_compilation, program=program), double_compilation
 
 
 @pytest.mark.thin(2)
@@ -80,48 +80,48 @@ def numbers(compilation):
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_steps_are_those_of_double_precision_to_its_digits(name):
     """Over a hundred steps, Casimirs by themselves; at most as near as numbers of 24 digits can be."""
-    (made, other), (at, given) = in_single(name), numbers(in_single(name)[0])
+    (single, other), (at, parameters) = in_single(name), numbers(in_single(name)[0])
     start = np.array(at.x, dtype=np.float32).astype(float)
-    found, right = (solver(c, "c").integrate(start, at.h, 100, **given) for c in (made, other))
-    difference = np.abs(found.x - right.x).max() / np.abs(right.x).max()
+    in_floats, right = (solver(c, "c").integrate(start, at.h, 100, **parameters) for c in (single, other))
+    difference = np.abs(in_floats.x - right.x).max() / np.abs(right.x).max()
     assert 1e-9 < difference < 100 * ONE_STEP
-    for name, values in found.casimirs.items():
+    for name, values in in_floats.casimirs.items():
         assert np.ptp(values) <= COARSER * 1e-14 * max(1.0, np.abs(right.casimirs[name]).max())
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", LATTICES)
 def test_lattices_move_as_in_double_precision(name):
-    (made, other), run_ = in_single(name), first_run(in_single(name)[0])
-    start = start_of(made.spec, run_)
-    found, right = (
+    (single, other), run_ = in_single(name), first_run(in_single(name)[0])
+    start = start_of(single.spec, run_)
+    in_floats, right = (
         lattice_solver_of(c, "c").integrate(start.state, float(run_.step), 50, parameters=start.arguments)
-        for c in (made, other)
+        for c in (single, other)
     )
-    assert 1e-9 < np.abs(found.x - right.x).max() / np.abs(right.x).max() < 50 * ONE_STEP
+    assert 1e-9 < np.abs(in_floats.x - right.x).max() / np.abs(right.x).max() < 50 * ONE_STEP
 
 
 @pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "nambu_pendulum", "kowalevski_gauss"]))
 def test_derivatives_are_those_of_double_precision(name):
     """The tangent map of a step, and gradients of a run; along paths they are traced one by one."""
-    (made, other), (at, given) = in_single(name, tangent=True, adjoint=True), numbers(in_single(name)[0])
-    (_, tangent), (_, right) = (solver(c, "c").step_tangent(at.x, at.h, **given) for c in (made, other))
+    (single, other), (at, parameters) = in_single(name, tangent=True, adjoint=True), numbers(in_single(name)[0])
+    (_, tangent), (_, right) = (solver(c, "c").step_tangent(at.x, at.h, **parameters) for c in (single, other))
     assert 1e-9 < np.abs(tangent - right).max() < ONE_STEP
     bar = np.resize([1.0, 2.0, -1.0], len(at.x))
-    bars = [solver(c, "c").pullback(at.x, h=at.h, steps=20, cotangent=bar, **given)[1:] for c in (made, other)]
+    bars = [solver(c, "c").pullback(at.x, h=at.h, steps=20, cotangent=bar, **parameters)[1:] for c in (single, other)]
     (x_bar, of), (x_right, of_right) = bars
     assert np.abs(x_bar - x_right).max() < 20 * ONE_STEP * np.abs(x_right).max()
     assert all(abs(of[p] - of_right[p]) < 20 * ONE_STEP * max(1.0, abs(of_right[p])) for p in of_right)
 
 
 def test_a_session_and_an_ensemble():
-    (made, other), (at, given) = in_single("rigid_body"), numbers(in_single("rigid_body")[0])
+    (single, other), (at, parameters) = in_single("rigid_body"), numbers(in_single("rigid_body")[0])
     states = np.array([at.x, at.x[::-1]])
-    found, right = (solver(c, "c").ensemble(states, at.h, 30, **given) for c in (made, other))
-    assert np.abs(found - right).max() < 30 * ONE_STEP
+    in_floats, right = (solver(c, "c").ensemble(states, at.h, 30, **parameters) for c in (single, other))
+    assert np.abs(in_floats - right).max() < 30 * ONE_STEP
     moved = []
-    for compilation in (made, other):
-        session = solver(compilation, "c").session(at.x, **given)
+    for compilation in (single, other):
+        session = solver(compilation, "c").session(at.x, **parameters)
         session.step(at.h)
         session.kick([0.1, 0.0, -0.1])
         session.step(at.h)
@@ -131,10 +131,10 @@ def test_a_session_and_an_ensemble():
 
 def test_it_stays_on_the_leaf_for_a_million_steps():
     """As in double precision: rounding does not add up."""
-    made, _ = in_single("rigid_body")
-    at, given = numbers(made)
-    found = solver(made, "c").integrate(at.x, at.h, 1_000_000, stride=10_000, **given)
-    assert np.ptp(found.casimirs["C"]) / np.abs(found.casimirs["C"]).max() < 1e-6
+    single, _ = in_single("rigid_body")
+    at, parameters = numbers(single)
+    run = solver(single, "c").integrate(at.x, at.h, 1_000_000, stride=10_000, **parameters)
+    assert np.ptp(run.casimirs["C"]) / np.abs(run.casimirs["C"]).max() < 1e-6
 
 
 LARGE = """phigen: 1
@@ -154,30 +154,30 @@ real: float
 def test_a_number_beyond_single_precision_is_named_and_costs_its_member_alone(tmp_path, wrong, said):
     """And numpy does not warn of its own."""
     (tmp_path / "large.yaml").write_text(LARGE, encoding="utf-8")
-    made = phigen.compile(tmp_path / "large.yaml", target="c")
-    given = {"x": 1.0, "k": 1.0, "h": 0.1} | wrong
+    solver = phigen.compile(tmp_path / "large.yaml", target="c")
+    numbers_given = {"x": 1.0, "k": 1.0, "h": 0.1} | wrong
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(phigen.ParameterError, match=re.escape(said)):
-            made.integrate([given["x"], 0], given["h"], 3, k=given["k"])
-        k, h = np.array([1, given["k"], 2]), np.array([0.1, given["h"], 0.2])
+            solver.integrate([numbers_given["x"], 0], numbers_given["h"], 3, k=numbers_given["k"])
+        k, h = np.array([1, numbers_given["k"], 2]), np.array([0.1, numbers_given["h"], 0.2])
         with pytest.raises(phigen.ParameterError, match=f"{re.escape(said)}.*as of member 1") as failure:
-            made.ensemble([[1, 0], [given["x"], 0], [0.5, 0]], h, 3, k=k)
+            solver.ensemble([[1, 0], [numbers_given["x"], 0], [0.5, 0]], h, 3, k=k)
     assert failure.value.members == (1,)
-    ends = made.ensemble([[1, 0], [0.5, 0]], h[::2], 3, k=k[::2])
+    ends = solver.ensemble([[1, 0], [0.5, 0]], h[::2], 3, k=k[::2])
     assert failure.value.trajectory[::2] == pytest.approx(ends, rel=1e-6)
 
 
 def test_a_site_beyond_single_precision_is_named():
-    made = lattice_solver_of(in_single("toda")[0], "c")
+    solver = lattice_solver_of(in_single("toda")[0], "c")
     x = np.ones((2, 8))
     x[1, 3] = -1e39
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(phigen.ParameterError, match=r"b = -1e\+39 is too large for single precision"):
-            made.integrate(x, 0.1, 1)
+            solver.integrate(x, 0.1, 1)
         with pytest.raises(phigen.StepError, match=r"1 member\(s\).*b = -1e\+39 is too large") as failure:
-            made.ensemble(np.array([np.ones((2, 8)), x]), 0.1, 1)
+            solver.ensemble(np.array([np.ones((2, 8)), x]), 0.1, 1)
     assert failure.value.members == (1,)
     assert np.isfinite(failure.value.trajectory[0]).all()
 

@@ -62,8 +62,8 @@ static void n_last(void);"""
 
 
 def test_functions_are_found_with_their_lines():
-    found = [(f.name, f.begin, f.end, f.static, f.defined) for f in functions_of(DECLARED.splitlines())]
-    assert found == [
+    extents = [(f.name, f.begin, f.end, f.static, f.defined) for f in functions_of(DECLARED.splitlines())]
+    assert extents == [
         ("n_exported", 7, 8, False, False),
         ("n_brief", 8, 9, True, True),
         ("n_long", 9, 18, False, True),
