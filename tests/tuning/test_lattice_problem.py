@@ -39,7 +39,9 @@ order: 4
 
 @pytest.fixture(autouse=True)
 def in_numpy(monkeypatch):
-    monkeypatch.setattr(lattice_problem, "lattice_solver_of", lambda made: lattice_solver_of(made, "numpy"))
+    monkeypatch.setattr(
+        lattice_problem, "lattice_solver_of", lambda compilation: lattice_solver_of(compilation, "numpy")
+    )
     monkeypatch.setattr("phigen.tuning.building.chosen_target", lambda target: "numpy")
 
 
@@ -54,27 +56,27 @@ def problem(sizes=(24,), **settings):
     return lattice_problem.lattice_problem(compiled(), run, settings, 0.05, 10.0, 1.0)
 
 
-def candidate(found):
-    return found.method(lattice_solver_of(compiled(), "numpy").backend)
+def candidate(setting_problem):
+    return setting_problem.method(lattice_solver_of(compiled(), "numpy").backend)
 
 
 def test_errors_of_the_energy_fall_with_the_order_in_units_of_the_sites():
-    found = problem()
-    coarse, fine = (energy_measure(found)(candidate(found), h, 10.0).measured for h in (0.2, 0.1))
+    chain = problem()
+    coarse, fine = (energy_measure(chain)(candidate(chain), h, 10.0).measured for h in (0.2, 0.1))
     assert np.log2(coarse / fine) == pytest.approx(4, abs=0.5)
-    x = found.start.reshape(2, 24)
-    density = lattice_solver_of(compiled(), "numpy").density(x, parameters=found.parameters)
-    assert found.unit.size == pytest.approx(np.abs(density).sum())
+    x = chain.start.reshape(2, 24)
+    density = lattice_solver_of(compiled(), "numpy").density(x, parameters=chain.parameters)
+    assert chain.unit.size == pytest.approx(np.abs(density).sum())
     assert problem(a=0.7).parameters["a"] == 0.7
 
 
 def test_classical_methods_follow_the_same_motion():
-    found = problem()
-    given = found.start.copy()
-    raced = found.classical(compiled(), ["rk4", "dop853"], given)
-    ours = candidate(found).rows(0.02, 50, 50)[-1]
-    theirs = [Classical(raced.runners[name], given, found).rows(0.02, 50, 50)[-1] for name in ("rk4", "dop853")]
-    assert np.abs(theirs[1] - ours).max() < 1e-7 < np.abs(found.start - ours).max()
+    chain = problem()
+    initial = chain.start.copy()
+    raced = chain.classical(compiled(), ["rk4", "dop853"], initial)
+    ours = candidate(chain).rows(0.02, 50, 50)[-1]
+    theirs = [Classical(raced.runners[name], initial, chain).rows(0.02, 50, 50)[-1] for name in ("rk4", "dop853")]
+    assert np.abs(theirs[1] - ours).max() < 1e-7 < np.abs(chain.start - ours).max()
     assert np.abs(theirs[0] - theirs[1]).max() < 1e-7
 
 
@@ -90,23 +92,23 @@ def test_the_fastest_rate_of_many_sites_is_found_without_all_eigenvalues():
 
 
 def test_large_grids_are_measured_on_fewer_sites_where_their_start_is_known():
-    found = problem((60_000,))
-    assert found.whole == (60_000,)
-    assert found.sizes[0] <= lattice_problem.MOST_SITES
-    assert found.start.reshape(2, -1).shape[1] == found.sizes[0]
-    assert found.most_rows * len(found.start) <= 1.1 * lattice_problem.MOST_NUMBERS
+    reduced = problem((60_000,))
+    assert reduced.whole == (60_000,)
+    assert reduced.sizes[0] <= lattice_problem.MOST_SITES
+    assert reduced.start.reshape(2, -1).shape[1] == reduced.sizes[0]
+    assert reduced.most_rows * len(reduced.start) <= 1.1 * lattice_problem.MOST_NUMBERS
 
 
 def test_settings_of_lattices_mean_what_is_built():
-    own, made = own_setting(compiled()), None
-    assert own.is_splitting
-    assert {s.kind for s in problem().guesses(own)} >= {"constant", "cayley", SPLITTING}
+    own_choice, candidate_built = own_setting(compiled()), None
+    assert own_choice.is_splitting
+    assert {s.kind for s in problem().guesses(own_choice)} >= {"constant", "cayley", SPLITTING}
     for setting in (Setting(SPLITTING, 6, "none", "auto"), Setting("constant", 6, OWN, "auto")):
-        made = build(compiled().spec, None, setting)
-        assert isinstance(made, Built)
-        assert (made.order, made.stages > 1, made.exact) == (6, True, True)
+        candidate_built = build(compiled().spec, None, setting)
+        assert isinstance(candidate_built, Built)
+        assert (candidate_built.order, candidate_built.stages > 1, candidate_built.exact) == (6, True, True)
         lines = "\n".join(setting.lines())
         again = compile_spec(specs.loads(CHAIN.replace("order: 4\n", f"{lines}\n")))
-        assert (again.label, again.order.order) == (made.kind, 6)
+        assert (again.label, again.order.order) == (candidate_built.kind, 6)
     series = own_setting(compile_spec(specs.loads(KDV)))
     assert (series.kind, series.composition, series.lines()[0]) == ("auto", "auto", "scheme: series")

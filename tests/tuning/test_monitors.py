@@ -50,8 +50,8 @@ def test_distances_are_found_where_h_has_them(states):
     system = compile_spec(specs.loads(KEPLER)).system
     assert {"(q1**2 + q2**2)**(3/4)", "sqrt(q1**2 + q2**2)"} <= {_sorted(g) for g in candidates(system, states)}
     six = np.random.default_rng(1).normal(size=(20, 6))
-    found = [str(g) for g in candidates(compile_spec(specs.loads(VORTICES)).system, six)]
-    assert any(g.count("x1") == 2 and g.startswith("(1 + ") and g.endswith("**(-1/2)") for g in found)
+    texts = [str(g) for g in candidates(compile_spec(specs.loads(VORTICES)).system, six)]
+    assert any(g.count("x1") == 2 and g.startswith("(1 + ") and g.endswith("**(-1/2)") for g in texts)
 
 
 def test_monitors_of_many_bodies_are_short_and_about_the_closest_encounter():
@@ -66,11 +66,11 @@ def test_monitors_of_many_bodies_are_short_and_about_the_closest_encounter():
     spec = specs.loads(f"{text}hamiltonian: {h.replace('+ -', '- ')}\n")
     rows = np.random.default_rng(2).normal(size=(30, 36))
     rows[3, [k * 6 + 4 for k in range(3)]] = rows[3, [k * 6 + 2 for k in range(3)]] + 1e-3
-    found = [str(g) for g in candidates(system_from_spec(spec), rows)]
-    assert found
-    assert max(map(len, found)) <= monitors.MOST_LETTERS
-    assert all(settings.monitor_of(g, spec) is not None for g in found)
-    first = next(g for g in found if g.startswith("(1 + "))
+    texts = [str(g) for g in candidates(system_from_spec(spec), rows)]
+    assert texts
+    assert max(map(len, texts)) <= monitors.MOST_LETTERS
+    assert all(settings.monitor_of(g, spec) is not None for g in texts)
+    first = next(g for g in texts if g.startswith("(1 + "))
     assert all(re.search(f"{a}_[24] - {a}_[24]", first) for a in axes)
 
 
@@ -92,14 +92,16 @@ def test_monitors_take_fewer_steps_for_the_same_error_and_say_how_they_are_writt
     spec = specs.loads(KEPLER)
     compilation = compile_spec(spec)
     problem = SystemProblem(START, {}, 0.01, 13.0, system=compilation.system)
-    wanted = monitors.settings(own_setting(compilation), 2, [])
-    wanted.append(Setting(wanted[0].kind, 2, "none", wanted[0].composition, monitor="(q1**2 + q2**2)**(3/4)"))
-    found = monitors.compare(spec, compilation.system, wanted, problem, states, 13.0, 1e-3, time.perf_counter() + 60)
-    gains = {trial.setting.monitor: found.gain(trial) for trial in found.found}
+    settings = monitors.settings(own_setting(compilation), 2, [])
+    settings.append(Setting(settings[0].kind, 2, "none", settings[0].composition, monitor="(q1**2 + q2**2)**(3/4)"))
+    comparison = monitors.compare(
+        spec, compilation.system, settings, problem, states, 13.0, 1e-3, time.perf_counter() + 60
+    )
+    gains = {trial.setting.monitor: comparison.gain(trial) for trial in comparison.found}
     assert gains["(q1**2 + q2**2)**(3/4)"] > 10
     assert gains["log"] > gains["(q1**2 + q2**2)**(3/4)"]
-    assert all(trial.error <= 1e-3 for trial in found.found)
-    best = found.found[0]
+    assert all(trial.error <= 1e-3 for trial in comparison.found)
+    best = comparison.found[0]
     assert "monitor: log" in best.setting.lines()
     again = best.setting.applied(spec)
     assert (again.monitor, again.scheme) == ("log", "splitting")
@@ -109,8 +111,8 @@ def test_the_lines_of_the_best_monitor_are_printed(capsys):
     plain = monitors.Trial(Setting("constant", 4, "none", "auto"), "constant", 4, 0.001, 36000.0, 1e-6, 0.04)
     best = replace(plain, setting=replace(plain.setting, monitor="1/(1 + q1**2)"), step=0.0505, steps=1000.0)
     run = specs.loads(KEPLER).runs["r"]
-    found = SimpleNamespace(winner=None, horizon=13.0)
-    print_monitors(monitors.Monitors(13.0, plain, (best,), {"q1**2": "late"}), found, run)
+    tuning = SimpleNamespace(winner=None, horizon=13.0)
+    print_monitors(monitors.Monitors(13.0, plain, (best,), {"q1**2": "late"}), tuning, run)
     text = capsys.readouterr().out
     assert "36 times" in text
     assert "Not measured: q1**2: late." in text

@@ -87,10 +87,10 @@ def test_smaller_step_wins_where_its_iterations_are_fewer():
 
 def test_scan_finds_the_step_and_the_largest_that_can_be_made():
     asked = []
-    found = scan(method(6, most=1.3, asked=asked), 0.01, 50.0, 1e-8, 6)
-    assert 1.3 / search.FINER < found[0].step <= 1.3
-    assert cheapest_step(found, 1e-8, 6)[0] == pytest.approx(1e-8 ** (1 / 6), rel=0.05)
-    assert [p.step for p in found] == sorted((p.step for p in found), reverse=True)
+    points = scan(method(6, most=1.3, asked=asked), 0.01, 50.0, 1e-8, 6)
+    assert 1.3 / search.FINER < points[0].step <= 1.3
+    assert cheapest_step(points, 1e-8, 6)[0] == pytest.approx(1e-8 ** (1 / 6), rel=0.05)
+    assert [p.step for p in points] == sorted((p.step for p in points), reverse=True)
     assert len(asked) < 35
     assert scan(method(6), 0.01, 0.5, 1e-8, 6)[0].step == 0.5
     assert scan(method(2, most=0.0), 0.1, 1.0, 1e-3, 2) == ()
@@ -189,8 +189,8 @@ def test_of_equally_cheap_methods_the_lowest_order_comes_first():
     def finalist(order, cost, stages=1):
         return Finalist(Curve("a", order, (), stages=stages), points(2, [1.0])[0], (cost, cost, 9.0))
 
-    found = ranking([finalist(10, 1.0), finalist(6, 1.04), finalist(4, 1.03, 5), finalist(2, 1.2), finalist(8, 1.01)])
-    assert [f.curve.order for f in found] == [6, 10, 8, 4, 2]
+    ranked = ranking([finalist(10, 1.0), finalist(6, 1.04), finalist(4, 1.03, 5), finalist(2, 1.2), finalist(8, 1.01)])
+    assert [f.curve.order for f in ranked] == [6, 10, 8, 4, 2]
     assert ranking([]) == []
     gauged, plain = (
         Finalist(Curve("a", 6, (), gauged=g), points(2, [1.0])[0], (1.0 - 0.01 * g,)) for g in (True, False)
@@ -299,13 +299,13 @@ class Learning:
         self.clock = clock
 
     def walk(self, h):
-        done, fast = 0, False
+        steps_done, fast = 0, False
 
         def make(steps):
-            nonlocal done, fast
-            slow = 0 if fast else min(steps, max(0, 96 - done))
+            nonlocal steps_done, fast
+            slow = 0 if fast else min(steps, max(0, 96 - steps_done))
             fast = fast or steps - slow >= 1000
-            done += steps
+            steps_done += steps
             self.clock[0] += 2e-6 + 100e-9 * steps - 75e-9 * (steps - slow) * fast
 
         return make
@@ -323,8 +323,8 @@ def test_orbit_is_compared_at_the_times_of_its_own_steps():
     assert 0.7 * stride * count <= 1000.0
     assert 0.7 * stride * (count + 1) > 1000.0
     states = Drifting(rate=1e-9).rows(0.7, stride * count, stride)
-    found = orbit_error(states, 0.7 * stride, Drifting(), 0.1, 1.0)
-    assert found == pytest.approx(0.7e-9 * stride * count)
+    error = orbit_error(states, 0.7 * stride, Drifting(), 0.1, 1.0)
+    assert error == pytest.approx(0.7e-9 * stride * count)
 
 
 def test_orbit_error_that_grows_faster_than_linearly_is_extrapolated_so():
@@ -341,9 +341,9 @@ def test_orbit_error_that_grows_faster_than_linearly_is_extrapolated_so():
 
 
 def test_references_that_disagree_are_no_reference():
-    found = agreed(Drifting(), Drifting(rate=1e-12), 0.1, 100.0, 1e-8, 1.0)
-    assert found.uncertainty == pytest.approx(1e-10)
-    assert found(0.5, MARKS).shape == (MARKS + 1, 2)
+    reference = agreed(Drifting(), Drifting(rate=1e-12), 0.1, 100.0, 1e-8, 1.0)
+    assert reference.uncertainty == pytest.approx(1e-10)
+    assert reference(0.5, MARKS).shape == (MARKS + 1, 2)
     with pytest.raises(CheckError, match=r"agree to that only up to t = 20"):
         agreed(Drifting(), Drifting(rate=1e-10), 0.1, 100.0, 1e-8, 1.0)
 
@@ -375,14 +375,14 @@ CASES = [
     ("name", "setting"), slow_but(CASES[::2], CASES), ids=[f"{n}-{s.described()}" for n, s in CASES]
 )
 def test_lines_of_a_setting_compile_to_what_was_measured(name, setting):
-    given = spec.load(SPECS / f"{name}.yaml")
-    made = build(given, compiled(name).system, setting)
-    lines = replace(setting, order=made.order).lines()
-    again = spec.loads(pasted(given.source, lines), f"{name}.yaml")
-    applied = setting.applied(given)
+    specification = spec.load(SPECS / f"{name}.yaml")
+    candidate = build(specification, compiled(name).system, setting)
+    lines = replace(setting, order=candidate.order).lines()
+    again = spec.loads(pasted(specification.source, lines), f"{name}.yaml")
+    applied = setting.applied(specification)
     assert (again.gauge, again.composition, again.scheme) == (applied.gauge, applied.composition, applied.scheme)
     copy = emit(compile_spec(again).program, "c", "phigen build")
-    assert code_of(made.files) == code_of(copy)
+    assert code_of(candidate.files) == code_of(copy)
 
 
 def code_of(files):
@@ -392,20 +392,20 @@ def code_of(files):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_own_setting_names_the_bi_realisation_of_the_spec(name):
-    given, system, realisation = described(name)
-    plain_choice = replace(plain(given), order=4, terms=None)
-    choice = given.birealisation
+    specification, system, realisation = described(name)
+    plain_choice = replace(plain(specification), order=4, terms=None)
+    choice = specification.birealisation
     kind = realisation.kind if choice.kind not in ("custom", "group-map", "spray") and choice.side == "q" else OWN
     again = realise(system, Setting(kind, 4).applied(plain_choice).birealisation)
     assert (again.alpha, again.beta, again.path) == (realisation.alpha, realisation.beta, realisation.path)
 
 
 def test_charts_leave_out_what_needs_formulas_and_start_with_those_that_are_built_quickly():
-    own = own_setting(compiled("rigid_body", 6))
-    found = charts(compiled("rigid_body").system, own)
-    assert {s.kind for s in found[:4]} == {SPLITTING, GAUSS}
-    assert found[4:6] == [replace(own, order=4), replace(own, order=8)]
-    kinds = {s.kind for s in found}
+    own_choice = own_setting(compiled("rigid_body", 6))
+    settings = charts(compiled("rigid_body").system, own_choice)
+    assert {s.kind for s in settings[:4]} == {SPLITTING, GAUSS}
+    assert settings[4:6] == [replace(own_choice, order=4), replace(own_choice, order=8)]
+    kinds = {s.kind for s in settings}
     assert "cayley" in kinds
     assert SPLITTING in kinds
     assert kinds & {"custom", "group-map", "spray", "auto", "karasev"} == set()
@@ -415,13 +415,15 @@ def test_charts_leave_out_what_needs_formulas_and_start_with_those_that_are_buil
 @pytest.mark.parametrize(("eps", "tried"), [("0.001", True), ("0.5", False)])
 def test_charts_try_methods_for_small_perturbations_where_there_is_one(eps, tried):
     text = "coordinates: [x, y, px, py]\npoisson: {canonical: {q: [x, y], p: [px, py]}}\nscheme: splitting\n"
-    made = compile_text(text + f"hamiltonian: (px**2 + py**2)/2 - 1/sqrt(x**2 + y**2) - {eps}*x**2\n", 4)
-    names = [s.composition for s in charts(made.system, own_setting(made)) if s.composition in NEAR_INTEGRABLE]
+    compilation = compile_text(text + f"hamiltonian: (px**2 + py**2)/2 - 1/sqrt(x**2 + y**2) - {eps}*x**2\n", 4)
+    names = [
+        s.composition for s in charts(compilation.system, own_setting(compilation)) if s.composition in NEAR_INTEGRABLE
+    ]
     offered = ["saba-8-2", "wisdom-holman-17", "wisdom-holman-modified-17", "aba-8-4", "aba-10-6-4"]
     assert names == (offered if tried else [])
-    for setting in charts(made.system, own_setting(made)):
+    for setting in charts(compilation.system, own_setting(compilation)):
         if setting.composition in NEAR_INTEGRABLE:
-            again = compile_spec(setting.applied(made.spec))
+            again = compile_spec(setting.applied(compilation.spec))
             assert (again.program.step.composition, again.order.order) == (setting.composition, setting.order)
 
 
@@ -436,12 +438,14 @@ def test_variants_compose_symmetric_methods_only():
 
 
 def test_what_does_not_apply_is_told_and_what_takes_too_long_is_ended():
-    given, system, _ = described("henon_heiles")
-    outcomes = dict(build_all(given, system, [Setting("cayley", 4), Setting("constant", 2)], time.perf_counter() + 600))
+    specification, system, _ = described("henon_heiles")
+    outcomes = dict(
+        build_all(specification, system, [Setting("cayley", 4), Setting("constant", 2)], time.perf_counter() + 600)
+    )
     assert outcomes[Setting("cayley", 4)].inapplicable
     assert isinstance(outcomes[Setting("constant", 2)], Built)
-    given, system, _ = described("spin_chain5")
-    ((_, late),) = build_all(given, system, [Setting("exponential", 6)], time.perf_counter() + 0.5)
+    specification, system, _ = described("spin_chain5")
+    ((_, late),) = build_all(specification, system, [Setting("exponential", 6)], time.perf_counter() + 0.5)
     assert isinstance(late, Refusal)
     assert "no time" in late.reason
     assert multiprocessing.active_children() == []
