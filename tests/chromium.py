@@ -77,10 +77,10 @@ class Browser:
 
     def value(self, script: str) -> Any:
         """The value of an expression of JavaScript in the page."""
-        done = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
-        if "exceptionDetails" in done:
-            raise RuntimeError(done["exceptionDetails"])
-        return done["result"].get("value")
+        reply = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in reply:
+            raise RuntimeError(reply["exceptionDetails"])
+        return reply["result"].get("value")
 
     def media(self, kind: str = "", **features: str) -> None:
         """Pretend to be a screen or a printer, with features such as prefers_color_scheme="dark"."""
@@ -117,16 +117,16 @@ class Browser:
     @property
     def complaints(self) -> list[str]:
         """Errors and warnings of the console, uncaught exceptions, violations of the policy, failed requests."""
-        found = []
+        complaints = []
         for event in self._events:
-            told = event["params"]
+            details = event["params"]
             if event["method"] == "Runtime.exceptionThrown":
-                found.append(str(told["exceptionDetails"]))
-            elif event["method"] == "Runtime.consoleAPICalled" and told["type"] in ("error", "warning", "assert"):
-                found.append(str(told["args"]))
+                complaints.append(str(details["exceptionDetails"]))
+            elif event["method"] == "Runtime.consoleAPICalled" and details["type"] in ("error", "warning", "assert"):
+                complaints.append(str(details["args"]))
             elif event["method"] == "Log.entryAdded":
-                found.append(str(told["entry"]))
-        return found
+                complaints.append(str(details["entry"]))
+        return complaints
 
     @property
     def requests(self) -> list[str]:

@@ -93,13 +93,13 @@ def _texts(item):
 
 
 def _is_slow(item):
-    given = _texts(item)
+    texts = _texts(item)
     thinned = [(QUICK, NAMES)] if item.get_closest_marker("corpus") else []
     thinned += [(mark.args, mark.kwargs["of"]) for mark in item.iter_markers("few")]
     return (
         item.get_closest_marker("slow")
         or item.get_closest_marker("exhaustive")
-        or any(given & {*of} - {*few} for few, of in thinned)
+        or any(texts & {*of} - {*few} for few, of in thinned)
     )
 
 
@@ -146,8 +146,8 @@ def compiled_solvers(tmp_path_factory):
 @pytest.fixture
 def as_users_compile(request, compiled_solvers, monkeypatch):
     """With --all, C is compiled with the flags users get, of the corpus that of one system for each kind of step."""
-    given = request.node.callspec.params.values() if hasattr(request.node, "callspec") else ()
-    if request.config.option.all and {*map(str, given)}.isdisjoint({*NAMES} - {*QUICK}):
+    values = request.node.callspec.params.values() if hasattr(request.node, "callspec") else ()
+    if request.config.option.all and {*map(str, values)}.isdisjoint({*NAMES} - {*QUICK}):
         monkeypatch.setattr(toolchain, "BASE_FLAGS", _optimised("-O3"))
 
 

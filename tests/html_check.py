@@ -28,11 +28,11 @@ class Page(HTMLParser):
         self._tables()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        given = {name: value or "" for name, value in attrs}
-        if len(given) != len(attrs):
+        attributes = {name: value or "" for name, value in attrs}
+        if len(attributes) != len(attrs):
             self.errors.append(f"{tag} has an attribute twice")
-        self.elements.append((tag, given))
-        self._expect_harmless(tag, given)
+        self.elements.append((tag, attributes))
+        self._expect_harmless(tag, attributes)
         if "math" in self._open and tag not in MATHML:
             self.errors.append(f"{tag} in a formula")
         if tag not in VOID:
@@ -55,10 +55,10 @@ class Page(HTMLParser):
 
     def all(self, tag: str) -> list[dict[str, str]]:
         """The attributes of all elements of a kind."""
-        return [given for name, given in self.elements if name == tag]
+        return [attributes for name, attributes in self.elements if name == tag]
 
-    def _expect_harmless(self, tag: str, given: dict[str, str]) -> None:
-        for name, value in given.items():
+    def _expect_harmless(self, tag: str, attributes: dict[str, str]) -> None:
+        for name, value in attributes.items():
             if name.startswith("on") or name in ("style", "srcdoc", "action", "formaction", "ping"):
                 self.errors.append(f"{tag} has the attribute {name}")
             loads = name in ("src", "href", "xlink:href", "poster", "data", "background", "cite")
@@ -70,12 +70,12 @@ class Page(HTMLParser):
             self.errors.append(f"there is an element {tag}")
 
     def _references(self) -> None:
-        ids = [given["id"] for _, given in self.elements if "id" in given]
+        ids = [attributes["id"] for _, attributes in self.elements if "id" in attributes]
         self.errors += [f"id {i} is there twice" for i in sorted({i for i in ids if ids.count(i) > 1})]
-        for tag, given in self.elements:
-            named = given.get("aria-labelledby", "").split() + given.get("for", "").split()
-            named += [given["href"][1:]] if given.get("href", "").startswith("#") else []
-            named += [v[5:-1] for v in given.values() if v.startswith("url(#")]
+        for tag, attributes in self.elements:
+            named = attributes.get("aria-labelledby", "").split() + attributes.get("for", "").split()
+            named += [attributes["href"][1:]] if attributes.get("href", "").startswith("#") else []
+            named += [v[5:-1] for v in attributes.values() if v.startswith("url(#")]
             self.errors += [f"{tag} refers to {i}, which is not there" for i in named if i not in ids]
 
     def _headings(self) -> None:
@@ -91,7 +91,9 @@ class Page(HTMLParser):
         tags = [tag for tag, _ in self.elements]
         if tags.count("table") != tags.count("caption"):
             self.errors.append("a table without caption")
-        self.errors += ["th without scope" for given in self.all("th") if given.get("scope") not in ("col", "row")]
-        for given in self.all("svg"):
-            if given.get("role") != "img" or "aria-labelledby" not in given:
+        self.errors += [
+            "th without scope" for attributes in self.all("th") if attributes.get("scope") not in ("col", "row")
+        ]
+        for attributes in self.all("svg"):
+            if attributes.get("role") != "img" or "aria-labelledby" not in attributes:
                 self.errors.append("a figure without name")

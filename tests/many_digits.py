@@ -31,10 +31,10 @@ def precisely(function: Callable[..., Any]) -> Callable[..., Any]:
 def values(roots: Sequence[Expression], at: Mapping[str, Any]) -> list[Any]:
     """Values of expressions as mpmath numbers of the current precision, by rules of its own."""
     plan, ends = _plan(tuple(roots))
-    found: list[Any] = []
+    results: list[Any] = []
     for rule, places in plan:
-        found.append(mpmath.mpf(at[rule]) if isinstance(rule, str) else rule(*[found[i] for i in places]))
-    return [found[i] for i in ends]
+        results.append(mpmath.mpf(at[rule]) if isinstance(rule, str) else rule(*[results[i] for i in places]))
+    return [results[i] for i in ends]
 
 
 @lru_cache(maxsize=1024)

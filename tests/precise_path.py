@@ -36,9 +36,9 @@ def by_paths(name: str, order: int | None = None) -> Compilation:
     return with_paths(spec_of(name), order)
 
 
-def with_paths(given: spec.Spec, order: int | None = None, composition: str = "auto") -> Compilation:
+def with_paths(specification: spec.Spec, order: int | None = None, composition: str = "auto") -> Compilation:
     """A spec compiled with the bi-realisation karasev."""
-    chosen = replace(given, birealisation=BirealisationChoice("karasev"), composition=composition, gauge="none")
+    chosen = replace(specification, birealisation=BirealisationChoice("karasev"), composition=composition, gauge="none")
     return compile_spec(chosen, order=order)
 
 
@@ -50,9 +50,9 @@ def compile_paths(text: str, order: int | None = None, composition: str = "auto"
 
 def numbers(compilation: Compilation, run: str) -> Setting:
     """State, step size and parameters of a run."""
-    found, parameters = compilation.spec.runs[run], {p.name: float(p.value) for p in compilation.spec.parameters}
-    parameters |= {k: float(v) for k, v in found.parameters.items()}
-    return Setting(tuple(float(v) for v in found.initial), float(found.step), parameters)
+    run_of_spec, parameters = compilation.spec.runs[run], {p.name: float(p.value) for p in compilation.spec.parameters}
+    parameters |= {k: float(v) for k, v in run_of_spec.parameters.items()}
+    return Setting(tuple(float(v) for v in run_of_spec.initial), float(run_of_spec.step), parameters)
 
 
 def state_of(raw: RawC) -> list[Any]:
@@ -172,8 +172,8 @@ class PrecisePathStep(PreciseSystem):
         self.steps = [mpmath.mpf(h) * mpmath.mpf(f) for f in fractions]
 
     def _generate(self, mean: Sequence[Any]) -> tuple[Any, Any]:
-        found = values(self._momenta, self.at(mean))
-        return mpmath.matrix(found[: self.n]), _square(found[self.n :], self.n)
+        generated = values(self._momenta, self.at(mean))
+        return mpmath.matrix(generated[: self.n]), _square(generated[self.n :], self.n)
 
     def __call__(self, x: Sequence[Any]) -> list[Any]:
         """Φ(x)."""

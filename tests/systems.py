@@ -103,10 +103,12 @@ hamiltonian: x1 + x2 + x3
 """
 
 
-def plain(given: spec.Spec) -> spec.Spec:
+def plain(specification: spec.Spec) -> spec.Spec:
     """The spec with all code for speed, and with no gauge where it leaves that to phigen: tests/generated/test_gauge.py
     is about gauges, tests/generated/test_profiles.py about short code."""
-    return replace(given, profile="fast", gauge="none" if given.gauge == "auto" else given.gauge)
+    return replace(
+        specification, profile="fast", gauge="none" if specification.gauge == "auto" else specification.gauge
+    )
 
 
 def compile_anew(text: str, order: int | None = None, scheme: str | None = None, **more: Any) -> Compilation:
@@ -126,25 +128,25 @@ def small(compilation: Compilation) -> Compilation:
 @cache
 def as_given(name: str) -> Compilation:
     """The compilation of a spec of the corpus, as it stands."""
-    found = spec_of(name)
-    return compile_spec(found, system=None if found.lattice else described(name)[1])
+    specification = spec_of(name)
+    return compile_spec(specification, system=None if specification.lattice else described(name)[1])
 
 
 @cache
 def compiled(name: str, order: int | None = None, scheme: str | None = None) -> Compilation:
     """The compilation of a system of the corpus, plain."""
-    found = spec_of(name)
-    if order is None and scheme is None and found.profile == "fast" and not as_given(name).program.gauge:
+    specification = spec_of(name)
+    if order is None and scheme is None and specification.profile == "fast" and not as_given(name).program.gauge:
         return as_given(name)
-    return compile_spec(plain(found), order=order, scheme=scheme, system=described(name)[1])
+    return compile_spec(plain(specification), order=order, scheme=scheme, system=described(name)[1])
 
 
 @cache
 def described(name: str) -> tuple[spec.Spec, System, BiRealisation]:
     """What is known of a system of the corpus before anything of its solver is made: quick, for choosing tests."""
-    found = spec_of(name)
-    system = system_from_spec(found)
-    return found, system, realise(system, found.birealisation)
+    specification = spec_of(name)
+    system = system_from_spec(specification)
+    return specification, system, realise(system, specification.birealisation)
 
 
 def first_run(compilation: Compilation) -> Run:

@@ -187,34 +187,36 @@ def test_a_text_in_place_of_a_file_hears_what_reads_it(lines):
 
 def test_formulas_are_those_of_the_method():
     """The log-canonical chart and its S_3, as sympy objects that can be used as such."""
-    found = phigen.formulas(from_sympy(), order=4)
-    (x, y), (a, b) = found.system.coordinates, found.covector
-    assert found.degree is None
-    assert found.hamiltonian == found.series[0] == found.system.hamiltonian
-    bracket = sum(f.diff(q) * g.diff(p) - f.diff(p) * g.diff(q) for f, g in [found.alpha] for q, p in [(x, a), (y, b)])
-    assert sympy.simplify(bracket - found.alpha[0] * found.alpha[1]) == 0
-    assert [m.subs({a: -a, b: -b}, simultaneous=True) for m in found.alpha] == list(found.beta)
-    assert found.series[1] == 0
+    formulas = phigen.formulas(from_sympy(), order=4)
+    (x, y), (a, b) = formulas.system.coordinates, formulas.covector
+    assert formulas.degree is None
+    assert formulas.hamiltonian == formulas.series[0] == formulas.system.hamiltonian
+    bracket = sum(
+        f.diff(q) * g.diff(p) - f.diff(p) * g.diff(q) for f, g in [formulas.alpha] for q, p in [(x, a), (y, b)]
+    )
+    assert sympy.simplify(bracket - formulas.alpha[0] * formulas.alpha[1]) == 0
+    assert [m.subs({a: -a, b: -b}, simultaneous=True) for m in formulas.alpha] == list(formulas.beta)
+    assert formulas.series[1] == 0
     assert len(phigen.formulas(from_sympy(), terms=5).series) == 5
 
 
 def test_formulas_know_the_gauge_and_the_closed_form_of_phi():
-    found = phigen.formulas(RIGID_BODY)
-    (free,) = found.gauge.values()
-    assert sympy.expand(found.hamiltonian - found.system.hamiltonian + free * found.system.casimirs["C"]) == 0
-    x, p = sympy.Matrix(found.system.coordinates), sympy.Matrix(found.covector)
+    formulas = phigen.formulas(RIGID_BODY)
+    (free,) = formulas.gauge.values()
+    assert sympy.expand(formulas.hamiltonian - formulas.system.hamiltonian + free * formulas.system.casimirs["C"]) == 0
+    x, p = sympy.Matrix(formulas.system.coordinates), sympy.Matrix(formulas.covector)
     at = dict(zip([*x, *p], [0.3, 0.5, -0.2, 0.1, -0.3, 0.2], strict=True))
     root = sympy.sqrt(p.dot(p))
     even = p.cross(p.cross(x)) * (1 - root / 2 * sympy.cot(root / 2)) / root**2
-    turned = found.system.poisson * p
-    for maps, sign in ((found.alpha, -1), (found.beta, 1)):
+    turned = formulas.system.poisson * p
+    for maps, sign in ((formulas.alpha, -1), (formulas.beta, 1)):
         assert max(abs((sympy.Matrix(maps) - x - even - sign * turned / 2).subs(at))) < 1e-15
 
 
 def test_formulas_of_paths_are_series_to_a_degree():
-    found = phigen.formulas(resources.bundled_specs() / "sir_epidemic.yaml", terms=4)
-    assert found.degree == 3
-    degrees = {sum(m) for a in found.alpha for m in sympy.Poly(a, *found.covector).monoms()}
+    formulas = phigen.formulas(resources.bundled_specs() / "sir_epidemic.yaml", terms=4)
+    assert formulas.degree == 3
+    degrees = {sum(m) for a in formulas.alpha for m in sympy.Poly(a, *formulas.covector).monoms()}
     assert degrees == {0, 1, 2, 3}
 
 

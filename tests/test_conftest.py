@@ -11,6 +11,6 @@ import pytest
 def test_who_asks_for_slow_tests_only_is_told_how_to_have_them_made():
     file = Path(__file__).with_name("test_tutorial.py")
     command = [sys.executable, "-m", "pytest", "-p", "no:xdist", "-p", "no:cacheprovider", file]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == pytest.ExitCode.NO_TESTS_COLLECTED
-    assert "--all runs the slow ones too" in done.stdout
+    process = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert process.returncode == pytest.ExitCode.NO_TESTS_COLLECTED
+    assert "--all runs the slow ones too" in process.stdout

@@ -27,8 +27,8 @@ def test_vector_field_is_that_of_the_equations_of_motion(name):
         for _ in range(3):
             x = [mpmath.mpf(v + w) for v, w in zip(centre, draw.uniform(0.01, 0.1, len(centre)), strict=True)]
             at = {**dict(zip(system.coordinates, x, strict=True)), **_parameters(name)}
-            found, expected = values(system.vector_field(), at), FIELDS[name](x)
-            for a, b in zip(found, expected, strict=True):
+            computed, expected = values(system.vector_field(), at), FIELDS[name](x)
+            for a, b in zip(computed, expected, strict=True):
                 assert abs(a - b) <= 1e-28 * (1 + abs(b))
 
 
@@ -44,8 +44,8 @@ def test_reference_state_is_the_solution_in_many_digits(name):
         start = [mpmath.mpf(v.numerator) / v.denominator for v in run.initial]
         pieces = 10 + int(expected["time"])
         state = extrapolated(FIELDS[name], start, expected["time"], pieces, 13)
-        for found, stated in zip(state, expected["state"], strict=True):
-            assert abs(found - mpmath.mpf(stated)) < 1e-13
+        for computed, stated in zip(state, expected["state"], strict=True):
+            assert abs(computed - mpmath.mpf(stated)) < 1e-13
 
 
 @pytest.mark.parametrize("name", sorted(set(REFERENCES) & set(FIELDS)))

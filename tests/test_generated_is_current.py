@@ -33,8 +33,8 @@ def test_whole_solver_is_what_is_made_of_the_spec(name):
 
 @pytest.mark.parametrize("name", golden.PARTIAL)
 def test_part_of_its_own_is_what_is_made_of_the_spec(name):
-    made = golden.part(name, golden.solver_files(name), golden.of_whole_solvers())
-    assert (golden.PARTS / f"{name}.txt").read_text(encoding="utf-8") == made, "make golden makes it anew"
+    current = golden.part(name, golden.solver_files(name), golden.of_whole_solvers())
+    assert (golden.PARTS / f"{name}.txt").read_text(encoding="utf-8") == current, "make golden makes it anew"
 
 
 @pytest.mark.parametrize("name", [*golden.WHOLE, *golden.PARTIAL])
@@ -55,15 +55,15 @@ def test_every_system_has_golden_files_and_nothing_else_does():
     page = (GENERATED / "README.md").read_text(encoding="utf-8")
     assert re.findall(r"^\| \[(\w+)\]\(\1\) \|", page, re.M) == golden.WHOLE
     assert sorted(path.name for path in GENERATED.iterdir() if path.is_dir()) == golden.WHOLE
-    found = {path.name for path in golden.PARTS.iterdir()}
-    assert found == {f"{name}.txt" for name in golden.PARTIAL} | {golden.CALLS.name}
+    file_names = {path.name for path in golden.PARTS.iterdir()}
+    assert file_names == {f"{name}.txt" for name in golden.PARTIAL} | {golden.CALLS.name}
 
 
 @pytest.mark.parametrize("specs", ["specs/pendulum_euler.yaml", pytest.param("specs", marks=pytest.mark.slow)])
 def test_generated_is_what_phigen_build_writes(monkeypatch, specs):
     monkeypatch.chdir(ROOT)
-    done = CliRunner().invoke(group, ["build", specs, "--check"], prog_name="phigen")
-    assert done.exit_code == 0, done.stderr
+    result = CliRunner().invoke(group, ["build", specs, "--check"], prog_name="phigen")
+    assert result.exit_code == 0, result.stderr
 
 
 @pytest.mark.parametrize("name", [*golden.WHOLE, *golden.PARTIAL])
@@ -112,10 +112,10 @@ def test_wheel_builds_the_same_bytes_and_carries_its_data(tmp_path):
     pytest.importorskip("build")
     dist = tmp_path / "dist"
     command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(dist), str(ROOT)]
-    done = subprocess.run(command, check=False, capture_output=True, text=True)
-    if "No module named" in done.stdout + done.stderr:
+    process = subprocess.run(command, check=False, capture_output=True, text=True)
+    if "No module named" in process.stdout + process.stderr:
         pytest.skip("no hatchling in this environment")
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert process.returncode == 0, process.stdout + process.stderr
     (wheel,) = dist.iterdir()
     unpacked = tmp_path / "unpacked"
     with zipfile.ZipFile(wheel) as archive:

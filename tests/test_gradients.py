@@ -14,10 +14,10 @@ FOLDER = Path(__file__).parent.parent / "docs/gradients"
 
 def task(name):
     """The script as a module."""
-    found = spec_from_file_location(name, FOLDER / f"{name}.py")
-    module = module_from_spec(found)
+    specification = spec_from_file_location(name, FOLDER / f"{name}.py")
+    module = module_from_spec(specification)
     sys.modules[name] = module
-    found.loader.exec_module(module)
+    specification.loader.exec_module(module)
     return module
 
 

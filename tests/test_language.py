@@ -1,4 +1,4 @@
-"""The language of CONTRIBUTING, as far as a machine sees it, in the whole package."""
+"""The language rules of CONTRIBUTING that a machine can check, in the whole package."""
 
 import ast
 import re
@@ -24,9 +24,8 @@ def _stored(node: ast.AST) -> str | None:
     return node.arg if isinstance(node, ast.arg) else None
 
 
-def breaches(source: str) -> list[str]:
-    """Names and docstrings of a module that break the rules, each with its line."""
-    tree = ast.parse(source)
+def empty_names(tree: ast.Module) -> list[str]:
+    """Variables and arguments of a module that name nothing, each with its line."""
     fields = {
         id(line.target)
         for node in ast.walk(tree)
@@ -34,11 +33,17 @@ def breaches(source: str) -> list[str]:
         for line in node.body
         if isinstance(line, ast.AnnAssign)
     }
-    listed = [
+    return [
         f"{node.lineno}: {name}"  # type: ignore[attr-defined]
         for node in ast.walk(tree)
         if id(node) not in fields and (name := _stored(node)) in EMPTY_NAMES
     ]
+
+
+def breaches(source: str) -> list[str]:
+    """Names and docstrings of a module that break the rules, each with its line."""
+    tree = ast.parse(source)
+    listed = empty_names(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
             words = (ast.get_docstring(node) or "").split()

@@ -111,9 +111,9 @@ def compiled_in_a_child(text):
     """What compiling says, and the processor time, in seconds of `clock`, and the megabytes it took."""
     command = [sys.executable, "-c", CHILD, str(4 * SECONDS), str(CEILING)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run(command, input=text, capture_output=True, text=True, check=False, env=environment)
-    assert done.returncode == 0, f"the child ended with {done.returncode}: {done.stderr[-2000:]}"
-    return json.loads(done.stdout)
+    process = subprocess.run(command, input=text, capture_output=True, text=True, check=False, env=environment)
+    assert process.returncode == 0, f"the child ended with {process.returncode}: {process.stderr[-2000:]}"
+    return json.loads(process.stdout)
 
 
 def test_the_memory_of_sums_counts_too(monkeypatch):
@@ -167,11 +167,11 @@ def test_rings_and_collected_polynomials_of_nested_functions_are_given_up_where_
             Tower(PLANE[0], [text.hamiltonian], PLANE[0])
     tower = Tower([*PLANE[0], STEP], [text.hamiltonian], PLANE[0])
     series = PolynomialSeries(tower, (tower.convert(text.hamiltonian),))
-    made = [len(collected_form(series, PLANE[0], [STEP], 10**6))]
+    term_counts = [len(collected_form(series, PLANE[0], [STEP], 10**6))]
     for most in (10_000, 2_000):  # the entries of the Hessian, then the polynomials themselves
         monkeypatch.setattr(limits, "CELLS", most)
-        made.append(len(collected_form(series, PLANE[0], [STEP], 10**6)))
-    assert made == [2, 1, 0]
+        term_counts.append(len(collected_form(series, PLANE[0], [STEP], 10**6)))
+    assert term_counts == [2, 1, 0]
 
 
 def test_a_graph_whose_hessian_is_too_large_is_given_up_before_it_is_made(monkeypatch):
@@ -207,8 +207,8 @@ def test_products_of_matrices_are_counted_as_they_would_be_made():
     left = [{0: a, 1: b, 2: c}, {1: ONE, 2: a}, {0: fixed}]
     right = [{0: c, 1: c, 2: fixed}, {0: d, 1: d}, {0: b, 1: b, 2: a}]
     rows = [{j: {k: e * right[k][j] for k, e in row.items() if j in right[k]} for j in range(3)} for row in left]
-    made = [total_at(terms) for row in rows for terms in row.values()]
-    true = cost([e for e in made if e is not fixed * fixed])
+    sums = [total_at(terms) for row in rows for terms in row.values()]
+    true = cost([e for e in sums if e is not fixed * fixed])
     assert OperationCount(true, lambda name: name == "fixed").matrix(left, right) == true
     with pytest.raises(TooManyError):
         OperationCount(true - 1, lambda name: name == "fixed").matrix(left, right)
@@ -248,7 +248,7 @@ def test_the_equations_of_a_path_are_counted_too(monkeypatch):
     text = spec(names(4), "lie_algebra: {name: gl(2)}", "+".join(f"{i}*x{i}**2" for i in range(1, 5)))
     text, counted = loads(text + "birealisation: karasev\n"), []
     monkeypatch.setattr(
-        discretisation, "path_operations", lambda *given: counted.append(path_operations(*given)) or counted[-1]
+        discretisation, "path_operations", lambda *arguments: counted.append(path_operations(*arguments)) or counted[-1]
     )
     compilation = compile_spec(text)
     true, direct = cost(compilation.program.step.generate.roots), compilation.scheme.generating
@@ -321,7 +321,7 @@ def test_a_step_that_is_too_large_is_refused_before_anything_is_proved(monkeypat
     ],
 )
 def test_every_stage_estimates_before_it_works(text, said, most):
-    found, seconds, megabytes = compiled_in_a_child(text)
-    assert found.startswith(said)
+    outcome, seconds, megabytes = compiled_in_a_child(text)
+    assert outcome.startswith(said)
     assert seconds < SECONDS
     assert megabytes < most

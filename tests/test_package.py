@@ -22,8 +22,8 @@ program = compile_proved(spec.load(resources.bundled_specs() / "pendulum_euler.y
 assert all(emit(program, target, "phigen") for target in ("c", "numpy", "js"))
 print(*(m for m in sys.modules if m.startswith(("phigen.lattice", "phigen.attitude", "phigen.targets.c.lattice"))))
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == []
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert process.stdout.split() == []
 
 
 def test_public_names_are_found():

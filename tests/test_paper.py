@@ -45,12 +45,12 @@ def test_numbers_are_current(name):
 
 
 def test_long_run_goes_on_as_it_began():
-    found = {f["quantity"]: f["measured"] for f in STORED["rigid_body"]["findings"]}
+    measured = {f["quantity"]: f["measured"] for f in STORED["rigid_body"]["findings"]}
     for quantity in ("energy, RK4: error at", "Casimir, RK4: error at"):
-        assert found[f"{quantity} t = 10000"] == pytest.approx(100 * found[f"{quantity} t = 100"], rel=0.01)
+        assert measured[f"{quantity} t = 10000"] == pytest.approx(100 * measured[f"{quantity} t = 100"], rel=0.01)
     amplitude = "energy, PHI-2: largest error up to"
-    assert found[f"{amplitude} t = 10000"] == pytest.approx(found[f"{amplitude} t = 100"], rel=0.01)
-    assert found["Casimir, PHI-2: largest error up to t = 10000"] < 1e-13
+    assert measured[f"{amplitude} t = 10000"] == pytest.approx(measured[f"{amplitude} t = 100"], rel=0.01)
+    assert measured["Casimir, PHI-2: largest error up to t = 10000"] < 1e-13
 
 
 @pytest.mark.parametrize("name", slow_but(["poisson_not_hamiltonian", "foliation"], PLATES))
@@ -73,12 +73,12 @@ def test_page_can_be_followed(tmp_path):
 
 def test_command_makes_one_figure_and_refuses_unknown_ones(tmp_path):
     runner = CliRunner()
-    done = runner.invoke(
+    result = runner.invoke(
         group, ["reproduce", "paper", "-o", str(tmp_path), "--figure", "singularity", "--format", "png"]
     )
-    assert done.exit_code == 0, done.output
+    assert result.exit_code == 0, result.output
     assert [p.name for p in tmp_path.iterdir()] == ["singularity.png"]
-    assert "T_sing" in done.stdout
+    assert "T_sing" in result.stdout
     wrong = runner.invoke(group, ["reproduce", "paper", "-o", str(tmp_path), "--figure", "tori"])
     assert wrong.exit_code == 2
     assert "no figure 'tori'" in wrong.stderr

@@ -94,9 +94,9 @@ def test_aarch64_gives_what_this_machine_gives(tmp_path):
         flags = ["-std=gnu99", "-O2", "-fno-sanitize=all", "-fno-math-errno", *numbers]
         run([*ZIG, "-target", "aarch64-linux-musl", *flags, "-c", f"{name}.c", "-o", f"{name}.o"], tmp_path)
     run([*ZIG[:-1], "ld.lld", "-static", "main.o", "maxwell_bloch.o", "-o", "arm"], tmp_path)
-    found = np.frombuffer(subprocess.run([emulator, "./arm"], cwd=tmp_path, capture_output=True, check=True).stdout)
+    process = np.frombuffer(subprocess.run([emulator, "./arm"], cwd=tmp_path, capture_output=True, check=True).stdout)
     right = solver(compiled("maxwell_bloch"), "c").integrate(at.x, at.h, 100).x[-1]
-    assert found == pytest.approx(right, abs=1e-12)
+    assert process == pytest.approx(right, abs=1e-12)
 
 
 @pytest.mark.slow

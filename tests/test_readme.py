@@ -24,9 +24,9 @@ def blocks():
 
 def block(start):
     """The block whose introduction starts like this."""
-    found = [text for introduction, text in blocks() if introduction.startswith(start)]
-    assert len(found) == 1, f"the README has {len(found)} blocks introduced by {start!r}"
-    return found[0]
+    texts = [text for introduction, text in blocks() if introduction.startswith(start)]
+    assert len(texts) == 1, f"the README has {len(texts)} blocks introduced by {start!r}"
+    return texts[0]
 
 
 @pytest.fixture
@@ -41,9 +41,9 @@ def workshop(tmp_path):
     environment = {**os.environ, "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
 
     def run(*command):
-        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout
+        process = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        assert process.returncode == 0, process.stdout + process.stderr
+        return process.stdout
 
     return run
 

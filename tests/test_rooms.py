@@ -109,15 +109,15 @@ def imports() -> dict[str, set[str]]:
     files = {name.removesuffix(".__init__"): path for name, path in files.items()}
     graph = {}
     for name, path in files.items():
-        found = set()
+        modules = set()
         for node in executed(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
-                found |= {alias.name for alias in node.names}
+                modules |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module:
                 members = {f"{node.module}.{alias.name}" for alias in node.names}
-                found |= members & files.keys() or {node.module}
-                found |= {node.module} if members - files.keys() else set()
-        graph[name] = (found & files.keys()) - {name}
+                modules |= members & files.keys() or {node.module}
+                modules |= {node.module} if members - files.keys() else set()
+        graph[name] = (modules & files.keys()) - {name}
     return graph
 
 

@@ -27,8 +27,10 @@ def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", folder]
     panels = {"PHIGEN_PANELS": "pendulum_euler toda thermal_spin"}
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, env={**os.environ, **panels})
-    assert done.returncode == 0, done.stderr
+    process = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, check=False, env={**os.environ, **panels}
+    )
+    assert process.returncode == 0, process.stderr
     return folder
 
 
@@ -62,9 +64,9 @@ def test_nothing_is_loaded_from_elsewhere(site):
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
-    found = Browser(tool("chromium"), tmp_path_factory.mktemp("profile"))
-    yield found
-    found.close()
+    chromium = Browser(tool("chromium"), tmp_path_factory.mktemp("profile"))
+    yield chromium
+    chromium.close()
 
 
 def test_a_system_of_the_gallery_runs_once_its_panel_is_opened(site, browser):
@@ -73,8 +75,8 @@ def test_a_system_of_the_gallery_runs_once_its_panel_is_opened(site, browser):
     frames = "document.querySelectorAll('details iframe').length"
     assert browser.value(frames) == 0
     browser.value(f"{panel}.open = true; {panel}.scrollIntoView()")  # out of sight it would rest
-    told = f"{panel}.querySelector('iframe')?.style.height"  # by the panel itself, once it has begun
-    wait = f"new Promise(done => {{ const look = () => {told} ? done({told}) : setTimeout(look, 50); look(); }})"
+    height = f"{panel}.querySelector('iframe')?.style.height"  # by the panel itself, once it has begun
+    wait = f"new Promise(done => {{ const look = () => {height} ? done({height}) : setTimeout(look, 50); look(); }})"
     assert float(browser.value(wait).removesuffix("px")) > 400
     browser.value(f"{panel}.open = false")
     assert (
@@ -91,10 +93,10 @@ def test_the_search_works_where_the_site_is_opened_from_a_file(site, browser):
         "const box = document.querySelector('[data-md-component=search-query]'); box.value = 'Casimir';"
         "box.dispatchEvent(new Event('keyup', {bubbles: true})); box.dispatchEvent(new Event('input'))"
     )
-    found = browser.value(
+    results = browser.value(
         "new Promise(done => { const begun = Date.now(); const look = () => {"
         "const links = document.querySelectorAll('.md-search-result__link');"
         "if (links.length || Date.now() - begun > 20000) done(links.length); else setTimeout(look, 50) }; look() })"
     )
-    assert found > 3
+    assert results > 3
     assert browser.complaints == []

@@ -42,7 +42,7 @@ def tool(name: str) -> str:
 
 def run(command: Sequence[str | Path], folder: Path, **environment: str) -> str:
     """What a command prints; the test fails if it fails."""
-    done = subprocess.run(
+    process = subprocess.run(
         [str(c) for c in command],
         cwd=folder,
         env={**os.environ, **environment},
@@ -51,8 +51,8 @@ def run(command: Sequence[str | Path], folder: Path, **environment: str) -> str:
         check=False,
         timeout=300,
     )
-    assert done.returncode == 0, f"{shlex.join(map(str, command))}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
-    return done.stdout
+    assert process.returncode == 0, f"{shlex.join(map(str, command))}\n{process.stdout[-2000:]}{process.stderr[-4000:]}"
+    return process.stdout
 
 
 def write(folder: Path, texts: Mapping[str, str]) -> None:

@@ -27,11 +27,11 @@ _FILES = ("yaml", "python", "c", "js", "sh")
 
 def blocks(text: str) -> list[tuple[str, str, str]]:
     """The paragraph before each fenced block, its language, and its text."""
-    found = []
+    examples = []
     for match in re.finditer(r"^```(\w+)\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE):
         paragraph = text[: match.start()].rstrip().rsplit("\n\n", 1)[-1]
-        found.append((paragraph, match[1], match[2]))
-    return found
+        examples.append((paragraph, match[1], match[2]))
+    return examples
 
 
 def file_named_in(paragraph: str) -> str | None:
@@ -55,8 +55,8 @@ def follow(page: Path, folder: Path) -> int:
 
 def labels_of(svg: str) -> list[str]:
     """The labels in an SVG file but the numbers along its axes."""
-    found = re.findall(r"<text[^>]*>([^<]*)</text>", svg)
-    return [label for label in found if not re.fullmatch(r"[−\d.]*", label)]
+    labels = re.findall(r"<text[^>]*>([^<]*)</text>", svg)
+    return [label for label in labels if not re.fullmatch(r"[−\d.]*", label)]
 
 
 def _environment(folder: Path) -> dict[str, str]:
@@ -83,8 +83,8 @@ def typed(command: str, folder: Path, environment: dict[str, str], status: int =
     words = shlex.split(command)
     if words[0] == "phigen" and not set(command) & set("|&;<>$*~"):
         with contextlib.chdir(folder):
-            done = CliRunner().invoke(group, words[1:], prog_name="phigen", env={"NO_COLOR": "1"})
-        return done.exit_code, done.output
+            result = CliRunner().invoke(group, words[1:], prog_name="phigen", env={"NO_COLOR": "1"})
+        return result.exit_code, result.output
     # So that echo $? tells about the command before it.
     typed = subprocess.run(
         ["sh", "-c", f"(exit {status})\n{command}"], cwd=folder, env=environment, check=False, text=True,
@@ -98,8 +98,8 @@ def _agrees(answer: str, output: str) -> bool:
     pattern = "".join(r"(?:.*\n)*?" if line == "…" else _pattern(line) + r"\n" for line in answer.splitlines())
     match = re.fullmatch(pattern, output)
     return bool(match) and all(
-        math.isclose(float(said), float(found), rel_tol=0.02) or max(abs(float(said)), abs(float(found))) < 1e-12
-        for said, found in zip(_said(answer), match.groups(), strict=True)
+        math.isclose(float(said), float(printed), rel_tol=0.02) or max(abs(float(said)), abs(float(printed))) < 1e-12
+        for said, printed in zip(_said(answer), match.groups(), strict=True)
     )
 
 

@@ -239,9 +239,7 @@ def _is_telling(turns: NDArray[np.int64]) -> bool:
 
 
 def _windows(rows: NDArray[np.int64], row_count: int) -> NDArray[np.int64]:
-    """Return the window of each row of a run of ``row_count`` rows: one of `WINDOWS` parts, or an extra window for the first
-    row.
-    """
+    """Return the window of each row of a run: one of `WINDOWS` parts, or an extra window for the first row."""
     share, remainder = divmod(row_count - 1, WINDOWS)
     window_ends = np.cumsum([share + (k < remainder) for k in range(WINDOWS)])
     return np.where(rows == 0, WINDOWS, np.searchsorted(window_ends, rows - 1, side="right"))

@@ -89,16 +89,16 @@ REFUSED = {
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("kind", REFUSED)
 def test_a_member_that_cannot_begin_leaves_the_others_their_runs(target, kind):
-    text, start, given = REFUSED[kind]
+    text, start, values = REFUSED[kind]
     pair = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
     solve = solver(compile_text(f"{pair}parameters: {{a: {{value: 1.3}}}}\norder: 4\n{text}"), target)
     for stride in (None, 2):
         with pytest.raises(ParameterError) as refused:
-            solve.ensemble(start, 0.01, 6, stride, **given)
+            solve.ensemble(start, 0.01, 6, stride, **values)
         assert refused.value.members == (1,)
         states = refused.value.trajectory
         for m in (0, 2):
-            run = solve.integrate(start[m], 0.01, 6, stride or 6, **{key: value[m] for key, value in given.items()})
+            run = solve.integrate(start[m], 0.01, 6, stride or 6, **{key: value[m] for key, value in values.items()})
             np.testing.assert_allclose(states[..., m, :], run.x if stride else run.x[-1], rtol=1e-14)
         if stride:
             assert np.isnan(states[1:, 1]).all()
