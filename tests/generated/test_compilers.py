@@ -200,11 +200,14 @@ birealisation: karasev
 runs: {r: {initial: [0.5, 0.2], step: 0.05, steps: 1}}
 """
 
-#: What few systems have, or none: splittings, whose C shares little with that of implicit steps; powers along paths.
+#: What few systems have, or none: splittings, whose C shares little with that of implicit steps; powers along paths;
+#: Gauss collocation in batches of members, of all unknowns and of some.
 FURTHER = {name: lambda name=name: compiled(name, 4, "splitting") for name in ("kepler", "toda3_quadratic")}
 FURTHER |= {
     "kowalevski_top": lambda: compiled("kowalevski_top", 6, "splitting"),
     "powers": lambda: compile_text(POWERS),
+    "kowalevski_gauss": lambda: compiled("kowalevski_gauss", 8),
+    "henon_heiles": lambda: compiled("henon_heiles", 4, "gauss"),
 }
 
 
