@@ -4,12 +4,12 @@
  *   scheme: Gauss collocation, 8 stages
  *   structure: exact; quadratic momentum maps for P1, P2, P3, G1, G2, G3
  *   step: implicit, all stages by fixed-point sweeps to round-off
- *   one evaluation at a stage: 72 additions, 95 multiplications
+ *   one evaluation at a stage: 72 additions, 93 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
  *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 06e3bc5dd0e0e524b9a137f0f85183d02f6441b0c57bf93976666a25e368ca9b
+ * body-sha256: 81843d5b23508dd98636e5b19cd66352c8afd33c5da78cf6d0b8ae551b774008
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -139,7 +139,8 @@ typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES];
 
 /* Before a loop over lanes: tells the compiler that iterations are independent. */
 #if defined(__clang__)
-#define kowalevski_gauss_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+/* Loops over lanes are not unrolled by clang, which would then vectorise the loops around them instead. */
+#define kowalevski_gauss_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
@@ -324,35 +325,35 @@ static void kowalevski_gauss_stage_field_lanes(const double coef[1], const doubl
     kowalevski_gauss_EACH_LANE
     for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
         const double P1 = x[0], P2 = x[1], P3 = x[2], G1 = x[3], G2 = x[4], G3 = x[5];
-        const double t1 = G3 * z[4][lane] + (G2 * z[3][lane] + G1 * z[2][lane]), t2 = G2 * z[4][lane];
-        const double t3 = 1.0 + z[0][lane], t4 = G3 * z[3][lane] + G1 * t3;
-        const double t5 = G1 * z[4][lane] + (G2 * t3 - G3 * z[2][lane]);
-        const double t6 = G3 * z[7][lane] + G2 * z[6][lane] + (P2 * z[3][lane] + P1 * z[2][lane]
+        const double t1 = (-0.5) * w[0][lane], t2 = G3 * z[4][lane] + (G2 * z[3][lane] + G1 * z[2][lane]);
+        const double t3 = G2 * z[4][lane], t4 = 1.0 + z[0][lane], t5 = G3 * z[3][lane] + G1 * t4;
+        const double t6 = G1 * z[4][lane] + (G2 * t4 - G3 * z[2][lane]);
+        const double t7 = G3 * z[7][lane] + G2 * z[6][lane] + (P2 * z[3][lane] + P1 * z[2][lane]
             + (P3 * z[4][lane] + G1 * z[5][lane]));
-        const double t7 = G1 * z[7][lane] - G3 * z[5][lane] + (P1 * z[4][lane] - P3 * z[2][lane]
-            + (G2 * z[1][lane] + P2 * t3));
-        const double t8 = G3 * z[6][lane] - G2 * z[7][lane] + (P3 * z[3][lane] - P2 * z[4][lane]
-            + (G1 * z[1][lane] + P1 * t3));
-        const double t9 = G2 * z[2][lane] + G3 * t3, t10 = G1 * z[3][lane], t11 = t9 - t10;
-        const double t12 = G2 * z[5][lane] - G1 * z[6][lane] + (P2 * z[2][lane] - P1 * z[3][lane]
-            + (G3 * z[1][lane] + P3 * t3));
-        const double t13 = z[7][lane] * t1 + z[6][lane] * (t2 - t4) + (z[5][lane] * t5 + z[4][lane] * t6)
-            + (z[2][lane] * t7 - z[3][lane] * t8 + (z[1][lane] * t11 + t3 * t12));
-        const double t14 = (-0.5) * (w[0][lane] * t13), t15 = t4 - t2;
-        const double t16 = z[6][lane] * t11 - z[7][lane] * t5 + (z[5][lane] * t1 - z[4][lane] * t7)
-            + (z[2][lane] * t6 + z[3][lane] * t12 + (z[1][lane] * t15 + t3 * t8));
-        const double t17 = (-0.25) * (w[0][lane] * t16);
-        const double t18 = z[6][lane] * t1 + z[7][lane] * t15 + (z[5][lane] * (t10 - t9) + z[4][lane] * t8)
-            + (z[1][lane] * t5 + t3 * t7 + (z[3][lane] * t6 - z[2][lane] * t12));
-        const double t19 = (-0.25) * (w[0][lane] * t18), t20 = (-0.5) * w[0][lane];
-        move[0][lane] = -(t14 * z[4][lane] + (t17 * z[2][lane] + t19 * z[3][lane]));
-        move[1][lane] = -(t19 * z[6][lane] + t14 * z[7][lane] + (t20 * z[2][lane] + t17 * z[5][lane]));
-        move[2][lane] = t19 * z[4][lane] + (t17 * t3 - t14 * z[3][lane]);
-        move[3][lane] = t14 * z[2][lane] + t19 * t3 - t17 * z[4][lane];
-        move[4][lane] = t17 * z[3][lane] + (t14 * t3 - t19 * z[2][lane]);
-        move[5][lane] = t19 * z[7][lane] - t14 * z[6][lane] + (t17 * z[1][lane] + t20 * t3);
-        move[6][lane] = t19 * z[1][lane] - t20 * z[4][lane] + (t14 * z[5][lane] - t17 * z[7][lane]);
-        move[7][lane] = t17 * z[6][lane] - t19 * z[5][lane] + (t20 * z[3][lane] + t14 * z[1][lane]);
+        const double t8 = G1 * z[7][lane] - G3 * z[5][lane] + (P1 * z[4][lane] - P3 * z[2][lane]
+            + (G2 * z[1][lane] + P2 * t4));
+        const double t9 = G3 * z[6][lane] - G2 * z[7][lane] + (P3 * z[3][lane] - P2 * z[4][lane]
+            + (G1 * z[1][lane] + P1 * t4));
+        const double t10 = G2 * z[2][lane] + G3 * t4, t11 = G1 * z[3][lane], t12 = t10 - t11;
+        const double t13 = G2 * z[5][lane] - G1 * z[6][lane] + (P2 * z[2][lane] - P1 * z[3][lane]
+            + (G3 * z[1][lane] + P3 * t4));
+        const double t14 = z[7][lane] * t2 + z[6][lane] * (t3 - t5) + (z[5][lane] * t6 + z[4][lane] * t7)
+            + (z[2][lane] * t8 - z[3][lane] * t9 + (z[1][lane] * t12 + t4 * t13));
+        const double t15 = t1 * t14, t16 = (-0.25) * w[0][lane], t17 = t5 - t3;
+        const double t18 = z[6][lane] * t12 - z[7][lane] * t6 + (z[5][lane] * t2 - z[4][lane] * t8)
+            + (z[2][lane] * t7 + z[3][lane] * t13 + (z[1][lane] * t17 + t4 * t9));
+        const double t19 = t16 * t18;
+        const double t20 = z[6][lane] * t2 + z[7][lane] * t17 + (z[5][lane] * (t11 - t10) + z[4][lane] * t9)
+            + (z[1][lane] * t6 + t4 * t8 + (z[3][lane] * t7 - z[2][lane] * t13));
+        const double t21 = t16 * t20;
+        move[0][lane] = -(t15 * z[4][lane] + (t19 * z[2][lane] + t21 * z[3][lane]));
+        move[1][lane] = -(t21 * z[6][lane] + t15 * z[7][lane] + (t1 * z[2][lane] + t19 * z[5][lane]));
+        move[2][lane] = t21 * z[4][lane] + (t19 * t4 - t15 * z[3][lane]);
+        move[3][lane] = t15 * z[2][lane] + t21 * t4 - t19 * z[4][lane];
+        move[4][lane] = t19 * z[3][lane] + (t15 * t4 - t21 * z[2][lane]);
+        move[5][lane] = t21 * z[7][lane] - t15 * z[6][lane] + (t19 * z[1][lane] + t1 * t4);
+        move[6][lane] = t21 * z[1][lane] - t1 * z[4][lane] + (t15 * z[5][lane] - t19 * z[7][lane]);
+        move[7][lane] = t19 * z[6][lane] - t21 * z[5][lane] + (t1 * z[3][lane] + t15 * z[1][lane]);
     }
 }
 
@@ -455,28 +456,6 @@ static void kowalevski_gauss_predict_at(kowalevski_gauss_history *past, double r
             for (int j = 0; j < kowalevski_gauss_NODES; ++j)
                 z[k][i] += factor[j] * past->increments[past->latest][k][j];
     }
-}
-
-/* The array that sweeps write. */
-static inline kowalevski_gauss_lanes *kowalevski_gauss_iterates(kowalevski_gauss_lanes *increments,
-    kowalevski_gauss_lanes *apart)
-{
-    (void)apart;
-    return increments;
-}
-
-/* A sweep: the increments of the unknowns, by what it reads. */
-static inline void kowalevski_gauss_sweep(const kowalevski_gauss_solver *s,
-    double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *factors, kowalevski_gauss_lanes *reads,
-    kowalevski_gauss_lanes *now)
-{
-    kowalevski_gauss_slopes(s, point, factors, reads, now);
-}
-
-/* What the next sweep reads, by these increments. */
-static inline void kowalevski_gauss_read(kowalevski_gauss_lanes *now, kowalevski_gauss_lanes *reads)
-{
-    kowalevski_gauss_mixed(kowalevski_gauss_mixing, now, reads);
 }
 
 /* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
@@ -616,12 +595,12 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
     double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *increments)
 {
     kowalevski_gauss_history *past = &s->history;
-    kowalevski_gauss_lanes z[kowalevski_gauss_READS], apart[kowalevski_gauss_ITERATED],
-        next[kowalevski_gauss_ITERATED], factors[kowalevski_gauss_FACTORS] = { { 0.0 } };
-    kowalevski_gauss_lanes *now = kowalevski_gauss_iterates(increments, apart);
+    kowalevski_gauss_lanes z[kowalevski_gauss_READS], next[kowalevski_gauss_ITERATED],
+        factors[kowalevski_gauss_FACTORS] = { { 0.0 } };
+    kowalevski_gauss_lanes *now = increments;
     kowalevski_gauss_progress progress = { HUGE_VAL, 0, 0 };
     kowalevski_gauss_set_factors(s->h, factors);
-    if (past->count == 0 || memcmp(&s->h, &past->h, sizeof s->h) != 0) {
+    if (past->count < 1 || memcmp(&s->h, &past->h, sizeof s->h) != 0) {
         memset(z, 0, sizeof z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h))
             kowalevski_gauss_predict_at(past, s->h / past->h, z);
@@ -634,7 +613,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
     }
     for (int sweep = 1; sweep <= kowalevski_gauss_MAX_SWEEPS; ++sweep) {
         const int tested = sweep >= past->sweeps;
-        kowalevski_gauss_sweep(s, point, factors, z, tested ? next : now);
+        kowalevski_gauss_slopes(s, point, factors, z, tested ? next : now);
         if (tested) {
             const double scale = kowalevski_gauss_scale(s->x, next),
                 square = kowalevski_gauss_change_of(scale, kowalevski_gauss_ITERATED, now, next);
@@ -657,7 +636,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
                 return kowalevski_gauss_OK;
             }
         }
-        kowalevski_gauss_read(now, z);
+        kowalevski_gauss_mixed(kowalevski_gauss_mixing, now, z);
     }
     return kowalevski_gauss_NO_CONVERGENCE;
 }

@@ -3,10 +3,10 @@
 #   scheme: Gauss collocation, 8 stages
 #   structure: exact; quadratic momentum maps for P1, P2, P3, G1, G2, G3
 #   step: implicit, all stages by fixed-point sweeps to round-off
-#   one evaluation at a stage: 72 additions, 95 multiplications
+#   one evaluation at a stage: 72 additions, 93 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: ff004b1846593303fd85a6da3a644ea7dd863e2268253fcd2ab66c113799e273
+# body-sha256: 11417cdc767b9b21f3149623b9778bc0fd5fbdabaa4964faa3c2bd149960fe61
 import numpy as np
 
 VERSION = "0.1.0"
@@ -124,35 +124,36 @@ def _stage_field(coef, x, z, w):
     G1 = x[..., 3]
     G2 = x[..., 4]
     G3 = x[..., 5]
-    t1 = G3 * z[4] + (G2 * z[3] + G1 * z[2])
-    t2 = G2 * z[4]
-    t3 = 1.0 + z[0]
-    t4 = G3 * z[3] + G1 * t3
-    t5 = G1 * z[4] + (G2 * t3 - G3 * z[2])
-    t6 = G3 * z[7] + G2 * z[6] + (P2 * z[3] + P1 * z[2] + (P3 * z[4] + G1 * z[5]))
-    t7 = G1 * z[7] - G3 * z[5] + (P1 * z[4] - P3 * z[2] + (G2 * z[1] + P2 * t3))
-    t8 = G3 * z[6] - G2 * z[7] + (P3 * z[3] - P2 * z[4] + (G1 * z[1] + P1 * t3))
-    t9 = G2 * z[2] + G3 * t3
-    t10 = G1 * z[3]
-    t11 = t9 - t10
-    t12 = G2 * z[5] - G1 * z[6] + (P2 * z[2] - P1 * z[3] + (G3 * z[1] + P3 * t3))
-    t13 = z[7] * t1 + z[6] * (t2 - t4) + (z[5] * t5 + z[4] * t6) + (z[2] * t7 - z[3] * t8 + (z[1] * t11 + t3 * t12))
-    t14 = (-0.5) * (w[0] * t13)
-    t15 = t4 - t2
-    t16 = z[6] * t11 - z[7] * t5 + (z[5] * t1 - z[4] * t7) + (z[2] * t6 + z[3] * t12 + (z[1] * t15 + t3 * t8))
-    t17 = (-0.25) * (w[0] * t16)
-    t18 = z[6] * t1 + z[7] * t15 + (z[5] * (t10 - t9) + z[4] * t8) + (z[1] * t5 + t3 * t7 + (z[3] * t6 - z[2] * t12))
-    t19 = (-0.25) * (w[0] * t18)
-    t20 = (-0.5) * w[0]
+    t1 = (-0.5) * w[0]
+    t2 = G3 * z[4] + (G2 * z[3] + G1 * z[2])
+    t3 = G2 * z[4]
+    t4 = 1.0 + z[0]
+    t5 = G3 * z[3] + G1 * t4
+    t6 = G1 * z[4] + (G2 * t4 - G3 * z[2])
+    t7 = G3 * z[7] + G2 * z[6] + (P2 * z[3] + P1 * z[2] + (P3 * z[4] + G1 * z[5]))
+    t8 = G1 * z[7] - G3 * z[5] + (P1 * z[4] - P3 * z[2] + (G2 * z[1] + P2 * t4))
+    t9 = G3 * z[6] - G2 * z[7] + (P3 * z[3] - P2 * z[4] + (G1 * z[1] + P1 * t4))
+    t10 = G2 * z[2] + G3 * t4
+    t11 = G1 * z[3]
+    t12 = t10 - t11
+    t13 = G2 * z[5] - G1 * z[6] + (P2 * z[2] - P1 * z[3] + (G3 * z[1] + P3 * t4))
+    t14 = z[7] * t2 + z[6] * (t3 - t5) + (z[5] * t6 + z[4] * t7) + (z[2] * t8 - z[3] * t9 + (z[1] * t12 + t4 * t13))
+    t15 = t1 * t14
+    t16 = (-0.25) * w[0]
+    t17 = t5 - t3
+    t18 = z[6] * t12 - z[7] * t6 + (z[5] * t2 - z[4] * t8) + (z[2] * t7 + z[3] * t13 + (z[1] * t17 + t4 * t9))
+    t19 = t16 * t18
+    t20 = z[6] * t2 + z[7] * t17 + (z[5] * (t11 - t10) + z[4] * t9) + (z[1] * t6 + t4 * t8 + (z[3] * t7 - z[2] * t13))
+    t21 = t16 * t20
     return _filled(x, [
-            -(t14 * z[4] + (t17 * z[2] + t19 * z[3])),
-            -(t19 * z[6] + t14 * z[7] + (t20 * z[2] + t17 * z[5])),
-            t19 * z[4] + (t17 * t3 - t14 * z[3]),
-            t14 * z[2] + t19 * t3 - t17 * z[4],
-            t17 * z[3] + (t14 * t3 - t19 * z[2]),
-            t19 * z[7] - t14 * z[6] + (t17 * z[1] + t20 * t3),
-            t19 * z[1] - t20 * z[4] + (t14 * z[5] - t17 * z[7]),
-            t17 * z[6] - t19 * z[5] + (t20 * z[3] + t14 * z[1]),
+            -(t15 * z[4] + (t19 * z[2] + t21 * z[3])),
+            -(t21 * z[6] + t15 * z[7] + (t1 * z[2] + t19 * z[5])),
+            t21 * z[4] + (t19 * t4 - t15 * z[3]),
+            t15 * z[2] + t21 * t4 - t19 * z[4],
+            t19 * z[3] + (t15 * t4 - t21 * z[2]),
+            t21 * z[7] - t15 * z[6] + (t19 * z[1] + t1 * t4),
+            t21 * z[1] - t1 * z[4] + (t15 * z[5] - t19 * z[7]),
+            t19 * z[6] - t21 * z[5] + (t1 * z[3] + t15 * z[1]),
         ])
 
 
@@ -230,16 +231,16 @@ MIXING = np.array([
     [1.005482808253216, 0.9912514332308027, 1.012225914113298, 0.9830238267636289, 1.0247213458032003, 0.9599572962220551, 1.0818949631055814, 0.5],
 ])
 
-# Predictor of the stages of a step from the stage increments of the last one.
+# Predictor of the stages of a step from the stage increments of the last one, then of the one before.
 PREDICTION = np.array([
-    [-0.02555927517325182, 0.04002129143135487, -0.05438417540508904, 0.07325812815024581, -0.10358367993934758, 0.16169236863280928, -0.300652702075914, 0.7665056642259032],
-    [-0.731830042234206, 1.1482708114924747, -1.5619903409759361, 2.092481756221542, -2.890132218774026, 4.215817523809776, -6.477865419312276, 9.082300892538074],
-    [-12.061893514283726, 18.765361645747955, -25.088841508795227, 32.59704845723685, -42.67137718753876, 56.4399800330904, -72.01739790743933, 72.67173490506158],
-    [-118.1499515199991, 182.2594473807656, -239.57098348711125, 302.34903993569634, -377.345415982756, 462.0341164850074, -523.6576882640823, 455.494196239361],
-    [-707.114266714457, 1082.8438921387317, -1403.100916145201, 1729.6219151791677, -2082.0103180467204, 2418.18023618926, -2556.1719695738393, 2072.2636907589163],
-    [-2659.2937551075042, 4049.725687114851, -5191.664494631218, 6291.961272313383, -7387.704180160404, 8294.963443549967, -8420.08648218661, 6584.012447758549],
-    [-6485.668786428028, 9839.779987204989, -12525.049692882953, 15012.661745393876, -17353.345418638954, 19092.478574653185, -18941.564853557105, 14532.241973122487],
-    [-10540.655904255567, 15959.369109106452, -20237.210409054635, 24114.77664895275, -27648.751587507646, 30108.530190688616, -29537.691656399158, 22459.61041241307],
+    [-1.0562883573249242, 0.17011181557929392, 0.7189655620887281, -0.6150695348288924, 0.33139841769889067, -0.09534494773332663, -0.14867438516875472, 0.6823888891627402, -0.023078953897651754, 0.04791703496477633, -0.10012678273506714, 0.21708501855891152, -0.44552757668699566, 0.6606482299785122, -0.018703785014926044, -1.1568474266637105],
+    [1.1236784141627987, -4.349276640604241, -2.395153324266041, 5.848209751460516, -6.799368708038393, 7.453913949427919, -8.914030157184168, 10.636277329542175, -0.32755775531306414, 0.5384236309829313, -0.753029294034664, 0.8686760702749455, -0.35880181316653914, -1.800710703232361, 3.1869876382437132, 5.347314969048372],
+    [5.0848641038758515, -74.62332435388342, -33.73968253840068, 94.85154068773407, -110.43884505214427, 113.76463063802224, -115.6350429003608, 100.64646241205422, -6.510304096332957, 10.8716481380434, -15.76616090178194, 19.90931606315355, -14.33855877271771, -21.667573138274747, 56.84692059566806, 78.56172233766412],
+    [281.4119054944364, -913.2359919768037, -559.3713547251529, 1237.4113397130202, -1313.0937364146876, 1225.235629201064, -1093.1827797626263, 817.3051550107181, -76.33240113232466, 125.64369293593548, -176.24298600578734, 205.0707578491596, -93.36808963306676, -384.96030593509425, 680.5796085091905, 1168.8992372438427],
+    [3542.643018332994, -6941.029624974229, -5165.279408973958, 9883.011867232579, -9810.072061717841, 8555.865815929577, -7067.641456468408, 4916.481282763816, -557.471742576356, 904.834245411404, -1227.099045931679, 1301.0259445540344, -167.08043319070322, -3707.4982183308925, 5071.963134051628, 10215.457682425043],
+    [22476.332543730132, -32709.93856824393, -28007.385187897802, 48577.33491814007, -45956.82578742851, 38305.86762574196, -30212.917999951333, 20236.81600940853, -2506.5939425921733, 4010.7558912984973, -5246.567177692984, 4963.566820237874, 1572.6027759384035, -20757.634302164173, 23434.03118614151, 53612.69075370039],
+    [78148.1986319992, -95328.96329261537, -89519.44463570009, 146036.57133306228, -133918.63286450363, 108525.16659120435, -83328.19364020127, 54687.030719482595, -6996.243265997881, 11057.24311563159, -13999.491746764175, 11745.341627041988, 9931.357698229382, -67769.49450151643, 67187.58111935604, 168189.57747063978],
+    [154728.26460009732, -172415.18562406432, -170197.79184448332, 268919.1093003448, -242547.87659446234, 193706.0111108098, -146749.65892535693, 95371.08087939216, -12293.912543345854, 19274.382132844315, -23870.006603584094, 18248.371676407914, 23748.4252838844, -130324.50777207095, 120286.32880576182, 316817.7890450205],
 ])
 
 # Unknowns that are offsets of coordinates, or the time; the others are those of group elements, of size 1.
@@ -317,26 +318,40 @@ def _with_new_step(memory, ratio):
     """Return the predictor of a step of another size, that of the last one times a ratio: predicted unknowns."""
     if memory[1].ndim != 3 or not abs(ratio) <= 1:
         return (np.zeros((1, 1)),) * 2
-    return (np.matmul(memory[1], _factors_at(1 + ratio * NODES).T)[np.newaxis],) * 2
+    return (_extrapolated(memory[1][..., : len(NODES)], ratio)[np.newaxis],) * 2
+
+
+def _extrapolated(increments, ratio):
+    """Return predicted unknowns of a step, the last one times a ratio, by the collocation polynomial of the last step."""
+    return np.matmul(increments, _factors_at(1 + ratio * NODES).T)
+
+
+def _predicted(memory):
+    """Return predicted unknowns, (unknowns, members, stages), or None before the first step."""
+    if memory[1].ndim == 3:
+        two = memory[1].shape[-1] == PREDICTION.shape[1]
+        return memory[1] @ PREDICTION.T if two else _extrapolated(memory[1], 1)
+    return memory[1][0] if memory[1].ndim > 3 else None
 
 
 def _advance(stage, x, carry, memory):
     """Make one step of all members.
 
-    `memory` holds the stage increments of the last step, and these in the frame of its end, or the start of the sweeps.
+    `memory` holds the stage increments of the last step, and those of up to two steps in the frame of the end of the
+    last, or the start of the sweeps.
     """
-    predicted = memory[1].ndim > 2
+    predicted = _predicted(memory)
     anew = np.zeros((8, len(x), len(WEIGHTS)))
-    start = memory[1] @ PREDICTION.T if memory[1].ndim == 3 else memory[1][0] if predicted else anew
-    increments, status = _solved(stage, x, start)
+    increments, status = _solved(stage, x, anew if predicted is None else predicted)
     failed = np.flatnonzero(status != "")
-    if predicted and len(failed):
+    if predicted is not None and len(failed):
         # If a step fails from the prediction, it is tried again without one.
         increments[:, failed], status[failed] = _solved(_stage_at(stage, failed), x[failed], anew[:, failed])
     end = np.sum(increments, axis=-1)
     following, rest = _sum(x, carry, _stage_change(stage[0], _point(stage, x)[:, 0], end))
     good = np.isfinite(following).all(axis=-1)
-    next_increments = np.array(_next_frame(stage[0][:, :, np.newaxis], end[:, :, np.newaxis], increments))
+    known = [increments, memory[1][..., : len(NODES)]] if memory[1].ndim == 3 else [increments]
+    next_increments = np.array(_next_frame(stage[0][:, :, np.newaxis], end[:, :, np.newaxis], np.concatenate(known, axis=-1)))
     next_increments = np.where((good & (status == ""))[:, np.newaxis], next_increments, 0.0)
     return following, rest, (increments, next_increments), np.where(good | (status != ""), status, "NOT_FINITE")
 

@@ -20,8 +20,10 @@ from phigen.symbolic.expression import (
     call,
     gradient,
     number,
+    sparse_derivatives,
     substitute,
     symbol,
+    symbols_of,
     total,
 )
 from phigen.symbolic.symbols import Symbol
@@ -142,10 +144,17 @@ def _momentum_change(group: AlgebraBlock, x: Sequence[Expression], w: Sequence[E
 
 def _momentum(group: AlgebraBlock, x: Sequence[Expression], g: Sequence[Expression]) -> list[Expression]:
     """Return x̃(G E_a G*) for a group element G."""
+    at_frame, combination = _at_frame(group, x, g)
+    return [_combined(group.algebra, parts, at_frame) for parts in combination]
+
+
+def _at_frame(
+    group: AlgebraBlock, x: Sequence[Expression], g: Sequence[Expression]
+) -> tuple[list[Expression], list[Vector]]:
+    """Return multiples of x̃(G f G*) for the frame elements f, and the combinations of these that are x̃(G E_a G*)."""
     algebra, scaled = group.algebra, _scaled(group, x)
     left = _functional_times(algebra, scaled, g)
-    at_frame = [_with_star(algebra, f, left, g) for f in scaled.frame]
-    return [_combined(algebra, parts, at_frame) for parts in scaled.combination]
+    return [_with_star(algebra, f, left, g) for f in scaled.frame], scaled.combination
 
 
 def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Expression]) -> list[Expression]:
@@ -207,11 +216,14 @@ def vector_field(
     weight: Expression = ONE,
     hold: Callable[[Expression], Expression] | None = None,
     slopes: Sequence[Expression] | None = None,
+    *,
+    collected: bool = False,
 ) -> list[Expression]:
     """Return the derivatives of the unknowns at a stage, with these values of the coordinates, times a weight.
 
     ``hold`` receives each component of the velocities in Lie algebras, and returns its replacement. ``slopes`` stand
-    for ∇H, where H is not that of the system.
+    for ∇H, where H is not that of the system. With ``collected``, velocities that are affine in the momenta are sums
+    over x̃(G f G*) for the elements f of the frame.
     """
     system, realisation = points.system, points.realisation
     slopes = gradient(system.hamiltonian, system.coordinates) if slopes is None else slopes
@@ -229,10 +241,39 @@ def vector_field(
     for group, first in zip(realisation.groups, points.starts, strict=True):
         # A constant among the basis elements, if there is one, acts as 0: it is central.
         velocity = _element(group.algebra, group.algebra.basis, [rates[i] for i in group.indices])
+        if collected:
+            sums = _collected(points, group, first, slopes, weight)
+            velocity = [v if s is None else s for v, s in zip(velocity, sums, strict=True)]
         if hold is not None:
             velocity = [hold(value) for value in velocity]
         derivatives += _multiplied(group.algebra, _group_element(points, group, first), velocity)
     return derivatives
+
+
+def _collected(
+    points: StageMap, group: AlgebraBlock, first: int, slopes: Sequence[Expression], weight: Expression
+) -> list[Expression | None]:
+    """Return −w Σ_a E_a ∂H/∂x_a as sums over x̃(G f G*); None for components that are not affine in the momenta."""
+    system, algebra = points.system, group.algebra
+    names = [system.coordinates[i] for i in group.indices]
+    state = {*system.coordinates, *system.times}
+    at_frame, combination = _at_frame(group, _values(system, group), _group_element(points, group, first))
+    components = _element(algebra, algebra.basis, [slopes[i] for i in group.indices])
+    sums: list[Expression | None] = []
+    for component, row in zip(components, sparse_derivatives(components, names), strict=True):
+        (constant,) = substitute([component], dict.fromkeys(names, ZERO))
+        if not state.isdisjoint(symbols_of(constant, *row.values())):
+            sums.append(None)
+            continue
+        factors = [ZERO] * len(at_frame)
+        for name, slope in row.items():
+            a = names.index(name)
+            constant = constant - slope * group.shift[a]
+            for k, c in combination[a].items():
+                factors[k] = factors[k] + slope * _scalar(algebra, c)
+        terms = [(constant, ONE), *zip(factors, at_frame, strict=True)]
+        sums.append(total(-factor * weight * value for factor, value in terms if not factor.is_zero))
+    return sums
 
 
 def _logarithmic_rate(points: StageMap, i: int, slopes: Sequence[Expression]) -> Expression:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from phigen.gauss.stage_map import StageMap, at_unknowns, derivatives_in_next_frame, vector_field
 from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.lowering import operation_counts
 from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import Expression, fold, raw, substitute, symbol
 from phigen.symbolic.symbols import Symbol, kind_of
@@ -19,6 +20,17 @@ WEIGHT = Symbol("w")
 
 def field_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
     """Return the vector field of the unknowns at a stage, multiplied by the weight h b_j of the stage."""
+    forms = [_field(points, coefficients, collected=collected) for collected in (False, True)]
+    values = min(forms, key=lambda form: operation_counts(form)["multiplications"])
+    return Kernel(
+        "stage_field",
+        "w times the derivatives of the unknowns of a stage, which are offsets from x, the start of the step",
+        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "w": (WEIGHT,)},
+        (Output("move", tuple(values)),),
+    )
+
+
+def _field(points: StageMap, coefficients: Coefficients, *, collected: bool) -> list[Expression]:
     velocities: list[Expression] = []
 
     def hold(value: Expression) -> Expression:
@@ -27,14 +39,8 @@ def field_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
         velocities.append(value)
         return symbol(Symbol(VELOCITY, len(velocities) - 1))
 
-    slopes = vector_field(points, at_unknowns(points), symbol(WEIGHT), hold)
-    values = _inserted(coefficients.hoist(slopes), coefficients.hoist(velocities))
-    return Kernel(
-        "stage_field",
-        "w times the derivatives of the unknowns of a stage, which are offsets from x, the start of the step",
-        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "w": (WEIGHT,)},
-        (Output("move", tuple(values)),),
-    )
+    slopes = vector_field(points, at_unknowns(points), symbol(WEIGHT), hold, collected=collected)
+    return _inserted(coefficients.hoist(slopes), _with_scaled_weights(coefficients.hoist(velocities)))
 
 
 def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> list[Expression]:
@@ -44,6 +50,18 @@ def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> 
         if e.op == "symbol" and kind_of(e.value) == VELOCITY:
             number_of_velocity: int = e.value.key[0]
             return velocities[number_of_velocity]
+        return raw(e.op, tuple(args), e.value) if e.args else e
+
+    return fold(roots, visit)
+
+
+def _with_scaled_weights(roots: Sequence[Expression]) -> list[Expression]:
+    """Return roots with (c·w)·e in place of c·(w·e): compilers compute c·w once for all sweeps of a step."""
+    weight = symbol(WEIGHT)
+
+    def visit(e: Expression, args: list[Expression]) -> Expression:
+        if e.op == "mul" and args[0].op == "number" and args[1].op == "mul" and args[1].args[0] == weight:
+            return raw("mul", (raw("mul", (args[0], weight)), args[1].args[1]))
         return raw(e.op, tuple(args), e.value) if e.args else e
 
     return fold(roots, visit)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from phigen.gauss.tableau import DOUBLE, EARLIER, SINGLE, Tableau, predictors, tableau
+from phigen.gauss.tableau import DOUBLE, EARLIER, SINGLE, SOLE_BAND, Tableau, predictors, tableau
 from phigen.lanes.in_lanes import Lanes, Stages
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.policies import POLICIES, GaussPolicy
@@ -44,7 +44,7 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
         ("NODES", step.tableau.stages, "stages of a step"),
         ("WIDTH", width, "of an array over the stages" + ", those that fill a vector" * (width > step.tableau.stages)),
         ("UNKNOWNS", step.unknowns, "of a stage"),
-        ("EARLIER", EARLIER if isinstance(lanes, Stages) else 1, "steps that predictors read"),
+        ("EARLIER", EARLIER, "steps that predictors read"),
     ]
 
 
@@ -85,7 +85,10 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool)
     if program.single:
         table = tableau(table.stages, SINGLE)  # rounded to float, their sums would differ from 1
     staged = isinstance(lanes, Stages)
-    predictions = predictors(table.stages, precision, integrated=bool(step.reduced)) if staged else (table.prediction,)
+    predictions = predictors(table.stages, precision, integrated=staged and bool(step.reduced))
+    if not staged:
+        by_one = [[list(row) for row in table.prediction]] if step.adjoint else []
+        predictions = [predictions[SOLE_BAND], *by_one]
     terms = [f"matrix[{j}][lane] * increment[{j}]" for j in range(table.stages)]
     older = [f"matrix[{table.stages + j}][lane] * before[{j}]" for j in range(table.stages)]
     of_members = [f"matrix[{j}][i] * increments[{j}][k][lane]" for j in range(table.stages)]

@@ -630,6 +630,31 @@ DEVICE_PREDICTOR = Choice(
     {"FORGET_ORDER(history)": ("", "history->order = 0;")},
 )
 
+STAGE_PREDICTORS = Choice(
+    "Gauss steps with their stages in lanes choose a predictor. Others use one, once it has the steps that it reads.",
+    ("STAGED",),
+    {
+        "PREDICT(past, z)": (
+            "phi_predict(past, past->count < PHI_EARLIER ? PHI_PREDICTORS - 1 : past->predictor, z)",
+            "phi_predict(past, z)",
+        ),
+        "NEEDED": ("1", "PHI_EARLIER"),
+    },
+)
+
+SWEEPS = Choice(
+    "Sweeps of a Gauss step iterate some unknowns, and read integrals of their increments; or they do so with all.",
+    ("REDUCED",),
+    {
+        "ITERATES(now, increments)": ("phi_lanes now[PHI_ITERATED];", "phi_lanes *now = increments;"),
+        "SWEEP(s, point, factors, z, now)": (
+            "phi_reduced_field_lanes(s->coef, point, z, factors, factors + 1, now)",
+            "phi_slopes(s, point, factors, z, now)",
+        ),
+        "READ_INCREMENTS(now, z)": ("phi_read(now, z)", "phi_mixed(phi_mixing, now, z)"),
+    },
+)
+
 PREDICTORS = Choice(
     "Each stage has a predictor of its own, if there are any.",
     ("GUESSES",),
@@ -678,6 +703,8 @@ ALL = (
     MATRIX,
     JOINED,
     FAR,
+    STAGE_PREDICTORS,
+    SWEEPS,
     PREDICTORS,
     MEMORY,
     DEVICE_STARTS,

@@ -132,10 +132,16 @@ static int phi_best_predictor(phi_history *past, double scale, phi_lanes *reads)
 }
 
 #else
-/* The values of the unknowns that the predictor derives from the increments of the last step. */
-static void phi_predict(phi_history *past, int predictor, phi_lanes *z)
+/* The values of the unknowns that the predictor derives from the increments of the last two steps. */
+static void phi_predict(phi_history *past, phi_lanes *z)
 {
-    phi_mixed(phi_prediction[predictor], past->increments[past->latest], z);
+    double(*last)[PHI_WIDTH] = past->increments[past->latest], (*older)[PHI_WIDTH] = past->increments[1 - past->latest];
+    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
+        PHI_CLEAR_STAGE(z[k]);
+        for (int j = 0; j < PHI_NODES; ++j)
+            for (int i = 0; i < PHI_NODES; ++i)
+                z[k][i] += phi_prediction[0][j][i] * last[k][j] + phi_prediction[0][PHI_NODES + j][i] * older[k][j];
+    }
 }
 
 #endif
@@ -167,11 +173,9 @@ static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lane
     past->h = s->h;
     past->kicked = 0;
 #if PHI_FRAMED
-#if PHI_STAGED
     phi_lanes last[PHI_UNKNOWNS];
     memcpy(last, past->increments[older], sizeof last);
     phi_to_next_frame(s, end, last, past->increments[older]);
-#endif
     phi_to_next_frame(s, end, increments, past->increments[latest]);
 #if PHI_ADJOINT
     PHI_COPY_STAGES(past->solved, increments, past->solved);
@@ -215,22 +219,22 @@ static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep,
 static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lanes *increments)
 {
     phi_history *past = &s->history;
-    phi_lanes z[PHI_READS], apart[PHI_ITERATED], next[PHI_ITERATED], factors[PHI_FACTORS] = { { 0.0 } };
-    phi_lanes *now = phi_iterates(increments, apart);
+    phi_lanes z[PHI_READS], next[PHI_ITERATED], factors[PHI_FACTORS] = { { 0.0 } };
+    PHI_ITERATES(now, increments)
     phi_progress progress = { HUGE_VAL, 0, 0 };
     phi_set_factors(s->h, factors);
-    if (past->count == 0 || PHI_DIFFERS(s->h, past->h)) {
+    if (past->count < PHI_NEEDED || PHI_DIFFERS(s->h, past->h)) {
         PHI_CLEAR_STAGES(z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h)) phi_predict_at(past, s->h / past->h, z);
         if (past->count > 1) past->count = 1;
         past->rate = 0.5;
         past->sweeps = 2;
     } else {
-        phi_predict(past, past->count < PHI_EARLIER ? PHI_PREDICTORS - 1 : past->predictor, z);
+        PHI_PREDICT(past, z);
     }
     for (int sweep = 1; sweep <= PHI_MAX_SWEEPS; ++sweep) {
         const int tested = sweep >= past->sweeps;
-        phi_sweep(s, point, factors, z, tested ? next : now);
+        PHI_SWEEP(s, point, factors, z, tested ? next : now);
         if (tested) {
             const double scale = phi_scale(s->x, next), square = phi_change_of(scale, PHI_ITERATED, now, next);
             const int solved = square * (past->rate * past->rate) <= PHI_SOLVED * PHI_SOLVED;
@@ -250,7 +254,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
                 return PHI_OK;
             }
         }
-        phi_read(now, z);
+        PHI_READ_INCREMENTS(now, z);
     }
     return PHI_NO_CONVERGENCE;
 }

@@ -19,23 +19,4 @@ static void phi_predict_at(phi_history *past, double ratio, phi_lanes *z)
             for (int j = 0; j < PHI_NODES; ++j) z[k][i] += factor[j] * past->increments[past->latest][k][j];
     }
 }
-
-/* The array that sweeps write. */
-static inline phi_lanes *phi_iterates(phi_lanes *increments, phi_lanes *apart)
-{
-    (void)apart;
-    return increments;
-}
-
-/* A sweep: the increments of the unknowns, by what it reads. */
-static inline void phi_sweep(const phi_solver *s, double point[PHI_POINT], phi_lanes *factors, phi_lanes *reads, phi_lanes *now)
-{
-    phi_slopes(s, point, factors, reads, now);
-}
-
-/* What the next sweep reads, by these increments. */
-static inline void phi_read(phi_lanes *now, phi_lanes *reads)
-{
-    phi_mixed(phi_mixing, now, reads);
-}
 #endif

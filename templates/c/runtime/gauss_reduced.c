@@ -13,19 +13,6 @@ static inline void phi_set_factors(double h, phi_lanes factors[PHI_FACTORS])
     for (int i = 0; i < PHI_WIDTH; ++i) factors[2][i] = h;
 }
 
-/* The array that sweeps write: increments of the iterated unknowns. */
-static inline phi_lanes *phi_iterates(phi_lanes *increments, phi_lanes *apart)
-{
-    (void)increments;
-    return apart;
-}
-
-/* A sweep: the increments of the iterated unknowns, by what it reads. */
-static inline void phi_sweep(const phi_solver *s, double point[PHI_POINT], phi_lanes *factors, phi_lanes *reads, phi_lanes *now)
-{
-    phi_reduced_field_lanes(s->coef, point, reads, factors, factors + 1, now);
-}
-
 /* What the next sweep reads, by these increments. */
 static inline void phi_read(phi_lanes *now, phi_lanes *reads)
 {

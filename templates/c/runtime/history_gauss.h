@@ -6,8 +6,8 @@ typedef struct {
     int count;     /* steps in increments */
     int latest;    /* index of the last step in increments */
     int sweeps;    /* number of the first sweep over the stages whose change is measured */
-    int predictor; /* number of the predictor */
 #if PHI_STAGED
+    int predictor; /* number of the predictor */
     int age;       /* steps since all predictors were compared for the first time */
 #endif
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */

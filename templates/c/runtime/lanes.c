@@ -23,7 +23,7 @@ typedef double phi_lanes[PHI_LANES];
 
 /* Before a loop over lanes: tells the compiler that iterations are independent. */
 #if defined(__clang__)
-#if PHI_PACKS
+#if PHI_PACKS || PHI_STAGED
 /* Loops over lanes are not unrolled by clang, which would then vectorise the loops around them instead. */
 #define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
 #else

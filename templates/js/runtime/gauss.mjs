@@ -16,9 +16,9 @@ export function stages() {
   return Array.from({ length: NODES }, () => new Float64Array(UNKNOWNS));
 }
 
-/** Predictor: results of the last step from which the next one starts. Affects the speed only. */
+/** Predictor: results of the last two steps, from which the next one starts. Affects the speed only. */
 export class History {
-  /** 0 before the first step. */
+  /** Steps whose increments are stored. */
   count = 0;
   /** Sweeps of the last step, and the factor by which their changes shrink. */
   sweeps = 2;
@@ -26,6 +26,8 @@ export class History {
   /** Increments of the stages of the last step, in the frame of its end, and its size. */
   increments = stages();
   h = NaN;
+  /** Increments of the step before, in the same frame. */
+  older = stages();
 
   /** Clear the predictor. */
   clear() {
@@ -40,7 +42,9 @@ export class History {
   /** An independent copy. */
   copy() {
     const twin = Object.assign(new History(), this);
-    twin.increments = this.increments.map((increment) => Float64Array.from(increment));
+    for (const steps of ["increments", "older"]) {
+      twin[steps] = this[steps].map((increment) => Float64Array.from(increment));
+    }
     return twin;
   }
 }
@@ -81,11 +85,11 @@ export function startOf({ x, t }) {
   return point;
 }
 
-/** The unknowns of all stages: weighted sums of the stage increments. */
+/** The unknowns of all stages: weighted sums of the stage increments, of one step or more. */
 export function mixed(matrix, increments, z) {
   for (let i = 0; i < NODES; i++) {
     z[i].fill(0);
-    for (let j = 0; j < NODES; j++) {
+    for (let j = 0; j < increments.length; j++) {
       const factor = matrix[i][j];
       for (let k = 0; k < UNKNOWNS; k++) z[i][k] += factor * increments[j][k];
     }
@@ -133,8 +137,8 @@ export function collocate(solver, stage, start, history, increments) {
   let last = Infinity;
   let rising = 0;
   let rises = 0;
-  if (history.count > 0 && solver.h === history.h) {
-    mixed(PREDICTION, history.increments, predicted);
+  if (history.count > 1 && solver.h === history.h) {
+    mixed(PREDICTION, [...history.increments, ...history.older], predicted);
   } else {
     const ratio = solver.h / history.h;
     if (history.count > 0 && Math.abs(ratio) <= 1) {
@@ -196,8 +200,12 @@ function attempt(solver, stage) {
   // #endif
   if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
   pass(solver, time);
-  work.now.forEach((one, i) => storeIncrement(solver.coef[stage], end, one, history.increments[i]));
-  history.count = 1;
+  for (let i = 0; i < NODES; i++) {
+    storeIncrement(solver.coef[stage], end, history.increments[i], history.older[i]);
+    storeIncrement(solver.coef[stage], end, work.now[i], history.increments[i]);
+  }
+  // predictors read steps of one size
+  history.count = solver.h === history.h ? Math.min(history.count + 1, 2) : 1;
   history.h = solver.h;
   turnStage(solver, stage, end);
   return "OK";
