@@ -42,7 +42,7 @@ class LatticeLoops:
 
     def _selection(self, sweep: Sweep) -> ir.Selection:
         coloured = self.step.sites.colours > 1
-        return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window)
+        return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window, sweep.first)
 
     def stage(self, kernel: Kernel) -> ir.Function:
         """Return the function of a kernel of the equation of a stage; the fields that it reads are those of y."""
@@ -108,7 +108,9 @@ class LatticeLoops:
         self, ends: Ends, kernel: Kernel, parameters: tuple[str, ...], updates: Iterable[ir.Statement]
     ) -> ir.Function:
         kind = "bonds" if self.step.others.graph else "pairs"
-        loop = ir.Loop(kind, (*self._reads(kernel, ()), *updates), end=ends.end, chosen=ends.chosen)
+        others = ir.Selection(first=ends.first, massive=ends.massive)
+        reads = self._reads(kernel, ())
+        loop = ir.Loop(kind, (*reads, *updates), end=ends.end, chosen=ends.chosen, selection=others)
         return _function(kernel, parameters, loop)
 
     def _cotangents(self, kernel: Kernel, sums: Sequence[str] = (), fields: Sequence[str] = ()) -> Iterator[ir.Update]:
@@ -206,7 +208,7 @@ class LatticeLoops:
     def arrays(self) -> tuple[str, ...]:
         """The arrays of the state."""
         sites = self.step.sites
-        return (*self.program.coordinates, *sites.parameters, *sites.increments)
+        return (*self.program.coordinates, *sites.parameters, *sites.increments, *sites.derived)
 
     @cached_property
     def numbers(self) -> tuple[str, ...]:

@@ -396,12 +396,16 @@ class Append:
 class Selection:
     """The sites that a sweep updates: those of one ``colour``, those away from boundary seams, or those on a seam.
 
-    ``inside`` excludes boundary seams; ``window`` selects the sites on the seams of these axes.
+    ``inside`` excludes boundary seams; ``window`` selects the sites on the seams of these axes. Sites before the
+    ``first`` are left out, in loops over pairs as the other site. Loops over ``massive`` sites end with the last one
+    that has a mass.
     """
 
     colour: int | None = None
     inside: bool = False
     window: int | None = None
+    first: int = 0
+    massive: bool = False
 
 
 ALL_SITES = Selection()

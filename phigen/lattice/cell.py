@@ -33,7 +33,8 @@ class Cell:
     ``casimirs`` maps names to a density and ``sites`` (one Casimir for each site), ``sum`` or ``product``;
     ``invariants`` are sums over sites. ``time`` is the symbol of t, which H and the invariants may contain, or "".
     ``forces`` and the sources of ``noise`` act at a site, with independent noise at each site. ``observables`` are
-    fields, or densities that ``reductions`` turn into numbers.
+    fields, or densities that ``reductions`` turn into numbers. ``derived`` are values at sites that a solver computes
+    from the parameters.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Cell:
     noise: Mapping[str, SpecNoise] = field(default_factory=dict)
     observables: Mapping[str, Expression] = field(default_factory=dict)
     reductions: Mapping[str, Reduction] = field(default_factory=dict)
+    derived: tuple[str, ...] = ()
 
     @property
     def driven(self) -> bool:
@@ -76,7 +78,7 @@ class Cell:
     def neighbours(self) -> Neighbours:
         """The symbols of all quantities with a value at every site: fields, then parameters at sites, then noise."""
         at_sites = (p.name for p in self.parameters if p.at == "sites")
-        return Neighbours((*self.fields, *at_sites, *self.increments), self.axes)
+        return Neighbours((*self.fields, *at_sites, *self.increments, *self.derived), self.axes)
 
     @property
     def vanishing(self) -> frozenset[str]:

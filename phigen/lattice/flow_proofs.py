@@ -31,12 +31,12 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
     if cell.forces:
         yield _forces(cell, flows, count, positive)
     for k, flow in enumerate(flows, 1):
-        residuals = [r for motion in flow.every_motion for r in _residuals(motion)]
+        residuals = [r for motion in flow.every_motion for r in motion_residuals(motion)]
         part_name, field_name = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
         name = f"the flow Φ of {part_name} at each site: Φ_0 = 1, dΦ_t/dt = {field_name}∘Φ_t"
         yield decide_zero(name, residuals, positive, flow.manner)
     for source, flow in zip(cell.noise, plan.noise, strict=True):
-        residuals = [r for motion in flow.motions for r in _residuals(motion)]
+        residuals = [r for motion in flow.motions for r in motion_residuals(motion)]
         name = f"the flow Φ of the noise {source} at each site: Φ_0 = 1, dΦ_t/dt = ΔW σπ∇g∘Φ_t"
         yield decide_zero(name, residuals, positive, flow.manner)
 
@@ -57,7 +57,7 @@ def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequenc
     return decide_zero(name, residuals, positive)
 
 
-def _residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:
+def motion_residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:
     """Yield the residuals that vanish if and only if the motion of a site is the flow of its rates."""
     names, increments = list(motion.solution), list(motion.solution.values())
     start = substitute(increments, {TIME: ZERO})

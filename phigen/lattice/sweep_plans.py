@@ -27,6 +27,7 @@ from phigen.lattice.damping import TogetherError
 from phigen.lattice.forcing import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.graphs import GraphSearch, energies, merged_ends, site_sums
 from phigen.lattice.observable_kernels import observables, observed_sums
+from phigen.lattice.relative_bodies import LatticeBodies, lattice_bodies, of_bodies, of_massive
 from phigen.lattice.series import SeriesPlan, plan_series
 from phigen.lattice.site_kernels import site_kernel
 from phigen.lattice.site_parts import (
@@ -49,6 +50,7 @@ from phigen.scheme.gathering import staged
 from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.logarithmic import composition_of
 from phigen.scheme.lowering import operation_counts
+from phigen.scheme.near_integrable import Corrected
 from phigen.scheme.noise import noise_lines, with_noise
 from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.order import Order
@@ -74,6 +76,7 @@ class SplittingPlan:
     noise: tuple[CellFlow, ...] = ()
     since: str = ""  # reason for using more colours than the minimum
     negative: int | None = None  # with a monitor, the part B of K = log(A + e) − log(−B)
+    bodies: LatticeBodies | None = None  # in relative coordinates
 
     #: The scheme, as in specs, and the name of the method for the user; a step is one stage of explicit flows.
     scheme = kind = "splitting"
@@ -120,8 +123,10 @@ class SplittingPlan:
             f"{len(choice.schedule().flows)} flows" if not marked else f"{', '.join(marked)} for each colour of sites"
         )
         monitor = [] if self.negative is None else [cell_monitor.fact(self.flows, self.negative)]
+        relative = [f"coordinates of flows: {self.bodies.change.replace('_', ' ')}"] if self.bodies else []
         return [
             *monitor,
+            *relative,
             f"scheme: splitting, H = {parts}, with the exact flow of each",
             f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows}{why}",
             "step: explicit",
@@ -166,6 +171,8 @@ def plan_sweeps(cell: Cell, spec: Spec) -> LatticePlan:
     cell_monitor.expect_applicable(cell, spec)
     if spec.scheme == "series" or (spec.scheme == "auto" and spec.birealisation.kind != "auto"):
         return plan_series(cell, spec)
+    if spec.coordinates_from:
+        return _plan_bodies(cell, spec)
     try:
         return _plan_splitting(cell, spec)
     except SpecError as unsplit:
@@ -196,6 +203,18 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
     plan = SplittingPlan(parts, _with_seams(choice, parts.colouring), noise, since)
     return replace(plan, negative=cell_monitor.negative_part(cell, plan.flows, spec)) if monitored else plan
+
+
+def _plan_bodies(cell: Cell, spec: Spec) -> SplittingPlan:
+    """Return the plan of bodies in relative coordinates."""
+    bodies = lattice_bodies(cell, spec)
+    parts = bodies.flows()
+    choice = planned(spec, SplitHamiltonian(parts.flows, small=1), spec.wanted_order, spec.composition, lambda: ())
+    if isinstance(choice.method, Corrected):
+        hint = "composition: saba-8-2 at order 2 or aba-10-6-4 at order 4, which need no corrector"
+        message = f"scheme splitting: composition {choice.method.name} is not offered for lattices"
+        raise SpecError([spec.diagnostic(("composition",), message, hint)])
+    return SplittingPlan(parts, choice, bodies=bodies)
 
 
 def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMethod:
@@ -285,6 +304,8 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
     """Return the solver of a lattice as a program."""
     extras = spec.extras
     monitored = spec.monitor is not None
+    bodies = plan.bodies if isinstance(plan, SplittingPlan) else None
+    cell = bodies.cell if bodies else cell
     late = (cell_monitor.LATE,) if monitored and extras.tangent else ()
     coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK, *late], cell.times)
     schedule = plan.schedule()
@@ -296,6 +317,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
         )
         for k, (flow, what) in enumerate(plan.flows_named(cell), 1)
     )
+    swept = of_bodies(swept, bodies) if bodies else swept
     if extras.adjoint and cell.noise:
         raise SpecError([Diagnostic("adjoint is not offered for lattices with noise")])
     plain_names = tuple(p.name for p in cell.parameters if p.at == "all")
@@ -316,6 +338,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
         kernels += rates.kernels
     sites = _sites(cell, plan.colouring, [*kernels, *observed.kernels])
     kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell, varied=solved is not None)
+    partners = of_massive(partners) if bodies and partners else partners
     if partners:
         purpose = "contribution of a pair to the energy of a part of H, or to its variation"
         of_parts = ((n, _gather(cell, merged_ends([s]), f"{n}_of_pairs", purpose)) for n, s in sums_of_parts)
@@ -340,6 +363,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
         rates=rates,
         refresh=refresh,
         adjoint=adjoint,
+        relative=bodies.sites(plan.flows) if bodies else None,
     )
     step = coefficients.settled(sweeps)
     facts = [_lattice_fact(cell, plan.colouring), *plan.facts, *_acting_facts(cell, plan), plan.order.note]
@@ -487,6 +511,7 @@ def _sites(cell: Cell, colouring: Colouring, kernels: Sequence[Kernel]) -> Sites
         tuple(colouring.periods(cell.boundary)) or (1,),
         tuple(least),
         increments=cell.increments,
+        derived=cell.derived,
         seams=colouring.seams,
     )
 

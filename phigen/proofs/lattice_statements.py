@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 
 from phigen.compilation import CompiledLattice
-from phigen.lattice import flow_proofs, forcing, proofs, series_proofs
+from phigen.lattice import flow_proofs, forcing, proofs, relative_proofs, series_proofs
 from phigen.lattice.cell import Cell
+from phigen.lattice.sweep_plans import SplittingPlan
 from phigen.proofs.statements import CASIMIRS, FORCES, INVARIANTS, METHOD, NOISE, SPLITTING
 from phigen.symbolic.verdict import REFUTED, Statement
 
@@ -30,5 +32,11 @@ def sweeps(compilation: CompiledLattice) -> dict[str, tuple[Statement, ...]]:
     """The parts of H of a lattice and their flows, or its bi-realisation and the equation of a stage."""
     cell, plan = compilation.cell, compilation.sweeps
     group = f"{METHOD} ({plan.kind})" if plan.is_implicit else SPLITTING
-    statements = plan.either(partial(flow_proofs.check, cell), partial(series_proofs.check, cell))
+
+    def of_splitting(splitting: SplittingPlan) -> Iterator[Statement]:
+        if splitting.bodies:
+            return relative_proofs.check(splitting.bodies, splitting.flows)
+        return flow_proofs.check(cell, splitting)
+
+    statements = plan.either(of_splitting, partial(series_proofs.check, cell))
     return {group: tuple(statements)}

@@ -484,6 +484,7 @@ class Sites:
     )  # symbols of kernels of bonds or pairs: field and end
     at_bonds: tuple[str, ...] = ()  # parameters at bonds
     increments: tuple[str, ...] = ()  # of the noise of a site in a part of a step
+    derived: tuple[str, ...] = ()  # values at sites that the solver computes from the parameters
     seams: tuple[Seam, ...] = ()  # the axes along which the colours fit every size
 
 
@@ -494,13 +495,16 @@ class Ends:
     Its inputs are ``coef`` or ``params``, ``site`` and ``bonds``, the parameters at bonds. ``end`` says which end of
     the bond, in the order of the user, the site is: a, b, or "" for either. ``chosen`` says which of the two must
     have the colour of the sweep: ``here``, ``there``, or "" for neither. ``extremes`` maps numbers of outputs, of
-    which the largest or the least value is kept in place of the sum, to ``max`` or ``min``.
+    which the largest or the least value is kept in place of the sum, to ``max`` or ``min``. Of pairs, b is a site from
+    ``first`` on; the sites after the last one with a mass contribute nothing where the kernel is ``massive``.
     """
 
     kernel: Kernel
     end: str = ""
     chosen: str = ""
     extremes: Mapping[int, str] = field(default_factory=dict)
+    first: int = 0
+    massive: bool = False
 
     @property
     def of_all(self) -> bool:
@@ -574,7 +578,8 @@ class Sweep:
     does not change.
 
     Without a colour the sweep updates every site. If it is ``inside``, it omits sites near seams. With a ``window``
-    it updates only sites near seams, by the terms that begin on the seams of these axes (bits), or on none.
+    it updates only sites near seams, by the terms that begin on the seams of these axes (bits), or on none. It updates
+    no sites before the ``first``.
 
     The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. The symbols of ``present`` are
     1 if a term of H lies within open ends, or if a site has the colour of the sweep, else 0; ``gathered`` are the
@@ -589,6 +594,7 @@ class Sweep:
     tangent: Sweep | None = None
     inside: bool = False
     window: int | None = None
+    first: int = 0
 
     @property
     def is_tangent(self) -> bool:
@@ -619,6 +625,22 @@ class Equation:
 
 
 @dataclass(frozen=True)
+class RelativeSites:
+    """The relative coordinates in which a lattice of bodies makes its steps (`phigen.lattice.relative_bodies`).
+
+    ``axes`` pairs the indices of each position and of its momentum or velocity. ``remainder`` is the part B; its sums
+    over pairs read positions, and ``shifts`` further sums read velocities. ``mass`` is a parameter at sites.
+    """
+
+    jacobi: bool
+    momenta: bool
+    axes: tuple[tuple[int, int], ...]
+    mass: str
+    remainder: int
+    shifts: int
+
+
+@dataclass(frozen=True)
 class Sweeps(_Scheduled):
     """A step of a lattice, by sweeps over its sites.
 
@@ -631,6 +653,8 @@ class Sweeps(_Scheduled):
     of the last flow, the last flow is in the middle too.
 
     In the series there is an ``equation`` in place of parts, and the schedule lists its stages.
+
+    Bodies in ``relative`` coordinates are transformed to these before the flows, and back afterwards.
     """
 
     sites: Sites
@@ -642,6 +666,7 @@ class Sweeps(_Scheduled):
     by_colour: tuple[bool, ...] = ()  # graphs: whether a part belongs to one colour
     equation: Equation | None = None
     rates: PartRates | None = None
+    relative: RelativeSites | None = None
 
     kind = SWEEPS
 

@@ -190,10 +190,7 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
     if raw.get("structure") is not None and raw.get("scheme") != "gauss":
         message = "structure belongs to scheme: gauss; other schemes are exact Poisson maps"
         problems.add(message, reader.locations["structure",], "remove structure, or scheme: gauss")
-    if raw.get("coordinates_from") is not None and raw.get("lattice") is not None:
-        hint = "phigen show --expand RUN writes an ordinary spec, which takes coordinates_from with canonical momenta"
-        problems.add("coordinates_from: not available for lattices", reader.locations["coordinates_from",], hint)
-    elif raw.get("coordinates_from") is not None and raw.get("scheme") != "splitting":
+    if raw.get("coordinates_from") is not None and raw.get("scheme") != "splitting":
         message = "coordinates_from belongs to scheme: splitting, whose parts are motions in these coordinates"
         problems.add(message, reader.locations["coordinates_from",], "scheme: splitting, or remove coordinates_from")
     how = WITHOUT_SERIES.get(raw.get("scheme", ""))

@@ -52,4 +52,7 @@ def switches(step: Sweeps) -> dict[str, bool]:
         "BY_COLOUR": bool(step.by_colour),
         "MONITOR": step.rates is not None,
         "LATE": step.rates is not None and bool(step.rates.slopes),
+        "BODIES": step.relative is not None,
+        "JACOBI": step.relative is not None and step.relative.jacobi,
+        "MOMENTA": step.relative is not None and step.relative.momenta,
     }

@@ -63,7 +63,15 @@ class _Tables:
         role = self.function.role
         source = self.params if role.is_stage or role.is_observable else ir.fixed("coef")
         yield ir.Call("fill", (ir.Constant(0),), ir.Member(SITES, "sums"))
-        yield from (ir.Call(name, (source, *map(ir.fixed, others))) for name in s.functions)
+        if not self.lattice.step.relative or role.is_observable:
+            yield from (ir.Call(name, (source, *map(ir.fixed, others))) for name in s.functions)
+            return
+        *arrays, last = map(ir.fixed, others)
+        placed = [ir.Called("placed", (array, last)) for array in arrays]
+        yield from (ir.Call(name, (source, *placed, last)) for name in s.functions)
+        varied = len(arrays) > 1
+        first = len(self.lattice.step.relative.axes) if varied else 0
+        yield ir.Call("joinSums", (arrays[-1], last, ir.Constant(first)))
 
     def _loop(self, s: ir.Loop) -> ir.Loop:
         body = tuple(new for inner in s.body for new in self._lowered(inner, s.selection))
@@ -72,7 +80,7 @@ class _Tables:
             self.head.append(ir.Unpack(("sums",), SITES))
             self.head += _cleared(s)
         if s.kind == "pairs":
-            return _counted("i", COUNT, (over_pairs(body),))
+            return _counted("i", COUNT, (over_pairs(body, s.selection),))
         if s.kind == "bonds":
             bonds = ir.Called("bonds", (ir.Constant(s.end), ir.Constant(s.chosen), *[COLOUR] * bool(s.chosen)), SITES)
             self.head.append(ir.Unpack(("here", "there", "bond"), bonds))
@@ -83,7 +91,7 @@ class _Tables:
             )
         sites = _sites_of(s.selection)
         if not sites:
-            return _counted("i", COUNT, body)
+            return ir.Loop("plain", body, "i", ir.Constant(s.selection.first), COUNT)
         self.head.insert(0, ir.Declare(ir.Type.ARRAY, ((chosen.symbol, sites),)))
         return _counted("k", ir.Member(chosen, "length"), (ir.index(SITE, ir.Entry(chosen, NUMBER)), *body))
 
@@ -131,6 +139,9 @@ class _Tables:
         if array.name in increments:
             increments_array = self._hoisted(Symbol("at", "dw"), ir.Member(SITES, "dw"))
             return ir.Entry(increments_array, of_array(site, increments.index(array.name)))
+        if array.name in self.lattice.step.sites.derived:
+            name = str(getattr(array.name, "kind", array.name))
+            return ir.Entry(self._hoisted(Symbol("at", name), ir.Member(SITES, name)), site)
         return ir.Entry(self._parameter(array.name), site)
 
     def _parameter(self, name: str) -> ir.Name:
@@ -162,9 +173,11 @@ def _counted(variable: str, end: ir.Value, body: ir.Block) -> ir.Loop:
     return ir.Loop("plain", body, variable, ir.Constant(0), end)
 
 
-def over_pairs(body: Iterable[ir.Statement]) -> ir.Loop:
-    """Return the loop over all other sites."""
-    return _counted("j", COUNT, (ir.If(ir.Binary("==", OTHER, SITE), (ir.Continue(),)), *body))
+def over_pairs(body: Iterable[ir.Statement], selection: ir.Selection = ir.ALL_SITES) -> ir.Loop:
+    """Return the loop over all other sites of a selection."""
+    other = ir.If(ir.Binary("==", OTHER, SITE), (ir.Continue(),))
+    high = ir.Member(SITES, "massive") if selection.massive else COUNT
+    return ir.Loop("plain", (other, *body), "j", ir.Constant(selection.first), high)
 
 
 def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:

@@ -63,9 +63,18 @@ def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, com
             body.append(ir.Assign(field, ir.Accumulated(ir.Name(s.array.name), s.value)))
         else:
             body.append(ir.Assign(field, s.value, adds=True))
-    colour = lowered(function).selection.colour
+    selection = lowered(function).selection
+    colour, low = selection.colour, _from(selection)
     swept = ir.Member(ROW, "swept") if passed else ir.Constant(colour)
-    return row_function(function, "coef", "row", body=(*head, *rows.before(), of_colour(body, colour, swept, layout)))
+    swept_sites = of_colour(body, colour, swept, layout, low)
+    return row_function(function, "coef", "row", body=(*head, *rows.before(), swept_sites))
+
+
+def _from(selection: ir.Selection) -> ir.Value:
+    """Return the first site of a segment that a sweep updates."""
+    if not selection.first:
+        return FROM
+    return ir.Select(ir.Binary("<", FROM, ir.Constant(selection.first)), ir.Constant(selection.first), FROM)
 
 
 def of_colour(
@@ -106,11 +115,11 @@ def _storing(
     function: ir.Function, layout: RowLayout, names: Mapping[int, str], member: str, kind: ir.Pointer, *, adds: bool
 ) -> ir.Function:
     """Return a function that stores to the arrays of a ``member`` of the row, by pointers with ``names``."""
-    rows, colour = rows_of(function, layout), lowered(function).selection.colour
+    rows, selection = rows_of(function, layout), lowered(function).selection
     head = grouped({name: (kind, layout.row(ir.entry(ir.Member(ROW, member), k))) for k, name in names.items()})
     places = ((ir.Entry(ir.Name(names[s.array.number]), SITE), s.value) for s in stores_of(function))
     body = (*rows.at_site(), *rows.computed, *(ir.Assign(place, value, adds) for place, value in places))
-    loop = of_colour(body, colour, ir.Constant(colour), layout)
+    loop = of_colour(body, selection.colour, ir.Constant(selection.colour), layout, _from(selection))
     return row_function(function, "coef", "row", body=(*head, *rows.before(), loop))
 
 
@@ -284,7 +293,9 @@ def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
     values = [ir.Select(same, start, s.value) for start, s in zip(starts, bond_loop.stores, strict=True)]
     updated = (u for s, p, v in zip(bond_loop.stores, places, values, strict=True) for u in updates(s, p, v))
     inner = over_sites((*together(rows.here), *rows.computed, *updated))
-    outer = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(0), LENGTH)
+    selection = bond_loop.loop.selection
+    high = ir.Member(SOLVER, "massive") if selection.massive else LENGTH
+    outer = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(selection.first), high)
     return row_function(
         bond_loop.function, *bond_loop.parameters, body=(*rows.before(), *grouped(arrays), *clear, outer)
     )

@@ -82,7 +82,7 @@ class WholeArrays:
         body: list[ir.Statement] = []
         for function in functions:
             loop = _loop(function)
-            added = (self._summed(s) for s in _stores(loop))
+            added = (self._summed(s, loop.selection) for s in _stores(loop))
             total = ir.Binary("+", SUMS, ir.Called("array", (ir.Listed(tuple(added)),), NP))
             body += [*self._bonds(loop), *self._reads(function), ir.Assign(SUMS, total)]
         quiet = ir.Within(ir.Called("errstate", (ir.fixed('all="ignore"'),), NP), tuple(body))
@@ -189,14 +189,19 @@ class WholeArrays:
         source: ir.Value = ir.fixed("parameters" if function.role.is_observable else "coef")
         if function.role.is_stage or function.role.is_transposed_stage:
             source = ir.Member(SITES, "parameters")
-        return ir.Called(f"_{sums_name(s.functions[0])}", (source, X, *varied, SITES))
+        called = f"_{sums_name(s.functions[0])}"
+        if not self.lattice.step.relative or function.role.is_observable:
+            return ir.Called(called, (source, X, *varied, SITES))
+        placed = (ir.Called("_placed", (SITES, array)) for array in (X, *varied))
+        sums = ir.Called(called, (source, *placed, SITES))
+        return ir.Called("_joined", (SITES, varied[0] if varied else X, sums))
 
     def _bonds(self, loop: ir.Loop) -> Iterator[ir.Statement]:
         if loop.kind == "bonds":
             which = (ir.fixed(repr(loop.end)), ir.fixed(repr(loop.chosen)))
             yield ir.Unpack(("here", "there", "bond"), ir.Called("bonds", which, SITES))
 
-    def _summed(self, s: ir.Store) -> ir.Value:
+    def _summed(self, s: ir.Store, selection: ir.Selection) -> ir.Value:
         """Return the sum, or the extreme, of a value of bonds or pairs at each site."""
         graph = self.lattice.step.others.graph
         if s.extreme:
@@ -207,6 +212,8 @@ class WholeArrays:
             return ir.Called("_extreme_of_others", (choose, start, s.value, SITES))
         if graph:
             return ir.Called("summed", (s.value, ir.fixed("here")), SITES)
+        if selection.massive:
+            return ir.Called("_over_sources", (s.value, SITES, ir.Constant(selection.first)))
         return ir.Called("_over_others", (s.value, SITES))
 
     def _reads(self, function: ir.Function) -> Iterator[ir.Statement]:
@@ -238,7 +245,12 @@ class WholeArrays:
             case ir.Load(array, offset, end):
                 if function.role.is_energy and array.storage is Storage.SUM:
                     return next(self._sums_value(function, s) for s in function.body if isinstance(s, ir.GatherSums))
-                return self._load(array, offset, end)
+                loaded = self._load(array, offset, end)
+                others = _loop(function).selection
+                if end == "b" and others.massive:
+                    first = others.first or ""
+                    loaded = ir.Entry(loaded, ir.fixed(f"{first}:sites.massive"))
+                return loaded
         return value
 
     def _load(self, array: ir.Array, offset: Sequence[int], end: str) -> ir.Value:
@@ -248,6 +260,8 @@ class WholeArrays:
         whole: ir.Value = ir.Entry(storage, number)
         if array.storage is Storage.STATE and array.name in increments:
             whole = ir.entry(ir.Member(SITES, "dw"), increments.index(array.name))
+        elif array.storage is Storage.STATE and array.name in self.lattice.step.sites.derived:
+            whole = ir.Member(SITES, str(getattr(array.name, "kind", array.name)))
         elif array.storage is Storage.STATE and array.name not in fields:
             whole = ir.entry(ir.Member(SITES, "parameters"), array.name)
         if end and self.lattice.step.others.graph and array.storage is not Storage.SEED:
@@ -304,6 +318,8 @@ def _chosen(selection: ir.Selection, new: ir.Value, old: ir.Value) -> ir.Value:
     """Return the new value at the sites of a selection, the old one elsewhere."""
     if selection.window is not None:
         return ir.Select(ir.Member(SITES, "beside"), new, old)
+    if selection.first:
+        return ir.Called("where", (ir.Member(SITES, "orbiting"), new, old), NP)
     colour = ir.Constant(None) if selection.colour is None else COLOUR
     if selection.inside:
         return ir.Called("inside", (colour, new, old), SITES)

@@ -150,7 +150,10 @@ def _anomaly(program: Program, *, near: bool = False) -> str:
 
 def near_rows(program: Program, names: Iterable[str]) -> list[str]:
     """Return small-argument functions for loops over sites, with the fewest operations that give full precision."""
-    return [rendered(program, "row_near.c", _row_values(program, f)) for f in names]
+    return [
+        _anomaly(program, near=True) if f == ANOMALY else rendered(program, "row_near.c", _row_values(program, f))
+        for f in names
+    ]
 
 
 def _row_values(program: Program, f: str) -> dict[str, object]:

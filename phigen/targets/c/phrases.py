@@ -529,6 +529,12 @@ JOINED = Choice(
     {"NOT_OPEN(s)": ("", "s->open = 0;")},
 )
 
+MOMENTA = Choice(
+    "Bodies have momenta, from which velocities follow if there is a mass.",
+    ("MOMENTA",),
+    {"OR_NO_MASS(mass)": ("|| !(mass > 0.0)", "")},
+)
+
 FAR = Choice(
     "Whether arguments of functions may be large, where functions have another form for them.",
     ("NEAR",),
@@ -702,6 +708,7 @@ ALL = (
     TABLES,
     MATRIX,
     JOINED,
+    MOMENTA,
     FAR,
     STAGE_PREDICTORS,
     SWEEPS,

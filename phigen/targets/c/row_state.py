@@ -46,6 +46,28 @@ LATTICE = (
         reset=("for (size_t k = 0; k < PHI_GATHERED; ++k, memory += block) s->gathered[k] = memory;",),
     ),
     StateBlock(
+        "placed",
+        "JACOBI",
+        ("double *placed[PHI_ARRAYS]; /* as x, with the positions of bodies from the first one */",),
+        reset=(
+            "memcpy(s->placed, s->x, sizeof s->x);",
+            "for (int k = 0; k < PHI_BODY_AXES; ++k, memory += block) s->placed[phi_body_axes[k][0]] = memory;",
+        ),
+    ),
+    StateBlock(
+        "placed_varied",
+        "JACOBI && TANGENT",
+        ("double *placed_varied[PHI_DIM]; /* variations of the positions in placed */",),
+        reset=(
+            "for (int k = 0; k < PHI_BODY_AXES; ++k, memory += block) s->placed_varied[phi_body_axes[k][0]] = memory;",
+        ),
+    ),
+    StateBlock(
+        "massive",
+        "BODIES",
+        ("ptrdiff_t massive;         /* number of bodies up to the last one with a mass */",),
+    ),
+    StateBlock(
         "bonds",
         "GRAPH",
         (

@@ -10,6 +10,7 @@ from dataclasses import fields, replace
 from functools import partial
 from typing import Any
 
+from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import OVERLOADED, Program
 from phigen.targets.c import emitter as c
@@ -82,7 +83,10 @@ def has_common_coefficients(program: Program) -> bool:
 
 
 def text_of_device(program: Program) -> str:
-    """Return the text of a file without its first comment."""
+    """Return the text of a file without its first comment. Raises `SpecError` for bodies in relative coordinates."""
+    if program.step.swept and program.step.swept.relative:
+        message = f"{program.name}: coordinates_from: devices have no steps in relative coordinates"
+        raise SpecError([Diagnostic(message, None, "another target, or remove coordinates_from")])
     common = has_common_coefficients(program)
     staged = len(program.fractions) > 1
     values = {

@@ -63,6 +63,9 @@ def _tables(program: Program, step: Sweeps) -> dict[str, object]:
         "unit": "stages" if step.equation else "flows",
         "schedule": f"[{', '.join(f'[{part},{_FIXED}{row}]' for part, row in step.schedule.flows)}]",
         "flows": f"[{', '.join(map(_listed, step.parts))}]",
+        "body_axes": json.dumps(step.relative.axes) if step.relative else "",
+        "mass": json.dumps(step.relative.mass) if step.relative else "",
+        "remainder": step.relative.remainder if step.relative else "",
         "tangents": f"[{', '.join(map(_listed, step.tangents))}]" if step.tangents else "",
     }
 

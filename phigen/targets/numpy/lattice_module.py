@@ -34,7 +34,8 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "schedule": repr(tuple(step.schedule.flows)),
         "by_colour": repr(step.by_colour),
     }
-    values["sized"] = bool(program.time or program.noise)
+    values["sized"] = bool(program.time or program.noise or step.relative)
+    values |= _of_bodies(step)
     arguments = {"t0": "0.0"} if program.time else {}
     arguments |= {"seed": "0", "member": "0", "step0": "0"} if program.noise else {}
     values["arguments"] = "".join(f", {name}={value}" for name, value in arguments.items())
@@ -54,6 +55,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     drawing = ["lattice_noise", "philox"] if program.noise else []
     parts = ["lattice", "lattice_sites", *graphs, *drawing, *(_SERIES if step.equation else ("lattice_splitting",))]
     parts += ["lattice_monitor"] * (step.rates is not None)
+    parts += ["lattice_bodies"] * (step.relative is not None)
     parts += ["lattice_steps", *(["lattice_tangent"] if program.extras.tangent else [])]
     pieces = [render("numpy", f"{part}.py", values) for part in parts]
     if step.adjoint:
@@ -63,6 +65,21 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     pieces += functions.called(program)
     pieces += _functions(LatticeLoops(program, step))
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)
+
+
+def _of_bodies(step: Sweeps) -> dict[str, object]:
+    """Return the values of templates for bodies in relative coordinates."""
+    relative = step.relative
+    if not relative:
+        return {"relative": False}
+    return {
+        "relative": True,
+        "jacobi": relative.jacobi,
+        "momenta": relative.momenta,
+        "mass": relative.mass,
+        "remainder": relative.remainder,
+        "body_axes": listed(relative.axes),
+    }
 
 
 def _reductions(program: Program) -> dict[str, object]:

@@ -90,6 +90,7 @@ static int phi_finite(const double *values, size_t count)
 }
 
 #include "lattice_carry.c"
+#include "lattice_bodies.c"
 #include "lattice_monitor.c"
 
 phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const double *x0 PHI_AND_T0, void *work)
@@ -123,6 +124,9 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
     phi_put_kinds(s);
     phi_put_parameters(s, &values);
     phi_put_at_bonds(s, &values);
+#if PHI_BODIES
+    if (!phi_weigh(s)) return PHI_BAD_ARGUMENT;
+#endif
 #if PHI_MONITOR
     memset(s->clock, 0, 4 * sizeof *s->clock);
     if (!phi_take_level(s)) return PHI_BAD_ARGUMENT;

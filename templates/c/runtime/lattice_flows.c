@@ -25,9 +25,11 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI
     for (size_t k = 0; k < s->vectors; ++k) { /* a flow reads its own fields at the same site only: threads need not wait */
         double *v[PHI_DIM];
         phi_vector(s, k, v);
+        if (part == PHI_REMAINDER) phi_gather_varied_pulls(s, coef, v, first, end);
         phi_tangent_rows(s, part, coef, v, first, end);
     }
 #endif
+    if (part == PHI_REMAINDER) phi_gather_pulls(s, coef, first, end);
     phi_sweep_rows(s, part, coef PHI_AND_FAR(far), first, end);
     phi_wait();
 }
@@ -183,6 +185,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
+    if (!s->open) phi_begin_relative(s);
     phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* an open flow is merged with the next */
 #endif
     status = phi_march(s, steps);
@@ -193,6 +196,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         --s->steps;
     }
 #endif
+    phi_to_cartesian(s, s->x);
     PHI_SET_TIME(s) PHI_TIME_AFTER(s, s->steps);
     return status;
 }

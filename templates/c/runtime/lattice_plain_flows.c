@@ -14,5 +14,16 @@ static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
     (void)steps;
     phi_sweep_part(s, phi_flow_parts[number], s->coef + number * PHI_ROW PHI_AND_FAR(s->far > 0));
 #endif
+#if PHI_BODIES
+    if (phi_flow_parts[number] == PHI_REMAINDER || PHI_THREAD > 0) return;
+    phi_move_centre(s->x, phi_times[number] * s->h);
+#if PHI_TANGENT
+    for (size_t k = 0; k < s->vectors; ++k) {
+        double *v[PHI_DIM];
+        phi_vector(s, k, v);
+        phi_move_centre(v, phi_times[number] * s->h);
+    }
+#endif
+#endif
 }
 #endif

@@ -24,7 +24,9 @@ phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t c
     for (size_t k = 0; k < count; ++k) {
         phi_vector(s, k, fields);
         for (size_t f = 0; f < PHI_DIM; ++f) phi_put(s, fields[f], v + (k * PHI_DIM + f) * s->sites);
+        phi_to_relative(s, fields);
     }
+    phi_begin_relative(s);
     s->vectors = count;
     for (; steps > 0 && status == PHI_OK; --steps) {
         phi_copy(s->before, s->x, s);
@@ -34,6 +36,7 @@ phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t c
     }
     s->vectors = 0;
     if (status != PHI_OK) phi_copy(s->x, s->before, s);
+    phi_to_cartesian(s, s->x);
 #if PHI_SERIES
     if (status != PHI_OK) phi_forget(s);
 #endif
@@ -43,6 +46,7 @@ phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t c
     }
     for (size_t k = 0; k < count && status == PHI_OK; ++k) {
         phi_vector(s, k, fields);
+        phi_to_cartesian(s, fields);
         phi_take(s, fields, v + k * PHI_DIM * s->sites);
     }
     return status;

@@ -2,13 +2,16 @@ import { FLOWS } from "./model.mjs";
 import { SOURCES } from "./model.mjs";
 import { drawAtSites } from "./site_noise.mjs";
 import { TANGENTS } from "./model.mjs";
+import { TIMES } from "./model.mjs";
 import { allFinite } from "./sites.mjs";
+import { moveCentre, toCartesian, toRelative } from "./bodies.mjs";
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----
 
 /** Make one step; returns a status. If it fails, the state is undefined. */
 export function makeStep(solver) {
   const { x, rows, sites } = solver;
+  toRelative(solver);
   // #if NOISE
   // flows of the noise come first and, in reverse order, last
   const back = sites.flows.length - SOURCES.length;
@@ -39,8 +42,10 @@ export function makeStep(solver) {
     // #else
     for (const sweep of FLOWS[part]) sweep(rows[row], x, sites);
     // #endif
+    moveCentre(solver, part, TIMES[row] * solver.h);
   }
   // #endif
+  toCartesian(solver);
   // #if TANGENT
   if (!solver.vectors.every(allFinite)) return "NOT_FINITE";
   // #endif

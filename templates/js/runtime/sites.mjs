@@ -8,6 +8,7 @@ import { AT_BONDS } from "./model.mjs";
 import { SOURCES } from "./model.mjs";
 import { SCHEDULE } from "./model.mjs";
 import { BY_COLOUR } from "./model.mjs";
+import { weigh } from "./bodies.mjs";
 
 // ---- The sites ----
 
@@ -37,6 +38,7 @@ export class Sites {
     this.#connect(options.bonds ?? []);
     // #endif
     this.params = this.#admitted(options.params ?? {});
+    weigh(this);
     const every = (Kind, value) => Kind.from({ length: this.count }, (_, i) => value(i));
     /**
      * The neighbours of each site, and 1 or 0 for terms of H that exist there or not, for each kind of term.

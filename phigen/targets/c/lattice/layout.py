@@ -124,7 +124,8 @@ def switches(layout: Layout) -> dict[str, bool]:
         "SLOPES": layout.slopes,
         "SHARED": bool(step.adjoint)
         or (step.equation is None and (program.profile == "fast" or program.extras.tangent))
-        or step.rates is not None,
+        or step.rates is not None
+        or step.relative is not None,
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }

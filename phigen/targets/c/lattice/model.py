@@ -96,6 +96,8 @@ def _reserved(layout: Layout, has: Mapping[str, bool]) -> int:
     fields = dimension + 2 * dimension * has["COMPENSATED"]  # the state before a step, and compensation terms
     fields += bool(layout.step.sites.seams)  # and the kinds of sites
     fields += 2 * has["MONITOR"]  # densities, and the clock
+    if layout.step.relative and has["JACOBI"]:  # positions from the first body, and their variations
+        fields += len(layout.step.relative.axes) * (1 + layout.program.extras.tangent)
     return len(layout.lattice.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage
 
 
@@ -196,6 +198,12 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
         yield "FLOWS", len(step.schedule.flows), "in a step"
     if step.rates:
         yield "NEGATIVE", 1 + step.rates.negative, "the part B of H, which is negative"
+    if step.relative:
+        bodies = step.relative
+        yield "BODY_AXES", len(bodies.axes), "axes along which bodies have a position and a velocity or momentum"
+        yield "MASS", layout.lattice.arrays.index(bodies.mass), "index of the masses"
+        yield "INNER", layout.lattice.arrays.index(sites.derived[0]), "index of the masses that orbits are about"
+        yield "REMAINDER", 1 + bodies.remainder, "the part of H besides the Kepler motions"
     if has["WAVES"]:
         far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = max(1, *far) if several else 1
@@ -224,6 +232,7 @@ def _tables_of_sites(layout: Layout, has: Mapping[str, bool]) -> dict[str, objec
         "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 and (several or sites.seams) else "",
         "seams": ", ".join(_braced([s.period, s.wide, s.near]) for s in sites.seams),
         "graph": layout.graph,
+        "body_axes": ", ".join(_braced(axis) for axis in step.relative.axes) if step.relative else "",
         "stages": ", ".join(stages),
     }
 

@@ -161,9 +161,24 @@ class _PartLoops:
             arguments = (S, COEF, ir.fixed("first"), ir.fixed("end"))
             blocks: dict[str, ir.Block] = {form: (ir.Call(f"rows{k + 1}{form}", arguments),) for form in forms}
             cases.append(row_drivers.in_forms(blocks))
+        if step.relative:
+            yield self._gathering(step.relative.remainder)
         title = "a flow" if coloured else "the flow of a part of H"
         title = f"How {title} carries a tangent vector" if self.varied else title[0].upper() + title[1:]
         yield driver_text(program, build.driver(name, title, parameters, cases, threads=threads))
+
+    def _gathering(self, remainder: int) -> str:
+        """Return the driver of the sums over pairs of bodies in relative coordinates."""
+        layout, program = self.loops.layout, self.loops.program
+        gathers = [sweep.gather for sweep in self.parts[remainder] if sweep.gather]
+        calls = tuple(ir.Call(e.kernel.name, (COEF, SEGMENT)) for gather in gathers for e in gather.ends)
+        placed = ir.Member(S, "placed") if switches(layout)["JACOBI"] else STATE
+        setup = [row_drivers.member("x", placed)]
+        setup += [row_drivers.member("varied", ir.fixed("v"))] * self.varied
+        name = "gather_tangent_rows" if self.varied else "gather_rows"
+        title = "The sums over other bodies" + ", and their variations" * self.varied
+        case = RowSegment(calls, tuple(setup))
+        return driver_text(program, drivers(self.loops).driver(name, title, ["coef", *["v"] * self.varied], [case]))
 
     def _calls_of_part(self, part: Sequence[Sweep]) -> Calls:
         """Return the calls for a row segment that make the flow of a part of H, in each form.
@@ -199,7 +214,7 @@ class _PartLoops:
             return tuple(values[name] for name in self.loops.told_of_bonds(*meant[k]))
 
         for k, loop in enumerate(self.loops.sums(sweep.gather, swept=True)):
-            others = []
+            others = list[_Call]()
             alone = self.loops.fast or layout.step.adjoint
             ways = () if alone or not sweep.gather else other_ways(layout.step.sites, sweep.gather)
             for gather, bonds, sign in ways:
@@ -225,6 +240,9 @@ class _PartLoops:
         setup = [row_drivers.member("varied", ir.fixed("v"))] * self.varied
         setup += [row_drivers.member("chosen", row_drivers.FLOW)] * bool(coloured and coloured[k])
         near = [*_near_seams(layout, self.parts[k])] if self.by_part else []
+        if layout.step.relative:  # drivers of their own compute the sums
+            names_of_sums = {e.kernel.name for s in self.parts[k] if s.gather for e in s.gather.ends}
+            forms = {f: [c for c in called if c.loop.name not in names_of_sums] for f, called in forms.items()}
         calls = [call for called in forms.values() for call in called]
         declared = [*_reordered(layout, [call.order for call in calls])]
         declared += _other_bonds(layout, [call.bonds for call in calls])

@@ -1,0 +1,239 @@
+"""Attracting bodies of a lattice in relative coordinates: Kepler motions, and a small remainder.
+
+H is Σ m_i|v_i|²/2 − Σ γ m_i m_j/|q_i − q_j|, written in momenta m v or in velocities v. In the coordinates of
+`phigen.splitting.relative` each body but the first has a position Q_i and a velocity V_i = w_i P_i, and the first
+stands for the centre of mass. Per unit of mass all equations have a limit at m_i = 0, a body that others attract and
+that attracts none:
+
+- A moves Q_i and V_i along a conic section with the strength γ M_i, and the centre of mass uniformly;
+- B shifts V_i by the pull of the other bodies.
+
+With Jacobi coordinates M_i = m_0 + … + m_i. Let a_i be the acceleration of body i by all others; that of Q_i is
+a_i − (m_0 a_0 + … + m_{i−1} a_{i−1})/M_{i−1}, and B has this without the pull of the Kepler motion, −γ M_i Q_i/|Q_i|³.
+With democratic heliocentric coordinates M_i = m_0; B has the pull of all bodies but the first, and shifts all Q_i by
+Σ m_j V_j/m_0 times the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from phigen.errors import SpecError
+from phigen.lattice.cancelling import divided
+from phigen.lattice.cell import PAIRS, Cell
+from phigen.lattice.site_parts import BondSum, CellFlow, CellSplitting, Colouring, SiteMotion, Summand
+from phigen.lattice.variations import varied_sum
+from phigen.scheme.steps import Gather, Partners, RelativeSites, Sweep
+from phigen.spec.model import Spec
+from phigen.splitting.exponential import SHIFTED
+from phigen.splitting.kepler import KeplerMotion, inverse_length, square
+from phigen.splitting.ring import TIME
+from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, number, power, sqrt, substitute, symbol
+from phigen.symbolic.neighbours import ENDS
+from phigen.symbolic.symbols import GATHERED, Symbol
+from phigen.symbolic.verdict import PROVED, decide_zero
+
+#: M_i, an array over the bodies that the solver computes from the masses.
+INNER_MASS = Symbol("inner", "mass")
+
+#: The key of specs, and the name of the coordinates in which B is a function of positions.
+KEY, JACOBI = "coordinates_from", "jacobi"
+
+_FORM = (
+    "hamiltonian: {sites: (px**2 + py**2)/(2*m), pairs: -G*m[a]*m[b]/sqrt((x[a] - x[b])**2 + (y[a] - y[b])**2)}, "
+    "or velocities with the brackets {x: {vx: 1/m}, y: {vy: 1/m}} and sites: m*(vx**2 + vy**2)/2"
+)
+
+
+class _OtherFormError(Exception):
+    """H is not that of attracting bodies; the text is the reason."""
+
+
+@dataclass(frozen=True)
+class LatticeBodies:
+    """Attracting bodies at the sites of a cell, in relative coordinates of the name ``change``.
+
+    ``axes`` pairs each position with its momentum or, unless there are ``momenta``, its velocity. ``mass`` is a
+    parameter at sites, ``gravity`` the factor γ of the attraction.
+    """
+
+    cell: Cell
+    change: str
+    axes: tuple[tuple[str, str], ...]
+    mass: str
+    gravity: Expression
+    momenta: bool
+
+    @property
+    def jacobi(self) -> bool:
+        """Whether the coordinates are those of Jacobi, else democratic heliocentric ones."""
+        return self.change == JACOBI
+
+    @cached_property
+    def kepler(self) -> KeplerMotion:
+        """The motion of one body in A, in the symbols of a site."""
+        q, v = (tuple(symbol(n) for n in of) for of in zip(*self.axes, strict=True))
+        return KeplerMotion(q, v, ONE, self.gravity * symbol(INNER_MASS))
+
+    @property
+    def shifts(self) -> tuple[Symbol, ...]:
+        """The symbols of Σ m_j V_j/m_0 along each axis, by which B shifts positions; none with Jacobi coordinates."""
+        return () if self.jacobi else tuple(Symbol(GATHERED, "shift", q) for q, _ in self.axes)
+
+    @property
+    def pulls(self) -> BondSum:
+        """The pull of a body b on a body a along each axis, per unit of mass, with the opposite sign."""
+        slopes = gradient(self.cell.pair_hamiltonian, [self.cell.at(q, ("a",)) for q, _ in self.axes])
+        inertia = {self.cell.at(self.mass, ("a",)): 1}
+        names = [Symbol(GATHERED, q) for q, _ in self.axes]
+        return BondSum({n: divided(e, inertia) for n, e in zip(names, slopes, strict=True)})
+
+    def flows(self) -> CellSplitting:
+        """Return A and B; B is the second, and small."""
+        return CellSplitting((self._motions(), self._remainder()), Colouring(1, (0,) * len(self.cell.axes)))
+
+    def sites(self, flows: Sequence[CellFlow]) -> RelativeSites:
+        """Return the facts for runtimes, with the flows in the order of the parts of a step."""
+        fields = self.cell.fields
+        axes = tuple((fields.index(q), fields.index(v)) for q, v in self.axes)
+        remainder = next(k for k, flow in enumerate(flows) if flow.motion is None)
+        return RelativeSites(self.jacobi, self.momenta, axes, self.mass, remainder, len(self.shifts))
+
+    def _motions(self) -> CellFlow:
+        motion = self.kepler
+        names = [name for axis in self.axes for name in axis]
+        increments = dict(zip(names, motion.increments(names), strict=True))
+        rates = dict(zip(names, motion.field(names), strict=True))
+        moved = SiteMotion(0, increments, (), rates, increments, motion.manner)
+        return CellFlow(motion.hamiltonian, tuple(increments.values()), motion.manner, (moved,), (), motion=motion)
+
+    def _remainder(self) -> CellFlow:
+        """Return the flow of B, whose Hamiltonian here is the energy of a pair."""
+        pulls, time = self.pulls, symbol(TIME)
+        q = [symbol(name) for name, _ in self.axes]
+        rates = {v: -symbol(n) for (_, v), n in zip(self.axes, pulls.values, strict=True)}
+        if self.jacobi:
+            towards = self.gravity * symbol(INNER_MASS) * power(sqrt(square(q)), -3)
+            rates = {name: e + towards * a for (name, e), a in zip(rates.items(), q, strict=True)}
+        rates |= {name: symbol(n) for (name, _), n in zip(self.axes, self.shifts, strict=False)}
+        increments = {name: time * e for name, e in rates.items()}
+        manner = f"{', '.join(rates)} {SHIFTED}"
+        motion = SiteMotion(0, increments, (pulls,), rates, increments, manner)
+        density = self.cell.pair_hamiltonian
+        if self.jacobi:
+            density = density + self.gravity * symbol(INNER_MASS) * symbol(self.mass) * inverse_length(q)
+        listed = (*increments.values(), *pulls.values.values())
+        return CellFlow(density, listed, manner, (motion,), ((Summand(density, bond=True), (0,)),))
+
+
+def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
+    """Return the bodies of a spec with relative coordinates. Raises `SpecError`, located at the key."""
+    _expect_supported(cell, spec)
+    try:
+        positions = _positions(cell)
+        mass, gravity = _attraction(cell, positions)
+        axes, momenta = _axes(cell, positions, mass)
+    except _OtherFormError as error:
+        message = f"{KEY}: {spec.coordinates_from} needs {_FORM}: {error}"
+        hint = "the first body is the heaviest; with jacobi the others follow from the inside out"
+        raise SpecError([spec.diagnostic((KEY,), message, hint)]) from None
+    derived = replace(cell, derived=(INNER_MASS,))
+    return LatticeBodies(derived, spec.coordinates_from, axes, mass, gravity, momenta)
+
+
+def of_bodies(parts: tuple[tuple[Sweep, ...], ...], bodies: LatticeBodies) -> tuple[tuple[Sweep, ...], ...]:
+    """Return the sweeps of both parts for all bodies but the first, with the sums that shift positions."""
+    return tuple(tuple(_of_bodies(sweep, bodies) for sweep in part) for part in parts)
+
+
+def of_massive(partners: Partners) -> Partners:
+    """Return the energies and forces of pairs as sums over the bodies with a mass, which all contributions contain."""
+
+    def massive(gather: Gather) -> Gather:
+        return replace(gather, ends=tuple(replace(e, massive=True) for e in gather.ends))
+
+    return replace(partners, energy=massive(partners.energy), field=massive(partners.field))
+
+
+def _of_bodies(sweep: Sweep, bodies: LatticeBodies) -> Sweep:
+    gather = sweep.gather
+    if gather:
+        shifts = bodies.shifts if not sweep.is_tangent else tuple(map(varied_sum, bodies.shifts))
+        ends = tuple(replace(e, first=0 if bodies.jacobi else 1, massive=True) for e in gather.ends)
+        gather = Gather(ends, (*gather.names, *shifts))
+    tangent = _of_bodies(sweep.tangent, bodies) if sweep.tangent else None
+    return replace(sweep, gather=gather, tangent=tangent, first=1)
+
+
+def _expect_supported(cell: Cell, spec: Spec) -> None:
+    """Raise `SpecError` for features that are not offered together with relative coordinates."""
+    refused = {
+        "lattice": (cell.relation != PAIRS, "all bodies attract one another, as with lattice: {pairs: all}"),
+        "monitor": (spec.monitor is not None, "Kepler motions take equal steps of the time"),
+        "time": (bool(cell.time), "Kepler motions have constant parameters"),
+        "forces": (bool(cell.forces.covector or cell.forces.vector), "the parts are those of attracting bodies"),
+        "damping": (cell.forces.damping is not None, "the parts are those of attracting bodies"),
+        "noise": (bool(cell.noise), "the parts are those of attracting bodies"),
+        "adjoint": (spec.extras.adjoint, "gradients of bodies in relative coordinates are those of an ordinary spec"),
+    }
+    for key, (present, reason) in refused.items():
+        if present:
+            hint = f"remove {KEY}" if key == "lattice" else f"remove {KEY}, or {key}"
+            if key == "adjoint":
+                hint = f"phigen show --expand RUN prints an ordinary spec, to which {KEY} can be added"
+            raise SpecError([spec.diagnostic((KEY,), f"{KEY}: not together with {key}: {reason}", hint)])
+
+
+def _positions(cell: Cell) -> list[str]:
+    """Return the fields that the attraction depends on."""
+    places = cell.places(cell.pair_hamiltonian).values()
+    positions = [f for f in cell.fields if (f, ("a",)) in places]
+    if len(positions) not in (2, 3) or len(cell.fields) != 2 * len(positions):
+        shown = f"{len(positions)} fields in the attraction, and {len(cell.fields)} in all"
+        raise _OtherFormError(f"there are {shown}; bodies have 2 or 3 positions and as many momenta or velocities")
+    return positions
+
+
+def _attraction(cell: Cell, positions: Sequence[str]) -> tuple[str, Expression]:
+    """Return the mass and γ, where the energy of a pair is −γ m[a] m[b]/|q_a − q_b|."""
+    at = [[cell.at(f, (end,)) for f in positions] for end in ENDS]
+    apart: dict[str, Expression] = dict.fromkeys([*at[0], *at[1]], ZERO) | {at[0][0]: ONE}
+    strength = -substitute([cell.pair_hamiltonian], apart)[0]
+    distance = inverse_length([symbol(a) - symbol(b) for a, b in zip(*at, strict=True)])
+    if not _vanishes(cell.pair_hamiltonian + strength * distance):
+        raise _OtherFormError("the energy of a pair is no multiple of one over the distance")
+    names = {base for base, _ in cell.places(strength).values()}
+    if len(names) != 1:
+        raise _OtherFormError(f"the attraction depends on {len(names)} parameters at sites, not on the masses alone")
+    (mass,) = names
+    ends = [cell.at(mass, (end,)) for end in ENDS]
+    gravity = substitute([strength], dict.fromkeys(ends, ONE))[0]
+    if not _vanishes(strength - gravity * symbol(ends[0]) * symbol(ends[1])):
+        raise _OtherFormError(f"the attraction is not proportional to {mass}[a]*{mass}[b]")
+    return mass, gravity
+
+
+def _axes(cell: Cell, positions: Sequence[str], mass: str) -> tuple[tuple[tuple[str, str], ...], bool]:
+    """Return positions with their momenta or velocities, and whether these are momenta."""
+    partners: dict[str, list[tuple[str, Expression]]] = {f: [] for f in cell.fields}
+    for (f, g), entry in cell.bracket.items():
+        partners[f].append((g, entry))
+    if any(len(listed) != 1 for listed in partners.values()) or any(partners[f][0][0] in positions for f in positions):
+        raise _OtherFormError("each position needs a bracket with one momentum or velocity, and no other")
+    axes = tuple((f, partners[f][0][0]) for f in positions)
+    entries, m = [partners[f][0][1] for f in positions], symbol(mass)
+    momenta = all(_vanishes(e - ONE) for e in entries)
+    if not momenta and not all(_vanishes(e - power(m, -1)) for e in entries):
+        raise _OtherFormError(f"the brackets of positions are neither 1 nor 1/{mass}")
+    squares = square([symbol(p) for _, p in axes])
+    kinetic = squares * power(m, -1) / number(2) if momenta else m * squares / number(2)
+    if not _vanishes(cell.hamiltonian - kinetic):
+        named = "the momenta" if momenta else "the velocities"
+        raise _OtherFormError(f"the energy of a site is not the kinetic energy in {named}, with the mass {mass}")
+    return axes, momenta
+
+
+def _vanishes(e: Expression) -> bool:
+    return decide_zero("", [("", e)]).verdict == PROVED

@@ -1,0 +1,220 @@
+#ifndef PHI_FILE_LATTICE_BODIES
+#define PHI_FILE_LATTICE_BODIES
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+#include "sweeps.h"
+
+/* ---- Relative coordinates of bodies ---- */
+/* Flows act on a position and a velocity of each body but the first, and at the first on those of the centre of mass.
+   Positions are relative to the centre of mass of all bodies before (Jacobi), or to the first body (democratic
+   heliocentric); velocities then are those from the centre of mass. */
+
+/* Compute the masses that Kepler motions are about; 0 if a mass is negative, or 0 where none may be: that of the first
+   body, and of bodies with momenta, whose velocities would be undefined. */
+static int phi_weigh(phi_solver *s)
+{
+    const double *m = s->x[PHI_MASS];
+    double sum = 0.0;
+    s->massive = 0;
+    for (ptrdiff_t i = 0; i < s->length; ++i) {
+        if (m[i] < 0.0 PHI_OR_NO_MASS(m[i])) return 0;
+        if (m[i] > 0.0) s->massive = i + 1;
+#if PHI_JACOBI
+        sum += m[i];
+        s->x[PHI_INNER][i] = sum;
+#else
+        sum = m[0];
+        s->x[PHI_INNER][i] = sum;
+#endif
+    }
+    return m[0] > 0.0 && isfinite(sum);
+}
+
+#if PHI_JACOBI
+/* Transform positions, or velocities, to relative ones. */
+static void phi_make_relative(const phi_solver *s, double *q)
+{
+    const double *m = s->x[PHI_MASS], *inner = s->x[PHI_INNER];
+    double centre = q[0];
+    for (ptrdiff_t i = 1; i < s->length; ++i) {
+        q[i] -= centre;
+        centre += m[i] / inner[i] * q[i];
+    }
+    q[0] = centre;
+}
+
+/* Transform relative positions, or velocities, to those of the bodies. */
+static void phi_make_cartesian(const phi_solver *s, double *q)
+{
+    const double *m = s->x[PHI_MASS], *inner = s->x[PHI_INNER];
+    double centre = q[0];
+    for (ptrdiff_t i = s->length - 1; i > 0; --i) {
+        centre -= m[i] / inner[i] * q[i];
+        q[i] += centre;
+    }
+    q[0] = centre;
+}
+
+/* Compute the positions of all bodies from the first one. */
+static void phi_place_bodies(const phi_solver *s, double *const *x, double *const *placed)
+{
+    const double *m = s->x[PHI_MASS], *inner = s->x[PHI_INNER];
+    for (int axis = 0; axis < PHI_BODY_AXES; ++axis) {
+        const double *q = x[phi_body_axes[axis][0]];
+        double *to = placed[phi_body_axes[axis][0]], centre = 0.0;
+        to[0] = 0.0;
+        for (ptrdiff_t i = 1; i < s->length; ++i) {
+            to[i] = centre + q[i];
+            centre += m[i] / inner[i] * q[i];
+        }
+    }
+}
+
+/* Subtract from the pull on each body that on the centre of mass of the bodies before; sums begin at `first`. */
+static void phi_join_pulls(const phi_solver *s, int first)
+{
+    const double *m = s->x[PHI_MASS], *inner = s->x[PHI_INNER];
+    for (int axis = 0; axis < PHI_BODY_AXES; ++axis) {
+        double *pull = s->gathered[first + axis], sum = m[0] * pull[0];
+        for (ptrdiff_t i = 1; i < s->length; ++i) {
+            const double before = sum / inner[i - 1];
+            sum += m[i] * pull[i];
+            pull[i] -= before;
+        }
+    }
+}
+#else
+/* The sum of m q over all bodies but the first. */
+static double phi_moment(const phi_solver *s, const double *q)
+{
+    const double *m = s->x[PHI_MASS];
+    double sum = 0.0;
+    for (ptrdiff_t i = 1; i < s->massive; ++i) sum += m[i] * q[i];
+    return sum;
+}
+
+/* The mass of all bodies. */
+static double phi_whole_mass(const phi_solver *s)
+{
+    const double *m = s->x[PHI_MASS];
+    double sum = m[0];
+    for (ptrdiff_t i = 1; i < s->massive; ++i) sum += m[i];
+    return sum;
+}
+
+/* Add a value to that of each body but the first. */
+static void phi_shift_bodies(const phi_solver *s, double *q, double value)
+{
+    for (ptrdiff_t i = 1; i < s->length; ++i) q[i] += value;
+}
+
+/* Store the sum of m v over all bodies but the first, per mass of the first, for each of these. */
+static void phi_join_shifts(const phi_solver *s, double *const *x, int first)
+{
+    for (int axis = 0; axis < PHI_BODY_AXES; ++axis) {
+        const double shift = phi_moment(s, x[phi_body_axes[axis][1]]) / s->x[PHI_MASS][0];
+        for (ptrdiff_t i = 1; i < s->length; ++i) s->gathered[first + axis][i] = shift;
+    }
+}
+#endif
+
+/* Transform a state, or a variation, to relative coordinates. */
+static void phi_to_relative(const phi_solver *s, double *const *x)
+{
+    for (int axis = 0; axis < PHI_BODY_AXES; ++axis) {
+        double *q = x[phi_body_axes[axis][0]], *v = x[phi_body_axes[axis][1]];
+#if PHI_MOMENTA
+        for (ptrdiff_t i = 0; i < s->length; ++i) v[i] /= s->x[PHI_MASS][i];
+#endif
+#if PHI_JACOBI
+        phi_make_relative(s, q);
+        phi_make_relative(s, v);
+#else
+        const double mass = phi_whole_mass(s), star = v[0];
+        phi_shift_bodies(s, q, -q[0]);
+        phi_shift_bodies(s, v, -v[0]);
+        q[0] += phi_moment(s, q) / mass;
+        v[0] += phi_moment(s, v) / mass;
+        phi_shift_bodies(s, v, star - v[0]);
+#endif
+    }
+}
+
+/* Transform the state to relative coordinates. */
+static void phi_begin_relative(phi_solver *s)
+{
+    phi_to_relative(s, s->x);
+#if PHI_COMPENSATED
+    phi_clear_carry(s);
+#endif
+}
+
+/* Transform relative coordinates back. */
+static void phi_to_cartesian(const phi_solver *s, double *const *x)
+{
+    for (int axis = 0; axis < PHI_BODY_AXES; ++axis) {
+        double *q = x[phi_body_axes[axis][0]], *v = x[phi_body_axes[axis][1]];
+#if PHI_JACOBI
+        phi_make_cartesian(s, q);
+        phi_make_cartesian(s, v);
+#else
+        const double recoil = phi_moment(s, v) / s->x[PHI_MASS][0];
+        q[0] -= phi_moment(s, q) / phi_whole_mass(s);
+        phi_shift_bodies(s, q, q[0]);
+        phi_shift_bodies(s, v, v[0]);
+        v[0] -= recoil;
+#endif
+#if PHI_MOMENTA
+        for (ptrdiff_t i = 0; i < s->length; ++i) v[i] *= s->x[PHI_MASS][i];
+#endif
+    }
+}
+
+/* Compute what the part B of H reads of other bodies, by all threads. */
+static void phi_gather_pulls(const phi_solver *s, const double *coef, size_t first, size_t end)
+{
+#if PHI_JACOBI
+    if (PHI_THREAD == 0) phi_place_bodies(s, s->x, s->placed);
+    phi_wait();
+#endif
+    phi_gather_rows(s, coef, first, end);
+    phi_wait();
+#if PHI_JACOBI
+    if (PHI_THREAD == 0) phi_join_pulls(s, 0);
+#else
+    if (PHI_THREAD == 0) phi_join_shifts(s, s->x, PHI_BODY_AXES);
+#endif
+    phi_wait();
+}
+
+#if PHI_TANGENT
+/* The same for a tangent vector v. */
+static void phi_gather_varied_pulls(const phi_solver *s, const double *coef, double *const *v, size_t first, size_t end)
+{
+    phi_wait(); /* for the use of the sums before */
+#if PHI_JACOBI
+    if (PHI_THREAD == 0) phi_place_bodies(s, s->x, s->placed);
+    if (PHI_THREAD == 0) phi_place_bodies(s, v, s->placed_varied);
+    phi_wait();
+    phi_gather_tangent_rows(s, coef, s->placed_varied, first, end);
+#else
+    phi_gather_tangent_rows(s, coef, v, first, end);
+#endif
+    phi_wait();
+#if PHI_JACOBI
+    if (PHI_THREAD == 0) phi_join_pulls(s, PHI_BODY_AXES);
+#else
+    if (PHI_THREAD == 0) phi_join_shifts(s, v, 2 * PHI_BODY_AXES);
+#endif
+    phi_wait();
+}
+#endif
+
+/* Move the centre of mass, which is free. */
+static void phi_move_centre(double *const *x, double time)
+{
+    for (int axis = 0; axis < PHI_BODY_AXES; ++axis)
+        x[phi_body_axes[axis][0]][0] += time * x[phi_body_axes[axis][1]][0];
+}
+#endif
