@@ -124,7 +124,9 @@ class _Orbit:
         g1, g2, r = self.end(c, s)
         inverse, inverse_end = power(self.distance, -1), power(r, -1)
         along = self.inverse_mass * (self.distance * g1 + self.moment * g2)
-        towards, pull = self.mu * g2, inverse * inverse_end * (self.strength * g1)
+        # the factors of the pull and of the momentum, not their rounded product, keep the flow canonical
+        towards = self.inverse_mass * (self.strength * g2)
+        pull = inverse * inverse_end * (self.strength * g1)
         q_change = [along * b - towards * inverse * a for a, b in zip(self.position, self.momentum, strict=True)]
         p_change = [-(pull * a + towards * inverse_end * b) for a, b in zip(self.position, self.momentum, strict=True)]
         return q_change, p_change

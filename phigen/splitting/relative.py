@@ -136,11 +136,12 @@ def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
     mass = list(accumulate(masses, add))
     inverse = [power(m, -1) for m in mass]
     share = [m * r for m, r in zip(masses, inverse, strict=True)]
-    moments = list(accumulate(([m * e for e in of] for m, of in zip(masses, q, strict=True)), _sum))
     momenta = list(accumulate(p, _sum))
-    count = len(q)
-    centres = [q[0], *([r * e for e in of] for r, of in zip(inverse[1:], moments[1:], strict=True))]
-    forms = [_difference(q[i], centres[i - 1]) for i in range(1, count)]
+    count, centre = len(q), q[0]
+    forms = list[list[Expression]]()
+    for i in range(1, count):
+        forms.append(_difference(q[i], centre))
+        centre = [c + share[i] * e for c, e in zip(centre, forms[-1], strict=True)]
     conjugate = [_difference(p[i], [share[i] * e for e in momenta[i]]) for i in range(1, count)]
     weights = [mass[i] * inverse[i - 1] * power(masses[i], -1) for i in range(1, count)]
     strengths = [total(bodies.strengths.get((i, j), ZERO) for j in range(i)) for i in range(1, count)]
@@ -196,24 +197,24 @@ def democratic_heliocentric(bodies: AttractingBodies) -> tuple[RelativeMotions, 
 def _spread_from_jacobi(bodies: AttractingBodies, mass: Sequence[Expression]) -> dict[str, Expression]:
     """Return the changes of the coordinates for those of Jacobi coordinates, from the last body to the first.
 
-    q_i is R_i + (M_{i−1}/M_i) Q_i with the centre of mass R_i of the bodies up to i, R_{i−1} = R_i − (m_i/M_i) Q_i; and
-    p_i is P_i + (m_i/M) p − m_i Σ P_a/M_{a−1} over a > i, where p is the total momentum.
+    With the centre of mass R_i and the momentum T_i of the bodies up to i, and s_i = m_i/M_i: R_{i−1} = R_i − s_i Q_i,
+    q_i = R_{i−1} + Q_i, p_i = P_i + s_i T_i, T_{i−1} = T_i − p_i. The total momentum T_N does not change.
+
+    As in the forms Q_i and P_i, the masses occur as s_i only. So the change is canonical, and inverse to the forms, if
+    the s_i are rounded. With several quotients of masses the energy would drift in proportion to their rounding errors.
     """
     spread = dict[str, Expression]()
     centre: list[Expression] = changes_of("R", 0, bodies.axes)
-    pull: list[Expression] = [ZERO] * bodies.axes
+    momentum: list[Expression] = [ZERO] * bodies.axes
     for i in range(len(mass) - 1, 0, -1):
-        inverse, before = power(mass[i], -1), power(mass[i - 1], -1)
+        share = bodies.masses[i] * power(mass[i], -1)
         of_q, of_p = changes_of("Q", i, bodies.axes), changes_of("P", i, bodies.axes)
-        position = [c + mass[i - 1] * inverse * d for c, d in zip(centre, of_q, strict=True)]
-        spread |= zip(bodies.positions[i], position, strict=True)
-        spread |= zip(
-            bodies.momenta[i], [d - bodies.masses[i] * u for d, u in zip(of_p, pull, strict=True)], strict=True
-        )
-        centre = [c - bodies.masses[i] * inverse * d for c, d in zip(centre, of_q, strict=True)]
-        pull = [u + before * d for u, d in zip(pull, of_p, strict=True)]
-    spread |= zip(bodies.positions[0], centre, strict=True)
-    return spread | dict(zip(bodies.momenta[0], [-(bodies.masses[0] * u) for u in pull], strict=True))
+        centre = [c - share * d for c, d in zip(centre, of_q, strict=True)]
+        moved = [d + share * t for d, t in zip(of_p, momentum, strict=True)]
+        spread |= zip(bodies.positions[i], _sum(centre, of_q), strict=True)
+        spread |= zip(bodies.momenta[i], moved, strict=True)
+        momentum = _difference(momentum, moved)
+    return spread | dict(zip((*bodies.positions[0], *bodies.momenta[0]), (*centre, *momentum), strict=True))
 
 
 def _spread_from_star(bodies: AttractingBodies, shares: Sequence[Expression]) -> dict[str, Expression]:
