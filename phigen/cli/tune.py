@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 )
 @settings_option
 @click.option(
-    "--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="Time limit of the search."
+    "--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="Time limit of the command."
 )
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw error against time: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
@@ -74,6 +74,7 @@ def command(
     from phigen.compiler import compile_proved
     from phigen.runtime.origin import origin_of
     from phigen.tuning.study import tune
+    from phigen.tuning.tuner import TimeBudget
 
     _expect_positive(horizon, "--horizon")
     _expect_positive(budget, "--budget")
@@ -81,6 +82,7 @@ def command(
         from phigen.drawing.palette import require_matplotlib
 
         require_matplotlib()
+    clock = TimeBudget(budget)
     spec = load_one(spec_file)
     if spec.noise:
         message = "phigen tune does not compare settings where there is noise"
@@ -97,7 +99,7 @@ def command(
     compilation = compile_proved(spec.for_running(profile=profile))
     chosen_target("auto", console.note)
     run, problem = initial_value_problem(console, compilation, name, settings, horizon, measure)
-    tuning = tune(compilation, problem, measure, accuracy, budget, console.note)
+    tuning = tune(compilation, problem, measure, accuracy, clock, console.note)
     if as_json:
         out_json(described(tuning, spec, run))
     elif tuning.winner:

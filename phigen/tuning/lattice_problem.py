@@ -26,6 +26,8 @@ from phigen.tuning.settings import CHOICES, FORMULAS, OWN, SPLITTING, Setting, d
 MOST_SITES = 10_000
 #: Limits on the numbers stored of one run, and of a run that is compared with a reference.
 MOST_NUMBERS, MOST_COMPARED = 2**24, 2**13
+#: States at which the energy of one run is examined, at most: each takes a call of Python and a pass over all sites.
+LATTICE_ROWS = 1024
 
 
 @dataclass
@@ -113,8 +115,8 @@ class LatticeProblem(Problem):
 
     @property
     def most_rows(self) -> int:
-        """The largest number of rows whose energies fit into memory."""
-        return min(super().most_rows, max(64, MOST_NUMBERS // len(self.start)))
+        """The largest number of rows whose energies are examined, and fit into memory."""
+        return min(LATTICE_ROWS, max(64, MOST_NUMBERS // len(self.start)))
 
     @property
     def evens_out(self) -> bool:

@@ -214,7 +214,7 @@ def _coarsest(
     if point is None:
         return []
     points = [point]
-    while points[0].step < 0.97 * largest_step and step == first:
+    while points[0].step < 0.97 * largest_step and step == first and patience():
         coarser = measure(min(points[0].step * FINER, largest_step))
         if coarser is None:
             break

@@ -25,6 +25,8 @@ from phigen.tuning.tuner import Notify, TimeBudget, Tuner
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
 #: The number of finalists, their largest cost relative to the best, and the rounds in which all are timed in turn.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
+#: Shares of the budget after which only what a result needs is confirmed, and methods are timed once.
+CONFIRMED, TIMED = 1.0, 1.1
 #: The time for monitors, as a share of the budget and in addition to it.
 MONITORS = 0.5
 #: Costs within this factor count as equal: then the lower order wins.
@@ -99,23 +101,24 @@ class Tuning:
 
 
 def tune(
-    compilation: Compilation, problem: Problem, measure: str, accuracy: float, budget: float,
+    compilation: Compilation, problem: Problem, measure: str, accuracy: float, budget: float | TimeBudget,
     note: Notify = lambda text: None,
 ) -> Tuning:  # fmt: skip
     """Measure the candidates of a spec on a run, and find the cheapest that meets the accuracy.
 
     ``measure`` is ``energy``, the largest error of the energy on the way, or ``orbit``, the distance from a
-    reference. Takes about ``budget`` seconds at most. Raises `StepError` if the spec's own setting cannot make even
-    small steps, `CheckError` if there is no reference, `ToolchainError` without a C compiler.
+    reference. Takes about ``budget`` seconds at most, or until a budget that has begun ends. Raises `StepError` if the
+    spec's own setting cannot make even small steps, `CheckError` if there is no reference, `ToolchainError` without a C
+    compiler.
     """
-    clock = TimeBudget(budget)
+    clock = budget if isinstance(budget, TimeBudget) else TimeBudget(budget)
     tuner = Tuner(compilation, problem, accuracy, clock, note)
     current = tuner.start(measure)
     finished = tuner.search(current)
     classical = tuner.peers()
     finalists = final(tuner, current)
     current_run = _present(tuner, current)
-    peers = [Finalist(c, p) for c in classical if (p := confirmed(tuner, c))]
+    peers = [Finalist(c, p) for c in classical if clock.left(CONFIRMED) > 0 and (p := confirmed(tuner, c))]
     timed = time_all([*finalists, *peers, *([current_run] if current_run else [])], tuner)
     ranked, peers = ranking(timed[: len(finalists)]), timed[len(finalists) :][: len(peers)]
     look = ranked and measure == "energy"
@@ -172,9 +175,10 @@ def final(tuner: Tuner, current: Curve) -> list[Finalist]:
     accuracy = tuner.accuracy
     finalists: list[Finalist] = []
     for curve in sorted(tuner.tried.values(), key=lambda c: c.cost(accuracy)):
-        enough = len(finalists) >= FINALISTS or tuner.clock.left(1.0) < 0
+        late = tuner.clock.left(CONFIRMED) < 0
+        enough = len(finalists) >= FINALISTS or late
         behind = bool(finalists) and curve.cost(accuracy) > BEHIND * finalists[0].point.cost
-        if math.isinf(curve.cost(accuracy)) or (finalists and (enough or behind) and curve is not current):
+        if math.isinf(curve.cost(accuracy)) or (finalists and (enough or behind) and (late or curve is not current)):
             continue
         point = confirmed(tuner, curve)
         if point:
@@ -191,8 +195,8 @@ def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
     method, measure = tuner.methods[curve.key], tuner.measures[curve.bounded]
     step, _ = search.cheapest_step(curve.points, search.AIM * accuracy, curve.order)
     step = step or search.cheapest_step(curve.points, accuracy, curve.order)[0]
-    for _ in range(ATTEMPTS):
-        if not step:
+    for attempt in range(ATTEMPTS):
+        if not step or (attempt and tuner.clock.left(CONFIRMED) < 0):
             return None
         h = search.rounded_down(min(step, curve.largest))
         span = confirming_span(tuner, curve, h)
@@ -221,15 +225,17 @@ def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
 def _present(tuner: Tuner, current: Curve) -> Finalist | None:
     """The spec's own setting at the step of the run."""
     h = tuner.problem.step
-    span = confirming_span(tuner, current, h)
+    span = confirming_span(tuner, current, h) if tuner.clock.left(CONFIRMED) > 0 else 0.0
     point = tuner.measures[current.bounded](tuner.methods[current.key], h, span) if span else None
     return Finalist(current, point) if point else None
 
 
 def time_all(finalists: Sequence[Finalist], tuner: Tuner) -> list[Finalist]:
-    """Time all methods in turn, in several rounds, so that disturbances affect all of them alike."""
+    """Time all methods in turn, in several rounds, so that disturbances affect all of them alike; at least once."""
     seconds: list[list[float]] = [[] for _ in finalists]
-    for _ in range(ROUNDS):
+    for completed in range(ROUNDS):
+        if completed and tuner.clock.left(TIMED) < 0:
+            break
         for finalist, rounds in zip(finalists, seconds, strict=True):
             h = finalist.point.step
             steps = steps_in(tuner.problem.horizon, h)

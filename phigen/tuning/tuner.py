@@ -22,6 +22,8 @@ from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, 
 #: Shares of the budget: after which no build starts; for one round of builds; for the expected time of a first guess;
 #: for one scan; and for one reference solution.
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
+#: Shares after which no candidate and no classical method is scanned any more.
+SCANNED, COMPARED = 0.9, 0.85
 #: The largest cost of a candidate relative to the best so far, and that of a classical method.
 WORTH, WORTH_KNOWING = 4.0, 100.0
 #: Classical methods that the result is compared with: their names in tables, and orders.
@@ -31,10 +33,10 @@ Notify = Callable[[str], object]
 
 
 class TimeBudget:
-    """The budget of time."""
+    """The budget of time, from ``start`` on, a time of `time.perf_counter`; by default from now on."""
 
-    def __init__(self, budget: float) -> None:
-        self.budget, self.start = budget, time.perf_counter()
+    def __init__(self, budget: float, start: float | None = None) -> None:
+        self.budget, self.start = budget, time.perf_counter() if start is None else start
 
     def at(self, share: float) -> float:
         """The time, as of `time.perf_counter`, at which a share of the budget is used up."""
@@ -120,10 +122,12 @@ class Tuner:
     def peers(self) -> list[Curve]:
         """The classical methods, scanned; none if there is no time to compile them."""
         current = next(iter(self.tried.values()))
-        if self._race is None and current.seconds > self.clock.left(0.85):
+        if self._race is None and current.seconds > self.clock.left(COMPARED):
             return []
         curves = []
         for name, (label, order) in PEERS.items():
+            if self.clock.left(COMPARED) <= 0:
+                break
             method = self._classical(name)
             label = f"{label} in {self._raced.language}"
             self.methods[label] = method
@@ -147,6 +151,8 @@ class Tuner:
                 self.refused[setting] = "it is not a Poisson map to round-off"
             elif outcome.fingerprint in self._known:
                 self.refused[setting] = ""
+            elif self.clock.left(SCANNED) <= 0:
+                self.refused[setting] = "there was no time to measure it"
             else:
                 curve = self.add(outcome, self.problem.method(outcome.solver()), WORTH * self.least)
                 cost = curve.cost(self.accuracy)
@@ -179,7 +185,7 @@ class Tuner:
         return affordable
 
     def _scanned(self, method: CompiledMethod, order: int, worth: float, *, bounded: bool) -> tuple[Point, ...]:
-        until = time.perf_counter() + min(SCANNING * self.clock.budget, max(self.clock.left(0.9), 0.0))
+        until = time.perf_counter() + min(SCANNING * self.clock.budget, max(self.clock.left(SCANNED), 0.0))
         measure, span = self.measures[bounded], self.piece
         return search.scan(
             lambda h: measure(method, h, span), self.problem.step, self.most, self.accuracy, order, worth,

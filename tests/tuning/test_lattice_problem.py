@@ -1,5 +1,6 @@
 """Lattices as problems of `phigen tune`: the same searches, on flat states."""
 
+import time
 from dataclasses import replace
 from functools import cache
 
@@ -9,12 +10,14 @@ import pytest
 from phigen import spec as specs
 from phigen.api import lattice_solver_of
 from phigen.compiler import compile_spec
-from phigen.tuning import lattice_problem
+from phigen.tuning import lattice_problem, study
 from phigen.tuning.building import Built, build
 from phigen.tuning.problem import Classical
 from phigen.tuning.scales import fastest_rate
 from phigen.tuning.settings import OWN, SPLITTING, Setting, own_setting
+from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import energy_measure
+from phigen.tuning.tuner import TimeBudget
 
 CHAIN = """phigen: 1
 name: chain
@@ -112,3 +115,22 @@ def test_settings_of_lattices_mean_what_is_built():
         assert (again.label, again.order.order) == (candidate_built.kind, 6)
     series = own_setting(compile_spec(specs.loads(KDV)))
     assert (series.kind, series.composition, series.lines()[0]) == ("auto", "auto", "scheme: series")
+
+
+def test_of_a_budget_that_is_used_up_only_the_setting_of_the_spec_is_left(monkeypatch):
+    """It is scanned at one step, confirmed and timed once; no candidate and no classical method is measured."""
+    clock, timed, found = TimeBudget(1.0, time.perf_counter() - 100.0), [], problem()
+
+    def counted(method, h, steps):
+        timed.append(h)
+        return nanoseconds_per_step(method, h, steps)
+
+    monkeypatch.setattr(study, "nanoseconds_per_step", counted)
+    tuning = study.tune(compiled(), found, "energy", 1e-2, clock)
+    assert [curve.setting for curve in tuning.curves] == [own_setting(compiled())]
+    assert (len(tuning.curves[0].points), len(tuning.finalists), tuning.peers, tuning.present) == (1, 1, (), None)
+    assert len(timed) == 1
+
+
+def test_the_energy_of_a_lattice_is_examined_at_a_bounded_number_of_states():
+    assert problem().most_rows == lattice_problem.LATTICE_ROWS

@@ -26,7 +26,7 @@ from phigen.tuning.settings import GAUSS, OWN, SPLITTING, Setting, charts, own_s
 from phigen.tuning.study import Finalist, Tuning, automatic, confirmed, ranking
 from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import MARKS, Point, energy_measure, marks, orbit_measure
-from phigen.tuning.tuner import expected_seconds
+from phigen.tuning.tuner import TimeBudget, expected_seconds
 
 SPECS = resources.bundled_specs()
 
@@ -207,7 +207,7 @@ def tuner_of(grows, budget=1e6):
 
     return curve, SimpleNamespace(
         accuracy=1e-6, methods={curve.key: None}, measures={True: measure}, piece=100.0, referring=False,
-        problem=SimpleNamespace(horizon=1e4), clock=SimpleNamespace(budget=budget),
+        problem=SimpleNamespace(horizon=1e4), clock=TimeBudget(budget),
     )  # fmt: skip
 
 
