@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 93e1523dd67197f5bf36d74395968080aa690b0605b266a73baceebe723141a6
+ * body-sha256: 18d752533dbd8322324f59f72bed9d4b3a4439a43e0a4dc0666a139bf0ef3ac5
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -71,9 +71,10 @@ typedef struct {
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has
-   point_vortices_work_size(sizes) bytes, aligned as by malloc, and must outlive *s. params may be NULL for
-   the defaults; its arrays are copied. Returns point_vortices_BAD_ARGUMENT if sizes are not admissible, x0 or
-   a parameter is not finite, or one that must be positive is not. */
+   point_vortices_work_size(sizes) bytes, aligned as by malloc, and must outlive *s. params is required, with
+   the arrays that have no default, and is copied. Returns point_vortices_BAD_ARGUMENT if sizes are not
+   admissible, params or a required array is NULL, x0 or a parameter is not finite, or one that must be
+   positive is not. */
 point_vortices_status point_vortices_init(point_vortices_solver *s, const point_vortices_params *params,
     const size_t sizes[point_vortices_AXES], const double *x0, void *work);
 

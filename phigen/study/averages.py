@@ -152,8 +152,9 @@ def averages(
 ) -> dict[str, Average]:
     """Return the averages over time of the observables of a trajectory, or of the columns of a series, by name.
 
-    They are those that ``phigen run`` prints and sweeps store: over the rows from the time ``after`` on, with standard
-    errors from at least ``blocks`` blocks. Fields of lattices, with a value at each site, are left out.
+    The averages are over the rows from the time ``after`` on, with standard errors from at least ``blocks`` blocks. A
+    trajectory does not hold ``average:`` of its run: for the numbers of ``phigen run`` and of sweeps, repeat its
+    ``after`` and ``blocks`` here. Fields of lattices, with a value at each site, are left out.
     """
     column_values = trajectory.columns if isinstance(trajectory, LatticeSeries) else trajectory.observables
     columns = {name: values for name, values in column_values.items() if np.ndim(values) == 1}

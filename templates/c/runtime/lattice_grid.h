@@ -3,8 +3,15 @@
 /* Bytes that phi_init needs for these sizes; 0 if they are not admissible. */
 size_t phi_work_size(const size_t sizes[PHI_AXES]);
 
+#if PHI_DEFAULTS
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has phi_work_size(sizes) bytes, aligned as by
    malloc, and must outlive *s. params may be NULL for the defaults; its arrays are copied. Returns
    PHI_BAD_ARGUMENT if sizes are not admissible, x0 or a parameter is not finite, or one that must be positive is not. */
+#else
+/* Initialise *s with the state x0[field][site], the last axis fastest. work has phi_work_size(sizes) bytes, aligned as by
+   malloc, and must outlive *s. params is required, with the arrays that have no default, and is copied. Returns
+   PHI_BAD_ARGUMENT if sizes are not admissible, params or a required array is NULL, x0 or a parameter is not finite, or
+   one that must be positive is not. */
+#endif
 phi_status phi_init(phi_solver *s, const phi_params *params, PHI_SIZES, const double *x0, void *work);
 #endif

@@ -105,6 +105,7 @@ def switches(layout: Layout) -> dict[str, bool]:
         "SWEPT": program.profile != "fast",
         "PAIRS": step.partners is not None and not layout.graph,
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
+        "DEFAULTS": all(p.values is None for p in program.parameters),
         "NUMBERED": any(p.at == "all" for p in program.parameters),
         "HANDS": any(handed_apart(program, step)),
         "TAKES": takes(program, step),
