@@ -48,14 +48,14 @@ class Beginning:
     level: float | None = None
 
 
-def level(about: Interface, more: dict[str, Any]) -> float | None:
+def level(interface: Interface, by_keyword: dict[str, Any]) -> float | None:
     """Return the energy level e of a lattice whose steps are equal in τ, taken from ``gauge`` among other arguments.
 
     None for −H of the start. Raises `ValueError` for anything but a finite number.
     """
-    if not about.monitored or "gauge" not in more:
+    if not interface.monitored or "gauge" not in by_keyword:
         return None
-    value = np.ravel(np.asarray(more.pop("gauge"), dtype=np.float64))
+    value = np.ravel(np.asarray(by_keyword.pop("gauge"), dtype=np.float64))
     if value.shape != (1,) or not np.isfinite(value).all():
         raise ValueError("gauge must be one finite number, the energy level e")
     return float(value[0])
@@ -77,46 +77,46 @@ def end(until: float, begin: float, h: float) -> float:
     return span
 
 
-def count(value: int, what: str, minimum: int, most: int = _MOST) -> int:
-    """Return an integer from ``minimum`` to ``most``. Raises `TypeError` and `ValueError` for others."""
+def count(value: int, name: str, minimum: int, maximum: int = _MOST) -> int:
+    """Return an integer from ``minimum`` to ``maximum``. Raises `TypeError` and `ValueError` for others."""
     try:
         number = operator.index(value)
     except TypeError:
-        raise TypeError(f"{what} must be an integer, not {_shown(value)}") from None
+        raise TypeError(f"{name} must be an integer, not {_shown(value)}") from None
     if number < minimum:
-        raise ValueError(f"{what} must be at least {minimum}, not {_shown(number)}")
-    if number > most:
-        raise ValueError(f"{what} must be at most {most}, not {_shown(number)}")
+        raise ValueError(f"{name} must be at least {minimum}, not {_shown(number)}")
+    if number > maximum:
+        raise ValueError(f"{name} must be at most {maximum}, not {_shown(number)}")
     return number
 
 
-def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -> float:
+def start_time(t0: float | None, interface: Interface, by_keyword: dict[str, float]) -> float:
     """Return the time of a start, 0 by default.
 
     If the Hamiltonian does not depend on the time, the name t0 may be a parameter's, and its value is added to
-    ``more``.
+    ``by_keyword``.
     """
     if t0 is None or interface.time:
         return 0.0 if t0 is None else number(t0, "the time t0")
     if "t0" not in interface.parameters:
         raise TypeError(f"t0 is not used: the Hamiltonian of {interface.name} does not depend on the time")
-    more["t0"] = t0
+    by_keyword["t0"] = t0
     return 0.0
 
 
-def draws(interface: Interface, more: dict[str, Any], named: Mapping[str, int | None] = NONE_DRAWN) -> Draws:
+def draws(interface: Interface, by_keyword: dict[str, Any], selections: Mapping[str, int | None] = NONE_DRAWN) -> Draws:
     """Return the random numbers selected by the arguments seed, member and step0.
 
-    Without noise, these names may be those of parameters, and their values are added to ``more``.
+    Without noise, these names may be those of parameters, and their values are added to ``by_keyword``.
     """
-    passed = {name: value for name, value in named.items() if value is not None}
+    selected = {name: value for name, value in selections.items() if value is not None}
     if interface.noise:
-        numbers = {name: count(value, name, 0, _LARGEST[name]) for name, value in passed.items()}
+        numbers = {name: count(value, name, 0, _LARGEST[name]) for name, value in selected.items()}
         return Draws(numbers.get("seed", 0), numbers.get("member", 0), numbers.get("step0", 0))
-    for name in passed:
+    for name in selected:
         if name not in interface.parameters:
             raise TypeError(f"{name} was given, but {interface.name} has no noise")
-    more |= passed
+    by_keyword |= selected
     return Draws()
 
 
@@ -132,13 +132,13 @@ def increments(values: ArrayLike, interface: Interface) -> Floats:
     return rows
 
 
-def expect_no_noise(what: str, interface: Interface) -> None:
+def expect_no_noise(argument: str, interface: Interface) -> None:
     """Raise `TypeError` if the system has noise, for functions that divide steps.
 
     The parts of a step would draw other random numbers than the whole step.
     """
     if interface.noise:
-        raise TypeError(f"{what} is not available with noise: parts of a step are not on the same path")
+        raise TypeError(f"{argument} is not available with noise: parts of a step are not on the same path")
 
 
 def times_within(times: ArrayLike, t: Floats) -> Floats:
@@ -156,23 +156,27 @@ def rows_at(t: Floats, x: Floats, requested_times: Floats) -> Floats:
     nearest = np.argmin(np.abs(t[:, np.newaxis] - requested_times), axis=0)
     apart = np.abs(t[nearest] - requested_times)
     if (apart > 1e-9 * np.ptp(t)).any():
-        between = float(requested_times[int(np.argmax(apart))])
-        message = f"with noise only states that are stored can be asked for: {between!r} is between two of them"
+        earliest_between = float(requested_times[int(np.argmax(apart))])
+        message = (
+            f"with noise only states that are stored can be asked for: {earliest_between!r} is between two of them"
+        )
         raise ValueError(f"{message}, where the path is not known; stride=1 stores all steps")
     rows: Floats = x[nearest]
     return rows
 
 
-def times(t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], more: dict[str, Any]) -> Floats | None:
+def times(
+    t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], by_keyword: dict[str, Any]
+) -> Floats | None:
     """Return the times ``t`` of states, whose leading axes have the given shape, as a flat array.
 
     Returns None if the Hamiltonian does not depend on the time. Then t may be the name of a parameter, and its value
-    is added to ``more``.
+    is added to ``by_keyword``.
     """
     if not interface.time:
         if t is not None and "t" not in interface.parameters:
             raise TypeError(f"t was given, but the Hamiltonian of {interface.name} does not depend on the time")
-        more |= {} if t is None else {"t": t}
+        by_keyword |= {} if t is None else {"t": t}
         return None
     if t is None:
         raise TypeError(f"t is missing: the Hamiltonian of {interface.name} depends on the time")
@@ -182,12 +186,12 @@ def times(t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], mor
     return rows
 
 
-def together(mapped: Mapping[str, Any] | None, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return parameters passed in a mapping and, as ``more``, by keyword. Raises `TypeError` for a name in both."""
-    both = sorted(set(mapped or {}) & set(more))
-    if both:
-        raise TypeError(f"parameter {both[0]!r} is given twice")
-    return {**(mapped or {}), **more}
+def together(mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any]) -> dict[str, Any]:
+    """Return parameters passed in a mapping and by keyword. Raises `TypeError` for a name in both."""
+    repeated = sorted(set(mapped or {}) & set(by_keyword))
+    if repeated:
+        raise TypeError(f"parameter {repeated[0]!r} is given twice")
+    return {**(mapped or {}), **by_keyword}
 
 
 def broken_bound(name: str, value: ArrayLike, interface: Interface) -> str:
@@ -198,35 +202,37 @@ def broken_bound(name: str, value: ArrayLike, interface: Interface) -> str:
     return "nonnegative" if name in interface.nonnegative and not least >= 0 else ""
 
 
-def parameters(interface: Interface, mapped: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
-    """Return the values of all parameters: those passed in a mapping and, as ``more``, by keyword, else defaults.
+def parameters(
+    interface: Interface, mapped: Mapping[str, float] | None, by_keyword: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the values of all parameters: those passed in a mapping and, as ``by_keyword``, by keyword, else defaults.
 
     Raises `TypeError` for unknown names and names passed twice, `ValueError` for values that are not admissible.
     """
     values = {name: float(value) for name, value in interface.parameters.items()}
-    asked = together(mapped, more)
-    expect_known(asked, interface.parameters)
-    for name, value in asked.items():
+    requested = together(mapped, by_keyword)
+    expect_known(requested, interface.parameters)
+    for name, value in requested.items():
         values[name] = number(value, f"parameter {name!r}")
-        if bound := broken_bound(name, values[name], interface):
-            raise ValueError(f"parameter {name!r} must be {bound}, not {_shown(value)}")
+        if violated := broken_bound(name, values[name], interface):
+            raise ValueError(f"parameter {name!r} must be {violated}, not {_shown(value)}")
     return values
 
 
-def state(x: ArrayLike, what: str, interface: Interface) -> Floats:
+def state(x: ArrayLike, argument: str, interface: Interface) -> Floats:
     """Return a copy of one state (DIM,). Raises `TypeError` and `ValueError`, as `states`."""
-    copy = states(x, what, interface)
+    copy = states(x, argument, interface)
     if copy.ndim != 1:
         expected = f"({interface.dimension},)"
-        raise ValueError(f"{what} must have shape {expected}, not {copy.shape}; for many states use ensemble")
+        raise ValueError(f"{argument} must have shape {expected}, not {copy.shape}; for many states use ensemble")
     return copy
 
 
-def members(x: ArrayLike, what: str, interface: Interface) -> Floats:
+def members(x: ArrayLike, argument: str, interface: Interface) -> Floats:
     """Return a copy of the states of an ensemble (members, DIM). Raises `TypeError` and `ValueError`, as `states`."""
-    copies = states(x, what, interface)
+    copies = states(x, argument, interface)
     if copies.ndim != 2:
-        raise ValueError(f"{what} must have shape (members, {interface.dimension}), not {copies.shape}")
+        raise ValueError(f"{argument} must have shape (members, {interface.dimension}), not {copies.shape}")
     return copies
 
 
@@ -237,12 +243,12 @@ def ensemble(
     stride: int | None,
     t0: ArrayLike | None,
     mapped: Mapping[str, ArrayLike] | None,
-    more: Mapping[str, ArrayLike],
+    by_keyword: Mapping[str, ArrayLike],
     interface: Interface,
     draws: Draws = FIRST_DRAWS,
 ) -> Members:
     """Return the members of an ensemble from the arguments of `Solver.ensemble`, checked."""
-    per_member: dict[str, Any] = {name: v for name, v in {**(mapped or {}), **more}.items() if np.ndim(v) > 0}
+    per_member: dict[str, Any] = {name: v for name, v in {**(mapped or {}), **by_keyword}.items() if np.ndim(v) > 0}
     if t0 is not None and np.ndim(t0) > 0 and not interface.time:
         per_member["t0"] = t0  # without a time, t0 can only be a parameter
     several: list[Any] = [v for v in (h, t0, *per_member.values()) if v is not None and np.ndim(v) > 0]
@@ -252,17 +258,17 @@ def ensemble(
         start = members(X0, "X0", interface)
     shape = (len(start),)
     # Names are checked with a number in place of each array.
-    plain: list[dict[str, Any]] = [
-        {n: 1.0 if n in per_member else v for n, v in (part or {}).items()} for part in (mapped, more)
+    shared_values: list[dict[str, Any]] = [
+        {n: 1.0 if n in per_member else v for n, v in (part or {}).items()} for part in (mapped, by_keyword)
     ]
     alone: Any = 1.0 if t0 is not None and np.ndim(t0) > 0 else t0
-    begin: Floats = np.asarray(start_time(alone, interface, plain[1]))
-    values = {name: np.asarray(value) for name, value in parameters(interface, *plain).items()}
+    begin: Floats = np.asarray(start_time(alone, interface, shared_values[1]))
+    values = {name: np.asarray(value) for name, value in parameters(interface, *shared_values).items()}
     for name in per_member.keys() & values.keys():
         values[name] = array(per_member[name], f"parameter {name!r}", shape)
-        if bound := broken_bound(name, values[name], interface):
-            m = int(np.argmin(values[name] >= 0 if bound == "nonnegative" else values[name] > 0))
-            raise ValueError(f"parameter {name!r} must be {bound}, not {float(values[name][m])}, as of member {m}")
+        if violated := broken_bound(name, values[name], interface):
+            m = int(np.argmin(values[name] >= 0 if violated == "nonnegative" else values[name] > 0))
+            raise ValueError(f"parameter {name!r} must be {violated}, not {float(values[name][m])}, as of member {m}")
     if alone is not t0 and interface.time:
         begin = array(t0, "the times t0", shape)  # type: ignore[arg-type]
     size = array(h, "the step size h", shape) if np.ndim(h) > 0 else np.asarray(step_size(h))  # type: ignore[arg-type]
@@ -275,20 +281,20 @@ def ensemble(
     return Members(start, size, count(steps, "steps", 0), values, begin, stride, draws, paths)
 
 
-def states(x: ArrayLike, what: str, interface: Interface) -> Floats:
+def states(x: ArrayLike, argument: str, interface: Interface) -> Floats:
     """Return a copy of states (…, DIM), so that the caller may change the array later.
 
     Raises `TypeError` for arrays that are not of real numbers, `ValueError` for other shapes and non-finite values.
     """
-    copy = real(x, what)
+    copy = real(x, argument)
     names = interface.coordinates
     if copy.ndim == 0 or copy.shape[-1] != len(names):
         last = f"{len(names)} ({', '.join(names)})"
-        raise ValueError(f"{what} must have a last axis of length {last}, but its shape is {copy.shape}")
+        raise ValueError(f"{argument} must have a last axis of length {last}, but its shape is {copy.shape}")
     if not np.isfinite(copy).all():
         index = tuple(np.argwhere(~np.isfinite(copy))[0].tolist())
-        place = f"{names[index[-1]]}" + (f" of member {index[0]}" if len(index) > 1 else "")
-        raise ValueError(f"{what} must be finite, but {place} is {float(copy[index])!r}")
+        element = f"{names[index[-1]]}" + (f" of member {index[0]}" if len(index) > 1 else "")
+        raise ValueError(f"{argument} must be finite, but {element} is {float(copy[index])!r}")
     return copy
 
 
@@ -300,15 +306,15 @@ def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: 
     if not interface.attitude:
         first(np.eye(1), None, interface)  # raises, with the reason why there is no attitude
     several = np.ndim(attitude0) > len(interface.attitude) if attitude0 is not None else False
-    placed = position0 is not None and np.ndim(position0) > 1
+    has_member_positions = position0 is not None and np.ndim(position0) > 1
     turns = array(attitude0, "attitude0", (members, *interface.attitude)) if several else None  # type: ignore[arg-type]
-    places = array(position0, "position0", (members, 3)) if placed and interface.position else None  # type: ignore[arg-type]
+    positions = array(position0, "position0", (members, 3)) if has_member_positions and interface.position else None  # type: ignore[arg-type]
     begin = np.empty((members, interface.element))
     identity = np.eye(interface.attitude[0])[0] if len(interface.attitude) == 1 else np.eye(interface.attitude[0])
     for m in range(members):
         attitude = attitude0 if turns is None else turns[m]
         begin[m] = first(
-            identity if attitude is None else attitude, position0 if places is None else places[m], interface
+            identity if attitude is None else attitude, position0 if positions is None else positions[m], interface
         )
     return begin
 
@@ -320,13 +326,13 @@ def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: I
     """
     if attitude0 is None and position0 is None:
         return None
-    for argument, there, what in (
+    for argument, session_there, what in (
         (attitude0, bool(interface.attitude), "attitude0"),
         (position0, interface.position, "position0"),
     ):
-        if argument is not None and not there:
-            where = "reconstruct: quaternion or matrix in its spec asks for one, positions belong to se(3)"
-            raise TypeError(f"{interface.name} has no {what[:-1]}: {where}")
+        if argument is not None and not session_there:
+            requirement = "reconstruct: quaternion or matrix in its spec asks for one, positions belong to se(3)"
+            raise TypeError(f"{interface.name} has no {what[:-1]}: {requirement}")
     shape = interface.attitude
     start = np.eye(shape[0]) if len(shape) == 2 else np.eye(4)[0]
     attitude = start if attitude0 is None else array(attitude0, "attitude0", shape)
@@ -335,21 +341,21 @@ def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: I
             raise ValueError("attitude0 must not be 0")
         attitude = attitude / np.abs(attitude).max()
         attitude /= np.sqrt(attitude @ attitude)
-    place = np.zeros(3) if position0 is None else array(position0, "position0", (3,))
-    return np.concatenate([attitude.ravel(), place]) if interface.position else attitude.ravel()
+    position = np.zeros(3) if position0 is None else array(position0, "position0", (3,))
+    return np.concatenate([attitude.ravel(), position]) if interface.position else attitude.ravel()
 
 
-def array(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Floats:
+def array(values: ArrayLike, argument: str, shape: tuple[int, ...]) -> Floats:
     """Return a copy of an array. Raises `ValueError` if its shape is not ``shape``, or a value is not finite."""
-    copy = real(values, what)
+    copy = real(values, argument)
     if copy.shape != shape:
-        raise ValueError(f"{what} must have shape {shape}, not {copy.shape}")
+        raise ValueError(f"{argument} must have shape {shape}, not {copy.shape}")
     if not np.isfinite(copy).all():
-        raise ValueError(f"{what} must be finite")
+        raise ValueError(f"{argument} must be finite")
     return copy
 
 
-def real(values: ArrayLike, what: str) -> Floats:
+def real(values: ArrayLike, argument: str) -> Floats:
     """Return a copy of an array of real numbers.
 
     Raises `TypeError` for texts and for complex numbers, whose imaginary parts would be lost.
@@ -361,26 +367,26 @@ def real(values: ArrayLike, what: str) -> Floats:
         if kind != "c":
             return np.array(values, dtype=np.float64)
     except OverflowError:
-        raise ValueError(f"{what} must be finite, but a number in it is too large") from None
+        raise ValueError(f"{argument} must be finite, but a number in it is too large") from None
     except (TypeError, ValueError) as error:
-        raise TypeError(f"{what} must be an array of numbers: {error}") from None
-    raise TypeError(f"{what} must be real")
+        raise TypeError(f"{argument} must be an array of numbers: {error}") from None
+    raise TypeError(f"{argument} must be real")
 
 
-def number(value: float, what: str) -> float:
+def number(value: float, argument: str) -> float:
     """Return a value as a float. Raises `TypeError` if it is not a number, `ValueError` if it is not finite."""
     if isinstance(value, str | bytes | bytearray):  # float() would accept texts
-        raise TypeError(f"{what} must be a number, not {_shown(value)}")
+        raise TypeError(f"{argument} must be a number, not {_shown(value)}")
     try:
         number = float(value)
     except OverflowError:
-        raise ValueError(f"{what} must be finite, not {_shown(value)}") from None
+        raise ValueError(f"{argument} must be finite, not {_shown(value)}") from None
     except (TypeError, ValueError):
         shape = np.shape(value) if isinstance(value, list | tuple | np.ndarray) else ()
         several = f"an array of shape {shape}" if shape else _shown(value)
-        raise TypeError(f"{what} must be {'one' if shape else 'a'} number, not {several}") from None
+        raise TypeError(f"{argument} must be {'one' if shape else 'a'} number, not {several}") from None
     if not math.isfinite(number):
-        raise ValueError(f"{what} must be finite, not {_shown(value)}")
+        raise ValueError(f"{argument} must be finite, not {_shown(value)}")
     return number
 
 
@@ -410,8 +416,8 @@ def expect_known(names: Iterable[str], known: Mapping[str, float]) -> None:
 def _unknown(name: str, known: Mapping[str, float]) -> str:
     if name == "h":
         return "unknown parameter 'h'; the step size of a run is step="
-    near = get_close_matches(name, known, n=1)
-    if near:
-        return f"unknown parameter {name!r}; did you mean {near[0]!r}?"
-    listed = f"the system has {', '.join(known)}" if known else "the system has none"
-    return f"unknown parameter {name!r}; {listed}"
+    similar_names = get_close_matches(name, known, n=1)
+    if similar_names:
+        return f"unknown parameter {name!r}; did you mean {similar_names[0]!r}?"
+    known_names = f"the system has {', '.join(known)}" if known else "the system has none"
+    return f"unknown parameter {name!r}; {known_names}"

@@ -47,11 +47,11 @@ class Backend(Protocol):
         """Return a back end whose trajectories all have the given gauge, one value for each Casimir of the gauge."""
         ...
 
-    def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
+    def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
         """Return final states (members, DIM), or frames (rows, members, DIM); ``threads`` None uses all cores.
 
-        ``turned`` (rows, members, numbers) holds the initial attitudes in its first row; the others are filled with the
-        attitudes of the frames. Without frames it has two rows, and the second receives the final attitudes.
+        ``attitudes`` (rows, members, numbers) holds the initial attitudes in its first row; the other rows are filled
+        with the attitudes of the frames. Without frames it has two rows, and the second receives the final attitudes.
         """
         ...
 

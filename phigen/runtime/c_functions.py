@@ -68,11 +68,19 @@ def functions_of(library: Any, interface: Interface) -> Any:
     dated = _dated(offered, interface) | (_NOISY if interface.noise else {})
     timed = _TIMED if interface.time else {}
     if interface.time or "init_gauge" in offered:  # one more argument: the time, or the gauge, of each member
-        _, each = _EXTRAS["ensemble_each"]
-        offered |= {"ensemble_each": (_INT, (*each[:3], _POINTER, *each[3:]))} if "ensemble_each" in offered else {}
-        _, back = _EXTRAS["pullback_each"]
-        named = "pullback_each"
-        offered |= {named: (_INT, (*back[:3], _POINTER, *back[3:]))} if named in offered else {}
+        _, signature_each = _EXTRAS["ensemble_each"]
+        offered |= (
+            {"ensemble_each": (_INT, (*signature_each[:3], _POINTER, *signature_each[3:]))}
+            if "ensemble_each" in offered
+            else {}
+        )
+        _, signature_pullback = _EXTRAS["pullback_each"]
+        pullback_name = "pullback_each"
+        offered |= (
+            {pullback_name: (_INT, (*signature_pullback[:3], _POINTER, *signature_pullback[3:]))}
+            if pullback_name in offered
+            else {}
+        )
     monitored = {"pullback": (_INT, (*_EXTRAS["pullback"][1], _POINTER))} if "level_bar" in offered else {}
     return bound(
         library,
@@ -89,14 +97,14 @@ def _of_attitudes(offered: Mapping[str, Any], interface: Interface) -> dict[str,
     """
     name = "ensemble_attitudes"
     times_or_gauges = (_POINTER,) if interface.time or "init_gauge" in offered else ()
-    drawn = (_LONG, _WORD, _LONG) if interface.noise else ()
-    rest = (_SIZE, _POINTER, _POINTER, _POINTER)
-    arguments = (_POINTER, _POINTER, _POINTER, _SIZE, *times_or_gauges, _POINTER, _SIZE, *drawn, *rest)
+    noise_types = (_LONG, _WORD, _LONG) if interface.noise else ()
+    result_types = (_SIZE, _POINTER, _POINTER, _POINTER)
+    arguments = (_POINTER, _POINTER, _POINTER, _SIZE, *times_or_gauges, _POINTER, _SIZE, *noise_types, *result_types)
     return {name: (_INT, arguments)} if name in offered else {}
 
 
 def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
     """Return the signatures of functions that take the time as a further argument, {} without a time."""
-    places = {"observables": 1, "noise_fields": 1, "ensemble_of": 3} if interface.time else {}
-    dated = {name: (offered[name], at) for name, at in places.items() if name in offered}
-    return {name: (result, (*a[:at], _DOUBLE, *a[at:])) for name, ((result, a), at) in dated.items()}
+    time_positions = {"observables": 1, "noise_fields": 1, "ensemble_of": 3} if interface.time else {}
+    dated = {name: (offered[name], position) for name, position in time_positions.items() if name in offered}
+    return {name: (result, (*a[:position], _DOUBLE, *a[position:])) for name, ((result, a), position) in dated.items()}

@@ -135,10 +135,10 @@ class CLatticeSession:
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
         bonds = np.ascontiguousarray(parameters.get("bonds", ()), dtype=np.uintp).reshape(-1, 2)
         graph = np.array([len(bonds), bonds.ctypes.data], dtype=np.uintp)  # the struct NAME_bonds
-        needed = functions.work_size(sizes.ctypes.data, *([len(bonds)] if interface.graph else []))
-        expect_room(f"the arrays of a solver of {' × '.join(map(str, sizes))} sites", needed)
+        work_size = functions.work_size(sizes.ctypes.data, *([len(bonds)] if interface.graph else []))
+        expect_room(f"the arrays of a solver of {' × '.join(map(str, sizes))} sites", work_size)
         self._beside = np.zeros(0, dtype=np.uint8)  # for tangent vectors
-        self._work = np.zeros(max(needed, 64), dtype=np.uint8)
+        self._work = np.zeros(max(work_size, 64), dtype=np.uint8)
         self._address = self._struct.ctypes.data
         with np.errstate(over="ignore"):  # values beyond single precision become infinite, which C reports
             first = np.ascontiguousarray(x0, dtype=self._real)
@@ -164,27 +164,27 @@ class CLatticeSession:
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps of size ``h``."""
         while steps > 0:
-            now = min(steps, self._steps_per_call)
-            status = self._c.integrate(self._address, h, now)
+            chunk = min(steps, self._steps_per_call)
+            status = self._c.integrate(self._address, h, chunk)
             if status:
                 raise BackendError(status_name(status), self.steps, self.state()[None])
-            steps -= now
+            steps -= chunk
 
     def advance_tangent(self, h: float, vectors: Floats, steps: int = 1) -> Floats:
         """Make ``steps`` steps, and return the tangent ``vectors`` multiplied by their derivatives."""
         if not hasattr(self._c, "integrate_tangent"):
             raise MissingExtraError("step_tangent")
-        carried = np.array(vectors, dtype=self._real, order="C")
-        needed = self._c.tangent_size(self._address, len(carried))
-        if len(self._beside) < needed:
-            expect_room(f"the arrays of {len(carried)} tangent vectors", needed)
-            self._beside = np.zeros(needed, dtype=np.uint8)
+        propagated = np.array(vectors, dtype=self._real, order="C")
+        work_size = self._c.tangent_size(self._address, len(propagated))
+        if len(self._beside) < work_size:
+            expect_room(f"the arrays of {len(propagated)} tangent vectors", work_size)
+            self._beside = np.zeros(work_size, dtype=np.uint8)
         status = self._c.integrate_tangent(
-            self._address, h, steps, len(carried), carried.ctypes.data, self._beside.ctypes.data
+            self._address, h, steps, len(propagated), propagated.ctypes.data, self._beside.ctypes.data
         )
         if status:
             raise BackendError(status_name(status), self.steps, self.state()[None])
-        return np.asarray(carried, dtype=np.float64)
+        return np.asarray(propagated, dtype=np.float64)
 
     def pull_back(self, h: float, steps: int, stride: int, bars: Floats, parameters_bar: int) -> tuple[Floats, Floats]:
         """Return the rows of a run, and the cotangent of its initial state from the cotangents ``bars`` of the rows.
@@ -194,16 +194,16 @@ class CLatticeSession:
         """
         row_bars = np.ascontiguousarray(bars[1:], dtype=self._real)
         rows, x0_bar = filled(f"{len(bars)} frames", bars.shape, self._real), np.empty(self._shape, self._real)
-        most, least = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
+        full_tape, least = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
         state = x0_bar.nbytes
         of_step = (int(self._c.trail_size(self._address, 1 + MEASURED_STEPS)) - least) // MEASURED_STEPS
         # At this size, checkpoints and the tape of one segment fit if each segment is recomputed once.
         recomputed = least + 3 * math.isqrt(steps * state * of_step)
         # A tape of the whole run pays if steps are slow, or if the tape is short because the inverse flow recomputes
         # states.
-        useful = most if self._dear or of_step < state else recomputed
+        useful = full_tape if self._dear or of_step < state else recomputed
         minimum = max(MIN_TAPE_VALUES * x0_bar.itemsize, least + MIN_CHECKPOINTS * 2 * state)
-        size = max(least, min(most or least, max(minimum, min(MAX_TAPE_BYTES, useful))))
+        size = max(least, min(full_tape or least, max(minimum, min(MAX_TAPE_BYTES, useful))))
         expect_room("the stored data of the reverse pass", size)
         tape = np.empty(size, dtype=np.uint8)
         pointers = (rows[1:].ctypes.data, row_bars.ctypes.data, x0_bar.ctypes.data, parameters_bar, tape.ctypes.data)
@@ -246,9 +246,9 @@ class CLatticeSession:
             return {}
         clock = self._clock()
         x = np.empty((self._saved_states * self._shape[0], *self._shape[1:]), self._real)
-        far = np.zeros(1, dtype=np.uintp)
-        fields = self._c.saved(self._address, x.ctypes.data, far.ctypes.data)
-        return clock | ({"before": x[:fields].copy(), "far": far} if fields else {"far": far})
+        full_range_flag = np.zeros(1, dtype=np.uintp)
+        fields = self._c.saved(self._address, x.ctypes.data, full_range_flag.ctypes.data)
+        return clock | ({"before": x[:fields].copy(), "far": full_range_flag} if fields else {"far": full_range_flag})
 
     def _clock(self) -> dict[str, Any]:
         """Return the energy level and the physical time of steps equal in τ, else nothing."""
@@ -274,8 +274,8 @@ class CLatticeSession:
             self._before = steps
         if "far" in arrays:
             x = np.ascontiguousarray(arrays["before"], dtype=self._real) if "before" in arrays else None
-            before, fields = (None, 0) if x is None else (x.ctypes.data, len(x))
-            self._expect_done(self._c.resume(self._address, h, before, fields, int(arrays["far"][0])))
+            earlier_state, fields = (None, 0) if x is None else (x.ctypes.data, len(x))
+            self._expect_done(self._c.resume(self._address, h, earlier_state, fields, int(arrays["far"][0])))
         if "passed" in arrays:
             self._set_clock(arrays["passed"])
 
@@ -313,15 +313,15 @@ class CLatticeSession:
         """Set the step size."""
         self._expect_done(self._c.begin(self._address, h))
 
-    def sweep(self, stage: int, far: int, first: int, end: int) -> None:
+    def sweep(self, stage: int, full_range: int, first: int, end: int) -> None:
         """Make one sweep of a step over the planes from ``first`` to ``end`` - 1."""
-        self._expect_done(self._c.sweep(self._address, stage, far, first, end))
+        self._expect_done(self._c.sweep(self._address, stage, full_range, first, end))
 
     def planes(self, field: int, first: int, end: int) -> Floats:
         """Return a copy of the planes of a field from ``first`` to ``end`` - 1."""
-        out = np.empty((end - first, *self._shape[2:]), self._real)
-        self._expect_done(self._c.planes(self._address, field, first, end, out.ctypes.data))
-        return out
+        result = np.empty((end - first, *self._shape[2:]), self._real)
+        self._expect_done(self._c.planes(self._address, field, first, end, result.ctypes.data))
+        return result
 
     def put_planes(self, field: int, first: int, end: int, values: Floats) -> None:
         """Replace the values of a field on the planes from ``first`` to ``end`` - 1."""
@@ -339,9 +339,9 @@ class CLatticeSession:
             raise ValueError(f"no such stage, planes or step: {status_name(status)}")
 
     def _filled(self, function: Any, shape: tuple[int, ...]) -> Floats:
-        out = np.empty(shape, self._real)
-        function(self._address, out.ctypes.data)
-        return out.astype(np.float64, copy=False)
+        result = np.empty(shape, self._real)
+        function(self._address, result.ctypes.data)
+        return result.astype(np.float64, copy=False)
 
 
 class CLattice:
@@ -361,8 +361,8 @@ class CLattice:
         """Return the number of threads that share the work on a lattice of ``sites`` sites."""
         if not self.interface.is_shared(sites):
             return 1
-        most = getattr(self._library, "omp_get_max_threads", None)  # of the OpenMP that it is linked with
-        return int(most()) if most else 1
+        openmp_maximum = getattr(self._library, "omp_get_max_threads", None)  # of the OpenMP that it is linked with
+        return int(openmp_maximum()) if openmp_maximum else 1
 
     def stages(self) -> list[SweepStage]:
         """Return the sweeps of a step in order, and, without noise, the last and the first merged into one.

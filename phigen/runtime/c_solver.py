@@ -81,8 +81,8 @@ class CSolver:
             status = self._c.init_gauge(session.address, packed.ctypes.data, start.ctypes.data, gauge)
         if status == 0 and first is not None:
             element = self._own(first)
-            place = element[math.prod(interface.attitude) :].ctypes.data if interface.position else None
-            status = self._c.set_attitude(session.address, element.ctypes.data, place)
+            position_address = element[math.prod(interface.attitude) :].ctypes.data if interface.position else None
+            status = self._c.set_attitude(session.address, element.ctypes.data, position_address)
         if status == 0 and interface.noise:
             status = self._c.set_noise(session.address, draws.seed, draws.member, draws.step)
         if status:
@@ -96,23 +96,23 @@ class CSolver:
         struct, interface = aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface
         return CSession(self._c, struct, interface.dimension, interface.element, self._real)
 
-    def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
+    def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         if not hasattr(self._c, "ensemble"):
             raise TypeError(f"{self.interface.name} was compiled without ensembles: the spec has without: [ensemble]")
         if not len(members) and members.alike:
             self._expect_parameters(members)
-        if turned is not None:
-            return self._with_attitudes(members, threads, turned)
-        alike = members.alike and not members.stride and self._gauge is None
-        if not (alike or hasattr(self._c, "ensemble_each")):
+        if attitudes is not None:
+            return self._with_attitudes(members, threads, attitudes)
+        are_identical = members.alike and not members.stride and self._gauge is None
+        if not (are_identical or hasattr(self._c, "ensemble_each")):
             return one_by_one(self, members, threads)
         final, status = np.empty_like(members.x0, order="C"), np.zeros(len(members), dtype=np.uint8)
         frames = members.frames() if members.stride else None
 
         def make(part: slice) -> None:
             x = self._own(members.x0[part].T)  # x[DIM][members]
-            if alike:
+            if are_identical:
                 self._alike(members.part(part), x, status[part])
             else:
                 rows = None if frames is None else frames[1:, part]
@@ -148,15 +148,18 @@ class CSolver:
         """Integrate in place members ``x`` (DIM, members) that differ in their states only."""
         h, parameters, t0 = members.numbers(0)
         packed = self._packed(parameters)
-        start, rest = (packed.ctypes.data, x.ctypes.data, x.shape[1]), (h, members.steps, status.ctypes.data)
+        start, further_arguments = (
+            (packed.ctypes.data, x.ctypes.data, x.shape[1]),
+            (h, members.steps, status.ctypes.data),
+        )
         begin = (t0,) if self.interface.time else ()
         if self.interface.noise:
             draws = members.draws.seed, int(members.paths[0]), members.draws.step
-            self._c.ensemble_of(*start, *begin, *rest[:2], *draws, rest[2])
+            self._c.ensemble_of(*start, *begin, *further_arguments[:2], *draws, further_arguments[2])
         elif begin:
-            self._c.ensemble_at(*start, t0, *rest)
+            self._c.ensemble_at(*start, t0, *further_arguments)
         else:
-            self._c.ensemble(*start, *rest)
+            self._c.ensemble(*start, *further_arguments)
 
     def _each(self, members: Members, x: Floats, status: Bytes, rows: Floats | None) -> None:
         """Integrate in place members ``x`` (DIM, members) with parameters, steps and times of their own.
@@ -169,46 +172,46 @@ class CSolver:
         start += [None if a is None else a.ctypes.data for a in began]
         stride = members.stride or 1
         frames = None if rows is None else np.empty((members.steps // stride, *x.shape), self._real)
-        at = None if frames is None else frames.ctypes.data
-        self._c.ensemble_each(*start, h.ctypes.data, members.steps, stride, at, status.ctypes.data)
+        frames_address = None if frames is None else frames.ctypes.data
+        self._c.ensemble_each(*start, h.ctypes.data, members.steps, stride, frames_address, status.ctypes.data)
         if rows is not None and frames is not None:
             rows[: len(frames)] = frames.transpose(0, 2, 1)
 
-    def _with_attitudes(self, members: Members, threads: int | None, turned: Floats) -> Floats:
-        """Return the result of `ensemble` for members with attitudes, and fill ``turned`` with these."""
+    def _with_attitudes(self, members: Members, threads: int | None, attitudes: Floats) -> Floats:
+        """Return the result of `ensemble` for members with attitudes, and fill ``attitudes`` with these."""
         count, row_count = len(members), members.steps // members.stride if members.stride else 0
         frames = members.frames() if members.stride else None
-        final, last, status = members.x0.copy(), turned[0].copy(), np.zeros(count, dtype=np.uint8)
+        final, last, status = members.x0.copy(), attitudes[0].copy(), np.zeros(count, dtype=np.uint8)
 
         def make(part: slice) -> None:
-            some = members.part(part)
+            part_members = members.part(part)
             x, element = (self._own(a[part].T) for a in (final, last))
             rows, elements = (np.empty((row_count, *a.shape), self._real) for a in (x, element))
-            self._all_turned(some, (x, element), (rows, elements), status[part])
+            self._all_turned(part_members, (x, element), (rows, elements), status[part])
             final[part], last[part] = x.T, element.T
             if frames is not None:
-                frames[1 : row_count + 1, part], turned[1 : row_count + 1, part] = (
+                frames[1 : row_count + 1, part], attitudes[1 : row_count + 1, part] = (
                     a.transpose(0, 2, 1) for a in (rows, elements)
                 )
 
         shared_out(members, threads, make)
-        good = status[:, np.newaxis] == 0
+        succeeded = status[:, np.newaxis] == 0
         if frames is None:
-            turned[-1] = last
+            attitudes[-1] = last
         elif members.steps % members.stride:
-            frames[-1], turned[-1] = (np.where(good, a, np.nan) for a in (final, last))
+            frames[-1], attitudes[-1] = (np.where(succeeded, a, np.nan) for a in (final, last))
         failures = {int(m): status_name(int(status[m])) for m in np.flatnonzero(status)}
         return members.checked(final if frames is None else frames, failures)
 
     def _all_turned(
-        self, members: Members, begun: tuple[Floats, Floats], rows: tuple[Floats, Floats], status: Bytes
+        self, members: Members, initial: tuple[Floats, Floats], rows: tuple[Floats, Floats], status: Bytes
     ) -> None:
         """Integrate members in place.
 
-        ``begun`` are their states and attitudes (numbers, members), ``rows`` receive those of the frames.
+        ``initial`` are their states and attitudes (numbers, members), ``rows`` receive those of the frames.
         """
         packed, times_or_gauges, h = self._numbers(members)
-        start = [packed if members.parameters else None, *begun]
+        start = [packed if members.parameters else None, *initial]
         draws = members.draws.seed, int(members.paths[0]), members.draws.step
         self._c.ensemble_attitudes(
             *(None if a is None else a.ctypes.data for a in start),
@@ -287,66 +290,68 @@ class CSolver:
         """
         if not hasattr(self._c, "pullback_each"):
             return False
-        held = self.interface.time or hasattr(self._c, "init_gauge")
-        return int(self._c.trail_size_each()) * members.steps <= MAX_TAPE_VALUES or (len(members) > 1 and not held)
+        holds_start_values = self.interface.time or hasattr(self._c, "init_gauge")
+        return int(self._c.trail_size_each()) * members.steps <= MAX_TAPE_VALUES or (
+            len(members) > 1 and not holds_start_values
+        )
 
     def _all_pulled(
-        self, members: Members, pieces: Sequence[Segment], tape: Floats, bars: Floats, status: Bytes
+        self, members: Members, segments: Sequence[Segment], tape: Floats, bars: Floats, status: Bytes
     ) -> tuple[Floats, Floats, Floats]:
         """Return the pullback of some members, from one call for each segment of the run."""
         rows, (packed, times_or_gauges, h) = np.empty_like(bars), self._numbers(members)
         parameters_bar, x_bar = np.zeros_like(packed), np.zeros_like(members.x0, dtype=self._real)
-        before = packed.ctypes.data if members.parameters else None
-        begun = self._begun(members, pieces, status)
-        for segment, x in zip(reversed(pieces), reversed(begun), strict=True):
+        parameters_address = packed.ctypes.data if members.parameters else None
+        segment_starts = self._segment_starts(members, segments, status)
+        for segment, x in zip(reversed(segments), reversed(segment_starts), strict=True):
             if status.any():
                 break
-            ends = bars[segment.rows.start : segment.rows.stop] if segment.rows else np.zeros((1, *x.shape))
-            row_bars = np.array(ends.transpose(1, 0, 2), dtype=self._real, order="C")
+            bars_at_ends = bars[segment.rows.start : segment.rows.stop] if segment.rows else np.zeros((1, *x.shape))
+            row_bars = np.array(bars_at_ends.transpose(1, 0, 2), dtype=self._real, order="C")
             row_bars[:, -1] += x_bar
             segment_rows, x_bar = np.empty_like(row_bars), np.empty_like(x)
-            out = (a.ctypes.data for a in (segment_rows, row_bars, x_bar, parameters_bar, tape, status))
+            addresses = (a.ctypes.data for a in (segment_rows, row_bars, x_bar, parameters_bar, tape, status))
             start = (
-                before,
+                parameters_address,
                 x.ctypes.data,
                 len(members),
                 *(None if a is None else a.ctypes.data for a in times_or_gauges),
             )
-            self._c.pullback_each(*start, h.ctypes.data, segment.count, max(1, segment.stride), *out)
+            self._c.pullback_each(*start, h.ctypes.data, segment.count, max(1, segment.stride), *addresses)
             if segment.rows:
                 rows[segment.rows.start : segment.rows.stop] = segment_rows.transpose(1, 0, 2)
         rows[0] = members.x0
         return rows, x_bar + bars[0], parameters_bar.T[: len(members.parameters)]
 
-    def _begun(self, members: Members, pieces: Sequence[Segment], status: Bytes) -> list[Floats]:
+    def _segment_starts(self, members: Members, segments: Sequence[Segment], status: Bytes) -> list[Floats]:
         """Return the states of members (members, DIM) at the start of each segment of a run."""
-        begun = [self._own(members.x0)]
-        for segment in pieces[:-1]:
-            x = np.array(begun[-1].T, order="C")
+        states = [self._own(members.x0)]
+        for segment in segments[:-1]:
+            x = np.array(states[-1].T, order="C")
             if not status.any():
                 self._each(replace(members, steps=segment.count), x, status, None)
-            begun.append(self._own(x.T))
-        return begun[: len(pieces)]
+            states.append(self._own(x.T))
+        return states[: len(segments)]
 
     def _pulled(
         self,
         x0: Floats,
         h: float,
-        pieces: Sequence[Segment],
+        segments: Sequence[Segment],
         tape: Floats,
         bars: Floats,
         parameters: Mapping[str, float],
         t0: float,
     ) -> tuple[Floats, Floats, Floats]:
         """Return the pullback of one member, segment by segment."""
-        at, begun, rows = self.start(x0, parameters, t0), list[CSession](), np.empty_like(bars)
-        for segment in pieces:
-            begun.append(at)
-            if segment is not pieces[-1]:
-                at = at.branch()
-                at.advance(h, segment.count)
+        current, segment_sessions, rows = self.start(x0, parameters, t0), list[CSession](), np.empty_like(bars)
+        for segment in segments:
+            segment_sessions.append(current)
+            if segment is not segments[-1]:
+                current = current.branch()
+                current.advance(h, segment.count)
         cotangents = Cotangents(*(np.zeros(n, self._real) for n in (len(x0), max(1, len(parameters)), 1)))
-        for segment, session in zip(reversed(pieces), reversed(begun), strict=True):
+        for segment, session in zip(reversed(segments), reversed(segment_sessions), strict=True):
             row_bars = bars[segment.rows.start : segment.rows.stop] if segment.rows else np.zeros((1, len(x0)))
             row_bars = np.array(row_bars, dtype=self._real)
             row_bars[-1] += cotangents.state
@@ -357,8 +362,8 @@ class CSolver:
         cotangents.state[:] += bars[0]
         if hasattr(self._c, "level_bar") and self._gauge is None:
             packed, start = self._packed(parameters), self._own(x0)
-            more = (cotangents.level[0], cotangents.state.ctypes.data, cotangents.parameters.ctypes.data)
-            self._c.level_bar(packed.ctypes.data, start.ctypes.data, *more)
+            bar_addresses = (cotangents.level[0], cotangents.state.ctypes.data, cotangents.parameters.ctypes.data)
+            self._c.level_bar(packed.ctypes.data, start.ctypes.data, *bar_addresses)
         return rows, cotangents.state, cotangents.parameters[: len(parameters)]
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
@@ -369,8 +374,8 @@ class CSolver:
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        out = np.empty((len(x), len(self.interface.casimirs)), self._real)
-        return self._fill(self._c.casimirs, x, out, parameters) if self.interface.casimirs else out
+        result = np.empty((len(x), len(self.interface.casimirs)), self._real)
+        return self._fill(self._c.casimirs, x, result, parameters) if self.interface.casimirs else result
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
@@ -378,13 +383,13 @@ class CSolver:
 
     def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        out = np.empty((len(x), len(self.interface.observables)), self._real)
-        return self._fill(self._c.observables, x, out, parameters, t) if self.interface.observables else out
+        result = np.empty((len(x), len(self.interface.observables)), self._real)
+        return self._fill(self._c.observables, x, result, parameters, t) if self.interface.observables else result
 
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        out = np.empty((len(x), len(self.interface.noise), x.shape[1]), self._real)
-        return self._fill(self._c.noise_fields, x, out, parameters, t)
+        result = np.empty((len(x), len(self.interface.noise), x.shape[1]), self._real)
+        return self._fill(self._c.noise_fields, x, result, parameters, t)
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
@@ -392,12 +397,12 @@ class CSolver:
         return np.array([self._c.monitor(packed.ctypes.data, row) for row in _addresses(x)], dtype=np.float64)
 
     def _fill(
-        self, function: Any, x: Floats, out: Floats, parameters: Mapping[str, float], t: Floats | None = None
+        self, function: Any, x: Floats, result: Floats, parameters: Mapping[str, float], t: Floats | None = None
     ) -> Floats:
         packed, x = self._packed(parameters), self._own(x)
-        for row in zip(*_times(t), _addresses(x), _addresses(out), strict=True):
+        for row in zip(*_times(t), _addresses(x), _addresses(result), strict=True):
             function(packed.ctypes.data, *row)
-        return out.astype(np.float64, copy=False)
+        return result.astype(np.float64, copy=False)
 
     def _packed(self, parameters: Mapping[str, float]) -> Floats:
         # A struct without parameters has one unused char, so that one zero is large enough.

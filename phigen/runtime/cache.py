@@ -38,9 +38,9 @@ _SCRATCH_LIFETIME = 3600.0  # seconds; an older folder belongs to a process that
 
 def directory() -> Path:
     """Return the folder of the cache: PHIGEN_CACHE_DIR, else the platform's folder for caches. It may not exist yet."""
-    named = os.environ.get("PHIGEN_CACHE_DIR")
-    if named:
-        return Path(named)
+    configured = os.environ.get("PHIGEN_CACHE_DIR")
+    if configured:
+        return Path(configured)
     if xdg := os.environ.get("XDG_CACHE_HOME"):
         return Path(xdg) / "phigen"
     try:
@@ -154,12 +154,12 @@ def _machine() -> str:
 
     They are part of the key, because machines with different processors may share a home folder and its cache.
     """
-    known = ("model name", "flags", "Features", "CPU implementer", "CPU part", "isa")
+    relevant_keys = ("model name", "flags", "Features", "CPU implementer", "CPU part", "isa")
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         lines = []
-    facts = sorted({line for line in lines if line.split(":")[0].strip() in known})
+    facts = sorted({line for line in lines if line.split(":")[0].strip() in relevant_keys})
     return "\n".join([platform.system(), platform.machine(), *(facts or [platform.processor(), platform.node()])])
 
 

@@ -33,9 +33,9 @@ class Checkpoint:
     def save(self, path: Path) -> None:
         """Write the file and rename it into place, so that a complete checkpoint exists whenever the process ends."""
         text = np.frombuffer(json.dumps(self.identity).encode(), dtype=np.uint8)
-        stored: dict[str, Any] = {_IDENTITY: text, **self.arrays}
+        entries: dict[str, Any] = {_IDENTITY: text, **self.arrays}
         with replacing(path) as file:
-            np.savez(file, allow_pickle=False, **stored)
+            np.savez(file, allow_pickle=False, **entries)
 
 
 def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) -> str:
@@ -63,8 +63,8 @@ def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:
     Raises `MismatchError` if the checkpoint belongs to another run, or if the file is not a checkpoint.
     """
     try:
-        with opened(path) as file, np.load(file, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
+        with opened(path) as file, np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
         stored_identity = json.loads(arrays.pop(_IDENTITY).tobytes())
     except (ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
         raise MismatchError(f"{path} is not a checkpoint of phigen: {error}") from None
@@ -77,6 +77,6 @@ def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:
     return arrays
 
 
-def _difference(key: str, before: Any, now: Any) -> str:
+def _difference(key: str, earlier: Any, current: Any) -> str:
     # A hash in a message would not help its reader.
-    return f"the {key} has changed" if key in HASHES else f"{key} was {before!r} and is {now!r}"
+    return f"the {key} has changed" if key in HASHES else f"{key} was {earlier!r} and is {current!r}"

@@ -114,32 +114,32 @@ class CrossingFinder(Generic[C]):
             self.values = [self._value(session, 0, 0.0)]
         while steps > 0:
             states, inner, clocks, failure = [], list[Floats](), list[float](), None
-            known = (len(self.values) - 1) // self.points
+            searched = (len(self.values) - 1) // self.points
             for _ in range(min(steps, self.block)):
-                before = session.branch()
+                start_session = session.branch()
                 try:
                     move()
                 except BackendError as error:
                     failure = error
                     break
-                self.past.append(before)
+                self.past.append(start_session)
                 states.append(session.state())
-                inner.append(self._inside(session))
+                inner.append(self._interpolated_states(session))
                 clocks.append(self._clock(session, math.nan))
             steps -= len(states)
             if states:
                 rows, self.latest, self.points = np.array(states), session, 1 + len(inner[0])
-                self.first = session.steps - len(rows) - known
-                counted = self._time(self.points * known + np.arange(1, self.points * len(rows) + 1))
-                times = counted if self.points > 1 or math.isnan(clocks[0]) else np.array(clocks)
+                self.first = session.steps - len(rows) - searched
+                point_times = self._time(self.points * searched + np.arange(1, self.points * len(rows) + 1))
+                times = point_times if self.points > 1 or math.isnan(clocks[0]) else np.array(clocks)
                 points = np.concatenate([np.array(inner), rows[:, np.newaxis]], axis=1) if self.points > 1 else rows
                 self.values += self._values(points.reshape(-1, rows.shape[1]), times).tolist()
-                yield rows, list(self._crossings(self.points * known))
+                yield rows, list(self._crossings(self.points * searched))
                 self.past, self.values = self.past[-1:], self.values[-self.points - 1 :]
             if failure:
                 raise failure
 
-    def _inside(self, session: C) -> Floats:
+    def _interpolated_states(self, session: C) -> Floats:
         """Return states (points, DIM) between the last two steps, if the session interpolates and g reads no clock."""
         interpolated = getattr(session, "interpolated", None)
         if interpolated is None or (self.timed and not math.isnan(self._clock(session, math.nan))):
@@ -155,10 +155,13 @@ class CrossingFinder(Generic[C]):
         copy, end = session.branch(), session.steps + part * (1 + 1e-12)
         try:
             for _ in self.follow(copy, 1, lambda: copy.advance(self.h, 1)):
-                inside = [place for place in self.places if place[0] <= end]
+                in_part = [found_place for found_place in self.places if found_place[0] <= end]
         except BackendError:
             return []
-        return [(self._clock(there, self.t0 + at * self.h), there.state()) for at, there in inside]
+        return [
+            (self._clock(crossing_session, self.t0 + steps_at * self.h), crossing_session.state())
+            for steps_at, crossing_session in in_part
+        ]
 
     def _time(self, j: Any, fraction: float = 0.0) -> Any:
         """Return the time at a fraction of interval j, where interval 0 begins at the first of the values."""
@@ -174,27 +177,27 @@ class CrossingFinder(Generic[C]):
             self._values(session.state()[np.newaxis], np.array([self._clock(session, self._time(j, fraction))]))[0]
         )
 
-    def _crossings(self, known: int) -> Iterator[tuple[float, Floats]]:
-        """Yield the crossings of this block, whose first ``known`` intervals were searched before."""
+    def _crossings(self, searched: int) -> Iterator[tuple[float, Floats]]:
+        """Yield the crossings of this block, whose first ``searched`` intervals were searched before."""
         self.places = []
         for sign in SIGNS[self.direction]:
             self._sign = sign
-            self.places += self._rising(known)
+            self.places += self._rising(searched)
         self.places.sort(key=lambda place: place[0])
-        for at, there in self.places:
-            yield self._clock(there, self.t0 + at * self.h), there.state()
+        for steps_at, crossing_session in self.places:
+            yield self._clock(crossing_session, self.t0 + steps_at * self.h), crossing_session.state()
 
-    def _rising(self, known: int) -> Iterator[tuple[float, C]]:
+    def _rising(self, searched: int) -> Iterator[tuple[float, C]]:
         v = [self._sign * value for value in self.values]
-        if known == 0 and v[0] == 0 < v[1]:
+        if searched == 0 and v[0] == 0 < v[1]:
             yield self.first, self.past[0]
         for i in range(len(v) - 1):
-            if i >= max(1, known) and (bracket := self._hidden(v, i)):
-                yield self._located(*bracket)
-            if i >= known and v[i] < 0 <= v[i + 1]:
-                yield self._located(i, 0.0, v[i], 1.0, v[i + 1])
+            if i >= max(1, searched) and (bracket := self._bracket_at_extremum(v, i)):
+                yield self._crossing_between(*bracket)
+            if i >= searched and v[i] < 0 <= v[i + 1]:
+                yield self._crossing_between(i, 0.0, v[i], 1.0, v[i + 1])
 
-    def _hidden(self, v: list[float], i: int) -> tuple[int, float, float, float, float] | None:
+    def _bracket_at_extremum(self, v: list[float], i: int) -> tuple[int, float, float, float, float] | None:
         """Return an interval beside point i and a bracket in it, if an extremum near that changes the sign of g."""
         a, b, c = v[i - 1 : i + 2]
         peak = a < b >= c and b < 0
@@ -207,11 +210,11 @@ class CrossingFinder(Generic[C]):
         if not abs(b) <= 2 * gain + 0.1 * abs(curvature):
             return None
         j = i - 1 if offset < 0 else i
-        at = self._extremum(v, j, -1.0 if peak else 1.0)
-        value = self._at(j, at)
+        extremum = self._extremum(v, j, -1.0 if peak else 1.0)
+        value = self._value_at(j, extremum)
         if (value < 0) == (b < 0):
             return None
-        return (j, 0.0, v[j], at, value) if peak else (j, at, value, 1.0, v[j + 1])
+        return (j, 0.0, v[j], extremum, value) if peak else (j, extremum, value, 1.0, v[j + 1])
 
     def _extremum(self, v: list[float], j: int, sign: float) -> float:
         """Return the fraction of interval j where sign·g is smallest, or the first one found where g changes its sign.
@@ -220,39 +223,39 @@ class CrossingFinder(Generic[C]):
         """
         low, high = 0.0, 1.0
         left, right = 1 - _GOLDEN, _GOLDEN
-        at_left, at_right = self._at(j, left), self._at(j, right)
+        at_left, at_right = self._value_at(j, left), self._value_at(j, right)
         while high - low > 1e-9:
-            for at, value in ((left, at_left), (right, at_right)):
+            for fraction, value in ((left, at_left), (right, at_right)):
                 if (value < 0) != (v[j] < 0):
-                    return at
+                    return fraction
             if sign * at_left < sign * at_right:
                 high, right, at_right = right, left, at_left
                 left = high - _GOLDEN * (high - low)
-                at_left = self._at(j, left)
+                at_left = self._value_at(j, left)
             else:
                 low, left, at_left = left, right, at_right
                 right = low + _GOLDEN * (high - low)
-                at_right = self._at(j, right)
+                at_right = self._value_at(j, right)
         return left if sign * at_left < sign * at_right else right
 
-    def _at(self, j: int, fraction: float) -> float:
+    def _value_at(self, j: int, fraction: float) -> float:
         """Return g at a fraction of interval j, on the collocation polynomial if there is one."""
         step, part = divmod(j, self.points)
         if self.points > 1:
             return self._on_polynomial(step, [(part + fraction) / self.points])[0]
-        return self._sign * self._value(self._moved(step, fraction, SUBSTEPS), j, fraction)
+        return self._sign * self._value(self._session_at_fraction(step, fraction, SUBSTEPS), j, fraction)
 
     def _on_polynomial(self, step: int, fractions: Sequence[float]) -> list[float]:
         """Return g at fractions of a step, on its collocation polynomial."""
-        states = self._after(step).interpolated(fractions)
+        states = self._session_after(step).interpolated(fractions)
         times = self._time(self.points * (step + np.array(fractions)))
         return [self._sign * float(value) for value in self._values(states, times)]
 
-    def _after(self, step: int) -> Any:
+    def _session_after(self, step: int) -> Any:
         """Return the session after a step; it must not be advanced."""
         return self.past[step + 1] if step + 1 < len(self.past) else self.latest
 
-    def _moved(self, step: int, fraction: float, substeps: Sequence[int]) -> C:
+    def _session_at_fraction(self, step: int, fraction: float, substeps: Sequence[int]) -> C:
         """Return a session after a fraction of a step, made in the first number of equal steps that does not fail."""
         for count in substeps:
             session = self.past[step].branch()
@@ -265,60 +268,62 @@ class CrossingFinder(Generic[C]):
                 break
         return session
 
-    def _located(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C]:
+    def _crossing_between(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C]:
         """Return the crossing in interval j between two fractions: its number of steps, and a session there."""
         step, part = divmod(j, self.points)
         low, high = (part + low) / self.points, (part + high) / self.points
-        if self.points > 1 and (polished := self._polished(step, low, at_low, high, at_high)):
-            fraction, there = polished
-            return self.first + step + fraction, there
+        if self.points > 1 and (polished := self._refined_on_polynomial(step, low, at_low, high, at_high)):
+            fraction, crossing_session = polished
+            return self.first + step + fraction, crossing_session
 
         def value(fraction: float) -> float:
-            there = self._moved(step, fraction, (count,))
-            return self._sign * self._value(there, self.points * step, self.points * fraction)
+            moved_session = self._session_at_fraction(step, fraction, (count,))
+            return self._sign * self._value(moved_session, self.points * step, self.points * fraction)
 
         for count in SUBSTEPS:
             # All fractions take the same number of substeps, so that g is a smooth function of the fraction.
             try:
                 fraction = root(value, low, at_low, high, at_high)
-                there = self._moved(step, fraction, (count,))
+                crossing_session = self._session_at_fraction(step, fraction, (count,))
             except BackendError:
                 if count == SUBSTEPS[-1]:
                     raise
             else:
                 break
-        return self.first + step + fraction, there
+        return self.first + step + fraction, crossing_session
 
-    def _polished(self, step: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C] | None:
+    def _refined_on_polynomial(
+        self, step: int, low: float, at_low: float, high: float, at_high: float
+    ) -> tuple[float, C] | None:
         """Return the fraction of a step and the session of the zero that is nearest to one on its polynomial.
 
         None if steps by Newton's method do not converge to it, as where g has a double zero.
         """
         fraction = root(lambda at: self._on_polynomial(step, [at])[0], low, at_low, high, at_high)
-        before, after = self._on_polynomial(step, [fraction - _DIFFERENCE, fraction + _DIFFERENCE])
-        slope, best = (after - before) / (2 * _DIFFERENCE), math.inf
-        place: tuple[float, C] | None = None
+        value_before, value_after = self._on_polynomial(step, [fraction - _DIFFERENCE, fraction + _DIFFERENCE])
+        slope, best = (value_after - value_before) / (2 * _DIFFERENCE), math.inf
+        zero: tuple[float, C] | None = None
         for _ in range(_MOST_NEWTON):
-            there: C = self._after(step).branch()
+            step_end: C = self._session_after(step).branch()
             try:
                 if fraction < 1:
-                    there.advance((fraction - 1) * self.h, 1)
+                    step_end.advance((fraction - 1) * self.h, 1)
             except BackendError:
                 return None
-            value = self._sign * self._value(there, self.points * step, self.points * fraction)
+            value = self._sign * self._value(step_end, self.points * step, self.points * fraction)
             if not abs(value) < best:  # rounding, unless the step that led here was not small
-                return place if best <= abs(slope) * math.sqrt(self._after(step).rounding) else None
-            best, place = abs(value), (fraction, there)
+                return zero if best <= abs(slope) * math.sqrt(self._session_after(step).rounding) else None
+            best, zero = abs(value), (fraction, step_end)
             following = min(1.0, max(0.0, fraction - value / slope)) if slope else math.nan
             if abs(following - fraction) <= np.finfo(float).eps:
-                return place
+                return zero
             fraction = following
         return None
 
-    def _clock(self, session: C, counted: float) -> float:
-        """Return the physical time of a session if its steps are equal in τ, else the ``counted`` time."""
+    def _clock(self, session: C, counted_time: float) -> float:
+        """Return the physical time of a session if its steps are equal in τ, else the ``counted_time`` time."""
         elapsed = getattr(session, "time", lambda: math.nan)()
-        return counted if math.isnan(elapsed) else float(elapsed)
+        return counted_time if math.isnan(elapsed) else float(elapsed)
 
 
 def root(f: Callable[[float], float], low: float, at_low: float, high: float, at_high: float) -> float:
@@ -333,13 +338,13 @@ def root(f: Callable[[float], float], low: float, at_low: float, high: float, at
         least = (2 * np.finfo(float).eps * abs(best) + _RESOLUTION) / abs(b - a)
         if value == 0 or least > 0.5:
             break
-        at = a + min(1 - least, max(least, share)) * (b - a)
-        f_at = f(at)
+        trial = a + min(1 - least, max(least, share)) * (b - a)
+        f_at = f(trial)
         if (f_at < 0) == (fa < 0):
             c, fc = a, fa
         else:
             c, fc, b, fb = b, fb, a, fa
-        a, fa = at, f_at
+        a, fa = trial, f_at
         xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
         share = 0.5
         if phi**2 < xi and (1 - phi) ** 2 < 1 - xi:

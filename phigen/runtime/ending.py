@@ -43,11 +43,11 @@ def at_time(session: Followed, h: float, span: float) -> End:
     steps, left = steps_until(session, h, span)
     part = abs(left) > EQUAL * abs(span)
 
-    def finish(here: Followed) -> tuple[Followed, float]:
+    def finish(last_session: Followed) -> tuple[Followed, float]:
         if not part:
-            return here, float(steps)
-        there, size = reached(here, h, left)
-        return there, steps + size / h
+            return last_session, float(steps)
+        end_session, size = reached(last_session, h, left)
+        return end_session, steps + size / h
 
     return End(steps, finish, span, part)
 
@@ -62,19 +62,19 @@ def after_steps(session: Followed, h: float, steps: int) -> End:
     return End(steps, lambda here: (here, float(steps)), session.time(), part=False)
 
 
-def where_zero(session: Followed, h: float, most: int, g: Function, t0: float, *, timed: bool) -> End | None:
-    """Return the end at the first zero of g after the start, in either direction; None without one in ``most`` steps.
+def where_zero(session: Followed, h: float, limit: int, g: Function, t0: float, *, timed: bool) -> End | None:
+    """Return the end at the first zero of g after the start, in either direction; None without one in ``limit`` steps.
 
     The session is at its start, and is advanced. The zero is located to round-off, by steps of the solver.
     """
     finder = CrossingFinder[Followed](g, h, t0, timed=timed, direction="both")
     try:
-        for _ in finder.follow(session, most, lambda: session.advance(h, 1)):
-            for at, there in finder.places:
-                if at > START:
-                    clock = there.time()
-                    span, steps = at * h if math.isnan(clock) else clock, int(np.floor(at))
-                    return End(steps, _finish_at((there, at)), span, at > steps, stopped=True)
+        for _ in finder.follow(session, limit, lambda: session.advance(h, 1)):
+            for steps_at, end_session in finder.places:
+                if steps_at > START:
+                    clock = end_session.time()
+                    span, steps = steps_at * h if math.isnan(clock) else clock, int(np.floor(steps_at))
+                    return End(steps, _finish_at((end_session, steps_at)), span, steps_at > steps, stopped=True)
     except BackendError:  # the run itself will report the failure
         pass
     return None

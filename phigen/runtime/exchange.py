@@ -45,10 +45,12 @@ def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
 def lattice_to_xarray(trajectory: LatticeTrajectory) -> xr.Dataset:
     """Return a Dataset: ``x`` (t, coordinate, *axes), ``energy`` (t), Casimirs, observables, arrays of parameters."""
     xarray = imported("xarray")
-    about = trajectory.solver.interface
+    interface = trajectory.solver.interface
     axes = trajectory.axes
     arrays = {n: v for n, v in trajectory.parameters.items() if np.ndim(v)}
-    shapes: dict[str, tuple[str, ...]] = dict.fromkeys(about.at_sites, axes) | dict.fromkeys(about.at_bonds, ("bond",))
+    shapes: dict[str, tuple[str, ...]] = dict.fromkeys(interface.at_sites, axes) | dict.fromkeys(
+        interface.at_bonds, ("bond",)
+    )
     numbers = {f"parameter_{n}": v for n, v in trajectory.parameters.items() if n not in arrays}
     dataset: xr.Dataset = xarray.Dataset(
         {

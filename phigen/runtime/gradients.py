@@ -56,20 +56,20 @@ class Segment:
     rows: range
 
 
-def segments(steps: int, stride: int, most: int) -> list[Segment]:
-    """Return the segments of a run, each of at most ``most`` steps; row r follows r strides, or the last step."""
+def segments(steps: int, stride: int, limit: int) -> list[Segment]:
+    """Return the segments of a run, each of at most ``limit`` steps; row r follows r strides, or the last step."""
 
     def cut() -> Iterator[Segment]:
-        many = max(1, most // stride) * stride
-        for first in range(0, steps, many):
-            last = min(first + many, steps)
+        chunk = max(1, limit // stride) * stride
+        for first in range(0, steps, chunk):
+            last = min(first + chunk, steps)
             row = first // stride
             rows = range(row + 1, row + 1 + -(-(last - first) // stride))
-            if last - first <= most:
+            if last - first <= limit:
                 yield Segment(first, last - first, stride, rows)
                 continue
-            for begin in range(first, last, most):  # one stride, which is too long by itself
-                count = min(most, last - begin)
+            for begin in range(first, last, limit):  # one stride, which is too long by itself
+                count = min(limit, last - begin)
                 yield Segment(begin, count, count, rows if begin + count == last else range(0))
 
     return list(cut())
@@ -92,13 +92,13 @@ def pullback(
     if start.ndim > 2:
         shapes = f"({interface.dimension},) or (members, {interface.dimension})"
         raise ValueError(f"x0 must have shape {shapes}, not {start.shape}")
-    steps, rest = arguments.count(steps, "steps", 0), dict(parameters)
+    steps, keyword_arguments = arguments.count(steps, "steps", 0), dict(parameters)
     width = max(1, steps) if stride is None else arguments.count(stride, "stride", 1)
-    per_member = [v for v in (h, t0, *rest.values()) if np.ndim(v) > 0] if start.ndim == 1 else []
+    per_member = [v for v in (h, t0, *keyword_arguments.values()) if np.ndim(v) > 0] if start.ndim == 1 else []
     if per_member:
         start = np.tile(start, (len(per_member[0]), 1))
     several = start.reshape(-1, interface.dimension)
-    members = arguments.ensemble(several, h, steps, width, t0, {}, rest, interface)
+    members = arguments.ensemble(several, h, steps, width, t0, {}, keyword_arguments, interface)
     rows = len(row_steps(steps, width))
     bars = cotangents(cotangent, start.shape if stride is None else (rows, *start.shape))
     bars = bars.reshape(1 if stride is None else rows, *several.shape)
@@ -114,8 +114,8 @@ def pullback(
             error.members = ()
         raise solver.failure(error, size, None, values) from error
     states = states.reshape(rows, *start.shape)
-    each = zip(members.parameters.items(), parameter_bars, strict=True)
-    bars_of = {name: bar if np.ndim(value) else bar.sum() for (name, value), bar in each}
+    named_bars = zip(members.parameters.items(), parameter_bars, strict=True)
+    bars_of = {name: bar if np.ndim(value) else bar.sum() for (name, value), bar in named_bars}
     return Pullback(states[-1] if stride is None else states, x0_bar.reshape(start.shape), bars_of)
 
 

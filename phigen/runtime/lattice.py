@@ -273,14 +273,14 @@ class LatticeTrajectory:
     @property
     def observables(self) -> dict[str, Floats]:
         """The observables of the spec by name: (frames,), and (frames, *sizes) for those of sites."""
-        about = self.solver.interface
-        numbers = {name: self.observed[:, k] for k, name in enumerate(about.observables)}
-        if not about.observed_fields:
+        interface = self.solver.interface
+        numbers = {name: self.observed[:, k] for k, name in enumerate(interface.observables)}
+        if not interface.observed_fields:
             return numbers
-        times = self.t.tolist() if about.time else [None] * len(self)
+        times = self.t.tolist() if interface.time else [None] * len(self)
         frames = zip(self.x, times, strict=True)
         rows = [self.solver.observables(x, t, parameters=self.parameters) for x, t in frames]
-        return numbers | {name: np.array([row[name] for row in rows]) for name in about.observed_fields}
+        return numbers | {name: np.array([row[name] for row in rows]) for name in interface.observed_fields}
 
     def _casimirs_by_frame(self) -> Iterator[dict[str, Any]]:
         return (self.solver.casimirs(x, parameters=self.parameters) for x in self.x)
@@ -350,13 +350,13 @@ class LatticeTrajectory:
                 add_member(archive, name, value)
 
     def _further(self) -> dict[str, Any]:
-        about = {"t": self.t, "energy": self.energy, "steps": self.steps, "h": self.h}
-        about |= {"origin": np.array(self.origin)} if self.origin else {}
-        about |= {} if self.tau is None else {"tau": self.tau}
-        about |= {f"observable_{name}": values for name, values in self.observables.items()}
-        about |= {name: values for name, (_, values) in self.transforms().items()}
-        named = {"coordinates": np.array(self.coordinates), "axes": np.array(self.axes)}
-        return {**about, **named, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
+        entries = {"t": self.t, "energy": self.energy, "steps": self.steps, "h": self.h}
+        entries |= {"origin": np.array(self.origin)} if self.origin else {}
+        entries |= {} if self.tau is None else {"tau": self.tau}
+        entries |= {f"observable_{name}": values for name, values in self.observables.items()}
+        entries |= {name: values for name, (_, values) in self.transforms().items()}
+        name_entries = {"coordinates": np.array(self.coordinates), "axes": np.array(self.axes)}
+        return {**entries, **name_entries, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
 
 
 class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
@@ -378,9 +378,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return getattr(self.backend, "device", None)
 
     def __repr__(self) -> str:
-        about = self.interface
-        fields = ", ".join(about.coordinates)
-        return f"<LatticeSolver {about.name}: order {about.order}, target {self.target}, ({fields})>"
+        interface = self.interface
+        fields = ", ".join(interface.coordinates)
+        return f"<LatticeSolver {interface.name}: order {interface.order}, target {self.target}, ({fields})>"
 
     # --- runs
 
@@ -402,7 +402,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         resume: bool = True,
         progress: Progress | None = None,
         parameters: Mapping[str, Any] | None = None,
-        **more: Any,
+        **by_keyword: Any,
     ) -> LatticeTrajectory:
         """Make ``steps`` steps of size ``h`` from ``x0`` (coordinates, *sizes).
 
@@ -420,26 +420,30 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         `StepError`, whose ``trajectory`` ends with the state before the failing step, and `ValueError` if the files
         belong to an interrupted run, or to a complete one that cannot be resumed.
         """
-        drawn = {"seed": seed, "member": member, "step0": step0}
-        at = self._beginning(x0, "x0", h, parameters, more, t0, drawn)
-        plan = self._planned(at, steps, stride, until, retry)
-        where: Any = {"output": output, "checkpoints": checkpoints, "resume": resume, "progress": progress}
-        return self.framed(plan, **where)
+        noise_arguments = {"seed": seed, "member": member, "step0": step0}
+        beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments)
+        plan = self._planned(beginning, steps, stride, until, retry)
+        storage: Any = {"output": output, "checkpoints": checkpoints, "resume": resume, "progress": progress}
+        return self.framed(plan, **storage)
 
     def _planned(
-        self, at: Beginning, steps: int | None, stride: int, until: float | None, retry: int
+        self, beginning: Beginning, steps: int | None, stride: int, until: float | None, retry: int
     ) -> IntegrationPlan:
         """Return the plan of an integration over a number of steps, or until a time."""
         if (steps is None) == (until is None):
-            many = "needs the number of steps, or the time until which to integrate"
-            raise TypeError(f"integrate {many if steps is None else 'takes either steps or until, not both'}")
+            requirement = "needs the number of steps, or the time until which to integrate"
+            raise TypeError(f"integrate {requirement if steps is None else 'takes either steps or until, not both'}")
         stride, retry = arguments.count(stride, "stride", 1), arguments.count(retry, "retry", 0)
         if retry:
             arguments.expect_no_noise("retry", self.interface)
         if until is None:
-            return IntegrationPlan(at, strided(at.h, arguments.count(steps or 0, "steps", 0), stride), at.t0, retry)
-        end = ending.at_time(ObservedCourse.begun(self, at, retry), at.h, arguments.end(until, at.t0, at.h))
-        return IntegrationPlan(at, strided(at.h, end.steps, stride, end), at.t0, retry)
+            return IntegrationPlan(
+                beginning, strided(beginning.h, arguments.count(steps or 0, "steps", 0), stride), beginning.t0, retry
+            )
+        end = ending.at_time(
+            ObservedCourse.begun(self, beginning, retry), beginning.h, arguments.end(until, beginning.t0, beginning.h)
+        )
+        return IntegrationPlan(beginning, strided(beginning.h, end.steps, stride, end), beginning.t0, retry)
 
     def carried_out(
         self, plan: IntegrationPlan, of: Sequence[str] = (), **where: Any
@@ -473,10 +477,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         def made(t: Floats, x: Floats, steps: int) -> LatticeTrajectory:
             crossed = np.array(run.crossed)
             crossings = self._trajectory(crossed, grown.whole(shape), met, steps, plan) if plan.section else None
-            retried, joined = tuple(run.course.retried), plan.past is not None
+            retried, continues = tuple(run.course.retried), plan.past is not None
             crossings = crossings and replace(crossings, origin=plan.origin)
             trajectory = replace(self._trajectory(t, x, rows, steps, plan), origin=plan.origin)
-            return replace(trajectory, crossings=crossings, retried=retried, tau=run.tau, joined=joined)
+            return replace(trajectory, crossings=crossings, retried=retried, tau=run.tau, joined=continues)
 
         try:
             run.make(progress)
@@ -486,11 +490,11 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             last = run.course.sites
             rows.record(last)
             states = np.array([*frames.first(len(rows) - 1), last.state()])
-            done = run.course.steps
+            steps_done = run.course.steps
             clock = run.course.time()
-            t = np.append(run.times, plan.begin + (plan.at.h * done if math.isnan(clock) else clock))
-            run.numbers.append(float(done))
-            failed = made(t, states, done + (plan.past.steps if plan.past else 0))
+            t = np.append(run.times, plan.begin + (plan.at.h * steps_done if math.isnan(clock) else clock))
+            run.numbers.append(float(steps_done))
+            failed = made(t, states, steps_done + (plan.past.steps if plan.past else 0))
             raise self.failure(error, plan.at.h, failed, plan.at.values) from error
         trajectory = made(run.times, frames.array, plan.steps)
         if plan.transforms:
@@ -533,7 +537,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         checkpoints: str | Path | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, Any] | None = None,
-        **more: Any,
+        **by_keyword: Any,
     ) -> LatticeTrajectory | LatticeSeries:
         """Integrate a run of the spec, the first by default, and return what `integrate` returns.
 
@@ -551,31 +555,35 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         base = runs.run_named(self.spec, name)
         assert self.spec is not None
         settings = runs.Settings(step, steps, until, stride, every, sizes, at)
-        chosen = runs.changed(self.spec, base, settings)
-        start = start_of(self.spec, chosen)
-        t0 = float(chosen.start) if self.interface.time else None
-        drawn = {"seed": chosen.seed if seed is None and self.interface.noise else seed}
-        values = start.arguments | arguments.together(parameters, more)
-        begun = self._beginning(start.state if x0 is None else x0, "x0", float(chosen.step), values, {}, t0, drawn)
-        plan = self._plan_of(chosen, begun, arguments.count(retry, "retry", 0))
-        of = chosen.record if chosen.records_numbers else ()
-        return self.carried_out(plan, of, output=output, checkpoints=checkpoints, progress=progress)
+        changed_run = runs.changed(self.spec, base, settings)
+        start = start_of(self.spec, changed_run)
+        t0 = float(changed_run.start) if self.interface.time else None
+        noise_arguments = {"seed": changed_run.seed if seed is None and self.interface.noise else seed}
+        values = start.arguments | arguments.together(parameters, by_keyword)
+        beginning = self._beginning(
+            start.state if x0 is None else x0, "x0", float(changed_run.step), values, {}, t0, noise_arguments
+        )
+        plan = self._plan_of(changed_run, beginning, arguments.count(retry, "retry", 0))
+        recorded = changed_run.record if changed_run.records_numbers else ()
+        return self.carried_out(plan, recorded, output=output, checkpoints=checkpoints, progress=progress)
 
-    def _plan_of(self, run: Run, at: Beginning, retry: int) -> IntegrationPlan:
+    def _plan_of(self, run: Run, beginning: Beginning, retry: int) -> IntegrationPlan:
         """The plan of a run of the spec, from a start that has been checked."""
         if retry or run.is_timed:
             arguments.expect_no_noise("retry" if retry else "every", self.interface)
         end, in_tau = None, self.interface.monitored and run.is_timed
         if run.stop is not None or run.until is not None or in_tau:
-            stop = self.function(run.stop, at.values) if run.stop is not None else None
-            end = runs.end_of(ObservedCourse.begun(self, at, retry), run, stop, timed=bool(self.interface.time))
-        rows = strided(at.h, run.steps, run.stride, end)
+            stop = self.function(run.stop, beginning.values) if run.stop is not None else None
+            end = runs.end_of(ObservedCourse.begun(self, beginning, retry), run, stop, timed=bool(self.interface.time))
+        rows = strided(beginning.h, run.steps, run.stride, end)
         if in_tau and end is not None:
             rows = timed_in_tau(runs.spans_of_run(run, end.span), end)
         elif run.is_timed:
-            span = at.h * run.steps if end is None else end.span
-            rows = timed(at.h, run.steps, runs.spans_of_run(run, span), end)
-        return IntegrationPlan(at, rows, at.t0, retry, self.section_of(run, at.values), self.transforms_of(run))
+            span = beginning.h * run.steps if end is None else end.span
+            rows = timed(beginning.h, run.steps, runs.spans_of_run(run, span), end)
+        return IntegrationPlan(
+            beginning, rows, beginning.t0, retry, self.section_of(run, beginning.values), self.transforms_of(run)
+        )
 
     def function(self, expression: Expression, values: Mapping[str, Any]) -> Function:
         """An expression in observables, parameters and the time as a function of observables (rows, observables)."""
@@ -583,9 +591,11 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
     def transforms_of(self, run: Run) -> Transforms | None:
         """Spectrum and correlation of the frames of a run, if it asks for any."""
-        asked = run.lattice
+        requested = run.lattice
         return (
-            Transforms(asked.spectrum, asked.correlation) if asked and (asked.spectrum or asked.correlation) else None
+            Transforms(requested.spectrum, requested.correlation)
+            if requested and (requested.spectrum or requested.correlation)
+            else None
         )
 
     def section_of(self, run: Run, values: Mapping[str, Any]) -> Crossed | None:
@@ -615,7 +625,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         resume: bool = True,
         progress: Progress | None = None,
         parameters: Mapping[str, Any] | None = None,
-        **more: Any,
+        **by_keyword: Any,
     ) -> LatticeSeries:
         """Integrate as `integrate` does, and record numbers every ``stride`` steps in place of frames.
 
@@ -624,9 +634,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         ``checkpoints`` the state and the rows are saved every two seconds. Raises the same as `integrate`; the
         ``trajectory`` of a `StepError` is the series.
         """
-        drawn = {"seed": seed, "member": member, "step0": step0}
-        at = self._beginning(x0, "x0", h, parameters, more, t0, drawn)
-        plan = self._planned(at, steps, stride, until, retry)
+        noise_arguments = {"seed": seed, "member": member, "step0": step0}
+        beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments)
+        plan = self._planned(beginning, steps, stride, until, retry)
         names = ("energy", *self.interface.observables) if of is None else of
         return self.numbered(plan, names, output=output, checkpoints=checkpoints, resume=resume, progress=progress)
 
@@ -641,18 +651,18 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         progress: Progress | None = None,
     ) -> LatticeSeries:
         """Integrate as planned, and record numbers. Names, files and errors are those of `series`."""
-        known = recordable(self.interface)
-        if strange := [name for name in of if name not in known]:
-            raise ValueError(f"cannot record {strange[0]!r}; there are {', '.join(known)}")
+        recordable_names = recordable(self.interface)
+        if strange := [name for name in of if name not in recordable_names]:
+            raise ValueError(f"cannot record {strange[0]!r}; there are {', '.join(recordable_names)}")
         target = expect_table(output) if output else None
         rows, met = NumberRows(self.interface, of), NumberRows(self.interface, of)
-        about = {"record": list(of)}
-        run = LatticeRun(self, plan, rows, met, Path(checkpoints) if checkpoints else None, about)
+        identity = {"record": list(of)}
+        run = LatticeRun(self, plan, rows, met, Path(checkpoints) if checkpoints else None, identity)
         self._expect_place(run, target, None, resume=resume)
 
         def made(steps: int, last: Floats) -> LatticeSeries:
-            at, first = plan.at, plan.at.x if plan.past is None else plan.past.first
-            settings = steps, at.h, at.values
+            beginning, first = plan.at, plan.at.x if plan.past is None else plan.past.first
+            settings = steps, beginning.h, beginning.values
             series = LatticeSeries(run.times, rows.columns, first, last, *settings, self, origin=plan.origin)
             crossings = replace(series, t=np.array(run.crossed), columns=met.columns) if plan.section else None
             return replace(series, crossings=crossings)
@@ -660,8 +670,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         try:
             run.make(progress)
         except BackendError as error:
-            done = run.course.steps + (plan.past.steps if plan.past else 0)
-            failed = made(done, run.course.sites.state())
+            steps_done = run.course.steps + (plan.past.steps if plan.past else 0)
+            failed = made(steps_done, run.course.sites.state())
             raise self.failure(error, plan.at.h, failed, plan.at.values) from error
         series = made(plan.steps, run.last.state())
         if target:
@@ -671,12 +681,15 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
     def ends_of(self, series: LatticeSeries) -> LatticeTrajectory:
         """Return the trajectory of the first and the last state of a series; see `LatticeSeries.ends`."""
-        x, about = np.array([series.first, series.last]), self.interface
+        x, interface = np.array([series.first, series.last]), self.interface
         t = np.array([series.t[0], series.t[-1]])
-        when = t.tolist() if about.time else [None, None]
-        energy = [self.hamiltonian(state, at, parameters=series.parameters) for state, at in zip(x, when, strict=True)]
+        when = t.tolist() if interface.time else [None, None]
+        energy = [
+            self.hamiltonian(state, instant, parameters=series.parameters)
+            for state, instant in zip(x, when, strict=True)
+        ]
         settings = series.steps, series.h, series.parameters
-        return LatticeTrajectory(t, x, np.array(energy), *settings, self.coordinates, about.axes, self)
+        return LatticeTrajectory(t, x, np.array(energy), *settings, self.coordinates, interface.axes, self)
 
     def step(
         self,
@@ -687,18 +700,18 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         seed: int | None = None,
         step0: int | None = None,
         parameters: Mapping[str, Any] | None = None,
-        **more: Any,
+        **by_keyword: Any,
     ) -> Floats:
         """Return the state one step of size ``h`` after ``x`` (coordinates, *sizes) at the time ``t0``.
 
         Raises `StepError`.
         """
-        at = self._beginning(x, "x", h, parameters, more, t0, {"seed": seed, "step0": step0})
-        session = self.started(at)
+        beginning = self._beginning(x, "x", h, parameters, by_keyword, t0, {"seed": seed, "step0": step0})
+        session = self.started(beginning)
         try:
-            session.advance(at.h, 1)
+            session.advance(beginning.h, 1)
         except BackendError as error:
-            raise self.failure(error, at.h, None, at.values) from error
+            raise self.failure(error, beginning.h, None, beginning.values) from error
         return session.state()
 
     def step_tangent(
@@ -711,7 +724,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         seed: int | None = None,
         step0: int | None = None,
         parameters: Mapping[str, Any] | None = None,
-        **more: Any,
+        **by_keyword: Any,
     ) -> tuple[Floats, Floats]:
         """Return the state one step after ``x``, and the product of its derivative with each of some ``vectors``.
 
@@ -719,8 +732,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         `LimitError` for more vectors than fit into memory, and `TypeError` if the solver was compiled without
         ``tangent=True``.
         """
-        for after in self.tangents(x, h, 1, vectors, t0=t0, seed=seed, step0=step0, parameters=parameters, **more):
-            return after
+        for result in self.tangents(
+            x, h, 1, vectors, t0=t0, seed=seed, step0=step0, parameters=parameters, **by_keyword
+        ):
+            return result
         raise AssertionError("one step")
 
     def tangents(
@@ -735,31 +750,35 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         seed: int | None = None,
         step0: int | None = None,
         parameters: Mapping[str, Any] | None = None,
-        **more: Any,
+        **by_keyword: Any,
     ) -> Generator[tuple[Floats, Floats], Floats | None, None]:
         """Yield the state and the tangent ``vectors`` after every ``stride`` steps of a trajectory, and after the last.
 
         Vectors have the shape (count, coordinates, *sizes), and are multiplied by the derivative of each step. Vectors
         that are sent to the generator replace them. Raises the same as `step_tangent`.
         """
-        at = self._beginning(x0, "x0", h, parameters, more, t0, {"seed": seed, "step0": step0})
-        start, steps = at.x, arguments.count(steps, "steps", 0)
+        beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, {"seed": seed, "step0": step0})
+        start, steps = beginning.x, arguments.count(steps, "steps", 0)
         expect_room("tangent vectors", 8 * np.size(vectors))
-        carried = np.array(vectors, dtype=np.float64)
-        if carried.ndim != start.ndim + 1 or carried.shape[1:] != start.shape or not np.isfinite(carried).all():
+        propagated = np.array(vectors, dtype=np.float64)
+        if (
+            propagated.ndim != start.ndim + 1
+            or propagated.shape[1:] != start.shape
+            or not np.isfinite(propagated).all()
+        ):
             shape = ", ".join(map(str, start.shape))
-            raise ValueError(f"tangent vectors must be finite and have shape (count, {shape}), not {carried.shape}")
-        session = self.started(at)
+            raise ValueError(f"tangent vectors must be finite and have shape (count, {shape}), not {propagated.shape}")
+        session = self.started(beginning)
         for count in np.diff(row_steps(steps, arguments.count(stride, "stride", 1))).tolist():
             try:
-                carried = session.advance_tangent(at.h, carried, count)
+                propagated = session.advance_tangent(beginning.h, propagated, count)
             except MissingExtraError:
                 hint = "compile it with tangent=True, or write tangent: true in the spec"
                 raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
             except BackendError as error:
-                raise self.failure(error, at.h, None, at.values) from error
-            sent = yield session.state(), carried
-            carried = carried if sent is None else sent
+                raise self.failure(error, beginning.h, None, beginning.values) from error
+            sent = yield session.state(), propagated
+            propagated = propagated if sent is None else sent
 
     def ensemble(
         self,
@@ -774,7 +793,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         step0: int | None = None,
         threads: int | None = None,
         parameters: Mapping[str, Any] | None = None,
-        **more: Any,
+        **by_keyword: Any,
     ) -> Floats:
         """Return the final states (members, coordinates, *sizes) of several lattices of the same size.
 
@@ -785,16 +804,16 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         takes the random numbers of ``member`` + k. Raises `StepError`: its ``members`` are the failed ones, its
         ``trajectory`` the array of states, in which failed members have their last state, or NaN in the rows after it.
         """
-        times = self._times(t0, more)
-        draws = arguments.draws(self.interface, more, {"seed": seed, "member": member, "step0": step0})
-        values = arguments.together(parameters, more)
+        times = self._times(t0, by_keyword)
+        draws = arguments.draws(self.interface, by_keyword, {"seed": seed, "member": member, "step0": step0})
+        values = arguments.together(parameters, by_keyword)
         return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, values, times, draws)
 
-    def _times(self, t0: ArrayLike | None, more: dict[str, Any]) -> Floats:
+    def _times(self, t0: ArrayLike | None, by_keyword: dict[str, Any]) -> Floats:
         """Return the initial time, a number or an array (members,); see `arguments.start_time`."""
         begin = t0 if np.ndim(t0 if t0 is not None else 0) and self.interface.time else None
         alone: Any = t0 if begin is None else 0.0
-        first = arguments.start_time(alone, self.interface, more)
+        first = arguments.start_time(alone, self.interface, by_keyword)
         return np.asarray(first if begin is None else begin, dtype=np.float64)
 
     def pullback(
@@ -807,7 +826,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         *,
         t0: ArrayLike | None = None,
         parameters: Mapping[str, Any] | None = None,
-        **more: Any,
+        **by_keyword: Any,
     ) -> Pullback:
         """Return the state after ``steps`` steps, and the derivatives of its scalar product with a ``cotangent``.
 
@@ -818,8 +837,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         first axis of rows, for all frames of `integrate`. Derivatives are exact to round-off. Raises `StepError`, and
         `TypeError` if the solver was compiled without ``adjoint=True``.
         """
-        times = self._times(t0, more)
-        values = arguments.together(parameters, more)
+        times = self._times(t0, by_keyword)
+        values = arguments.together(parameters, by_keyword)
         return lattice_gradients.pullback(self, x0, h, steps, cotangent, stride, times, values)
 
     def jacobian(self, *_: Any, **__: Any) -> NoReturn:
@@ -836,15 +855,15 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         member: int | None = None,
         step0: int | None = None,
         parameters: Mapping[str, Any] | None = None,
-        **more: Any,
+        **by_keyword: Any,
     ) -> LiveLattice:
         """Return a session at ``x0`` (coordinates, *sizes), whose steps the caller makes: ``.step``, ``.kick``, ``.x``.
 
         The other arguments are those of `integrate`.
         """
-        drawn = {"seed": seed, "member": member, "step0": step0}
-        at = self._beginning(x0, "x0", None, parameters, more, t0, drawn)
-        return LiveLattice(self, at)
+        noise_arguments = {"seed": seed, "member": member, "step0": step0}
+        beginning = self._beginning(x0, "x0", None, parameters, by_keyword, t0, noise_arguments)
+        return LiveLattice(self, beginning)
 
     # --- functions of states
 
@@ -858,52 +877,54 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             row = int(np.argmin(np.abs(t - time)))
             begin = float(t[row]) if self.interface.time else 0.0
             level = -float(trajectory.energy[0]) if self.interface.monitored else None
-            at = Beginning(np.array(x[row]), trajectory.h, trajectory.parameters, begin, level=level)
+            beginning = Beginning(np.array(x[row]), trajectory.h, trajectory.parameters, begin, level=level)
             try:
-                states[k] = moved_on(LatticeCourse(self, at), trajectory.h, time - float(t[row])).state()
+                states[k] = moved_on(LatticeCourse(self, beginning), trajectory.h, time - float(t[row])).state()
             except BackendError as error:
                 raise self.failure(error, trajectory.h, None, trajectory.parameters) from error
         return states
 
     def hamiltonian(
-        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
+        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **by_keyword: Any
     ) -> float:
         """Return H of a state (coordinates, *sizes), at the time ``t`` if H depends on the time."""
-        return self._session_at(x, parameters, more, t).hamiltonian()
+        return self._session_at(x, parameters, by_keyword, t).hamiltonian()
 
     def density(
-        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
+        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **by_keyword: Any
     ) -> Floats:
         """Return the density of H at the sites (*sizes), whose sum is H."""
-        return self._session_at(x, parameters, more, t).density()
+        return self._session_at(x, parameters, by_keyword, t).density()
 
-    def casimirs(self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> dict[str, Any]:
+    def casimirs(
+        self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **by_keyword: Any
+    ) -> dict[str, Any]:
         """Return the Casimirs of a state, by name: arrays (*sizes) for those of sites, else numbers."""
-        about = self.interface
-        densities = self._session_at(x, parameters, more, 0.0 if self.interface.time else None).casimirs()
-        kinds = zip(about.casimirs, about.casimir_kinds, densities, strict=True)
+        interface = self.interface
+        densities = self._session_at(x, parameters, by_keyword, 0.0 if self.interface.time else None).casimirs()
+        kinds = zip(interface.casimirs, interface.casimir_kinds, densities, strict=True)
         return {name: reduced(kind, values) for name, kind, values in kinds}
 
     def observables(
-        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
+        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **by_keyword: Any
     ) -> dict[str, Any]:
         """Return the observables of the spec of a state, by name: numbers, and arrays (*sizes) for those of sites."""
-        about, session = self.interface, self._session_at(x, parameters, more, t)
-        numbers = dict(zip(about.observables, session.observables().tolist(), strict=True))
-        return numbers | dict(zip(about.observed_fields, session.observed_fields(), strict=True))
+        interface, session = self.interface, self._session_at(x, parameters, by_keyword, t)
+        numbers = dict(zip(interface.observables, session.observables().tolist(), strict=True))
+        return numbers | dict(zip(interface.observed_fields, session.observed_fields(), strict=True))
 
     def vector_field(
-        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
+        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **by_keyword: Any
     ) -> Floats:
         """Return π∇H of a state (coordinates, *sizes), the same shape."""
-        return self._session_at(x, parameters, more, t).vector_field()
+        return self._session_at(x, parameters, by_keyword, t).vector_field()
 
     def _session_at(
-        self, x: ArrayLike, parameters: Mapping[str, Any] | None, more: dict[str, Any], t: float | None = None
+        self, x: ArrayLike, parameters: Mapping[str, Any] | None, by_keyword: dict[str, Any], t: float | None = None
     ) -> LatticeSession:
         state = self.state(x, "x")
-        times = arguments.times(t, self.interface, (), more)
-        values = self.values(parameters, more, state.shape[1:])
+        times = arguments.times(t, self.interface, (), by_keyword)
+        values = self.values(parameters, by_keyword, state.shape[1:])
         return self.started(Beginning(state, 1.0, values, 0.0 if times is None else float(times[0])))
 
     # --- arguments
@@ -912,93 +933,103 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """Return the shape of a state as text for a message."""
         return ", ".join([str(len(self.coordinates)), *(f"N_{axis}" for axis in self.interface.axes)])
 
-    def state(self, x: ArrayLike, what: str) -> Floats:
+    def state(self, x: ArrayLike, argument: str) -> Floats:
         """Return a copy of a state. Raises `ValueError` for sizes that do not fit, and for non-finite values."""
-        about = self.interface
-        copy = arguments.real(x, what)
-        if copy.ndim != 1 + len(about.axes) or copy.shape[0] != len(about.coordinates):
-            raise ValueError(f"{what} must have shape ({self.shape_text()}), not {copy.shape}")
-        for axis, size, least, period in zip(about.axes, copy.shape[1:], about.least, about.periods, strict=True):
+        interface = self.interface
+        copy = arguments.real(x, argument)
+        if copy.ndim != 1 + len(interface.axes) or copy.shape[0] != len(interface.coordinates):
+            raise ValueError(f"{argument} must have shape ({self.shape_text()}), not {copy.shape}")
+        for axis, size, least, period in zip(
+            interface.axes, copy.shape[1:], interface.least, interface.periods, strict=True
+        ):
             if size < least:
-                raise ValueError(f"{what} has {size} sites along {axis}; neighbours and brackets need {least} or more")
+                raise ValueError(
+                    f"{argument} has {size} sites along {axis}; neighbours and brackets need {least} or more"
+                )
             if size % period:
-                message = f"{what} has {size} sites along {axis}; the colours of sites need multiples of {period}"
+                message = f"{argument} has {size} sites along {axis}; the colours of sites need multiples of {period}"
                 hint = "compile from a spec that has a run of this size, or with scheme='series'"
                 raise ValueError(f"{message}; {hint}")
         if not np.isfinite(copy).all():
-            place = tuple(np.argwhere(~np.isfinite(copy))[0].tolist())
-            where = ", ".join(map(str, place[1:]))
-            raise ValueError(f"{what} must be finite, but {about.coordinates[place[0]]} at ({where}) is not")
+            index = tuple(np.argwhere(~np.isfinite(copy))[0].tolist())
+            site_text = ", ".join(map(str, index[1:]))
+            raise ValueError(
+                f"{argument} must be finite, but {interface.coordinates[index[0]]} at ({site_text}) is not"
+            )
         return copy
 
-    def values(self, mapped: Mapping[str, Any] | None, more: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Any]:
+    def values(
+        self, mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any], sizes: Sequence[int]
+    ) -> dict[str, Any]:
         """Return all parameters: numbers, and arrays over the sites or the bonds; for a graph the bonds too.
 
         Raises `TypeError` for unknown names, `ValueError` for values that are not admissible.
         """
-        about = self.interface
-        everything = arguments.together(mapped, more)
+        interface = self.interface
+        everything = arguments.together(mapped, by_keyword)
         everything |= self.defaults(everything, sizes)
-        bonds = {"bonds": checked_bonds(everything.pop("bonds", None), sizes[0])} if about.graph else {}
-        shapes = dict.fromkeys(about.at_sites, tuple(sizes))
-        shapes |= dict.fromkeys(about.at_bonds, (len(bonds["bonds"]),) if bonds else ())
+        bonds = {"bonds": checked_bonds(everything.pop("bonds", None), sizes[0])} if interface.graph else {}
+        shapes = dict.fromkeys(interface.at_sites, tuple(sizes))
+        shapes |= dict.fromkeys(interface.at_bonds, (len(bonds["bonds"]),) if bonds else ())
         arrays = {n: v for n, v in everything.items() if n in shapes}
         numbers = {n: v for n, v in everything.items() if n not in shapes}
-        values: dict[str, Any] = dict(arguments.parameters(about, numbers, {}))
+        values: dict[str, Any] = dict(arguments.parameters(interface, numbers, {}))
         for name, value in arrays.items():
             array = arguments.real(value, f"parameter {name!r}")
             if array.shape not in ((), shapes[name]):
                 raise ValueError(f"parameter {name!r} must be a number or have shape {shapes[name]}, not {array.shape}")
-            where = "sites" if name in about.at_sites else "bonds"
+            domain = "sites" if name in interface.at_sites else "bonds"
             if not np.isfinite(array).all():
-                raise ValueError(f"parameter {name!r} must be finite at all {where}")
-            if bound := arguments.broken_bound(name, array, about):
-                raise ValueError(f"parameter {name!r} must be {bound} at all {where}")
+                raise ValueError(f"parameter {name!r} must be finite at all {domain}")
+            if violated := arguments.broken_bound(name, array, interface):
+                raise ValueError(f"parameter {name!r} must be {violated} at all {domain}")
             values[name] = array
         return values | bonds
 
-    def defaults(self, passed: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Floats]:
-        """Return the defaults of parameters not in ``passed`` that are formulas, lists, files or random numbers.
+    def defaults(self, passed_values: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Floats]:
+        """Return the defaults of parameters not in ``passed_values`` that are formulas, lists, files or random numbers.
 
         They are evaluated at the given sizes. Raises `SpecError` for those that do not fit the sizes.
         """
-        missing = self.interface.required - set(passed)
-        if not missing:
+        missing_names = self.interface.required - set(passed_values)
+        if not missing_names:
             return {}
         if self.spec is None:
-            raise TypeError(f"parameter {min(missing)!r} has no default for all sizes; give an array, or one number")
+            raise TypeError(
+                f"parameter {min(missing_names)!r} has no default for all sizes; give an array, or one number"
+            )
         from phigen.lattice.states import defaults_at
 
-        bonds = len(checked_bonds(passed.get("bonds"), sizes[0])) if self.interface.graph else 0
-        return defaults_at(self.spec, missing, tuple(sizes), bonds)
+        bonds = len(checked_bonds(passed_values.get("bonds"), sizes[0])) if self.interface.graph else 0
+        return defaults_at(self.spec, missing_names, tuple(sizes), bonds)
 
     def _beginning(
         self,
         x: ArrayLike,
-        what: str,
+        argument: str,
         h: float | None,
         parameters: Mapping[str, Any] | None,
-        more: dict[str, Any],
+        by_keyword: dict[str, Any],
         t0: float | None,
-        drawn: Mapping[str, int | None] = arguments.NONE_DRAWN,
+        noise_arguments: Mapping[str, int | None] = arguments.NONE_DRAWN,
     ) -> Beginning:
         """Return the checked arguments of a trajectory; the step size is NaN if it is not known yet."""
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, drawn)
-        level = arguments.level(self.interface, more)
-        start = self.state(x, what)
+        begin = arguments.start_time(t0, self.interface, by_keyword)
+        draws = arguments.draws(self.interface, by_keyword, noise_arguments)
+        level = arguments.level(self.interface, by_keyword)
+        start = self.state(x, argument)
         size = math.nan if h is None else arguments.step_size(h)
-        return Beginning(start, size, self.values(parameters, more, start.shape[1:]), begin, draws, level=level)
+        return Beginning(start, size, self.values(parameters, by_keyword, start.shape[1:]), begin, draws, level=level)
 
-    def started(self, at: Beginning) -> LatticeSession:
+    def started(self, beginning: Beginning) -> LatticeSession:
         """Return a session for checked arguments. Raises `StepError`."""
         try:
-            session = self.backend.start(at.x, at.values, at.t0, at.draws)
-            if at.level is not None:
-                session.hold(at.level)
+            session = self.backend.start(beginning.x, beginning.values, beginning.t0, beginning.draws)
+            if beginning.level is not None:
+                session.hold(beginning.level)
             return session
         except BackendError as error:
-            raise self.failure(error, at.h, None, at.values, at.x) from error
+            raise self.failure(error, beginning.h, None, beginning.values, beginning.x) from error
 
     def failure(
         self, error: BackendError, h: float, so_far: Any, values: Mapping[str, Any], start: Floats | None = None
@@ -1008,19 +1039,21 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         facts = {"step": error.step, "status": error.status, "trajectory": so_far, "members": error.members}
         if error.status == "BAD_ARGUMENT":
             state = {} if start is None else dict(zip(self.coordinates, start, strict=True))
-            if wrong := self.interface.single and arguments.beyond_single({**state, **values, "the step h": h}):
-                return ParameterError(f"{name}: {wrong}", **{**facts, "step": 0})
+            if beyond_range := self.interface.single and arguments.beyond_single({**state, **values, "the step h": h}):
+                return ParameterError(f"{name}: {beyond_range}", **{**facts, "step": 0})
             numbers = ", ".join(f"{n} = {v!r}" for n, v in values.items() if np.ndim(v) == 0)
             reason = "a coefficient computed from parameters alone is not finite"
             reason += ", or the part B of H is not negative where it starts" * self.interface.monitored
             return ParameterError(f"{name}: no step can be made with {numbers}: {reason}", **{**facts, "step": 0})
-        where = f"step {error.step} of size {h!r} failed" if error.step >= 0 else "a step failed"
+        step_text = f"step {error.step} of size {h!r} failed" if error.step >= 0 else "a step failed"
         if error.members:
-            where += f" for {len(error.members)} member(s) of the ensemble ({', '.join(map(str, error.members[:5]))})"
+            step_text += (
+                f" for {len(error.members)} member(s) of the ensemble ({', '.join(map(str, error.members[:5]))})"
+            )
         advice = "the state left the range of the formulas; a smaller step helps, unless the solution ends here"
         if error.step == 0 and error.status == "NOT_FINITE" and (so_far is not None or not self.interface.time):
             advice = self._undefined(error.states[-1], values, None if so_far is None else float(so_far.t[0])) or advice
-        return StepError(f"{name}: {where}: {error.status}, {advice}", **facts)
+        return StepError(f"{name}: {step_text}: {error.status}, {advice}", **facts)
 
     def _undefined(self, x: Floats, values: Mapping[str, Any], t: float | None) -> str:
         """Return a message that names the first site where H is not finite, "" if there is none."""
@@ -1029,16 +1062,18 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         if not len(sites):
             return ""
         site = tuple(sites[0].tolist())
-        there = ", ".join(f"{f} = {float(x[(k, *site)])!r}" for k, f in enumerate(self.coordinates))
-        return f"since H is not finite at the start: at the site ({', '.join(map(str, site))}), where {there}"
+        values_text = ", ".join(f"{f} = {float(x[(k, *site)])!r}" for k, f in enumerate(self.coordinates))
+        return f"since H is not finite at the start: at the site ({', '.join(map(str, site))}), where {values_text}"
 
     def _trajectory(
         self, t: Floats, x: Floats, rows: FrameRows, steps: int, plan: IntegrationPlan
     ) -> LatticeTrajectory:
-        at, axes = plan.at, self.interface.axes
+        beginning, axes = plan.at, self.interface.axes
         observed = np.array(rows.observed).reshape(len(t), len(self.interface.observables))
         energy = np.array(rows.energy)
-        return LatticeTrajectory(t, x, energy, steps, at.h, at.values, self.coordinates, axes, self, observed)
+        return LatticeTrajectory(
+            t, x, energy, steps, beginning.h, beginning.values, self.coordinates, axes, self, observed
+        )
 
 
 def missing_bonds() -> TypeError:
@@ -1054,13 +1089,15 @@ def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
     pairs = array.reshape(-1, 2) if array.size == 0 else array
     if pairs.ndim != 2 or pairs.shape[1] != 2:
         raise ValueError(f"bonds must have shape (bonds, 2), not {pairs.shape}")
-    whole = pairs.astype(np.int64)
-    wrong = np.flatnonzero((whole != pairs).any(1) | (whole < 0).any(1) | (whole >= sites).any(1))
-    wrong = np.append(wrong, np.flatnonzero(whole[:, 0] == whole[:, 1]))
-    if len(wrong):
-        a, b = pairs[wrong[0]].tolist()
-        raise ValueError(f"bond {wrong[0]} runs from {a} to {b}, not between two different sites from 0 to {sites - 1}")
-    return whole
+    integers = pairs.astype(np.int64)
+    wrong_bonds = np.flatnonzero((integers != pairs).any(1) | (integers < 0).any(1) | (integers >= sites).any(1))
+    wrong_bonds = np.append(wrong_bonds, np.flatnonzero(integers[:, 0] == integers[:, 1]))
+    if len(wrong_bonds):
+        a, b = pairs[wrong_bonds[0]].tolist()
+        raise ValueError(
+            f"bond {wrong_bonds[0]} runs from {a} to {b}, not between two different sites from 0 to {sites - 1}"
+        )
+    return integers
 
 
 def reduced(kind: str, densities: Floats) -> Any:

@@ -30,11 +30,11 @@ class LatticeCourse:
     branches share a saved state for up to `SHARED_STEPS` steps; a branch that is used repeats the steps since then.
     """
 
-    def __init__(self, solver: LatticeSolver, at: Beginning) -> None:
-        self.solver, self.at = solver, at
+    def __init__(self, solver: LatticeSolver, beginning: Beginning) -> None:
+        self.solver, self.at = solver, beginning
         self._arrays: Mapping[str, Any] = {}
-        self._sites: LatticeSession | None = solver.started(at)
-        self._clock, self._before = Clock(at.t0), 0
+        self._sites: LatticeSession | None = solver.started(beginning)
+        self._clock, self._before = Clock(beginning.t0), 0
         self._ahead = 0  # steps from the saved arrays to where a course without a session stands
         self._anchor: Mapping[str, Any] = {}  # saved arrays that branches share, with the same step size since
         self._anchor_steps = 0
@@ -44,12 +44,12 @@ class LatticeCourse:
         """The session."""
         if self._sites is None:
             # counted from the last change of the step size, so that times and random numbers are the same
-            arrays, clock, counted = self._arrays, self._clock, self._before
-            draws = replace(self.at.draws, step=self.at.draws.step + counted)
+            arrays, clock, steps_before = self._arrays, self._clock, self._before
+            draws = replace(self.at.draws, step=self.at.draws.step + steps_before)
             begin = Beginning(np.asarray(arrays["state"]), clock.h, self.at.values, clock.t, draws)
             self._sites = self.solver.started(begin)
             if clock.h:
-                self._sites.resume(clock.h, int(arrays["counts"][1]) - counted, arrays)
+                self._sites.resume(clock.h, int(arrays["counts"][1]) - steps_before, arrays)
             elif "passed" in arrays:
                 self._sites.hold(float(arrays["passed"][0]))
             if self._ahead:
@@ -120,10 +120,10 @@ class LatticeCourse:
         return {"state": self.state(), "clock": np.array([clock.t, clock.h]), "counts": counts, **sites.saved()}
 
     @classmethod
-    def restored(cls, solver: LatticeSolver, at: Beginning, arrays: Mapping[str, Any]) -> LatticeCourse:
-        """The course that began at ``at`` and was saved."""
+    def restored(cls, solver: LatticeSolver, beginning: Beginning, arrays: Mapping[str, Any]) -> LatticeCourse:
+        """The course that began at ``beginning`` and was saved."""
         course = object.__new__(cls)
-        course.__setstate__({"solver": solver, "at": at, "saved": arrays})
+        course.__setstate__({"solver": solver, "at": beginning, "saved": arrays})
         return course
 
     def __getstate__(self) -> dict[str, Any]:
@@ -131,8 +131,8 @@ class LatticeCourse:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.solver, self.at, arrays = state["solver"], state["at"], state["saved"]
-        (t, h), (counted, _) = arrays["clock"].tolist(), arrays["counts"].tolist()
-        self._clock, self._before = Clock(t, h, counted), counted
+        (t, h), (steps_before, _) = arrays["clock"].tolist(), arrays["counts"].tolist()
+        self._clock, self._before = Clock(t, h, steps_before), steps_before
         self._arrays, self._sites, self._ahead = arrays, None, 0
         self._anchor, self._anchor_steps = {}, 0
 
@@ -158,13 +158,15 @@ class ObservedCourse(Retrying):
         return {**cast("LatticeCourse", self.session).saved(), "parts": parts}
 
     @classmethod
-    def begun(cls, solver: LatticeSolver, at: Beginning, retry: int = 0) -> ObservedCourse:
+    def begun(cls, solver: LatticeSolver, beginning: Beginning, retry: int = 0) -> ObservedCourse:
         """Return a new course at its start."""
-        return cls(cast("Followed", LatticeCourse(solver, at)), retry)
+        return cls(cast("Followed", LatticeCourse(solver, beginning)), retry)
 
     @classmethod
-    def restored(cls, solver: LatticeSolver, at: Beginning, retry: int, arrays: Mapping[str, Any]) -> ObservedCourse:
-        """The course that began at ``at`` and was saved."""
-        course = cls(cast("Followed", LatticeCourse.restored(solver, at, arrays)), retry)
+    def restored(
+        cls, solver: LatticeSolver, beginning: Beginning, retry: int, arrays: Mapping[str, Any]
+    ) -> ObservedCourse:
+        """The course that began at ``beginning`` and was saved."""
+        course = cls(cast("Followed", LatticeCourse.restored(solver, beginning, arrays)), retry)
         course._extra, *course.retried = arrays["parts"].tolist()
         return course

@@ -36,7 +36,9 @@ def ensemble(
     per_member = {
         name: np.asarray(value) for name, value in parameters.items() if has_members(solver.interface, name, value)
     }
-    per_member |= {what: np.asarray(v) for what, v in (("the step size h", h), ("the times t0", t0)) if np.ndim(v)}
+    per_member |= {
+        argument: np.asarray(v) for argument, v in (("the step size h", h), ("the times t0", t0)) if np.ndim(v)
+    }
     start = states(solver, X0, per_member)
     count, steps = len(start), arguments.count(steps, "steps", 0)
     marks = row_steps(steps, max(steps, 1) if stride is None else arguments.count(stride, "stride", 1))
@@ -62,20 +64,22 @@ def ensemble(
             failures[m] = error.status
             final[m] = error.states[-1]
 
-    most = cores() if threads is None else arguments.count(threads, "threads", 1)
-    shared = solver.interface.is_shared(math.prod(start.shape[2:]))  # each member is then integrated by all threads
-    in_threads(1 if shared else max(1, min(most, count)), make, range(count))
+    max_threads = cores() if threads is None else arguments.count(threads, "threads", 1)
+    uses_all_threads = solver.interface.is_shared(
+        math.prod(start.shape[2:])
+    )  # each member is then integrated by all threads
+    in_threads(1 if uses_all_threads else max(1, min(max_threads, count)), make, range(count))
     states_or_frames = final if stride is None else frames
     if failures:
         failed = tuple(sorted(failures))
-        shown = ", ".join(map(str, failed[:5])) + (", …" if len(failed) > 5 else "")
+        listing = ", ".join(map(str, failed[:5])) + (", …" if len(failed) > 5 else "")
         m, status = failed[0], failures[failed[0]]
         message = (
-            f"{solver.interface.name}: a step failed for {len(failed)} member(s) of the ensemble ({shown}): {status}"
+            f"{solver.interface.name}: a step failed for {len(failed)} member(s) of the ensemble ({listing}): {status}"
         )
         numbers = dict(zip(solver.coordinates, start[m], strict=True)) | values[m] | {"the step h": sizes[m]}
-        if wrong := solver.interface.single and arguments.beyond_single(numbers):
-            message += f", {wrong}"
+        if beyond_range := solver.interface.single and arguments.beyond_single(numbers):
+            message += f", {beyond_range}"
         raise StepError(message, step=-1, status=status, trajectory=states_or_frames, members=failed)
     return states_or_frames
 
@@ -88,21 +92,21 @@ def has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
     return bool(np.ndim(value) == 1 + axes)
 
 
-def states(solver: LatticeSolver, X0: ArrayLike, per_member: Mapping[str, Any], what: str = "X0") -> Floats:
+def states(solver: LatticeSolver, X0: ArrayLike, per_member: Mapping[str, Any], argument: str = "X0") -> Floats:
     """Return the initial states (members, coordinates, *sizes). Raises `ValueError` for other shapes.
 
     ``per_member`` are the arguments with an axis of members; if there are any, one state may stand for all members.
     """
     axes = 1 + len(solver.interface.axes)
-    each: Iterable[Floats]
+    member_states: Iterable[Floats]
     if np.ndim(X0) == axes and per_member:
-        count, each = len(next(iter(per_member.values()))), repeat(solver.state(X0, what))
+        count, member_states = len(next(iter(per_member.values()))), repeat(solver.state(X0, argument))
     elif np.ndim(X0) == 1 + axes:
-        count, each = len(np.asarray(X0)), (solver.state(x, what) for x in np.asarray(X0))
+        count, member_states = len(np.asarray(X0)), (solver.state(x, argument) for x in np.asarray(X0))
     else:
-        raise ValueError(f"{what} must have shape (members, {solver.shape_text()}), not {np.shape(X0)}")
+        raise ValueError(f"{argument} must have shape (members, {solver.shape_text()}), not {np.shape(X0)}")
     start = filled(f"the states of {count} members", (count, *np.shape(X0)[-axes:]))
-    for m, x in zip(range(count), each, strict=False):
+    for m, x in zip(range(count), member_states, strict=False):
         start[m] = x
     for name, value in per_member.items():
         if len(value) != len(start):

@@ -54,14 +54,14 @@ class FrameRows:
         self.energy.append(sites.hamiltonian())
         self.observed.append(sites.observables())
 
-    def begin(self, past: Past) -> None:
+    def begin(self, earlier_run: Past) -> None:
         """See `Sink`."""
-        assert past.x is not None
-        for k, state in enumerate(past.x):
+        assert earlier_run.x is not None
+        for k, state in enumerate(earlier_run.x):
             self.frames.put(k, state)
-        columns = [values for name, values in past.columns.items() if name != "energy"]
-        self.energy = past.columns["energy"].tolist()
-        self.observed = list(np.column_stack([np.empty((len(past.t), 0)), *columns]))
+        columns = [values for name, values in earlier_run.columns.items() if name != "energy"]
+        self.energy = earlier_run.columns["energy"].tolist()
+        self.observed = list(np.column_stack([np.empty((len(earlier_run.t), 0)), *columns]))
 
     def saved(self) -> dict[str, Any]:
         """See `Sink`."""
@@ -113,15 +113,20 @@ class GrowingFrames:
         self._states = [] if frames is None else list(frames[:count])
 
 
-def identity_of(solver: LatticeSolver, at: Beginning, rows: Sequence[int | float]) -> dict[str, Any]:
+def identity_of(solver: LatticeSolver, beginning: Beginning, rows: Sequence[int | float]) -> dict[str, Any]:
     """Return all facts that determine an integration with ``rows`` (a description of the rows), as plain data."""
-    arrays = {name: np.asarray(value) for name, value in at.values.items() if np.ndim(value)}
-    numbers = {name: float(value) for name, value in at.values.items() if not np.ndim(value)}
-    hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": at.x}.items()}
-    hashes |= {"t0": at.t0.hex()} if at.t0 else {}
-    hashes |= {"draws": repr(at.draws)} if at.draws != FIRST_DRAWS else {}
-    about = {"solver": solver.backend.identity, "h": at.h, "sizes": list(at.x.shape), "steps": list(rows)}
-    return {**about, "parameters": numbers, "arrays": hashes}
+    arrays = {name: np.asarray(value) for name, value in beginning.values.items() if np.ndim(value)}
+    numbers = {name: float(value) for name, value in beginning.values.items() if not np.ndim(value)}
+    hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": beginning.x}.items()}
+    hashes |= {"t0": beginning.t0.hex()} if beginning.t0 else {}
+    hashes |= {"draws": repr(beginning.draws)} if beginning.draws != FIRST_DRAWS else {}
+    identity = {
+        "solver": solver.backend.identity,
+        "h": beginning.h,
+        "sizes": list(beginning.x.shape),
+        "steps": list(rows),
+    }
+    return {**identity, "parameters": numbers, "arrays": hashes}
 
 
 class Frames:
@@ -222,10 +227,10 @@ def site_names(coordinates: Sequence[str], sizes: Sequence[int]) -> tuple[str, .
     return tuple(f"{name}_{site}" for name in coordinates for site in sites)
 
 
-def state_columns(about: LatticeInterface, sizes: Sequence[int]) -> list[Column]:
+def state_columns(interface: LatticeInterface, sizes: Sequence[int]) -> list[Column]:
     """Return the columns of a table of states, with energy, Casimirs that are one number, and observables."""
-    summed = tuple(n for n, kind in zip(about.casimirs, about.casimir_kinds, strict=True) if kind != "sites")
-    return trajectory_columns(site_names(about.coordinates, sizes), summed, (), about.observables)
+    summed = tuple(n for n, kind in zip(interface.casimirs, interface.casimir_kinds, strict=True) if kind != "sites")
+    return trajectory_columns(site_names(interface.coordinates, sizes), summed, (), interface.observables)
 
 
 def write_whole(path: Path, trajectory: LatticeTrajectory) -> None:
@@ -275,9 +280,9 @@ def _write_store(path: Path, trajectory: LatticeTrajectory) -> None:
 def write_table(path: Path, trajectory: LatticeTrajectory) -> None:
     """Write a trajectory as ``.csv``. Raises `ValueError` for more sites than it has columns."""
     expect_columns(trajectory.x.shape[1:])
-    about, shape = trajectory.solver.interface, trajectory.x.shape
+    interface, shape = trajectory.solver.interface, trajectory.x.shape
     states = trajectory.x.reshape(shape[0], int(np.prod(shape[1:])))
-    columns = state_columns(about, trajectory.x.shape[2:])
+    columns = state_columns(interface, trajectory.x.shape[2:])
     summed = [trajectory.casimirs[c.key.removeprefix("casimir_")] for c in columns if c.key.startswith("casimir_")]
     write(path, columns, np.column_stack([trajectory.t, states, trajectory.energy, *summed, trajectory.observed]), {})
 

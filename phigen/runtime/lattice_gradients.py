@@ -33,7 +33,9 @@ def pullback(
     per_member = {
         name: np.asarray(value) for name, value in parameters.items() if has_members(solver.interface, name, value)
     }
-    per_member |= {what: np.asarray(v) for what, v in (("the step size h", h), ("the times t0", t0)) if np.ndim(v)}
+    per_member |= {
+        argument: np.asarray(v) for argument, v in (("the step size h", h), ("the times t0", t0)) if np.ndim(v)
+    }
     single = np.ndim(x0) == 1 + len(solver.interface.axes) and not per_member
     start = solver.state(x0, "x0")[np.newaxis] if single else states(solver, x0, per_member, "x0")
     width = max(1, steps) if stride is None else arguments.count(stride, "stride", 1)
@@ -44,7 +46,7 @@ def pullback(
     if stride is None:
         bars = np.concatenate([np.zeros((rows - 1, *start.shape)), bars])
     times = np.broadcast_to(t0, len(start))
-    each = [arguments.step_size(size) for size in np.broadcast_to(h, len(start))]
+    step_sizes = [arguments.step_size(size) for size in np.broadcast_to(h, len(start))]
     frames = filled(f"{rows} frames", (rows, *start.shape))
     parameters = {**parameters, **solver.defaults(parameters, start.shape[2:])}  # once for all members
     x0_bar, bars_by_member = np.empty_like(start), list[dict[str, Floats]]()
@@ -53,23 +55,23 @@ def pullback(
             {n: per_member[n][m] if n in per_member else v for n, v in parameters.items()}, {}, start.shape[2:]
         )
         try:
-            frames[:, m], x0_bar[m], by = solver.backend.pullback(
-                x, each[m], steps, width, bars[:, m], values, float(times[m])
+            frames[:, m], x0_bar[m], parameter_bars = solver.backend.pullback(
+                x, step_sizes[m], steps, width, bars[:, m], values, float(times[m])
             )
         except MissingExtraError:
             raise without_pullback(solver.interface) from None
         except BackendError as error:
-            named = BackendError(error.status, error.step, error.states, () if single else (m,))
-            raise solver.failure(named, each[m], None, values) from error
-        bars_by_member.append(by)
+            member_error = BackendError(error.status, error.step, error.states, () if single else (m,))
+            raise solver.failure(member_error, step_sizes[m], None, values) from error
+        bars_by_member.append(parameter_bars)
     bar = x0_bar.reshape(shape)
     result = frames.reshape(rows, *shape)
-    every = {
-        name: np.array([by[name] for by in bars_by_member])
+    all_bars = {
+        name: np.array([parameter_bars[name] for parameter_bars in bars_by_member])
         if name in per_member
-        else np.sum([by[name] for by in bars_by_member], axis=0)
+        else np.sum([parameter_bars[name] for parameter_bars in bars_by_member], axis=0)
         for name in solver.interface.parameters
     }
     if not bars_by_member:
-        every = {name: np.zeros(np.shape(parameters.get(name, 0.0))) for name in every}
-    return Pullback(result[-1] if stride is None else result, bar, every)
+        all_bars = {name: np.zeros(np.shape(parameters.get(name, 0.0))) for name in all_bars}
+    return Pullback(result[-1] if stride is None else result, bar, all_bars)

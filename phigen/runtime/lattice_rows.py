@@ -54,32 +54,32 @@ class RowSteps:
 def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSteps:
     """Return rows at every ``stride``-th of ``steps`` steps and the last, or up to an end with a part of a step."""
     if end is None or not end.part:
-        whole = row_steps(steps if end is None else end.steps, stride)
-        return RowSteps(whole, np.zeros(len(whole)), end)
-    whole = np.append(np.arange(0, end.steps + 1, stride, dtype=np.int64), end.steps)
-    part = np.zeros(len(whole))
+        whole_rows = row_steps(steps if end is None else end.steps, stride)
+        return RowSteps(whole_rows, np.zeros(len(whole_rows)), end)
+    whole_rows = np.append(np.arange(0, end.steps + 1, stride, dtype=np.int64), end.steps)
+    part = np.zeros(len(whole_rows))
     part[-1] = end.span - end.steps * h
-    return RowSteps(whole, part, end)
+    return RowSteps(whole_rows, part, end)
 
 
 def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) -> RowSteps:
     """Return rows at times ``spans`` after the start, and at the end: after ``steps`` steps, or at ``end``."""
     last = h * steps if end is None else end.span
     inner = [span for span in spans if abs(last - span) > EQUAL * abs(last)]
-    whole = [whole_steps(h, span) for span in inner]
-    left = np.array([span - h * count for span, count in zip(inner, whole, strict=True)])
+    step_numbers = [whole_steps(h, span) for span in inner]
+    left = np.array([span - h * count for span, count in zip(inner, step_numbers, strict=True)])
     part = np.where(np.abs(left) > EQUAL * np.abs(inner), left, 0.0)
     tail = strided(h, steps, max(1, steps if end is None else end.steps), end)
-    whole = [0, *whole, int(tail.whole[-1])]
-    return RowSteps(np.array(whole, dtype=np.int64), np.array([0.0, *part, tail.part[-1]]), end)
+    step_numbers = [0, *step_numbers, int(tail.whole[-1])]
+    return RowSteps(np.array(step_numbers, dtype=np.int64), np.array([0.0, *part, tail.part[-1]]), end)
 
 
 def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
     """Return rows at times ``spans`` after the start, and at the end, for steps that are equal in τ."""
     inner = [span for span in spans if abs(end.span - span) > EQUAL * abs(end.span)]
-    whole = np.zeros(len(inner) + 2, dtype=np.int64)
-    whole[-1] = end.steps
-    return RowSteps(whole, np.zeros(len(whole)), end, np.array([0.0, *inner, end.span]))
+    step_numbers = np.zeros(len(inner) + 2, dtype=np.int64)
+    step_numbers[-1] = end.steps
+    return RowSteps(step_numbers, np.zeros(len(step_numbers)), end, np.array([0.0, *inner, end.span]))
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ class Sink(Protocol):
         """Store the present state of a session as the next row."""
         ...
 
-    def begin(self, past: Past) -> None:
+    def begin(self, earlier_run: Past) -> None:
         """Store the rows of a finished run that this one continues."""
         ...
 
@@ -72,9 +72,9 @@ class LatticeRun:
         rows, saved = self.plan.rows, time.monotonic()
         for k in range(self.count, len(rows)):
             self._advance(self._steps_before(k) - self.course.steps)
-            there, number = self._reached(k)
-            self._mark(there, number)
-            self.last = there.sites
+            course_at_row, number = self._reached(k)
+            self._store_mark(course_at_row, number)
+            self.last = course_at_row.sites
             self.rows.see(self.last)
             self.count += 1
             if self.checkpoints and time.monotonic() - saved >= self.rows.seconds:
@@ -87,8 +87,8 @@ class LatticeRun:
     def times(self) -> Floats:
         """The times of the complete rows."""
         if self.solver.interface.monitored:
-            past = [] if self.plan.past is None else self.plan.past.t[:-1].tolist()
-            return np.array([*past, *(self.plan.begin + t for t in self.clocks)])
+            earlier_times = [] if self.plan.past is None else self.plan.past.t[:-1].tolist()
+            return np.array([*earlier_times, *(self.plan.begin + t for t in self.clocks)])
         return self.plan.times[: self.count + (len(self.plan.past.t) - 1 if self.plan.past else 0)]
 
     @property
@@ -98,9 +98,9 @@ class LatticeRun:
             return None
         return self.plan.at.h * np.array(self.numbers)
 
-    def _mark(self, there: ObservedCourse, number: float) -> None:
+    def _store_mark(self, course: ObservedCourse, number: float) -> None:
         """Store the time and the number of steps of a row."""
-        self.clocks.append(there.time())
+        self.clocks.append(course.time())
         self.numbers.append(number)
 
     def _steps_before(self, k: int) -> int:
@@ -126,7 +126,7 @@ class LatticeRun:
             self.crossed = arrays["crossed"].tolist()
             self.clocks, self.numbers = (arrays[name].tolist() for name in ("clocks", "numbers"))
             return
-        self._mark(self.course, 0.0)
+        self._store_mark(self.course, 0.0)
         if plan.past:
             self.rows.begin(plan.past)
         else:
@@ -142,8 +142,10 @@ class LatticeRun:
         finder = CrossingFinder[ObservedCourse](section.g, plan.at.h, plan.begin, block=block, **clock)
         if "section.values" in arrays:
             finder.values = arrays["section.values"].tolist()
-            before = {name.removeprefix("past."): a for name, a in arrays.items() if name.startswith("past.")}
-            finder.past = [ObservedCourse.restored(self.solver, plan.at, plan.retry, before)] if before else []
+            finder_arrays = {name.removeprefix("past."): a for name, a in arrays.items() if name.startswith("past.")}
+            finder.past = (
+                [ObservedCourse.restored(self.solver, plan.at, plan.retry, finder_arrays)] if finder_arrays else []
+            )
         return finder
 
     def _advance(self, steps: int) -> None:
@@ -153,37 +155,37 @@ class LatticeRun:
             course.advance(h, steps)
             return
         for _, crossings in self.finder.follow(course, steps, lambda: course.advance(h, 1)):
-            self._cross(crossings)
+            self._store_crossings(crossings)
 
-    def _cross(self, crossings: list[tuple[float, Floats]]) -> None:
+    def _store_crossings(self, crossings: list[tuple[float, Floats]]) -> None:
         """Store crossings with the states of the sessions of the finder."""
         assert self.finder
-        for (t, _), (_, there) in zip(crossings, self.finder.places, strict=False):
+        for (t, _), (_, crossing_session) in zip(crossings, self.finder.places, strict=False):
             self.crossed.append(t)
-            self.crossings.see(there.sites)
+            self.crossings.see(crossing_session.sites)
 
     def _reached(self, k: int) -> tuple[ObservedCourse, float]:
         """The course at row k, from the whole steps before it, and its number of steps."""
         rows, part, h = self.plan.rows, float(self.plan.rows.part[k]), self.plan.at.h
         course: ObservedCourse = self.course
-        between: ObservedCourse
+        inner_course: ObservedCourse
         if k == len(rows) - 1 and rows.end:
-            there: ObservedCourse
-            there, number = rows.end.finish(course)
+            end_course: ObservedCourse
+            end_course, number = rows.end.finish(course)
             if self.finder and number > course.steps:
-                self._cross(self.finder.within(course, number - course.steps))
-            return there, number
+                self._store_crossings(self.finder.within(course, number - course.steps))
+            return end_course, number
         if rows.spans is not None:
             left = float(rows.spans[k]) - course.time()
             if abs(left) <= EQUAL * abs(rows.spans[k]):
                 return course, float(course.steps)
-            between, part = reached(course, h, left)
-            return between, course.steps + part / h
+            inner_course, part = reached(course, h, left)
+            return inner_course, course.steps + part / h
         if not part:
             return course, float(course.steps)
-        between = course.branch()
-        between.advance(part, 1)
-        return between, course.steps + part / h
+        inner_course = course.branch()
+        inner_course.advance(part, 1)
+        return inner_course, course.steps + part / h
 
     # --- checkpoints
 
@@ -200,17 +202,17 @@ class LatticeRun:
         arrays |= {name: np.array(values) for name, values in marks.items()}
         if self.finder:
             arrays["section.values"] = np.array(self.finder.values)
-            for before in self.finder.past:
-                arrays |= {f"past.{name}": array for name, array in before.saved().items()}
+            for crossing in self.finder.past:
+                arrays |= {f"past.{name}": array for name, array in crossing.saved().items()}
         Checkpoint(self._identity(), arrays).save(self.checkpoints)
 
     def _identity(self) -> dict[str, Any]:
         plan = self.plan
-        about = identity_of(self.solver, plan.at, plan.rows.described())
-        about |= {"retry": plan.retry} if plan.retry else {}
-        about |= {"section": [plan.section.text, plan.section.direction]} if plan.section else {}
-        about |= {"past": len(plan.past.t)} if plan.past else {}
-        return {**about, **self.identity}
+        identity = identity_of(self.solver, plan.at, plan.rows.described())
+        identity |= {"retry": plan.retry} if plan.retry else {}
+        identity |= {"section": [plan.section.text, plan.section.direction]} if plan.section else {}
+        identity |= {"past": len(plan.past.t)} if plan.past else {}
+        return {**identity, **self.identity}
 
     def _loaded(self) -> Mapping[str, Any]:
         """The arrays of the checkpoint, if there is one."""

@@ -65,28 +65,28 @@ class LatticeSeries:
         Keys of an ``.npz`` are t, energy, casimir_NAME, observable_NAME, first, last, coordinates, axes, steps, h
         and parameter_NAME. Raises `ValueError` for other suffixes.
         """
-        about = self.solver.interface
+        interface = self.solver.interface
         columns = [Column("t", ("t",), flat=True)]
-        columns += [Column(key_of(name, about), (name,), flat=True) for name in self.columns]
+        columns += [Column(key_of(name, interface), (name,), flat=True) for name in self.columns]
         scalars = {"first": self.first, "last": self.last}
-        scalars |= {"coordinates": np.array(about.coordinates), "axes": np.array(about.axes)}
+        scalars |= {"coordinates": np.array(interface.coordinates), "axes": np.array(interface.axes)}
         scalars |= {"origin": np.array(self.origin)} if self.origin else {}
         scalars |= {"steps": np.array(self.steps), "h": np.array(self.h)}
         scalars |= {f"parameter_{name}": np.asarray(value) for name, value in self.parameters.items()}
         write(path, columns, np.column_stack([self.t, *self.columns.values()]), scalars)
 
 
-def key_of(name: str, about: LatticeInterface) -> str:
+def key_of(name: str, interface: LatticeInterface) -> str:
     """Return the name of a column in a ``.npz``."""
-    if name in about.observables:
+    if name in interface.observables:
         return f"observable_{name}"
-    return f"casimir_{name}" if name in about.casimirs else name
+    return f"casimir_{name}" if name in interface.casimirs else name
 
 
-def recordable(about: LatticeInterface) -> tuple[str, ...]:
+def recordable(interface: LatticeInterface) -> tuple[str, ...]:
     """Return the names of all numbers that a run may record."""
-    summed = (name for name, kind in zip(about.casimirs, about.casimir_kinds, strict=True) if kind != "sites")
-    return ("energy", *summed, *about.observables)
+    summed = (name for name, kind in zip(interface.casimirs, interface.casimir_kinds, strict=True) if kind != "sites")
+    return ("energy", *summed, *interface.observables)
 
 
 def series_of(trajectory: LatticeTrajectory) -> LatticeSeries:
@@ -101,8 +101,8 @@ def series_of(trajectory: LatticeTrajectory) -> LatticeSeries:
 class NumberRows:
     """Rows of the numbers ``names``, without states (`phigen.runtime.lattice_run.Sink`)."""
 
-    def __init__(self, about: LatticeInterface, names: Sequence[str]) -> None:
-        self.about, self.names, self.seconds = about, names, CHECKPOINT_SECONDS
+    def __init__(self, interface: LatticeInterface, names: Sequence[str]) -> None:
+        self.about, self.names, self.seconds = interface, names, CHECKPOINT_SECONDS
         self.rows: list[list[float]] = []
 
     def __len__(self) -> int:
@@ -116,11 +116,11 @@ class NumberRows:
 
     def see(self, sites: LatticeSession) -> None:
         """See `Sink`."""
-        self.rows.append(_read(sites, self.about, self.names))
+        self.rows.append(_recorded_columns(sites, self.about, self.names))
 
-    def begin(self, past: Past) -> None:
+    def begin(self, earlier_run: Past) -> None:
         """See `Sink`."""
-        self.rows = np.column_stack([past.columns[name] for name in self.names]).tolist()
+        self.rows = np.column_stack([earlier_run.columns[name] for name in self.names]).tolist()
 
     def saved(self) -> dict[str, Any]:
         """See `Sink`."""
@@ -131,15 +131,15 @@ class NumberRows:
         self.rows = arrays["rows"].tolist()
 
 
-def _read(session: LatticeSession, about: LatticeInterface, names: Sequence[str]) -> list[float]:
-    """Return the columns of a session; only recorded quantities are computed."""
+def _recorded_columns(session: LatticeSession, interface: LatticeInterface, names: Sequence[str]) -> list[float]:
+    """Return the recorded quantities of a session by column; other quantities are not computed."""
     from phigen.runtime.lattice import reduced
 
     values = {"energy": session.hamiltonian()} if "energy" in names else {}
-    if any(name in about.observables for name in names):
-        values |= dict(zip(about.observables, session.observables().tolist(), strict=True))
-    if summed := [name for name in names if name in about.casimirs]:
-        kinds = zip(about.casimirs, about.casimir_kinds, session.casimirs(), strict=True)
+    if any(name in interface.observables for name in names):
+        values |= dict(zip(interface.observables, session.observables().tolist(), strict=True))
+    if summed := [name for name in names if name in interface.casimirs]:
+        kinds = zip(interface.casimirs, interface.casimir_kinds, session.casimirs(), strict=True)
         values |= {name: reduced(kind, densities) for name, kind, densities in kinds if name in summed}
     return [values[name] for name in names]
 

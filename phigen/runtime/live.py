@@ -62,12 +62,12 @@ class LiveSession:
         self._move(self._session.kick, self._checked(change, "change"))
         return self
 
-    def set_parameters(self, parameters: Mapping[str, float] | None = None, /, **more: float) -> Self:
+    def set_parameters(self, parameters: Mapping[str, float] | None = None, /, **by_keyword: float) -> Self:
         """Replace parameters, and return the session; state, time, attitude and random numbers are unchanged.
 
         Raises `TypeError` and `ValueError` for names and values that are not admissible; nothing changes then.
         """
-        changes = arguments.together(parameters, more)
+        changes = arguments.together(parameters, by_keyword)
         values = self.solver.values({**self.parameters, **changes}, {})
         try:
             self._session.set_parameters(values)
@@ -149,8 +149,8 @@ class LiveSession:
         self.__dict__.update(state)
         self._session = self.solver.backend.restored(state["_session"], self.parameters)
 
-    def _checked(self, value: ArrayLike, what: str) -> Floats:
-        return arguments.state(value, what, self.solver.interface)
+    def _checked(self, value: ArrayLike, argument: str) -> Floats:
+        return arguments.state(value, argument, self.solver.interface)
 
     def _casimirs_of(self, x: Floats) -> dict[str, float]:
         casimirs = self.solver.casimirs(x, parameters=self.parameters)
@@ -163,9 +163,11 @@ class LiveSession:
         try:
             by(values)
         except BackendError as error:
-            said = "or the monitor not positive there" if self.solver.interface.monitored else "too large"
+            cause = "or the monitor not positive there" if self.solver.interface.monitored else "too large"
             name = self.solver.interface.name
-            raise StepError(f"{name}: the state is not finite, {said}", step=self.steps, status=error.status) from error
+            raise StepError(
+                f"{name}: the state is not finite, {cause}", step=self.steps, status=error.status
+            ) from error
         self._put = self.x
 
 
@@ -176,10 +178,10 @@ class LiveLattice(LiveSession):
     `LiveSession`. The cost of a step, a kick or a copy is proportional to the number of sites.
     """
 
-    def __init__(self, solver: LatticeSolver, at: Beginning) -> None:
-        super().__init__(solver, cast("Session", LatticeCourse(solver, at)), at.values, at.t0)
+    def __init__(self, solver: LatticeSolver, beginning: Beginning) -> None:
+        super().__init__(solver, cast("Session", LatticeCourse(solver, beginning)), beginning.values, beginning.t0)
 
-    def set_parameters(self, parameters: Mapping[str, float] | None = None, /, **more: float) -> Self:
+    def set_parameters(self, parameters: Mapping[str, float] | None = None, /, **by_keyword: float) -> Self:
         """Raise `TypeError`: the parameters of a lattice are fixed during a session."""
         raise TypeError("the parameters of a lattice are fixed: start another session at x, with t0")
 
@@ -191,9 +193,9 @@ class LiveLattice(LiveSession):
     @property
     def observables(self) -> dict[str, Any]:
         """The observables of the spec at the state, by name: numbers, and arrays (*sizes) for those of sites."""
-        about, sites = self.solver.interface, self._sites
-        numbers = dict(zip(about.observables, sites.observables().tolist(), strict=True))
-        return numbers | dict(zip(about.observed_fields, sites.observed_fields(), strict=True))
+        interface, sites = self.solver.interface, self._sites
+        numbers = dict(zip(interface.observables, sites.observables().tolist(), strict=True))
+        return numbers | dict(zip(interface.observed_fields, sites.observed_fields(), strict=True))
 
     def copy(self) -> LiveLattice:
         """Return an independent copy."""
@@ -213,10 +215,10 @@ class LiveLattice(LiveSession):
     def _sites(self) -> LatticeSession:
         return cast("LatticeCourse", self._session).sites
 
-    def _checked(self, value: ArrayLike, what: str) -> Floats:
-        x: Floats = self.solver.state(value, what)
+    def _checked(self, value: ArrayLike, argument: str) -> Floats:
+        x: Floats = self.solver.state(value, argument)
         if x.shape != self._put.shape:
-            raise ValueError(f"{what} must have shape {self._put.shape}, not {x.shape}")
+            raise ValueError(f"{argument} must have shape {self._put.shape}, not {x.shape}")
         return x
 
     def _casimirs_of(self, x: Floats) -> dict[str, Any]:

@@ -46,7 +46,7 @@ def march(
     finder: CrossingFinder[Session] | None = None,
     see_tangent: Callable[[Floats], None] | None = None,
     *,
-    begun: bool = False,
+    is_started: bool = False,
     goes_on: bool = False,
 ) -> Iterator[Piece]:
     """Advance a session to ``steps`` steps of size h, and yield every ``stride``-th state and the last, in pieces.
@@ -54,11 +54,11 @@ def march(
     If ``goes_on``, a part of a step follows, and the last whole step is not the last state of the run.
 
     The length of a piece depends on the speed of the machine, the rows do not. ``see_tangent`` receives the derivative
-    (DIM, DIM) of each step. ``begun`` is true if the initial state was yielded before. Raises `BackendError` after a
-    piece that ends with the state before the failing step.
+    (DIM, DIM) of each step. ``is_started`` is true if the initial state was yielded before. Raises `BackendError` after
+    a piece that ends with the state before the failing step.
     """
     size = 1
-    if not begun:
+    if not is_started:
         yield standing(session, 0.0)
     while session.steps < steps:
         start = time.perf_counter()
@@ -70,16 +70,16 @@ def march(
                 session, h, min(steps, session.steps + size), stride, finder, see_tangent
             ):
                 crossings += met
-                here = zip(states, marks, strict=False)
-                rows |= {number + k: row for k, row in enumerate(here) if (number + k) % stride == 0}
+                marked_states = zip(states, marks, strict=False)
+                rows |= {number + k: row for k, row in enumerate(marked_states) if (number + k) % stride == 0}
         except BackendError as error:
             failure = error
         if (session.steps == steps and not goes_on) or (failure and session.steps):
             rows[session.steps] = session.state(), (session.time(), session.element())
         x = np.array([state for state, _ in rows.values()]).reshape(len(rows), len(session.state()))
-        passed = np.array([time for _, (time, _) in rows.values()])
+        times = np.array([time for _, (time, _) in rows.values()])
         turned = np.array([element for _, (_, element) in rows.values()]).reshape(len(rows), len(session.element()))
-        yield Piece(np.array(list(rows), dtype=np.float64), x, crossings, passed, turned)
+        yield Piece(np.array(list(rows), dtype=np.float64), x, crossings, times, turned)
         if failure:
             raise failure
         quick = time.perf_counter() - start < _SECONDS
@@ -88,16 +88,16 @@ def march(
 
 def standing(session: Session, number: float) -> Piece:
     """Return a piece with one row: the state of a session, ``number`` steps after the start."""
-    return _piece([(session, number)], len(session.state()), len(session.element()))
+    return _piece_of_rows([(session, number)], len(session.state()), len(session.element()))
 
 
-def _piece(
+def _piece_of_rows(
     rows: Sequence[tuple[Session, float]], width: int, element: int, crossings: Sequence[tuple[float, Floats]] = ()
 ) -> Piece:
-    x = np.array([here.state() for here, _ in rows]).reshape(-1, width)
-    turned = np.array([here.element() for here, _ in rows]).reshape(len(rows), element)
-    passed = np.array([here.time() for here, _ in rows])
-    return Piece(np.array([n for _, n in rows]), x, list(crossings), passed, turned)
+    x = np.array([session.state() for session, _ in rows]).reshape(-1, width)
+    turned = np.array([session.element() for session, _ in rows]).reshape(len(rows), element)
+    times = np.array([session.time() for session, _ in rows])
+    return Piece(np.array([n for _, n in rows]), x, list(crossings), times, turned)
 
 
 def march_at(
@@ -134,28 +134,28 @@ def march_at(
         else:
             session.advance(h, count)
 
-    begun, failure = time.perf_counter(), None
+    started_at, failure = time.perf_counter(), None
     for span in spans:
         try:
-            here, number = _there(session, h, steps, span, advance)
+            row_session, number = _session_at_time(session, h, steps, span, advance)
         except BackendError as error:
             failure = error
             break
-        rows.append((here.branch(), number))
-        if time.perf_counter() - begun > _SECONDS or len(rows) == _MOST_ROWS:
-            yield _piece(rows, *sizes, crossings)
-            begun, rows = time.perf_counter(), []
+        rows.append((row_session.branch(), number))
+        if time.perf_counter() - started_at > _SECONDS or len(rows) == _MOST_ROWS:
+            yield _piece_of_rows(rows, *sizes, crossings)
+            started_at, rows = time.perf_counter(), []
             crossings.clear()
-    yield _piece(rows, *sizes, crossings)
+    yield _piece_of_rows(rows, *sizes, crossings)
     if failure:
         raise failure
     while session.steps < steps:
         crossings.clear()
         advance(min(_MOST_STEPS, steps - session.steps))
-        yield _piece([], *sizes, crossings)
+        yield _piece_of_rows([], *sizes, crossings)
 
 
-def _there(
+def _session_at_time(
     session: Session, h: float, steps: int, span: float, advance: Callable[[int], object]
 ) -> tuple[Session, float]:
     """Return a session at a time after the start, and its number of steps with a fraction.
@@ -163,14 +163,14 @@ def _there(
     The argument ``session`` is advanced by the whole steps before that time.
     """
     clock = session.time()
-    passed = session.steps * h if np.isnan(clock) else clock
-    count, _ = steps_until(session, h, span - passed)
+    elapsed = session.steps * h if np.isnan(clock) else clock
+    count, _ = steps_until(session, h, span - elapsed)
     advance(min(count, steps - session.steps))
     left = span - (session.steps * h if np.isnan(clock) else session.time())
     if abs(left) <= EQUAL * abs(span):
         return session, float(session.steps)
-    there, size = reached(session, h, left)
-    return there, session.steps + size / h
+    row_session, size = reached(session, h, left)
+    return row_session, session.steps + size / h
 
 
 def _states(
@@ -199,12 +199,12 @@ def _states(
             yield session.steps - len(states) + 1, states, marks, met
             marks.clear()
         return
-    done = session.steps
-    while done < target:
-        count = 1 if see_tangent else min(target, done + stride - done % stride) - done
+    steps_done = session.steps
+    while steps_done < target:
+        count = 1 if see_tangent else min(target, steps_done + stride - steps_done % stride) - steps_done
         if see_tangent:
             move()
         else:
             session.advance(h, count)
-        done += count
-        yield done, [session.state()], [(session.time(), session.element())], []
+        steps_done += count
+        yield steps_done, [session.state()], [(session.time(), session.element())], []

@@ -54,20 +54,20 @@ class Members:
         """Whether members differ in their states only."""
         return not any(np.ndim(value) for value in (self.h, self.t0, *self.parameters.values()))
 
-    def part(self, chosen: slice | NDArray[np.intp]) -> Members:
+    def part(self, selection: slice | NDArray[np.intp]) -> Members:
         """Return the ensemble of some of the members."""
 
         def selected(value: Floats) -> Floats:
-            return value[chosen] if np.ndim(value) else value
+            return value[selection] if np.ndim(value) else value
 
         parameters = {name: selected(value) for name, value in self.parameters.items()}
         numbers: dict[str, Any] = {
             "h": selected(self.h),
             "parameters": parameters,
             "t0": selected(self.t0),
-            "paths": self.paths[chosen],
+            "paths": self.paths[selection],
         }
-        return replace(self, x0=self.x0[chosen], **numbers)
+        return replace(self, x0=self.x0[selection], **numbers)
 
     def numbers(self, m: int) -> tuple[float, dict[str, float], float]:
         """Return the step size, the parameters and the initial time of one member."""
@@ -117,8 +117,8 @@ def shared_out(members: Members, threads: int | None, make: Callable[[slice], No
 
     Short ensembles take fewer threads, since a thread must do more work than its start costs.
     """
-    most = min(len(members) * members.steps // _STEPS_PER_THREAD, -(-len(members) // PART_GRANULARITY))
-    threads = max(1, min(cores() if threads is None else threads, most))
+    useful_threads = min(len(members) * members.steps // _STEPS_PER_THREAD, -(-len(members) // PART_GRANULARITY))
+    threads = max(1, min(cores() if threads is None else threads, useful_threads))
     in_threads(threads, make, parts(members, threads))
 
 

@@ -63,11 +63,11 @@ class NumpyLatticeSession:
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps of size ``h``."""
         self.prepare(h)
-        past: dict[Any, Any] = {}
+        predictors: dict[Any, Any] = {}
         with np.errstate(all="ignore"):
             for _ in range(steps):
                 try:
-                    self._x = self._module._advance(self._sites, self._rows, self._x, past)
+                    self._x = self._module._advance(self._sites, self._rows, self._x, predictors)
                 except self._module.FailedError as failed:
                     raise BackendError(str(failed), self.steps, self._x[None].copy()) from None
                 finally:
@@ -80,11 +80,11 @@ class NumpyLatticeSession:
         if not hasattr(self._module, "step_tangent"):
             raise MissingExtraError("step_tangent")
         self.prepare(h)
-        carried, past = list(vectors), dict[Any, Any]()
+        carried, predictors = list(vectors), dict[Any, Any]()
         with np.errstate(all="ignore"):
             for _ in range(steps):
                 try:
-                    self._x = self._module._advance(self._sites, self._rows, self._x, past, carried)
+                    self._x = self._module._advance(self._sites, self._rows, self._x, predictors, carried)
                     self._module._finite(np.array(carried))
                 except self._module.FailedError as failed:
                     raise BackendError(str(failed), self.steps, self._x[None].copy()) from None

@@ -10,7 +10,7 @@ from phigen.runtime.interface import BackendError, Floats, row_steps
 from phigen.runtime.members import Members
 
 
-def ensemble(module: Any, members: Members, gauge: Floats | None, turned: Floats | None = None) -> Floats:
+def ensemble(module: Any, members: Members, gauge: Floats | None, attitudes: Floats | None = None) -> Floats:
     """Return final states or frames, as `phigen.runtime.backend.Backend.ensemble` does.
 
     ``gauge`` is (members, Casimirs), None without a gauge.
@@ -20,7 +20,7 @@ def ensemble(module: Any, members: Members, gauge: Floats | None, turned: Floats
         if not module._admissible(module._values(dict(members.parameters))):
             raise BackendError("BAD_ARGUMENT", 0, members.x0)
         return members.x0.copy() if frames is None else frames
-    batch = MemberBatch(module, members, gauge, None if turned is None else turned[0].copy())
+    batch = MemberBatch(module, members, gauge, None if attitudes is None else attitudes[0].copy())
     if frames is not None:
         frames[1:] = np.nan
     marks = row_steps(members.steps, members.stride or max(members.steps, 1))
@@ -28,11 +28,11 @@ def ensemble(module: Any, members: Members, gauge: Floats | None, turned: Floats
         batch.advance(int(steps))
         if frames is not None:
             frames[row, batch.who] = batch.x
-        if turned is not None:
-            turned[row] = np.nan
-            turned[row, batch.who] = batch.turned[batch.who]
-    if turned is not None and frames is None:
-        turned[-1] = batch.turned
+        if attitudes is not None:
+            attitudes[row] = np.nan
+            attitudes[row, batch.who] = batch.turned[batch.who]
+    if attitudes is not None and frames is None:
+        attitudes[-1] = batch.turned
     return members.checked(batch.final if frames is None else frames, batch.failures, batch.failed_at)
 
 
@@ -64,8 +64,8 @@ class MemberBatch:
         self._memory = [(self._carry, self._carry)] * len(self._stages)
         self._first, self._turned, self.turned = first, (self._carry, self._carry), np.empty_like(members.x0)
         if first is not None:
-            still = module._identity(len(members))
-            self._rate, self._turned = module._rates(values, self.x, gauge), (still, np.zeros_like(still))
+            identity = module._identity(len(members))
+            self._rate, self._turned = module._rates(values, self.x, gauge), (identity, np.zeros_like(identity))
             self.turned = first.copy()
         self._before, self._running = self.x, False
         self._select_settings()
@@ -98,10 +98,10 @@ class MemberBatch:
         if not self._running:
             return
         x, carry = self._state()
-        lost = np.flatnonzero(~np.isfinite(x).all(axis=-1))
+        failed_members = np.flatnonzero(~np.isfinite(x).all(axis=-1))
         self.x, self._carry, self._running = np.where(np.isfinite(x), x, self._before), carry, False
-        if len(lost):
-            self._leave(dict.fromkeys(lost.tolist(), "NOT_FINITE"))
+        if len(failed_members):
+            self._leave(dict.fromkeys(failed_members.tolist(), "NOT_FINITE"))
 
     def _state(self) -> tuple[Floats, Floats]:
         """The states of the remaining members and their compensation terms; inside a run, those of its inner steps."""
@@ -128,27 +128,27 @@ class MemberBatch:
 
     def _of_step(self) -> tuple[Any, ...]:
         """Return the arguments of the next step's stages beside the state: time, step size and noise."""
-        now = self._t0 + self._done * self._h, self._h
-        return (*now, self._drawn(self._done)) if hasattr(self._module, "_drawing") else now
+        time_and_step = self._t0 + self._done * self._h, self._h
+        return (*time_and_step, self._drawn(self._done)) if hasattr(self._module, "_drawing") else time_and_step
 
     def _step(self) -> dict[int, str]:
         """Make one step of all members, or none if some fail; return the status of the failed by place in ``who``."""
         module, memory = self._module, list(self._memory)
-        x, carry, turned = self.x, self._carry, self._turned
+        x, carry, attitudes = self.x, self._carry, self._turned
         of_step = self._of_step() if hasattr(module, "_renewed") else ()
         for k, prepared in enumerate(self._stages):
             stage = module._renewed(prepared, *of_step) if of_step else prepared
-            before = stage, x, carry
+            stage_before = stage, x, carry
             x, carry, memory[k], status = module._advance(stage, x, carry, memory[k])
             if hasattr(module, "_time_of"):
-                nowhere = np.isnan(module._time_of(stage, before[1], memory[k][0]))
+                nowhere = np.isnan(module._time_of(stage, stage_before[1], memory[k][0]))
                 status = np.where((status == "") & nowhere, "NOT_FINITE", status)
             failed = np.flatnonzero(status != "")
             if len(failed):
                 return {int(m): str(status[m]) for m in failed}
             if self._first is not None:
-                turned = module._turn_stage(*before, memory[k][0], *turned)
-        self.x, self._carry, self._memory, self._turned = x, carry, memory, turned
+                attitudes = module._turn_stage(*stage_before, memory[k][0], *attitudes)
+        self.x, self._carry, self._memory, self._turned = x, carry, memory, attitudes
         self._done += 1
         return {}
 

@@ -55,10 +55,10 @@ class AttitudeState(NamedTuple):
         return {"first": self.first, "begun": self.begun, "element": self.element, "lost": self.lost, "rate": rate}
 
     @classmethod
-    def from_arrays(cls, stored: Mapping[str, Any]) -> AttitudeState:
+    def from_arrays(cls, arrays: Mapping[str, Any]) -> AttitudeState:
         """Return the attitude that `arrays` stored."""
-        rate = stored["rate"] if stored["rate"].size else None
-        return cls(stored["first"], float(stored["begun"]), stored["element"], stored["lost"], rate)
+        rate = arrays["rate"] if arrays["rate"].size else None
+        return cls(arrays["first"], float(arrays["begun"]), arrays["element"], arrays["lost"], rate)
 
 
 class NumpySession:
@@ -157,17 +157,17 @@ class NumpySession:
         """See `Session`."""
         if self._turned is None:
             return np.empty(0)
-        turned = self._turned
-        elapsed = self._now() - turned.begun
-        return np.array(self._module._attitude(turned.first, turned.element, turned.rate, elapsed)[0])
+        attitude = self._turned
+        elapsed = self._now() - attitude.begun
+        return np.array(self._module._attitude(attitude.first, attitude.element, attitude.rate, elapsed)[0])
 
     def turn_from(self, first: Floats | None) -> None:
         """Set the attitude at the present state to a group element; None for the identity."""
-        values, still = self._values(), self._module._identity(1)
+        values, identity = self._values(), self._module._identity(1)
         gauge = None if self._gauge is None else np.broadcast_to(self._gauge, (1, len(self._module.GAUGE)))
         rate = self._module._rates(values, self._x, gauge)
-        begun = still if first is None else first[np.newaxis]
-        self._turned = AttitudeState(begun, self._now(), still, np.zeros_like(still), rate)
+        initial = identity if first is None else first[np.newaxis]
+        self._turned = AttitudeState(initial, self._now(), identity, np.zeros_like(identity), rate)
 
     def advance(self, h: float, steps: int) -> None:
         """See `Session`."""
@@ -180,7 +180,7 @@ class NumpySession:
 
     def _make(self, steps: int) -> None:
         for _ in range(steps):
-            self._commit(*self._tried())
+            self._commit(*self._attempted_step())
 
     def _run_corrected(self, steps: int) -> None:
         """Make steps between correctors. Without a successful step, or if a corrector fails, the state is unchanged."""
@@ -213,7 +213,7 @@ class NumpySession:
         self._prepare(h)
         with np.errstate(all="ignore"):
             for row in increments:
-                self._commit(*self._tried(row))
+                self._commit(*self._attempted_step(row))
 
     def advance_tangent(self, h: float) -> Floats:
         """See `Session`."""
@@ -222,7 +222,7 @@ class NumpySession:
         self._prepare(h)
         tangent = np.eye(self._x.shape[1])
         with np.errstate(all="ignore"):
-            x, carry, memory, stages = self._tried()
+            x, carry, memory, stages = self._attempted_step()
             for arguments in stages:
                 stage, converged = self._module._tangent_stage(*arguments)
                 if not (converged.all() and np.isfinite(stage).all()):
@@ -261,25 +261,25 @@ class NumpySession:
         clock: dict[str, Any] = {"t": self._t, "counted": self._counted, "h": self._h, "steps": self.steps}
         clock["draws"] = np.array([self._draws.seed, self._draws.member, self._draws.step], dtype=np.uint64)
         clock["passed"] = np.array(self._passed)
-        turned = {} if self._turned is None else self._turned.arrays()
-        arrays = {"x": self._x, "carry": self._carry, "memory": memory, "gauge": gauge, **turned}
+        attitude_arrays = {} if self._turned is None else self._turned.arrays()
+        arrays = {"x": self._x, "carry": self._carry, "memory": memory, "gauge": gauge, **attitude_arrays}
         np.savez(buffer, allow_pickle=False, **arrays, **clock)
         return buffer.getvalue()
 
     @classmethod
     def from_bytes(cls, module: Any, parameters: Mapping[str, float], saved: bytes) -> NumpySession:
         """Return the session that `saved` stored as these bytes."""
-        with np.load(io.BytesIO(saved)) as stored:
-            gauge = stored["gauge"] if stored["gauge"].size else None
-            draws = Draws(*stored["draws"].tolist())
-            session = cls(module, parameters, stored["x"], stored["carry"], gauge, draws=draws)
-            session.steps = int(stored["steps"])
-            session._turned = AttitudeState.from_arrays(stored) if "first" in stored else None
-            if np.isfinite(stored["h"]):
-                session._prepare(float(stored["h"]))
-                session._memory = [(pair[0], pair[1]) for pair in stored["memory"]]
-            session._t, session._counted = float(stored["t"]), int(stored["counted"])
-            session._passed = (stored["passed"][0], stored["passed"][1])
+        with np.load(io.BytesIO(saved)) as archive:
+            gauge = archive["gauge"] if archive["gauge"].size else None
+            draws = Draws(*archive["draws"].tolist())
+            session = cls(module, parameters, archive["x"], archive["carry"], gauge, draws=draws)
+            session.steps = int(archive["steps"])
+            session._turned = AttitudeState.from_arrays(archive) if "first" in archive else None
+            if np.isfinite(archive["h"]):
+                session._prepare(float(archive["h"]))
+                session._memory = [(pair[0], pair[1]) for pair in archive["memory"]]
+            session._t, session._counted = float(archive["t"]), int(archive["counted"])
+            session._passed = (archive["passed"][0], archive["passed"][1])
         return session
 
     def _now(self) -> float:
@@ -306,10 +306,12 @@ class NumpySession:
         if not hasattr(self._module, "_drawing"):
             return self._now(), self._h
         draws, prescribed = self._draws, None if increments is None else increments[np.newaxis]
-        drawn = self._module._drawing(self._h, 1, draws.seed, draws.member, draws.step, prescribed)
-        return self._now(), self._h, drawn(0 if increments is not None else self.steps)
+        noise = self._module._drawing(self._h, 1, draws.seed, draws.member, draws.step, prescribed)
+        return self._now(), self._h, noise(0 if increments is not None else self.steps)
 
-    def _tried(self, increments: Floats | None = None) -> tuple[Floats, Floats, list[Pair], list[CompletedStage]]:
+    def _attempted_step(
+        self, increments: Floats | None = None
+    ) -> tuple[Floats, Floats, list[Pair], list[CompletedStage]]:
         """Return state, compensation term and predictors after one step, and its completed stages.
 
         The session does not change. Raises `BackendError`.
@@ -318,27 +320,27 @@ class NumpySession:
         of_step = self._of_step(increments) if self._renewed else ()
         for k, prepared in enumerate(self._stages):
             stage = self._module._renewed(prepared, *of_step) if of_step else prepared
-            before = stage, x, carry
+            stage_before = stage, x, carry
             x, carry, memory[k], status = self._module._advance(stage, x, carry, memory[k])
             if status[0] != "":
                 raise BackendError(str(status[0]), self.steps, self._x.copy())
-            stages.append((*before, memory[k][0]))
+            stages.append((*stage_before, memory[k][0]))
         return x, carry, memory, stages
 
     def _commit(self, x: Floats, carry: Floats, memory: list[Pair], stages: list[CompletedStage]) -> None:
         if hasattr(self._module, "_time_of"):
-            passed = self._passed
+            passed_time = self._passed
             for stage, start, _, value in stages:
                 elapsed = self._module._time_of(stage, start, value)
                 if np.isnan(elapsed[0]):
                     raise BackendError("NOT_FINITE", self.steps, self._x.copy())
-                passed = self._module._sum(*passed, elapsed)
-            self._passed = passed
+                passed_time = self._module._sum(*passed_time, elapsed)
+            self._passed = passed_time
         if self._turned is not None:
-            element, lost = self._turned.element, self._turned.lost
+            element, compensation = self._turned.element, self._turned.lost
             for completed in stages:
-                element, lost = self._module._turn_stage(*completed, element, lost)
-            self._turned = self._turned._replace(element=element, lost=lost)
+                element, compensation = self._module._turn_stage(*completed, element, compensation)
+            self._turned = self._turned._replace(element=element, lost=compensation)
         self._x, self._carry, self._memory = x, carry, memory
         self.steps += 1
 
@@ -388,9 +390,9 @@ class NumpySolver:
         """See `phigen.runtime.backend.Backend`."""
         return NumpySession.from_bytes(self.module, parameters, saved)
 
-    def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
+    def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`; in one thread."""
-        return ensemble(self.module, members, self._gauges(members.x0, members.parameters), turned)
+        return ensemble(self.module, members, self._gauges(members.x0, members.parameters), attitudes)
 
     @property
     def has_pullback(self) -> bool:
@@ -427,8 +429,8 @@ class NumpySolver:
         """Return the gauge of each member (members, Casimirs of the gauge), None if there is no gauge."""
         if not self.module.GAUGE:
             return None
-        chosen = self.module.gauge(x0, **parameters) if self._gauge is None else self._gauge
-        return np.broadcast_to(chosen, (len(x0), len(self.module.GAUGE)))
+        gauges = self.module.gauge(x0, **parameters) if self._gauge is None else self._gauge
+        return np.broadcast_to(gauges, (len(x0), len(self.module.GAUGE)))
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""

@@ -37,8 +37,8 @@ class Origin:
     command: str = "run"
 
     def __str__(self) -> str:
-        by = "" if self.command == "run" else f" by {self.command}"
-        return f"phigen origin: {quote(self.spec)} {quote(self.run)} {self.digest}{by}"
+        command_text = "" if self.command == "run" else f" by {self.command}"
+        return f"phigen origin: {quote(self.spec)} {quote(self.run)} {self.digest}{command_text}"
 
     @property
     def _kind(self) -> str:
@@ -48,15 +48,15 @@ class Origin:
     def _named(self) -> str:
         return f"the {self._kind} {self.run} of {self.spec}"
 
-    def difference(self, other: Origin) -> str:
+    def difference(self, requested: Origin) -> str:
         """Return how another origin differs, as the end of the sentence "the file holds …"; "" if it does not."""
-        if self.command != other.command:
-            return f"a result of phigen {other.command}, not of phigen {self.command}"
-        if (self.spec, self.run) != (other.spec, other.run):
-            return f"{other._named}, not {self._named}"
-        if self.digest != other.digest:
+        if self.command != requested.command:
+            return f"a result of phigen {requested.command}, not of phigen {self.command}"
+        if (self.spec, self.run) != (requested.spec, requested.run):
+            return f"{requested._named}, not {self._named}"
+        if self.digest != requested.digest:
             changed = "with other equations, Casimirs or observables"
-            return f"the {other._kind} {other.run} of another spec {other.spec}, {changed}"
+            return f"the {requested._kind} {requested.run} of another spec {requested.spec}, {changed}"
         return ""
 
 
@@ -90,8 +90,8 @@ def read_origin(path: Path) -> Origin | None:
     if suffix != ".npz":
         return _within(path.read_bytes())
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            return _within(str(stored["origin"]).encode())
+        with np.load(path, allow_pickle=False) as archive:
+            return _within(str(archive["origin"]).encode())
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
 

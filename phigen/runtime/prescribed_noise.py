@@ -16,8 +16,8 @@ class PrescribedNoise(Forwarding[Session]):
 
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps."""
-        done = self.steps
-        self.session.advance_along(h, self.increments[done : done + steps])
+        steps_done = self.steps
+        self.session.advance_along(h, self.increments[steps_done : steps_done + steps])
 
     def branch(self) -> PrescribedNoise:
         """Return an independent copy."""

@@ -78,8 +78,8 @@ class Propagation:
         """Return the number of axes of a parameter of one member."""
         if not isinstance(self.solver, LatticeSolver):
             return 0
-        about = self.solver.interface
-        return len(about.axes) if parameter in about.at_sites else int(parameter in about.at_bonds)
+        interface = self.solver.interface
+        return len(interface.axes) if parameter in interface.at_sites else int(parameter in interface.at_bonds)
 
     def shape(self, start: tuple[int, ...]) -> tuple[int, ...]:
         """Return the shape of the result for initial states of shape ``start``."""
@@ -133,15 +133,17 @@ class Propagation:
         """
         start, members, values = self._members(x0, parameters)
         shape = self.shape((len(members), start[-1]))
-        by_x0, by = np.empty((*shape, start[-1])), {name: np.empty(shape) for name in parameters}
-        for place in np.ndindex(*shape[1:]):
+        by_x0, by_parameters = np.empty((*shape, start[-1])), {name: np.empty(shape) for name in parameters}
+        for index in np.ndindex(*shape[1:]):
             unit = np.zeros(shape)
-            unit[(slice(None), *place)] = 1.0
-            by_x0[(slice(None), *place)], bars = self.transposed(members, values, unit)
+            unit[(slice(None), *index)] = 1.0
+            by_x0[(slice(None), *index)], bars = self.transposed(members, values, unit)
             for name, bar in bars.items():
-                by[name][(slice(None), *place)] = bar
-        whole = self.shape(start)
-        return by_x0.reshape(*whole, start[-1]), {name: slopes.reshape(whole) for name, slopes in by.items()}
+                by_parameters[name][(slice(None), *index)] = bar
+        result_shape = self.shape(start)
+        return by_x0.reshape(*result_shape, start[-1]), {
+            name: slopes.reshape(result_shape) for name, slopes in by_parameters.items()
+        }
 
     def _members(self, x0: ArrayLike, parameters: Values) -> tuple[tuple[int, ...], Floats, dict[str, Floats]]:
         """Return the shape of the start, the initial states (members, DIM), and the parameters (members, …)."""

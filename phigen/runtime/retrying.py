@@ -16,9 +16,9 @@ class Retrying(Forwarding[Followed]):
     map from a whole step; ``retried`` lists the numbers of the steps made in parts. ``steps`` counts whole steps.
     """
 
-    def __init__(self, session: Followed, most: int) -> None:
+    def __init__(self, session: Followed, limit: int) -> None:
         super().__init__(session)
-        self.most = most
+        self.most = limit
         self.retried: list[int] = []
         self._extra = 0  # steps of the session minus whole steps: a step in n parts adds n - 1
 

@@ -77,11 +77,11 @@ def changed(spec: Spec, run: Run, settings: Settings) -> Run:
         run = replace(run, every=every, at=())
     if settings.at is not None:
         known_end = run.stop is None and (run.until is not None or spec.monitor is None)
-        run = replace(run, every=None, at=_times(run, settings.at, known_end=known_end))
+        run = replace(run, every=None, at=_row_times(run, settings.at, known_end=known_end))
     return _resized(spec, run, settings.sizes)
 
 
-def _times(run: Run, times: Sequence[float], *, known_end: bool) -> tuple[Fraction, ...]:
+def _row_times(run: Run, times: Sequence[float], *, known_end: bool) -> tuple[Fraction, ...]:
     """Return times of rows in the order of the run, each once.
 
     Raises `ValueError` for times before the start, or after the end if that is known, and if there are none.
@@ -124,8 +124,8 @@ def end_of(session: Followed, run: Run, stop: Function | None, *, timed: bool) -
     """
     h, t0 = float(run.step), float(run.start)
     last = at_time(session.branch(), h, float(run.until) - t0) if run.until is not None else None
-    most = run.steps if last is None else last.steps + last.part
-    zero = where_zero(session.branch(), h, most, stop, t0, timed=timed) if stop else None
+    last_step = run.steps if last is None else last.steps + last.part
+    zero = where_zero(session.branch(), h, last_step, stop, t0, timed=timed) if stop else None
     if zero and (last is None or abs(zero.span) < abs(last.span)):
         return zero
     if last is not None:
@@ -135,18 +135,18 @@ def end_of(session: Followed, run: Run, stop: Function | None, *, timed: bool) -
     return End(run.steps, lambda here: (here, float(run.steps)), h * run.steps, part=False)
 
 
-def spans_of(every: float, span: float) -> list[float]:
-    """Return the multiples of ``every`` from the start to before the end of a ``span`` of time."""
-    count = math.ceil(abs(span / every) * (1 - EQUAL))
-    return [k * math.copysign(every, span) for k in range(1, count)]
+def spans_of(interval: float, span: float) -> list[float]:
+    """Return the multiples of ``interval`` from the start to before the end of a ``span`` of time."""
+    count = math.ceil(abs(span / interval) * (1 - EQUAL))
+    return [k * math.copysign(interval, span) for k in range(1, count)]
 
 
 def spans_of_run(run: Run, span: float) -> list[float]:
     """Return the times from the start to the rows of a run with ``every`` or ``at``, before the end of a span."""
     if run.every is not None:
         return spans_of(float(run.every), span)
-    asked = [float(time - run.start) for time in run.at]
-    return [s for s in asked if 0 < s / span < 1 - EQUAL]
+    requested = [float(time - run.start) for time in run.at]
+    return [s for s in requested if 0 < s / span < 1 - EQUAL]
 
 
 def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
@@ -175,11 +175,11 @@ def _timed_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session,
     """
     h = float(run.step)
     for span in spans_of_run(run, end.span):
-        passed = session.time() if math.isfinite(session.time()) else session.steps * h
-        steps, left = steps_until(session, h, span - passed)
+        elapsed = session.time() if math.isfinite(session.time()) else session.steps * h
+        steps, left = steps_until(session, h, span - elapsed)
         session.advance(h, steps)
         if abs(left) <= EQUAL * abs(span):
             yield session, float(session.steps)
         else:
-            there, size = reached(session, h, left)
-            yield there, session.steps + size / h
+            row_session, size = reached(session, h, left)
+            yield row_session, session.steps + size / h

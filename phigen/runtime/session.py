@@ -121,12 +121,12 @@ def rows_along(
         try:
             session.advance(h, mark - session.steps)
         except BackendError as error:
-            good = session.steps
-            complete_rows = states[: len(row_steps(good, stride))].copy()
+            good_steps = session.steps
+            complete_rows = states[: len(row_steps(good_steps, stride))].copy()
             # The last row of a trajectory is its last state, whether or not a stride ends there.
             complete_rows[-1] = session.state()
             see(len(complete_rows) - 1)
-            raise BackendError(error.status, good, complete_rows) from error
+            raise BackendError(error.status, good_steps, complete_rows) from error
         states[row] = session.state()
         see(row)
         if progress and (mark - reported >= report_every or mark == steps):

@@ -74,8 +74,8 @@ class Solver(Named[Backend, Interface]):
         return getattr(self.backend, "device", None)
 
     def __repr__(self) -> str:
-        about = self.interface
-        return f"<Solver {about.name}: order {about.order}, target {self.target}, ({', '.join(about.coordinates)})>"
+        facts = self.interface
+        return f"<Solver {facts.name}: order {facts.order}, target {self.target}, ({', '.join(facts.coordinates)})>"
 
     def integrate(
         self,
@@ -95,7 +95,7 @@ class Solver(Named[Backend, Interface]):
         increments: ArrayLike | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> Trajectory:
         """Make ``steps`` steps of size ``h`` from ``x0`` (DIM,), storing every ``stride``-th state and the last.
 
@@ -108,12 +108,12 @@ class Solver(Named[Backend, Interface]):
         replaces them. ``progress`` is called from time to time with the number of steps done. Raises `StepError`, whose
         ``trajectory`` ends with the state before the failing step.
         """
-        drawn = {"seed": seed, "member": member, "step0": step0}
-        at = self._beginning(x0, "x0", h, parameters, more, t0, drawn, (attitude0, position0))
+        noise_arguments = {"seed": seed, "member": member, "step0": step0}
+        beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments, (attitude0, position0))
         stride, retry = arguments.count(stride, "stride", 1), arguments.count(retry, "retry", 0)
         if retry:
             arguments.expect_no_noise("retry", self.interface)
-        session = self._started(at)
+        session = self._started(beginning)
         followed: Followed = session
         if increments is not None:
             rows = arguments.increments(increments, self.interface)
@@ -121,28 +121,28 @@ class Solver(Named[Backend, Interface]):
             if steps > len(rows) or until is not None:
                 raise ValueError(f"increments are those of {len(rows)} steps")
         course = Retrying(followed, retry)
-        passed, elements = dict[int, float](), dict[int, Floats]()
+        times, elements = dict[int, float](), dict[int, Floats]()
 
         def see(row: int) -> None:
-            passed[row], elements[row] = course.time(), course.element()
+            times[row], elements[row] = course.time(), course.element()
 
-        def trajectory(states: Floats, done: int) -> Trajectory:
-            tau: Floats = at.h * row_steps(done, stride).astype(np.float64)
-            turned = np.array(list(elements.values()))
-            marks = Marks(tau, np.array(list(passed.values())), turned, done, tuple(course.retried))
-            return self._trajectory(states, marks, at)
+        def trajectory(states: Floats, steps_done: int) -> Trajectory:
+            tau: Floats = beginning.h * row_steps(steps_done, stride).astype(np.float64)
+            attitudes = np.array(list(elements.values()))
+            marks = Marks(tau, np.array(list(times.values())), attitudes, steps_done, tuple(course.retried))
+            return self._trajectory(states, marks, beginning)
 
         if steps is None and until is None:
             raise TypeError("integrate needs the number of steps, or the time until which to integrate")
         if steps is not None and until is not None:
             raise TypeError("integrate takes either steps or until, not both")
         if until is not None:
-            return self._until(course, arguments.end(until, at.t0, at.h), stride, at)
+            return self._until(course, arguments.end(until, beginning.t0, beginning.h), stride, beginning)
         steps = arguments.count(steps if steps is not None else 0, "steps", 0)
         try:
-            states = rows_along(course, at.h, steps, stride, progress, see)
+            states = rows_along(course, beginning.h, steps, stride, progress, see)
         except BackendError as error:
-            raise self.failure(error, at.h, trajectory(error.states, error.step), at.values) from error
+            raise self.failure(error, beginning.h, trajectory(error.states, error.step), beginning.values) from error
         return trajectory(states, steps)
 
     def run(
@@ -159,7 +159,7 @@ class Solver(Named[Backend, Interface]):
         seed: int | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> Trajectory:
         """Integrate a run of the spec, the first by default, and return what `integrate` returns.
 
@@ -172,60 +172,62 @@ class Solver(Named[Backend, Interface]):
         spec, settings = self.spec, runs.Settings(step, steps, until, stride, every, at=at)
         base = runs.run_named(spec, name)
         assert spec is not None
-        chosen = runs.changed(spec, base, settings)
-        initial = {c: more.pop(c) for c in self.interface.coordinates if c in more}
+        run_ = runs.changed(spec, base, settings)
+        initial = {c: by_keyword.pop(c) for c in self.interface.coordinates if c in by_keyword}
         if x0 is not None and initial:
             raise TypeError(f"a run takes either x0 or initial values such as {next(iter(initial))}, not both")
-        of_run = zip(self.interface.coordinates, chosen.initial, strict=True)
+        of_run = zip(self.interface.coordinates, run_.initial, strict=True)
         start = [initial.get(c, float(value)) for c, value in of_run] if x0 is None else x0
-        values: dict[str, float] = {n: float(v) for n, v in chosen.parameters.items()}
-        values |= arguments.together(parameters, more)
-        t0 = float(chosen.start) if self.interface.time else None
-        drawn = {"seed": chosen.seed if seed is None and self.interface.noise else seed}
-        if chosen.stop is None and not chosen.is_timed:
-            length: dict[str, Any] = {"steps": chosen.steps} if chosen.until is None else {"until": float(chosen.until)}
+        values: dict[str, float] = {n: float(v) for n, v in run_.parameters.items()}
+        values |= arguments.together(parameters, by_keyword)
+        t0 = float(run_.start) if self.interface.time else None
+        noise_arguments = {"seed": run_.seed if seed is None and self.interface.noise else seed}
+        if run_.stop is None and not run_.is_timed:
+            length: dict[str, Any] = {"steps": run_.steps} if run_.until is None else {"until": float(run_.until)}
             return self.integrate(
-                start, float(chosen.step), stride=chosen.stride, t0=t0, seed=drawn["seed"], progress=progress,
+                start, float(run_.step), stride=run_.stride, t0=t0, seed=noise_arguments["seed"], progress=progress,
                 parameters=values, **length,
             )  # fmt: skip
         arguments.expect_no_noise("every", self.interface)
-        return self._rows(chosen, self._beginning(start, "x0", float(chosen.step), values, {}, t0, drawn))
+        return self._rows(run_, self._beginning(start, "x0", float(run_.step), values, {}, t0, noise_arguments))
 
-    def _rows(self, run: Run, at: Beginning) -> Trajectory:
+    def _rows(self, run: Run, beginning: Beginning) -> Trajectory:
         """Return the trajectory of a run that ends at a zero, or whose rows have equal distances in time."""
         names = self.interface
-        stop = function_of(run.stop, names.coordinates, at.values, names.time) if run.stop is not None else None
-        session = self._started(at)
+        stop = function_of(run.stop, names.coordinates, beginning.values, names.time) if run.stop is not None else None
+        session = self._started(beginning)
         end = runs.end_of(session, run, stop, timed=bool(names.time))
         rows: list[tuple[Floats, float, float, Floats]] = []
 
         def trajectory() -> Trajectory:
-            x, tau, passed, element = (np.array(column) for column in zip(*rows, strict=True))
-            return self._trajectory(x, Marks(tau, passed, element, end.steps + end.part), at)
+            x, tau, times, element = (np.array(column) for column in zip(*rows, strict=True))
+            return self._trajectory(x, Marks(tau, times, element, end.steps + end.part), beginning)
 
         try:
-            for there, done in runs.rows_of(session, run, end):
-                rows.append((there.state(), done * at.h, there.time(), there.element()))
+            for row_session, steps_done in runs.rows_of(session, run, end):
+                rows.append((row_session.state(), steps_done * beginning.h, row_session.time(), row_session.element()))
         except BackendError as error:
-            raise self.failure(error, at.h, trajectory(), at.values) from error
+            raise self.failure(error, beginning.h, trajectory(), beginning.values) from error
         return trajectory()
 
-    def _until(self, course: Retrying, span: float, stride: int, at: Beginning) -> Trajectory:
+    def _until(self, course: Retrying, span: float, stride: int, beginning: Beginning) -> Trajectory:
         """Return the trajectory of `integrate` over a span of time."""
-        seen: list[tuple[Floats, float, float, Floats, int, tuple[int, ...]]] = []
+        rows: list[tuple[Floats, float, float, Floats, int, tuple[int, ...]]] = []
 
-        def see(now: Retrying, tau: float) -> None:
-            seen.append((now.state(), tau, now.time(), now.element(), now.steps, tuple(now.retried)))
+        def see(session: Retrying, tau: float) -> None:
+            rows.append(
+                (session.state(), tau, session.time(), session.element(), session.steps, tuple(session.retried))
+            )
 
         def trajectory() -> Trajectory:
-            x, tau, passed, turned, steps, retried = zip(*seen, strict=True)
-            marks = Marks(np.array(tau), np.array(passed), np.array(turned), steps[-1], retried[-1])
-            return self._trajectory(np.array(x), marks, at)
+            x, tau, times, attitudes, steps, retried = zip(*rows, strict=True)
+            marks = Marks(np.array(tau), np.array(times), np.array(attitudes), steps[-1], retried[-1])
+            return self._trajectory(np.array(x), marks, beginning)
 
         try:
-            along_until(course, at.h, span, stride, see)
+            along_until(course, beginning.h, span, stride, see)
         except BackendError as error:
-            raise self.failure(error, at.h, trajectory(), at.values) from error
+            raise self.failure(error, beginning.h, trajectory(), beginning.values) from error
         return trajectory()
 
     def session(
@@ -239,15 +241,15 @@ class Solver(Named[Backend, Interface]):
         member: int | None = None,
         step0: int | None = None,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> LiveSession:
         """Return a session at ``x0`` (DIM,), whose steps the caller makes: ``.step(h)``, ``.kick(dx)``, ``.x``.
 
         The other arguments are those of `integrate`.
         """
-        drawn = {"seed": seed, "member": member, "step0": step0}
-        at = self._beginning(x0, "x0", None, parameters, more, t0, drawn, (attitude0, position0))
-        return LiveSession(self, self._started(at), at.values, at.t0)
+        noise_arguments = {"seed": seed, "member": member, "step0": step0}
+        beginning = self._beginning(x0, "x0", None, parameters, by_keyword, t0, noise_arguments, (attitude0, position0))
+        return LiveSession(self, self._started(beginning), beginning.values, beginning.t0)
 
     def states_at(self, trajectory: Trajectory, times: Floats) -> Floats:
         """Return the states (times, DIM) of a trajectory of this solver at given times; see `Trajectory.at`."""
@@ -276,15 +278,15 @@ class Solver(Named[Backend, Interface]):
         seed: int | None = None,
         step0: int | None = None,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> Floats:
         """Return the state (DIM,) one step of size ``h`` after ``x`` (DIM,) at the time ``t0``. Raises `StepError`."""
-        at = self._beginning(x, "x", h, parameters, more, t0, {"seed": seed, "step0": step0})
-        session = self._started(at)
+        beginning = self._beginning(x, "x", h, parameters, by_keyword, t0, {"seed": seed, "step0": step0})
+        session = self._started(beginning)
         try:
-            session.advance(at.h, 1)
+            session.advance(beginning.h, 1)
         except BackendError as error:
-            raise self.failure(error, at.h, None, at.values) from error
+            raise self.failure(error, beginning.h, None, beginning.values) from error
         return session.state()
 
     def step_tangent(
@@ -296,16 +298,16 @@ class Solver(Named[Backend, Interface]):
         seed: int | None = None,
         step0: int | None = None,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> tuple[Floats, Floats]:
         """Return the state (DIM,) one step after ``x`` (DIM,), and its derivative by ``x`` (DIM, DIM).
 
         Row i of the derivative is the gradient of the new coordinate i. It is exact to round-off, for a fixed gauge if
         the solver chooses one. Raises `StepError`, and `TypeError` if the solver was compiled without ``tangent=True``.
         """
-        at = self._beginning(x, "x", h, parameters, more, t0, {"seed": seed, "step0": step0})
-        session = self._started(at)
-        tangent = self._with_tangent(session, at)
+        beginning = self._beginning(x, "x", h, parameters, by_keyword, t0, {"seed": seed, "step0": step0})
+        session = self._started(beginning)
+        tangent = self._with_tangent(session, beginning)
         return session.state(), tangent
 
     def tangents(
@@ -319,17 +321,19 @@ class Solver(Named[Backend, Interface]):
         member: int | None = None,
         step0: int | None = None,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> Iterator[tuple[Floats, Floats]]:
         """Yield the state (DIM,) after each step of a trajectory, and the derivative (DIM, DIM) of that step.
 
         The steps are those of `integrate`. Raises the same as `step_tangent`.
         """
-        at = self._beginning(x0, "x0", h, parameters, more, t0, {"seed": seed, "member": member, "step0": step0})
+        beginning = self._beginning(
+            x0, "x0", h, parameters, by_keyword, t0, {"seed": seed, "member": member, "step0": step0}
+        )
         steps = arguments.count(steps, "steps", 0)
-        session = self._started(at)
+        session = self._started(beginning)
         for _ in range(steps):
-            tangent = self._with_tangent(session, at)
+            tangent = self._with_tangent(session, beginning)
             yield session.state(), tangent
 
     def section(
@@ -343,7 +347,7 @@ class Solver(Named[Backend, Interface]):
         t0: float | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> Section:
         """Return the zeros of ``g`` along the trajectory of ``steps`` steps of size ``h`` from ``x0`` (DIM,).
 
@@ -353,20 +357,22 @@ class Solver(Named[Backend, Interface]):
         `StepError`, whose ``trajectory`` is the `Section` until the failure.
         """
         arguments.expect_no_noise("section", self.interface)
-        at = self._beginning(x0, "x0", h, parameters, more, t0)
+        beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0)
         steps = arguments.count(steps, "steps", 0)
         zeros: list[tuple[float, Floats]] = []
         if direction not in SIGNS:
             raise ValueError(f"direction must be {', '.join(SIGNS)}, not {direction!r}")
-        finder = CrossingFinder[Session](g, at.h, at.t0, timed=bool(self.interface.time), direction=direction)
-        session = self._started(at)
+        finder = CrossingFinder[Session](
+            g, beginning.h, beginning.t0, timed=bool(self.interface.time), direction=direction
+        )
+        session = self._started(beginning)
         try:
-            for _, crossings in finder.follow(session, steps, lambda: session.advance(at.h, 1)):
+            for _, crossings in finder.follow(session, steps, lambda: session.advance(beginning.h, 1)):
                 zeros += crossings
                 if progress:
                     progress(session.steps)
         except BackendError as error:
-            raise self.failure(error, at.h, self._section(zeros), at.values) from error
+            raise self.failure(error, beginning.h, self._section(zeros), beginning.values) from error
         return self._section(zeros)
 
     def ensemble(
@@ -382,7 +388,7 @@ class Solver(Named[Backend, Interface]):
         step0: int | None = None,
         threads: int | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
-        **more: ArrayLike,
+        **by_keyword: ArrayLike,
     ) -> Floats:
         """Return the final states (members, DIM) of an ensemble with the initial states ``X0`` (members, DIM).
 
@@ -394,9 +400,9 @@ class Solver(Named[Backend, Interface]):
         member fails: its ``members`` are the failed ones, its ``trajectory`` the array of states, in which failed
         members have their last state, or NaN in the rows after it.
         """
-        drawn = {"seed": seed, "member": member, "step0": step0}
-        asked = self._members(X0, h, steps, stride, t0, drawn, parameters, more)
-        return self._together(asked, threads, self.backend.ensemble)
+        noise_arguments = {"seed": seed, "member": member, "step0": step0}
+        members = self._members(X0, h, steps, stride, t0, noise_arguments, parameters, by_keyword)
+        return self._integrate_members(members, threads, self.backend.ensemble)
 
     def attitudes(
         self,
@@ -413,7 +419,7 @@ class Solver(Named[Backend, Interface]):
         step0: int | None = None,
         threads: int | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
-        **more: ArrayLike,
+        **by_keyword: ArrayLike,
     ) -> Turned:
         """Return the states of `ensemble` with attitudes and positions: (x, attitude, position).
 
@@ -423,19 +429,21 @@ class Solver(Named[Backend, Interface]):
         the same bits as in `integrate`. Raises the same as `ensemble`, with all three results in ``trajectory``, and
         `TypeError` if the spec does not say ``reconstruct``.
         """
-        drawn = {"seed": seed, "member": member, "step0": step0}
-        asked = self._members(X0, h, steps, stride, t0, drawn, parameters, more)
-        rows = len(row_steps(asked.steps, asked.stride or max(asked.steps, 1)))
-        turned = np.full((rows, len(asked), self.interface.element), np.nan)
-        turned[0] = arguments.firsts(attitude0, position0, self.interface, len(asked))
+        noise_arguments = {"seed": seed, "member": member, "step0": step0}
+        requested = self._members(X0, h, steps, stride, t0, noise_arguments, parameters, by_keyword)
+        rows = len(row_steps(requested.steps, requested.stride or max(requested.steps, 1)))
+        elements = np.full((rows, len(requested), self.interface.element), np.nan)
+        elements[0] = arguments.firsts(attitude0, position0, self.interface, len(requested))
 
         def with_attitudes(x: Floats) -> Turned:
-            attitude, position = turned_into(self.interface, turned if asked.stride else turned[-1])
+            attitude, position = turned_into(self.interface, elements if requested.stride else elements[-1])
             assert attitude is not None
             return Turned(x, attitude, position)
 
         try:
-            x = self._together(asked, threads, lambda members, most: self.backend.ensemble(members, most, turned))
+            x = self._integrate_members(
+                requested, threads, lambda members, most: self.backend.ensemble(members, most, elements)
+            )
         except StepError as error:
             error.trajectory = with_attitudes(error.trajectory)
             raise
@@ -452,7 +460,7 @@ class Solver(Named[Backend, Interface]):
         t0: ArrayLike | None = None,
         threads: int | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
-        **more: ArrayLike,
+        **by_keyword: ArrayLike,
     ) -> Pullback:
         """Return the state after ``steps`` steps, and the derivatives of its scalar product with a ``cotangent``.
 
@@ -466,7 +474,7 @@ class Solver(Named[Backend, Interface]):
         is included. There are no derivatives of times and attitudes. Raises `StepError`, and `TypeError` if the solver
         was compiled without ``adjoint=True``.
         """
-        values = arguments.together(parameters, more)
+        values = arguments.together(parameters, by_keyword)
         threads = threads if threads is None else arguments.count(threads, "threads", 1)
         return gradients.pullback(self, x0, h, steps, cotangent, stride, t0, threads, values)
 
@@ -478,7 +486,7 @@ class Solver(Named[Backend, Interface]):
         *,
         t0: float | None = None,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> Jacobian:
         """Return the state (DIM,) after ``steps`` steps from ``x0`` (DIM,), and its derivatives by x0 and parameters.
 
@@ -486,9 +494,9 @@ class Solver(Named[Backend, Interface]):
         one `pullback` for each coordinate, with the same conventions and errors.
         """
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
-        for name, value in arguments.together(parameters, more).items():
+        for name, value in arguments.together(parameters, by_keyword).items():
             arguments.number(value, f"parameter {name!r}")
-        options: dict[str, Any] = {"t0": t0, "parameters": parameters, **more}
+        options: dict[str, Any] = {"t0": t0, "parameters": parameters, **by_keyword}
         rows = [self.pullback(start, h, steps, side, **options) for side in np.eye(len(start))]
         names = rows[0].parameters_bar
         return Jacobian(
@@ -503,7 +511,7 @@ class Solver(Named[Backend, Interface]):
         t: ArrayLike | None = None,
         *,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> Floats:
         """Return H of the states ``x`` (…, DIM), shape (…).
 
@@ -511,16 +519,16 @@ class Solver(Named[Backend, Interface]):
         """
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        when = arguments.times(t, self.interface, states.shape[:-1], more)
-        return self.backend.hamiltonian(rows, self.values(parameters, more), when).reshape(states.shape[:-1])
+        when = arguments.times(t, self.interface, states.shape[:-1], by_keyword)
+        return self.backend.hamiltonian(rows, self.values(parameters, by_keyword), when).reshape(states.shape[:-1])
 
     def casimirs(
-        self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float
+        self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **by_keyword: float
     ) -> dict[str, Floats]:
         """Return the Casimirs of the states ``x`` (…, DIM), by name, each of shape (…)."""
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        values = self.backend.casimirs(rows, self.values(parameters, more))
+        values = self.backend.casimirs(rows, self.values(parameters, by_keyword))
         return {name: values[:, i].reshape(states.shape[:-1]) for i, name in enumerate(self.interface.casimirs)}
 
     def vector_field(
@@ -529,13 +537,13 @@ class Solver(Named[Backend, Interface]):
         t: ArrayLike | None = None,
         *,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> Floats:
         """Return π∇H at the states ``x`` (…, DIM), the same shape; ``t`` as for `hamiltonian`."""
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        when = arguments.times(t, self.interface, states.shape[:-1], more)
-        return self.backend.vector_field(rows, self.values(parameters, more), when).reshape(states.shape)
+        when = arguments.times(t, self.interface, states.shape[:-1], by_keyword)
+        return self.backend.vector_field(rows, self.values(parameters, by_keyword), when).reshape(states.shape)
 
     def noise_fields(
         self,
@@ -543,13 +551,13 @@ class Solver(Named[Backend, Interface]):
         t: ArrayLike | None = None,
         *,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> Floats:
         """Return σπ∇g of each source of noise at the states ``x`` (…, DIM), shape (…, sources, DIM)."""
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        when = arguments.times(t, self.interface, states.shape[:-1], more)
-        fields = self.backend.noise_fields(rows, self.values(parameters, more), when)
+        when = arguments.times(t, self.interface, states.shape[:-1], by_keyword)
+        fields = self.backend.noise_fields(rows, self.values(parameters, by_keyword), when)
         return fields.reshape(*states.shape[:-1], len(self.interface.noise), self.interface.dimension)
 
     def observables(
@@ -558,7 +566,7 @@ class Solver(Named[Backend, Interface]):
         t: ArrayLike | None = None,
         *,
         parameters: Mapping[str, float] | None = None,
-        **more: float,
+        **by_keyword: float,
     ) -> dict[str, Floats]:
         """Return the observables of the spec at the states ``x`` (…, DIM), by name, each of shape (…).
 
@@ -566,8 +574,8 @@ class Solver(Named[Backend, Interface]):
         """
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        when = arguments.times(t, self.interface, states.shape[:-1], more)
-        values = self.backend.observables(rows, self.values(parameters, more), when)
+        when = arguments.times(t, self.interface, states.shape[:-1], by_keyword)
+        values = self.backend.observables(rows, self.values(parameters, by_keyword), when)
         return {name: values[:, i].reshape(states.shape[:-1]) for i, name in enumerate(self.interface.observables)}
 
     def observed(self, x: Floats, t: Floats, parameters: Mapping[str, float]) -> Floats:
@@ -578,22 +586,22 @@ class Solver(Named[Backend, Interface]):
         """Return H (rows,) of the states (rows, DIM) of a trajectory at its times (rows,)."""
         return self.backend.hamiltonian(x, parameters, t if self.interface.time else None)
 
-    def _trajectory(self, x: Floats, marks: Marks, at: Beginning) -> Trajectory:
-        casimirs = self.backend.casimirs(x, at.values)
-        t = marks.passed if self.interface.monitored else at.t0 + marks.tau
+    def _trajectory(self, x: Floats, marks: Marks, beginning: Beginning) -> Trajectory:
+        casimirs = self.backend.casimirs(x, beginning.values)
+        t = marks.passed if self.interface.monitored else beginning.t0 + marks.tau
         attitude, position = turned_into(self.interface, marks.turned)
-        observed = self.observed(x, t, at.values)
+        observed = self.observed(x, t, beginning.values)
         return Trajectory(
             tau=marks.tau if self.interface.monitored else t,
             retried=marks.retried,
             solver=self,
             t=t,
             x=x,
-            energy=self.energies(x, t, at.values),
+            energy=self.energies(x, t, beginning.values),
             casimirs={name: casimirs[:, i] for i, name in enumerate(self.interface.casimirs)},
             steps=marks.steps,
-            h=at.h,
-            parameters=at.values,
+            h=beginning.h,
+            parameters=beginning.values,
             coordinates=self.interface.coordinates,
             attitude=attitude,
             position=position,
@@ -603,19 +611,19 @@ class Solver(Named[Backend, Interface]):
     def _beginning(
         self,
         x: ArrayLike,
-        what: str,
+        argument: str,
         h: float | None,
         parameters: Mapping[str, float] | None,
-        more: dict[str, float],
+        by_keyword: dict[str, float],
         t0: float | None,
-        drawn: Mapping[str, int | None] = arguments.NONE_DRAWN,
+        noise_arguments: Mapping[str, int | None] = arguments.NONE_DRAWN,
         first: tuple[ArrayLike | None, ArrayLike | None] = (None, None),
     ) -> Beginning:
         """Return the checked arguments of a trajectory; the step size is NaN if it is not known yet."""
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, drawn)
-        values = self.values(parameters, more)
-        start = arguments.state(x, what, self.interface)
+        begin = arguments.start_time(t0, self.interface, by_keyword)
+        draws = arguments.draws(self.interface, by_keyword, noise_arguments)
+        values = self.values(parameters, by_keyword)
+        start = arguments.state(x, argument, self.interface)
         size = math.nan if h is None else arguments.step_size(h)
         return Beginning(start, size, values, begin, draws, arguments.first(*first, self.interface))
 
@@ -626,39 +634,41 @@ class Solver(Named[Backend, Interface]):
         steps: int,
         stride: int | None,
         t0: ArrayLike | None,
-        drawn: Mapping[str, int | None],
+        noise_arguments: Mapping[str, int | None],
         parameters: Mapping[str, ArrayLike] | None,
-        more: Mapping[str, ArrayLike],
+        by_keyword: Mapping[str, ArrayLike],
     ) -> Members:
         """Return the checked arguments of an ensemble."""
-        keywords: dict[str, Any] = dict(more)
-        draws = arguments.draws(self.interface, keywords, drawn)
+        keywords: dict[str, Any] = dict(by_keyword)
+        draws = arguments.draws(self.interface, keywords, noise_arguments)
         return arguments.ensemble(X0, h, steps, stride, t0, parameters, keywords, self.interface, draws)
 
-    def _together(self, asked: Members, threads: int | None, make: Callable[[Members, int | None], Floats]) -> Floats:
+    def _integrate_members(
+        self, requested: Members, threads: int | None, make: Callable[[Members, int | None], Floats]
+    ) -> Floats:
         """Return the states of members that ``make`` integrates. Raises `StepError` if members fail."""
-        most = threads if threads is None else arguments.count(threads, "threads", 1)
+        max_threads = threads if threads is None else arguments.count(threads, "threads", 1)
         try:
-            return make(asked, most)
+            return make(requested, max_threads)
         except BackendError as error:
             m = error.members[0] if error.members else 0
-            h, values, _ = asked.numbers(m)
-            raise self.failure(error, h, error.states, values, asked.x0[m] if len(asked) else None) from error
+            h, values, _ = requested.numbers(m)
+            raise self.failure(error, h, error.states, values, requested.x0[m] if len(requested) else None) from error
 
-    def _started(self, at: Beginning) -> Session:
+    def _started(self, beginning: Beginning) -> Session:
         try:
-            return self.backend.start(at.x, at.values, at.t0, at.first, at.draws)
+            return self.backend.start(beginning.x, beginning.values, beginning.t0, beginning.first, beginning.draws)
         except BackendError as error:
-            raise self.failure(error, at.h, None, at.values, at.x) from error
+            raise self.failure(error, beginning.h, None, beginning.values, beginning.x) from error
 
-    def _with_tangent(self, session: Session, at: Beginning) -> Floats:
+    def _with_tangent(self, session: Session, beginning: Beginning) -> Floats:
         try:
-            return session.advance_tangent(at.h)
+            return session.advance_tangent(beginning.h)
         except MissingExtraError:
             hint = "compile it with tangent=True, or write tangent: true in the spec"
             raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
         except BackendError as error:
-            raise self.failure(error, at.h, None, at.values) from error
+            raise self.failure(error, beginning.h, None, beginning.values) from error
 
     def _section(self, crossings: Sequence[tuple[float, Floats]]) -> Section:
         t, x = np.array([t for t, _ in crossings]), np.array([x for _, x in crossings])
@@ -680,8 +690,10 @@ class Solver(Named[Backend, Interface]):
         name = self.interface.name
         if error.status == "BAD_ARGUMENT":
             state = {} if start is None else dict(zip(self.coordinates, start.tolist(), strict=True))
-            if wrong := self.interface.single and arguments.beyond_single({**state, **parameters, "the step h": h}):
-                message = f"{name}: {wrong}" + (f", as of member {error.members[0]}" if error.members else "")
+            if beyond_range := self.interface.single and arguments.beyond_single(
+                {**state, **parameters, "the step h": h}
+            ):
+                message = f"{name}: {beyond_range}" + (f", as of member {error.members[0]}" if error.members else "")
                 return ParameterError(
                     message, step=0, status=error.status, trajectory=trajectory, members=error.members
                 )
@@ -693,16 +705,16 @@ class Solver(Named[Backend, Interface]):
             if self.interface.monitored:
                 message += f"{', or' if settings else ':'} where it starts the monitor is not positive"
             return ParameterError(message, step=0, status=error.status, trajectory=trajectory, members=error.members)
-        where = f"{name}: step {error.step} of size {h!r} failed" if error.step >= 0 else f"{name}: a step failed"
+        step_text = f"{name}: step {error.step} of size {h!r} failed" if error.step >= 0 else f"{name}: a step failed"
         if error.members:
-            shown = ", ".join(map(str, error.members[:5])) + (", …" if len(error.members) > 5 else "")
-            where += f" for {len(error.members)} member(s) of the ensemble ({shown})"
+            members_text = ", ".join(map(str, error.members[:5])) + (", …" if len(error.members) > 5 else "")
+            step_text += f" for {len(error.members)} member(s) of the ensemble ({members_text})"
         elif error.step >= 0 and isinstance(trajectory, Trajectory):
             reached = trajectory.t[-1] if self.interface.monitored else trajectory.t[0] + error.step * h
-            where += f" at t = {reached:.12g}"
-        message = f"{where}: {error.status}" + (f", {_ADVICE[error.status]}" if error.status in _ADVICE else "")
+            step_text += f" at t = {reached:.12g}"
+        message = f"{step_text}: {error.status}" + (f", {_ADVICE[error.status]}" if error.status in _ADVICE else "")
         return StepError(message, step=error.step, status=error.status, trajectory=trajectory, members=error.members)
 
-    def values(self, mapped: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
+    def values(self, mapped: Mapping[str, float] | None, by_keyword: Mapping[str, float]) -> dict[str, float]:
         """Return the values of all parameters. Raises the same as `arguments.parameters`."""
-        return arguments.parameters(self.interface, mapped, more)
+        return arguments.parameters(self.interface, mapped, by_keyword)

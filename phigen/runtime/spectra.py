@@ -61,8 +61,8 @@ class DynamicSpectrum:
         zarr = imported("zarr")
         root = zarr.open_group(str(path), mode="w", zarr_format=2)
         for name, (dimensions, values) in self.variables("S").items():
-            about = {"_ARRAY_DIMENSIONS": list(dimensions)}
-            root.create_array(name, data=values, fill_value=None, attributes=about)  # 0 is a value like others
+            attributes = {"_ARRAY_DIMENSIONS": list(dimensions)}
+            root.create_array(name, data=values, fill_value=None, attributes=attributes)  # 0 is a value like others
         root.attrs["of"] = list(self.of)
         zarr.consolidate_metadata(str(path))
 
@@ -108,8 +108,10 @@ class Transforms:
 
     def of(self, run: LatticeTrajectory) -> tuple[DynamicSpectrum | None, Correlation | None]:
         """Return spectrum and correlation of a trajectory."""
-        asked, pair = self.spectrum, self.correlation
-        structure_factor = spectrum(run, asked.of, after=_number(asked.after)) if asked else None
+        spectrum_request, pair = self.spectrum, self.correlation
+        structure_factor = (
+            spectrum(run, spectrum_request.of, after=_number(spectrum_request.after)) if spectrum_request else None
+        )
         if pair is None:
             return structure_factor, None
         values = correlation(run, pair.of, pair.other, pair.axis, pair.up_to, after=_number(pair.after))
@@ -137,9 +139,9 @@ def spectrum(run: LatticeTrajectory, of: Sequence[str], *, after: float | None =
     window *= np.sqrt(count / (window**2).sum())
     total = np.zeros((count, *sizes))
     for k in fields:
-        shown = np.array(run.x[first : first + count, k]) * window.reshape(-1, *[1] * len(sizes))
+        windowed = np.array(run.x[first : first + count, k]) * window.reshape(-1, *[1] * len(sizes))
         # e^{+iωt} in time, so that a wave moving to larger r has q and ω of the same sign
-        total += np.abs(np.fft.fftn(np.fft.ifft(shown, axis=0), axes=range(1, 1 + len(sizes)))) ** 2
+        total += np.abs(np.fft.fftn(np.fft.ifft(windowed, axis=0), axes=range(1, 1 + len(sizes)))) ** 2
     total /= float(np.prod(sizes)) ** 2
     values = np.moveaxis(np.fft.fftshift(total), 0, -1)
     q = tuple(np.fft.fftshift(2 * np.pi * np.fft.fftfreq(size)) for size in sizes)
@@ -158,15 +160,15 @@ def correlation(
     _expect_grid(run, "a correlation")
     if axis not in run.axes:
         raise ValueError(f"{axis!r} is no axis; there are {', '.join(run.axes)}")
-    along = 1 + run.axes.index(axis)
-    size = run.x.shape[1 + along]
+    array_axis = 1 + run.axes.index(axis)
+    size = run.x.shape[1 + array_axis]
     if not 0 <= up_to < size:
         raise ValueError(f"up_to must be from 0 to {size - 1}, the last distance along {axis}, not {up_to!r}")
     count, sums = 0, np.zeros(up_to + 1)
     numbers, means = np.zeros(up_to + 1), np.zeros(2)
-    pair, wraps = (_index(run, of), _index(run, other)), not run.solver.interface.open_axes[along - 1]
+    pair, wraps = (_index(run, of), _index(run, other)), not run.solver.interface.open_axes[array_axis - 1]
     for x in itertools.islice(run.x, len(run.t) - len(_later(run.t, run.h, after)), None):
-        f, g = (np.moveaxis(np.asarray(x[k]), along - 1, 0) for k in pair)
+        f, g = (np.moveaxis(np.asarray(x[k]), array_axis - 1, 0) for k in pair)
         means += f.mean(), g.mean()
         count += 1
         for d in range(up_to + 1):
@@ -210,7 +212,7 @@ def _index(run: LatticeTrajectory, name: str) -> int:
     return run.coordinates.index(name)
 
 
-def _expect_grid(run: LatticeTrajectory, what: str) -> None:
-    about = run.solver.interface
-    if about.graph or about.pairs:
-        raise ValueError(f"{what} is along the axes of a grid, and {about.name} has none")
+def _expect_grid(run: LatticeTrajectory, argument: str) -> None:
+    interface = run.solver.interface
+    if interface.graph or interface.pairs:
+        raise ValueError(f"{argument} is along the axes of a grid, and {interface.name} has none")

@@ -47,7 +47,7 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
     begin = session.time()
     target = begin + span
     rounded = _ROUNDINGS * session.rounding * max(abs(begin), abs(span))
-    size, before, missed_before = h, 0.0, -span
+    size, lower_size, missed_before = h, 0.0, -span
     while True:  # halve the first step until it succeeds
         try:
             copy = _moved(session, size)
@@ -58,9 +58,9 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
                 raise
     missed = copy.time() - target
     for _ in range(MAX_SECANTS):
-        if missed == 0 or size == before or missed == missed_before:
+        if missed == 0 or size == lower_size or missed == missed_before:
             break
-        following = size - missed * (size - before) / (missed - missed_before)
+        following = size - missed * (size - lower_size) / (missed - missed_before)
         if abs(following - size) <= 1e-16 * abs(size):
             break
         try:
@@ -70,7 +70,7 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
         ahead = candidate.time() - target
         if abs(ahead) >= abs(missed) and abs(missed) <= rounded:
             break
-        before, missed_before = size, missed
+        lower_size, missed_before = size, missed
         size, missed, copy = following, ahead, candidate
     if abs(missed) > max(1e-9 * max(abs(begin), abs(span)), rounded):
         raise BackendError("NO_CONVERGENCE", session.steps, session.state()[np.newaxis])
@@ -83,25 +83,25 @@ def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
     If a step fails within the span, the number includes that step, so that the caller meets the same failure.
     """
     if not np.isfinite(session.time()):
-        whole = whole_steps(h, span)
-        return whole, span - whole * h
-    target, done, chunk, growing, here = session.time() + span, 0, 1, True, session
+        whole_count = whole_steps(h, span)
+        return whole_count, span - whole_count * h
+    target, steps_done, chunk, growing, last_session = session.time() + span, 0, 1, True, session
     while chunk:
-        copy = here.branch()
+        copy = last_session.branch()
         try:
             copy.advance(h, chunk)
         except BackendError:
             if chunk == 1:
-                return done + 1, 0.0
-            beyond = True
+                return steps_done + 1, 0.0
+            overshoots = True
         else:
-            beyond = (target - copy.time()) * np.sign(span) < 0
-        if beyond:
+            overshoots = (target - copy.time()) * np.sign(span) < 0
+        if overshoots:
             chunk, growing = chunk // 2, False
         else:
-            here, done = copy, done + chunk
+            last_session, steps_done = copy, steps_done + chunk
             chunk = 2 * chunk if growing else chunk
-    return done, target - here.time()
+    return steps_done, target - last_session.time()
 
 
 def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C, float], object]) -> None:
@@ -110,43 +110,43 @@ def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C
     ``see`` receives every stride-th session and the last, each with its τ. Raises `BackendError`.
     """
     see(session, 0.0)
-    done = 0
+    steps_done = 0
     if not np.isfinite(session.time()):
-        whole = whole_steps(h, span)
-        while done < whole:
-            count = min(stride - done % stride, whole - done)
+        whole_count = whole_steps(h, span)
+        while steps_done < whole_count:
+            count = min(stride - steps_done % stride, whole_count - steps_done)
             session.advance(h, count)
-            done += count
-            if done % stride == 0:
-                see(session, done * h)
-        left = span - done * h
+            steps_done += count
+            if steps_done % stride == 0:
+                see(session, steps_done * h)
+        left = span - steps_done * h
     else:
         chunk, growing = 1, True
         while chunk:
-            chunk = min(chunk, stride - done % stride)
+            chunk = min(chunk, stride - steps_done % stride)
             copy = session.branch()
             copy.advance(h, chunk)
             if (span - copy.time()) * np.sign(span) < 0:  # the copy is past the end
                 chunk, growing = chunk // 2, False
                 continue
-            session, done = copy, done + chunk
+            session, steps_done = copy, steps_done + chunk
             chunk = 2 * chunk if growing else chunk
-            if done % stride == 0:
-                see(session, done * h)
+            if steps_done % stride == 0:
+                see(session, steps_done * h)
         left = span - session.time()
     if abs(left) <= EQUAL * abs(span):
-        if done % stride:
-            see(session, done * h)
+        if steps_done % stride:
+            see(session, steps_done * h)
         return
     end, size = reached(session, h, left)
-    see(end, done * h + size)
+    see(end, steps_done * h + size)
 
 
-def states_at(place: Callable[[int], Session], t: Floats, x: Floats, h: float, times: Floats) -> Floats:
+def states_at(session_at: Callable[[int], Session], t: Floats, x: Floats, h: float, times: Floats) -> Floats:
     """Return the states (times, DIM) at given times of a trajectory with rows ``t`` and ``x``.
 
-    Each is reached from the nearest row by steps of size h or −h and a part of one. ``place`` returns a session at the
-    row of that number. Raises `BackendError`.
+    Each state is reached from the nearest row by steps of size h or −h and a part of a step. ``session_at`` returns a
+    session at the row of that number. Raises `BackendError`.
     """
     states = np.empty((len(times), x.shape[1]))
     for k, time in enumerate(np.asarray(times, dtype=np.float64).tolist()):
@@ -154,16 +154,16 @@ def states_at(place: Callable[[int], Session], t: Floats, x: Floats, h: float, t
         span = time - float(t[row])
         states[k] = x[row]
         if span:
-            states[k] = moved_on(place(row), h, span).state()
+            states[k] = moved_on(session_at(row), h, span).state()
     return states
 
 
 def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -> None:
     """Make steps for the time ``span``: whole steps of size h, then a part of one. For steps equal in time."""
     step = float(np.copysign(h, span))
-    whole = whole_steps(step, span)
-    advance(step, whole)
-    left = span - whole * step
+    whole_count = whole_steps(step, span)
+    advance(step, whole_count)
+    left = span - whole_count * step
     if abs(left) > EQUAL * abs(span):
         advance(left, 1)
 

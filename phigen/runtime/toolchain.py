@@ -86,11 +86,11 @@ def find() -> Compiler:
     zig is that of the Python package ziglang. Raises `ToolchainError` if the compiler named in CC does not work, and
     `NoCompilerError` if none of the others does; the messages say why.
     """
-    named = os.environ.get("CC", "").strip()
-    if named:
-        compiler = _examined(_command(named))
+    configured = os.environ.get("CC", "").strip()
+    if configured:
+        compiler = _examined(_command(configured))
         if isinstance(compiler, str):
-            raise ToolchainError(f"the C compiler named in CC, {named}, {compiler}\n  hint: {_HINT}")
+            raise ToolchainError(f"the C compiler named in CC, {configured}, {compiler}\n  hint: {_HINT}")
         return compiler
     reasons = []
     for candidate in _CANDIDATES:
@@ -99,7 +99,7 @@ def find() -> Compiler:
             return compiler
         reasons.append(f"{candidate} {compiler}")
     if find_spec(_PACKAGE):
-        compiler = _answering((sys.executable, "-m", _PACKAGE, "cc"))
+        compiler = _responding_compilers((sys.executable, "-m", _PACKAGE, "cc"))
         if isinstance(compiler, Compiler):
             return compiler
         reasons.append(f"{_PACKAGE} {compiler}")
@@ -126,7 +126,7 @@ def threaded(compiler: Compiler) -> Compiler:
         source.write_text(_TRIAL_OF_THREADS, encoding="utf-8")
         flags = (*BASE_FLAGS, "-Werror", OPENMP)
         try:
-            has_openmp = not _made(compiler.command, flags, [source], library, _TRIAL_TIMEOUT)
+            has_openmp = not _compile_library(compiler.command, flags, [source], library, _TRIAL_TIMEOUT)
         except (OSError, subprocess.TimeoutExpired):
             has_openmp = False
     return replace(compiler, tuning=(*compiler.tuning, OPENMP)) if has_openmp else compiler
@@ -144,7 +144,7 @@ def compile_library(
     output.unlink(missing_ok=True)
     try:
         with progress.stage(f"{sources[0].stem}: C compiler"):
-            failure = _made(compiler.command, compiler.flags, sources, output, timeout)
+            failure = _compile_library(compiler.command, compiler.flags, sources, output, timeout)
     except subprocess.TimeoutExpired as error:
         raise ToolchainError(
             f"{compiler} did not finish within {timeout:g} s\n"
@@ -158,12 +158,12 @@ def compile_library(
 _NOT_FOUND = "was not found"
 
 
-def _command(named: str) -> tuple[str, ...]:
+def _command(configured: str) -> tuple[str, ...]:
     try:
-        return tuple(shlex.split(named))
+        return tuple(shlex.split(configured))
     except ValueError as error:
         raise ToolchainError(
-            f"CC={named} cannot be read as a command: {error}\n  hint: quote it as for a shell, e.g. CC='gcc -O2'"
+            f"CC={configured} cannot be read as a command: {error}\n  hint: quote it as for a shell, e.g. CC='gcc -O2'"
         ) from error
 
 
@@ -172,25 +172,27 @@ def _examined(command: tuple[str, ...]) -> Compiler | str:
     path = shutil.which(command[0])
     if path is None:
         return "is not a program" if shutil.which(command[0], os.F_OK) else _NOT_FOUND
-    return _answering((path, *command[1:]))
+    return _responding_compilers((path, *command[1:]))
 
 
 @cache
-def _answering(command: tuple[str, ...]) -> Compiler | str:
+def _responding_compilers(command: tuple[str, ...]) -> Compiler | str:
     try:
-        code, said = _run([*command, "--version"], _TRIAL_TIMEOUT, errors=False)
-        version = next((line.strip() for line in said.splitlines() if line.strip()), "")
+        code, output = _run([*command, "--version"], _TRIAL_TIMEOUT, errors=False)
+        version = next((line.strip() for line in output.splitlines() if line.strip()), "")
         if code or not version:
-            return f"does not report its version: --version {_ended(code, said) if code else 'printed nothing'}"
+            return (
+                f"does not report its version: --version {_failure_text(code, output) if code else 'printed nothing'}"
+            )
         with tempfile.TemporaryDirectory(prefix="phigen-") as folder:
-            return _tried(command, version, Path(folder))
+            return _with_tuning_flags(command, version, Path(folder))
     except subprocess.TimeoutExpired as error:
         return f"did not answer within {error.timeout:g} s"
     except OSError as error:
         return f"cannot be tried: {error.filename}: {error.strerror}"
 
 
-def _tried(command: tuple[str, ...], version: str, folder: Path) -> Compiler | str:
+def _with_tuning_flags(command: tuple[str, ...], version: str, folder: Path) -> Compiler | str:
     """Return the compiler with the tuning flags that it accepts, or why it compiles no library.
 
     All flags are tried at once, and one by one if that fails.
@@ -199,9 +201,9 @@ def _tried(command: tuple[str, ...], version: str, folder: Path) -> Compiler | s
     source, library = folder / "trial.c", folder / "trial.so"
     source.write_text(_TRIAL, encoding="utf-8")
 
-    def failure(*more: str) -> str:
+    def failure(*by_keyword: str) -> str:
         library.unlink(missing_ok=True)
-        return _made(command, (*BASE_FLAGS, *more), [source], library, patience)
+        return _compile_library(command, (*BASE_FLAGS, *by_keyword), [source], library, patience)
 
     # -Werror turns clang's warning about an unused flag into a refusal.
     if not failure("-Werror", *TUNING_FLAGS):
@@ -212,11 +214,13 @@ def _tried(command: tuple[str, ...], version: str, folder: Path) -> Compiler | s
     return Compiler(command, version, tuple(flag for flag in TUNING_FLAGS if not failure("-Werror", flag)))
 
 
-def _made(command: Sequence[str], flags: Sequence[str], sources: Sequence[Path], output: Path, timeout: float) -> str:
+def _compile_library(
+    command: Sequence[str], flags: Sequence[str], sources: Sequence[Path], output: Path, timeout: float
+) -> str:
     """Compile a library; return "", or why there is none, as the end of a sentence about the compiler."""
-    code, said = _run([*command, *flags, *map(str, sources), "-o", str(output), "-lm"], timeout)
+    code, messages = _run([*command, *flags, *map(str, sources), "-o", str(output), "-lm"], timeout)
     if code:
-        return _ended(code, said)
+        return _failure_text(code, messages)
     head = _head(output)
     if head is None:
         return "reported success, but wrote no library"
@@ -235,15 +239,15 @@ def _head(path: Path) -> bytes | None:
         return None
 
 
-def _ended(code: int, said: str) -> str:
+def _failure_text(code: int, messages: str) -> str:
     """Return the failure of a compiler as the end of a sentence, with the first lines of its messages."""
-    how = f"failed with exit code {code}" if code > 0 else f"was ended by {signal.Signals(-code).name}"
-    lines = said.strip().splitlines()
+    ending = f"failed with exit code {code}" if code > 0 else f"was ended by {signal.Signals(-code).name}"
+    lines = messages.strip().splitlines()
     if not lines:
-        return f"{how} without a message"
-    shown = "\n".join(f"    {line}" for line in lines[:_MESSAGE_LINES])
-    more = f"\n    … {len(lines) - _MESSAGE_LINES} more lines" if len(lines) > _MESSAGE_LINES else ""
-    return f"{how}:\n{shown}{more}"
+        return f"{ending} without a message"
+    first_lines = "\n".join(f"    {line}" for line in lines[:_MESSAGE_LINES])
+    remaining_note = f"\n    … {len(lines) - _MESSAGE_LINES} more lines" if len(lines) > _MESSAGE_LINES else ""
+    return f"{ending}:\n{first_lines}{remaining_note}"
 
 
 def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tuple[int, str]:

@@ -131,23 +131,25 @@ class Trajectory:
     def columns(self) -> list[Column]:
         """Return the columns of `rows`."""
         shape = () if self.attitude is None else self.attitude.shape[1:]
-        turned = element_columns(shape, position=self.position is not None)
+        attitude_columns = element_columns(shape, position=self.position is not None)
         observed = tuple(self.observables)
-        return trajectory_columns(self.coordinates, tuple(self.casimirs), turned, observed, monitored=self.monitored)
+        return trajectory_columns(
+            self.coordinates, tuple(self.casimirs), attitude_columns, observed, monitored=self.monitored
+        )
 
     def rows(self) -> Floats:
         """Return all values (rows, columns) as they are written to files, in the order of `columns`."""
-        turned = [] if self.attitude is None else [self.attitude.reshape(len(self), -1)]
-        turned += [] if self.position is None else [self.position]
+        attitude_rows = [] if self.attitude is None else [self.attitude.reshape(len(self), -1)]
+        attitude_rows += [] if self.position is None else [self.position]
         times = [self.t, self.tau] if self.monitored else [self.t]
         return np.column_stack(
-            [*times, self.x, self.energy, *self.casimirs.values(), *turned, *self.observables.values()]
+            [*times, self.x, self.energy, *self.casimirs.values(), *attitude_rows, *self.observables.values()]
         )
 
     def scalars(self) -> dict[str, Any]:
         """Return the entries of a ``.npz`` beside the columns: names of coordinates, steps, h and parameters."""
-        about = {"coordinates": np.array(self.coordinates), "steps": self.steps, "h": self.h}
-        return {**about, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
+        entries = {"coordinates": np.array(self.coordinates), "steps": self.steps, "h": self.h}
+        return {**entries, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
 
 
 class Turned(NamedTuple):
@@ -180,7 +182,7 @@ def element_columns(shape: tuple[int, ...], *, position: bool) -> list[Column]:
 def trajectory_columns(
     coordinates: tuple[str, ...],
     casimirs: tuple[str, ...],
-    turned: Sequence[Column] = (),
+    attitude_columns: Sequence[Column] = (),
     observables: tuple[str, ...] = (),
     *,
     monitored: bool = False,
@@ -190,11 +192,16 @@ def trajectory_columns(
     Names are distinct: a coordinate ``t`` is in the column ``t_``.
     """
     times = [Column(name, (name,), flat=True) for name in (["t", "tau"] if monitored else ["t"])]
-    reserved_names = [name for column in [*times, *turned] for name in column.names]
+    reserved_names = [name for column in [*times, *attitude_columns] for name in column.names]
     reserved = Reserved(frozenset(["energy", *reserved_names]))
-    named = tuple(identifiers(coordinates, reserved).values())
-    first = [*times, Column("x", named), Column("energy", ("energy",), flat=True)]
-    casimir_names = identifiers(casimirs, reserved | named)
-    listed = [Column(f"casimir_{name}", (casimir_names[name],), flat=True) for name in casimirs]
-    observed = identifiers(observables, reserved | named | casimir_names.values())
-    return [*first, *listed, *turned, *(Column(f"observable_{o}", (observed[o],), flat=True) for o in observables)]
+    column_names = tuple(identifiers(coordinates, reserved).values())
+    first = [*times, Column("x", column_names), Column("energy", ("energy",), flat=True)]
+    casimir_names = identifiers(casimirs, reserved | column_names)
+    casimir_columns = [Column(f"casimir_{name}", (casimir_names[name],), flat=True) for name in casimirs]
+    observed = identifiers(observables, reserved | column_names | casimir_names.values())
+    return [
+        *first,
+        *casimir_columns,
+        *attitude_columns,
+        *(Column(f"observable_{o}", (observed[o],), flat=True) for o in observables),
+    ]

@@ -47,15 +47,15 @@ class CUDADevice:
 
     def kernel(self, program: Any, name: str) -> Any:
         """See `phigen.runtime.devices.device.Device`."""
-        return self._tried(lambda: program.get_function(name))
+        return self._checked_call(lambda: program.get_function(name))
 
     def local_bytes(self, kernel: Any) -> int:
         """See `phigen.runtime.devices.device.Device`."""
-        return self._tried(lambda: int(kernel.local_size_bytes))
+        return self._checked_call(lambda: int(kernel.local_size_bytes))
 
     def empty(self, size: int) -> Any:
         """See `phigen.runtime.devices.device.Device`."""
-        return self._tried(lambda: self._cupy.empty(max(1, size), dtype=np.uint8))
+        return self._checked_call(lambda: self._cupy.empty(max(1, size), dtype=np.uint8))
 
     def constants(self, array: Any) -> Any:
         """See `phigen.runtime.devices.device.Device`; a struct that CuPy passes by value, in constant memory."""
@@ -64,20 +64,22 @@ class CUDADevice:
     def write(self, buffer: Any, array: Any) -> None:
         """See `phigen.runtime.devices.device.Device`."""
         if array.nbytes:
-            self._tried(lambda: buffer[: array.nbytes].set(array.view(np.uint8).reshape(-1)))
+            self._checked_call(lambda: buffer[: array.nbytes].set(array.view(np.uint8).reshape(-1)))
 
     def read(self, buffer: Any, array: Any) -> None:
         """See `phigen.runtime.devices.device.Device`."""
         if array.nbytes:
-            self._tried(lambda: buffer[: array.nbytes].get(out=array.view(np.uint8).reshape(-1)))
+            self._checked_call(lambda: buffer[: array.nbytes].get(out=array.view(np.uint8).reshape(-1)))
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
         """See `phigen.runtime.devices.device.Device`."""
-        group = self._tried(lambda: kernel.max_threads_per_block)  # at most the launch bounds of the kernel
-        passed = tuple(np.uint64(0) if argument is None else argument for argument in arguments)  # a null pointer
-        self._tried(lambda: kernel((-(-items // group),), (group,), passed))
+        group = self._checked_call(lambda: kernel.max_threads_per_block)  # at most the launch bounds of the kernel
+        launch_arguments = tuple(
+            np.uint64(0) if argument is None else argument for argument in arguments
+        )  # a null pointer
+        self._checked_call(lambda: kernel((-(-items // group),), (group,), launch_arguments))
 
-    def _tried(self, call: Callable[[], Result]) -> Result:
+    def _checked_call(self, call: Callable[[], Result]) -> Result:
         """Return the result of a call of CUDA; its errors become those of the device protocol."""
         cuda = self._cupy.cuda
         try:
@@ -103,8 +105,8 @@ def device(index: int | None = None) -> CUDADevice:
     if key not in _OPENED:
         cupy, names = _cards()
         _OPENED[key] = CUDADevice(cupy, choose(names, "CUDA", index))
-    opened: CUDADevice = _OPENED[key]
-    return opened
+    card: CUDADevice = _OPENED[key]
+    return card
 
 
 def count() -> int:

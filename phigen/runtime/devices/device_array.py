@@ -43,18 +43,18 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
         left, right = (operands[1], operands[0]) if swapped else (operands[0], operands[-1])
         return left._combined(_OPERATIONS[ufunc.__name__], right, swapped=swapped)
 
-    def _combined(self, operation: int, other: Any, *, swapped: bool) -> DeviceArray:
+    def _combined(self, operation: int, operand: Any, *, swapped: bool) -> DeviceArray:
         value, of_rows, rows = 0.0, self.buffer, 0
-        if isinstance(other, DeviceArray):
-            of_rows = other.buffer
-        elif np.ndim(other) == 0:
-            value, rows = float(other), 2
+        if isinstance(operand, DeviceArray):
+            of_rows = operand.buffer
+        elif np.ndim(operand) == 0:
+            value, rows = float(operand), 2
         else:
-            of_rows, rows = self.launcher.tables.written(other, self.launcher.real), 1
+            of_rows, rows = self.launcher.tables.written(operand, self.launcher.real), 1
         result = self.launcher.empty(self.size)
         numbers = (self.size, self.size // self.shape[0], operation, rows, int(swapped))
-        passed = [*map(np.int32, numbers), self.launcher.real(value), self.buffer, of_rows, result]
-        self.launcher.device.launch(self.launcher.kernels["combine"], self.size, passed)
+        launch_arguments = [*map(np.int32, numbers), self.launcher.real(value), self.buffer, of_rows, result]
+        self.launcher.device.launch(self.launcher.kernels["combine"], self.size, launch_arguments)
         return DeviceArray(self.launcher, result, self.shape)
 
     def max(self, axis: Any = None) -> Any:

@@ -80,13 +80,13 @@ class DeviceSolver:
         host = self._host.with_gauge(gauge)
         return DeviceSolver(self._files, self.interface, self.target, host, np.ascontiguousarray(gauge), self._index)
 
-    def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
+    def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`; ``threads`` has no effect.
 
         Members are integrated in batches that fit into the memory of the device. Raises `DeviceError` if it fails; the
         ``trajectory`` of the error holds the results so far, NaN for other members.
         """
-        if turned is not None:
+        if attitudes is not None:
             raise TypeError(f"target {self.target} computes no attitudes of ensembles; compile for target c")
         if not len(members):
             return self._host.ensemble(members, threads)  # checks the parameters
@@ -94,31 +94,31 @@ class DeviceSolver:
         if frames is not None:
             frames[1:] = np.nan
         common, coefficients = self._has_common_coefficients(members), list[Any]()
-        status, done, batch = np.zeros(len(members), dtype=np.uint8), 0, self._batch(members)
-        while done < len(members):
-            part = slice(done, min(done + batch, len(members)))
+        status, members_done, batch = np.zeros(len(members), dtype=np.uint8), 0, self._batch(members)
+        while members_done < len(members):
+            part = slice(members_done, min(members_done + batch, len(members)))
             try:
                 if common and not coefficients:
                     coefficients.append(self._coefficients(members))
                 self._integrate(members.part(part), final[part], status[part], frames, part, coefficients)
-                done = part.stop
+                members_done = part.stop
             except OutOfMemoryError as error:
                 if batch == 1:
                     raise self._failure(
-                        f"too little memory for {batch} members: {error}", final, frames, done
+                        f"too little memory for {batch} members: {error}", final, frames, members_done
                     ) from None
                 batch //= 2
             except DeviceError as error:
-                raise self._failure(str(error), final, frames, done) from error
+                raise self._failure(str(error), final, frames, members_done) from error
         failures = {int(m): status_name(int(status[m])) for m in np.flatnonzero(status)}
         if frames is not None and members.steps % members.stride:
             frames[-1] = np.where(status[:, np.newaxis] == 0, final, np.nan)
         return members.checked(final if frames is None else frames, failures)
 
-    def _failure(self, message: str, final: Floats, frames: Floats | None, done: int) -> DeviceError:
+    def _failure(self, message: str, final: Floats, frames: Floats | None, members_done: int) -> DeviceError:
         hint = (
-            f"members from {done} on were not integrated; use fewer members, or a larger stride"
-            if done or frames is not None
+            f"members from {members_done} on were not integrated; use fewer members, or a larger stride"
+            if members_done or frames is not None
             else "take fewer members"
         )
         failed = DeviceError(f"{self.interface.name}: {message}\n  hint: {hint}")
@@ -132,8 +132,10 @@ class DeviceSolver:
         of_member = size * (self.interface.dimension * (rows + 1) + len(members.parameters) + 3) + 1
         frames = max(1, size * self.interface.dimension * rows)
         fitting = int(min(device.memory * _SHARE // of_member, device.largest // frames))
-        short = max(device.units * _MEMBERS_PER_UNIT, device.units * _STEPS_PER_UNIT // max(1, members.steps))
-        return max(1, min(fitting, short, len(members)))
+        batch_of_short_runs = max(
+            device.units * _MEMBERS_PER_UNIT, device.units * _STEPS_PER_UNIT // max(1, members.steps)
+        )
+        return max(1, min(fitting, batch_of_short_runs, len(members)))
 
     def _integrate(
         self,
@@ -152,7 +154,7 @@ class DeviceSolver:
         x = np.ascontiguousarray(members.x0.T, dtype=self._real)
         rows = members.steps // members.stride if frames is not None else 0
         states, ended = self._written(x), device.empty(count)
-        out = device.empty(rows * x.size * size) if rows else None
+        result = device.empty(rows * x.size * size) if rows else None
         parameters = self._shared_or_each(self._parameters(members))
         arguments: list[Any] = [*coefficients, np.uint64(count), *parameters, states]
         if self.interface.time:
@@ -163,14 +165,14 @@ class DeviceSolver:
         if self.interface.noise:
             first = np.uint32(members.paths[0])
             arguments += [np.uint64(members.draws.seed), first, np.uint64(members.draws.step)]
-        arguments += [np.uint64(max(1, members.stride)), out, ended]
+        arguments += [np.uint64(max(1, members.stride)), result, ended]
         device.launch(self._kernels(common=bool(coefficients))["ensemble"], count, arguments)
         device.read(ended, status)
         device.read(states, x)
         final[:] = x.T
         if rows and frames is not None:
             stored_rows = np.empty((rows, *x.shape), self._real)
-            device.read(out, stored_rows)
+            device.read(result, stored_rows)
             frames[1 : rows + 1, part] = stored_rows.transpose(0, 2, 1)
 
     def _kernels(self, *, common: bool) -> Kernels:
@@ -194,15 +196,15 @@ class DeviceSolver:
     def _warn_of_local_memory(self, kernel: Any) -> None:
         """Warn of steps that are slow because the registers of a card are too few for their values."""
         if self.device.is_card and (size := self.device.local_bytes(kernel)) > _LOCAL_BYTES:
-            about = f"{self.interface.name}: besides registers, each member uses {size} bytes of {self.device.name}"
+            message = f"{self.interface.name}: besides registers, each member uses {size} bytes of {self.device.name}"
             hint = "members with the same parameters and step need less, as do a lower order and scheme: splitting"
-            warnings.warn(f"{about}, which is slow; {hint}", PhigenWarning, stacklevel=2)
+            warnings.warn(f"{message}, which is slow; {hint}", PhigenWarning, stacklevel=2)
 
     def _has_common_coefficients(self, members: Members) -> bool:
         """Whether all members have the same parameters, step and gauge, and their kernel can share coefficients."""
         same = np.ndim(members.h) == 0 and not any(np.ndim(v) for v in members.parameters.values())
-        chosen = self._holds_gauge and self._gauge is None
-        return same and not chosen and f"{self.interface.name}_COMMON" in self._header
+        has_chosen_gauge = self._holds_gauge and self._gauge is None
+        return same and not has_chosen_gauge and f"{self.interface.name}_COMMON" in self._header
 
     def _coefficients(self, members: Members) -> Any:
         """Return the coefficients of all members as an argument of their kernel."""

@@ -25,17 +25,17 @@ class ImplicitSession(DeviceLatticeSession):
     def advance(self, h: float, steps: int) -> None:
         """See `DeviceLatticeSession.advance`."""
         self.prepare(h)
-        past: dict[Any, Any] = {}
+        predictors: dict[Any, Any] = {}
         with np.errstate(all="ignore"):
             for _ in range(steps):
-                self._advance_once(past)
+                self._advance_once(predictors)
 
-    def _advance_once(self, past: dict[Any, Any]) -> None:
+    def _advance_once(self, predictors: dict[Any, Any]) -> None:
         with resumable(self.steps):
             self._upload()
             state = DeviceArray(self._launcher, self._fields, self._shape)
             try:
-                following = self._stepping._advance(self._sites, self._rows, state, past)
+                following = self._stepping._advance(self._sites, self._rows, state, predictors)
             except self._stepping.FailedError as failed:
                 self._tell_time()
                 raise BackendError(str(failed), self.steps, self._x[None].copy()) from None
@@ -49,13 +49,13 @@ class ImplicitSession(DeviceLatticeSession):
             self._write_coefficients([coefficients])
             self._written = coefficients
         self._write_parameters()
-        launch, out = self._interface.launches.others[name], self._launcher.empty(self._size)
+        launch, result = self._interface.launches.others[name], self._launcher.empty(self._size)
         variation = varied.buffer if varied is not None else None
         arrays = {"x": x.buffer, "start": start.buffer, "varied": variation, "dw": self._increments}
         if self._interface.noise:
             self._launcher.write(self._increments, self._sites.dw)
-        self._launcher.run(launch, self._coefficients, out=out, **arrays)
-        return DeviceArray(self._launcher, out, self._shape)
+        self._launcher.run(launch, self._coefficients, out=result, **arrays)
+        return DeviceArray(self._launcher, result, self._shape)
 
 
 def stepping_module(text: str, name: str, *, single: bool) -> Any:

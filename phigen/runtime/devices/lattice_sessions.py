@@ -30,9 +30,11 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._on_device = False
         super().__init__(*arguments, timed=timed)
         self._launcher: Launcher = backend.launcher(self._sites, self._shape[1:])
-        stored = self._size * (2 if self._interface.compensated else 1)  # the fields, and their compensation terms
-        self._fields, self._before = (self._launcher.empty(stored) for _ in range(2))
-        self._stored = stored
+        stored_count = self._size * (
+            2 if self._interface.compensated else 1
+        )  # the fields, and their compensation terms
+        self._fields, self._before = (self._launcher.empty(stored_count) for _ in range(2))
+        self._stored = stored_count
         self._flag = self._device.empty(4)
         self._increments = self._launcher.empty(self._launcher.tables.count * max(1, len(self._interface.noise)))
         self._parameters: list[float] = []  # those on the device
@@ -78,13 +80,13 @@ class DeviceLatticeSession(NumpyLatticeSession):
         left = steps
         while left:
             count = min(left, _STEPS_PER_LOOK)
-            begun = self.steps
-            with resumable(begun):
+            first_step = self.steps
+            with resumable(first_step):
                 self._upload()
                 self._launcher.copy(self._fields, self._before, self._stored)
                 self._make(count)
                 if self._failed():
-                    self.steps = begun
+                    self.steps = first_step
                     self._restore()
                     self._make_until_failure()
             left -= count
@@ -158,9 +160,9 @@ class DeviceLatticeSession(NumpyLatticeSession):
             return None, 0
         self._upload()
         self._write_parameters()
-        out = self._launcher.empty(launch.outputs * self._launcher.tables.count)
-        self._launcher.run(launch, self._launcher.parameters, x=self._fields, out=out)
-        return out, launch.outputs
+        result = self._launcher.empty(launch.outputs * self._launcher.tables.count)
+        self._launcher.run(launch, self._launcher.parameters, x=self._fields, out=result)
+        return result, launch.outputs
 
     def _write_parameters(self) -> None:
         """Copy the parameters that are numbers, and the time, to the device, if they changed."""
@@ -173,15 +175,15 @@ class DeviceLatticeSession(NumpyLatticeSession):
     def _fields_of(self, name: str) -> Floats:
         """Return the outputs of a kernel (outputs, *sizes)."""
         with resumable(self.steps):
-            out, outputs = self._evaluated(name)
+            result, outputs = self._evaluated(name)
             sizes = self._shape[1:]
-            return self._launcher.read(out, (outputs, *sizes)) if outputs else np.empty((0, *sizes))
+            return self._launcher.read(result, (outputs, *sizes)) if outputs else np.empty((0, *sizes))
 
     def _numbers_of(self, name: str, kinds: Sequence[str]) -> Floats:
         """Return the outputs of a kernel, reduced over the sites by the kind of each."""
         with resumable(self.steps):
-            out, _ = self._evaluated(name)
-            return self._launcher.reduced(out, kinds, self._launcher.tables.count)
+            result, _ = self._evaluated(name)
+            return self._launcher.reduced(result, kinds, self._launcher.tables.count)
 
     def hamiltonian(self) -> float:
         """Return H of the state."""
@@ -210,7 +212,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
             return np.empty(0)
         values = self._numbers_of("observables", [kind for kind, _ in reductions])
         counts = {"sites": count, "bonds": len(getattr(self._sites, "ends", ())), "pairs": count * (count - 1) / 2}
-        divisors = [counts[over] if kind == "mean" else 1.0 for kind, over in reductions]
+        divisors = [counts[domain] if kind == "mean" else 1.0 for kind, domain in reductions]
         with np.errstate(all="ignore"):
             quotients: Floats = values / np.array(divisors)
         return quotients

@@ -67,16 +67,18 @@ class DeviceLattice(NumpyLattice):
 
     def launcher(self, sites: Any, sizes: tuple[int, ...]) -> Launcher:
         """Return the launches for a lattice of some size. Raises `DeviceError` if it is too large."""
-        launches, about = self.interface.launches, self.interface
-        rows = [len(launches.neighbours), about.dimension * (2 if about.compensated else 1)]
-        rows += [one.outputs for one in launches.others.values()]
+        launches, interface = self.interface.launches, self.interface
+        rows = [len(launches.neighbours), interface.dimension * (2 if interface.compensated else 1)]
+        rows += [launch.outputs for launch in launches.others.values()]
         largest = np.iinfo(np.int32).max // max(rows)
         if np.prod(sizes, dtype=float) > largest:
-            raise DeviceError(f"{about.name}: {sizes} are more than {largest} sites, the most that 32 bits can number")
+            raise DeviceError(
+                f"{interface.name}: {sizes} are more than {largest} sites, the most that 32 bits can number"
+            )
         if self._of_sizes[0] != sizes:
             self._of_sizes = sizes, {}
-        real = np.float32 if about.single else np.float64
-        return Launcher(self.kernels, SiteTables(self.device, sites, sizes, about, real, self._of_sizes[1]))
+        real = np.float32 if interface.single else np.float64
+        return Launcher(self.kernels, SiteTables(self.device, sites, sizes, interface, real, self._of_sizes[1]))
 
     def start(
         self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS

@@ -76,17 +76,17 @@ class Launcher:
         if not items:
             return
         arrays = {**self.tables.arrays(launch, colour), **buffers, "sums": self._summed(launch)}
-        passed = [arrays.get(name) for name in self._names]
+        table_arguments = [arrays.get(name) for name in self._names]
         numbers = [np.int32(items), np.int32(self.tables.count), sites, coefficients, np.int32(first)]
-        self.device.launch(self.kernels[launch.kernel], items, [*numbers, *passed])
+        self.device.launch(self.kernels[launch.kernel], items, [*numbers, *table_arguments])
 
     def _summed(self, launch: SiteLaunch | SumLaunch) -> Any:
         """Return the buffer of sums over bonds or pairs; one for all kernels."""
         if self._sums is None and "sums" in self._names:
             launches = self.tables.interface.launches
-            listed = [*launches.others.values(), *(sweep for part in launches.parts for sweep in part)]
-            most = max((s.values for one in listed for s in one.sums), default=1)
-            self._sums = self.empty(most * self.tables.count)
+            all_launches = [*launches.others.values(), *(sweep for part in launches.parts for sweep in part)]
+            largest = max((s.values for one_launch in all_launches for s in one_launch.sums), default=1)
+            self._sums = self.empty(largest * self.tables.count)
         return self._sums
 
     def copy(self, source: Any, target: Any, numbers: int) -> None:

@@ -40,11 +40,11 @@ class MonitoredSession(DeviceLatticeSession):
         """See `phigen.runtime.numpy_lattice.NumpyLatticeSession.place`."""
         if not np.isfinite(x).all():
             raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy())
-        before, self._x = self._x, x
+        previous, self._x = self._x, x
         try:
             self._hold_level()
         except BackendError:
-            self._x = before
+            self._x = previous
             raise
 
     def advance(self, h: float, steps: int) -> None:
@@ -59,14 +59,14 @@ class MonitoredSession(DeviceLatticeSession):
         """Make one step. Raises `BackendError`, with the state before it, if it fails."""
         self._upload()
         self._launcher.copy(self._fields, self._before, self._stored)
-        begun = self._sites.clock
+        start_clock = self._sites.clock
         try:
             self._make(1)
             failed = self._failed()
         except self._monitoring.FailedError:
             failed = True
         if failed:
-            self._sites.clock = begun
+            self._sites.clock = start_clock
             self._restore()
             raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
 
@@ -74,10 +74,10 @@ class MonitoredSession(DeviceLatticeSession):
         """Make steps without a check of the results."""
         self._host = None
         module, sites = self._monitoring, self._sites
-        late = [[0.0]] if hasattr(module, "_late") else []
+        correction_times = [[0.0]] if hasattr(module, "_late") else []
         for part, row in module.SCHEDULE * steps:
             time = self._rows[row] / module._rate(sites, part, None)
-            self._write_coefficients([module._prepare(sites.parameters, time, *late)])
+            self._write_coefficients([module._prepare(sites.parameters, time, *correction_times)])
             for sweep in self._interface.launches.parts[part]:
                 self._launcher.run(sweep, self._coefficients, x=self._fields, dw=self._increments)
             if part != module.NEGATIVE:

@@ -55,7 +55,7 @@ class OpenCLDevice:
 
     def empty(self, size: int) -> Any:
         """See `phigen.runtime.devices.device.Device`."""
-        return self._tried(lambda: self._cl.Buffer(self._context, self._cl.mem_flags.READ_WRITE, max(1, size)))
+        return self._checked_call(lambda: self._cl.Buffer(self._context, self._cl.mem_flags.READ_WRITE, max(1, size)))
 
     def local_bytes(self, kernel: Any) -> int:
         """See `phigen.runtime.devices.device.Device`; 0 where a driver does not know."""
@@ -70,23 +70,23 @@ class OpenCLDevice:
     def write(self, buffer: Any, array: Any) -> None:
         """See `phigen.runtime.devices.device.Device`."""
         if array.nbytes:
-            self._tried(lambda: self._cl.enqueue_copy(self._queue, buffer, array))
+            self._checked_call(lambda: self._cl.enqueue_copy(self._queue, buffer, array))
 
     def read(self, buffer: Any, array: Any) -> None:
         """See `phigen.runtime.devices.device.Device`."""
         if array.nbytes:
-            self._tried(lambda: self._cl.enqueue_copy(self._queue, array, buffer))
+            self._checked_call(lambda: self._cl.enqueue_copy(self._queue, array, buffer))
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
         """See `phigen.runtime.devices.device.Device`."""
         size = kernel.get_work_group_info(self._cl.kernel_work_group_info.COMPILE_WORK_GROUP_SIZE, self._device)[0]
-        self._tried(lambda: kernel(self._queue, (-(-items // size) * size,), (size,), *arguments))
+        self._checked_call(lambda: kernel(self._queue, (-(-items // size) * size,), (size,), *arguments))
 
     @property
     def _device(self) -> Any:
         return self._context.devices[0]
 
-    def _tried(self, call: Callable[[], Result]) -> Result:
+    def _checked_call(self, call: Callable[[], Result]) -> Result:
         """Return the result of a call of OpenCL; its errors become those of the device protocol."""
         try:
             return call()
@@ -109,8 +109,8 @@ def device(index: int | None = None) -> OpenCLDevice:
         cl = _library()
         devices = _listed(cl)
         _OPENED[key] = OpenCLDevice(cl, devices[choose([d.name for d in devices], "OpenCL", index)])
-    opened: OpenCLDevice = _OPENED[key]
-    return opened
+    opencl_device: OpenCLDevice = _OPENED[key]
+    return opencl_device
 
 
 def count() -> int:

@@ -12,8 +12,8 @@ DEVICES = {"opencl": "phigen.runtime.devices.opencl", "cuda": "phigen.runtime.de
 
 def device_of(target: str, index: int | None = None) -> Device:
     """Return a device of a target in this process. Raises `DeviceError` or `MissingPackageError`."""
-    opened: Device = import_module(DEVICES[target]).device(index)
-    return opened
+    device: Device = import_module(DEVICES[target]).device(index)
+    return device
 
 
 def devices_of(target: str) -> int:

@@ -48,8 +48,8 @@ class SiteTables:
             elif launch.inside:
                 mask &= ~self.sites.beside
             if launch.colour is not None and launch.window is None:
-                weights, places = self.interface.colour_weights, np.indices(self.sizes)
-                mask &= sum(w * p for w, p in zip(weights, places, strict=True)) % self.interface.colours == (
+                weights, site_indices = self.interface.colour_weights, np.indices(self.sizes)
+                mask &= sum(w * p for w, p in zip(weights, site_indices, strict=True)) % self.interface.colours == (
                     launch.colour
                 )
             numbers = np.flatnonzero(mask)
@@ -60,16 +60,16 @@ class SiteTables:
     def arrays(self, launch: SiteLaunch | SumLaunch, colour: int) -> Mapping[str, Any]:
         """Return the tables that a kernel reads, by the names of its arguments; None for tables that it does not
         read."""
-        starts, others, at_bonds = None, None, None
+        starts, other_sites, at_bonds = None, None, None
         if isinstance(launch, SumLaunch) and self.interface.graph:
-            starts, others, at_bonds = self._bonds(launch, colour)
+            starts, other_sites, at_bonds = self._bonds(launch, colour)
         return {
             "neighbours": self._of_sizes("neighbours", np.int32, self._neighbours),
             "weights": self._of_sizes("weights", self.real, self._weights),
             "at_sites": self._own("at_sites", self.real, self._at_sites),
             "on_seams": self._on_seams(launch.window if isinstance(launch, SiteLaunch) else None),
             "starts": starts,
-            "others": others,
+            "others": other_sites,
             "at_bonds": at_bonds,
             "colours": self._own("colours", np.int32, lambda: [getattr(self.sites, "colours", np.zeros(0))]),
             "colour": np.int32(colour),
@@ -121,16 +121,16 @@ class SiteTables:
         key = "bonds", launch.end, launch.chosen, colour if launch.chosen else 0
         if key not in self._stored:
             self.sites.colour = colour
-            here, there, bond = self.sites.bonds(launch.end, launch.chosen)
-            order = np.argsort(here, kind="stable")
-            starts = np.append(0, np.cumsum(np.bincount(here, minlength=self.count)))
+            own_ends, other_ends, bond = self.sites.bonds(launch.end, launch.chosen)
+            order = np.argsort(own_ends, kind="stable")
+            starts = np.append(0, np.cumsum(np.bincount(own_ends, minlength=self.count)))
             parameters = [
                 np.broadcast_to(self.sites.parameters[n], len(self.sites.ends)) for n in self.interface.at_bonds
             ]
             at_bonds = _joined([values[bond[order]] for values in parameters])
             self._stored[key] = (
                 self.written(starts, np.int32),
-                self.written(there[order], np.int32),
+                self.written(other_ends[order], np.int32),
                 self.written(at_bonds, self.real),
             )
         bonds: tuple[Any, Any, Any] = self._stored[key]
@@ -141,7 +141,7 @@ def _joined(rows: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return np.concatenate([np.zeros(0), *(np.ravel(row) for row in rows)])
 
 
-def _stored(tables: dict[Any, Any], key: Any, written: Any) -> Any:
+def _stored(tables: dict[Any, Any], key: Any, values: Any) -> Any:
     if key not in tables:
-        tables[key] = written()
+        tables[key] = values()
     return tables[key]
