@@ -77,8 +77,8 @@ class Collocation:
 
     @cached_property
     def _places(self) -> list[Expression]:
-        at = at_unknowns(self.points)
-        return [at[c] for c in self.points.system.coordinates]
+        positions = at_unknowns(self.points)
+        return [positions[c] for c in self.points.system.coordinates]
 
     @cached_property
     def _derivatives(self) -> list[Expression]:
@@ -90,7 +90,7 @@ class Collocation:
         return tuple(Symbol(GRADIENT, k) for k in range(self.points.system.dimension))
 
     @cached_property
-    def _seen(self) -> tuple[Sequence[str], Sequence[Expression]] | None:
+    def _traced_value(self) -> tuple[Sequence[str], Sequence[Expression]] | None:
         kernel = frame_kernel(self.points, Coefficients(()))
         return None if kernel is None else (kernel.inputs["k"], kernel.outputs[0].values)
 
@@ -110,21 +110,21 @@ class Collocation:
         """Return h b_j times the derivatives of the unknowns at all stages (unknowns, stages), for these increments."""
         z = moves @ jnp.asarray(table.mixing, x.dtype).T
         values = self._values(x, z, parameters)
-        places = _stacked(_Traced(values).values(self._places), self.stages, x.dtype)
-        slopes = jax.vmap(lambda at: self.slope(at, *arguments))(places.T).T
+        stacked = _stacked(_Traced(values).values(self._places), self.stages, x.dtype)
+        slopes = jax.vmap(lambda at: self.slope(at, *arguments))(stacked.T).T
         values |= dict(zip(self._slope_symbols, slopes, strict=True))
         weights = self.h * jnp.asarray(table.weights, x.dtype)
         return weights * _stacked(_Traced(values).values(self._derivatives), self.stages, x.dtype)
 
     def advance(self, carry: Carry, arguments: Any, parameters: Mapping[str, Any]) -> Carry:
         """Return the state of a run after a step; x is NaN if the step failed."""
-        x, compensation, seen = carry
+        x, compensation, difference = carry
         table, unit = tableau_of(x.dtype, self.stages), rounding_of(x.dtype)
 
         def rest(moves: Any) -> Any:
             return self.moves(table, x, moves, arguments, parameters) - moves
 
-        guess = seen @ jnp.asarray(table.prediction, x.dtype).T @ _inverse_mixing(table, x.dtype)
+        guess = difference @ jnp.asarray(table.prediction, x.dtype).T @ _inverse_mixing(table, x.dtype)
         moves = jax.lax.custom_root(
             rest,
             jax.lax.stop_gradient(guess),
@@ -135,22 +135,22 @@ class Collocation:
         change = _stacked(_Traced(self._values(x, end, parameters)).values(self.points.change), None, x.dtype)
         change = change + jax.lax.stop_gradient(compensation)
         following = x + change
-        lost = jax.lax.stop_gradient(change - (following - x))
-        return following, lost, jax.lax.stop_gradient(self._from_the_end(end, moves, parameters))
+        rounding_error = jax.lax.stop_gradient(change - (following - x))
+        return following, rounding_error, jax.lax.stop_gradient(self._from_the_end(end, moves, parameters))
 
     def _scale(self, x: Any) -> Any:
         """Return the scales of the unknowns (unknowns, 1): |x| for coordinates, 1 for group elements."""
         size = jnp.sqrt(jnp.sum(x**2))
         size = jnp.where(size > 0, size, 1)
-        plain = len(self.points.moved)
-        ones = jnp.ones(len(self.points.unknowns) - plain, x.dtype)
-        return jnp.concatenate([jnp.broadcast_to(size, (plain,)), ones])[:, None]
+        coordinate_count = len(self.points.moved)
+        ones = jnp.ones(len(self.points.unknowns) - coordinate_count, x.dtype)
+        return jnp.concatenate([jnp.broadcast_to(size, (coordinate_count,)), ones])[:, None]
 
     def _from_the_end(self, end: Any, moves: Any, parameters: Mapping[str, Any]) -> Any:
         """Return the increments of a step in the frame of its end."""
-        if self._seen is None:
+        if self._traced_value is None:
             return moves
-        symbols, roots = self._seen
+        symbols, roots = self._traced_value
         values = {**parameters, **dict(zip(symbols, moves, strict=True))}
         values |= dict(zip(self.points.unknowns, end, strict=True))
         return _stacked(_Traced(values).values(roots), self.stages, moves.dtype)
@@ -177,30 +177,30 @@ def _solved(equation: Callable[[Any], Any], start: Any, scale: Any, unit: float)
 
     Sweeps that diverge from ``start`` restart once at 0.
     """
-    solved, rounding, near = (unit * v for v in (POLICY.solved, POLICY.rounding, POLICY.nearly_rounding))
+    solved_limit, rounding, near_rounding = (unit * v for v in (POLICY.solved, POLICY.rounding, POLICY.nearly_rounding))
     stages, infinity = start.shape[1], jnp.asarray(jnp.inf, start.dtype)
 
     def goes_on(state: tuple[Any, ...]) -> Any:
         return (state[1] < MAX_SWEEPS) & ~state[-1]
 
     def swept(state: tuple[Any, ...]) -> tuple[Any, ...]:
-        moves, sweep, before, rate, rising, rises, again, _ = state
+        moves, sweep, previous_size, rate, rising, rises, repeated, _ = state
         change = equation(moves)
         size = _largest(change, scale)
-        contraction = size / jnp.maximum(before, jnp.finfo(size.dtype).tiny)
-        counts = (contraction > 0) & (contraction < 1) & (size > near)
+        contraction = size / jnp.maximum(previous_size, jnp.finfo(size.dtype).tiny)
+        counts = (contraction > 0) & (contraction < 1) & (size > near_rounding)
         rate = jnp.where(counts, 0.7 * rate + 0.3 * contraction, rate)
         slow = (contraction >= 1) | (contraction > jnp.maximum(1.5 * rate, POLICY.stalled))
-        rises = rises + ((contraction >= 1) & (size <= near))
-        done = (rate * size <= solved) | (slow & (size <= rounding)) | (rises > 1)
+        rises = rises + ((contraction >= 1) & (size <= near_rounding))
+        is_solved = (rate * size <= solved_limit) | (slow & (size <= rounding)) | (rises > 1)
         rising = jnp.where(contraction >= 1, rising + 1, 0)
-        lost = ~done & (~jnp.isfinite(size) | (rising >= POLICY.most_rising + stages))
-        anew = lost & again
-        moves = jnp.where(anew, 0, jnp.where(lost, jnp.nan, moves + change))
-        before = jnp.where(anew, infinity, size)
+        has_failed = ~is_solved & (~jnp.isfinite(size) | (rising >= POLICY.most_rising + stages))
+        anew = has_failed & repeated
+        moves = jnp.where(anew, 0, jnp.where(has_failed, jnp.nan, moves + change))
+        previous_size = jnp.where(anew, infinity, size)
         rate = jnp.where(anew, 0.5, rate)
         rising, rises, sweep = (jnp.where(anew, 0, v) for v in (rising, rises, sweep + 1))
-        return moves, sweep, before, rate, rising, rises, again & ~anew, done | (lost & ~anew)
+        return moves, sweep, previous_size, rate, rising, rises, repeated & ~anew, is_solved | (has_failed & ~anew)
 
     none, half = jnp.asarray(0), jnp.asarray(0.5, start.dtype)
     state = (start, none, infinity, half, none, none, jnp.any(start != 0), jnp.asarray(False))
@@ -217,21 +217,21 @@ def _solved_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
 
 def _swept_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
     """Return the solution of (F′ − 1) L = side by sweeps L ← F′L − side."""
-    solved, rounding = unit * LINEAR_POLICY.adjoint_solved, unit * LINEAR_POLICY.adjoint_rounding
+    solved_limit, rounding = unit * LINEAR_POLICY.adjoint_solved, unit * LINEAR_POLICY.adjoint_rounding
     floor = jnp.finfo(side.dtype).tiny
 
     def goes_on(state: tuple[Any, ...]) -> Any:
         return (state[1] < MAX_SWEEPS) & ~state[-1]
 
     def swept(state: tuple[Any, ...]) -> tuple[Any, ...]:
-        moves, sweep, before, stalls, _ = state
+        moves, sweep, previous_size, stalls, _ = state
         change = linear(moves) - side
         following = moves + change
         size, largest = jnp.max(jnp.abs(change)), jnp.max(jnp.abs(following)) + floor
-        rate = size / jnp.maximum(before, floor)
+        rate = size / jnp.maximum(previous_size, floor)
         stalls = stalls + ((rate > LINEAR_POLICY.adjoint_stalled) & (size <= rounding * largest))
-        done = (stalls > 1) | ((sweep > 0) & (size * rate <= solved * largest)) | ~jnp.isfinite(size)
-        return following, sweep + 1, size, stalls, done
+        is_solved = (stalls > 1) | ((sweep > 0) & (size * rate <= solved_limit * largest)) | ~jnp.isfinite(size)
+        return following, sweep + 1, size, stalls, is_solved
 
     none = jnp.asarray(0)
     state = (-side, none, jnp.asarray(jnp.inf, side.dtype), none, jnp.asarray(False))

@@ -71,7 +71,7 @@ def flow(
 def _run_of(method: Collocation, bracket: System, steps: int, stride: int | None) -> Callable[..., Any]:
     defaults = {p.name: float(p.value) for p in bracket.parameters}
     counts = np.diff(row_steps(steps, stride or max(1, steps)))
-    whole = int(np.sum(counts == counts[0])) if len(counts) else 0
+    whole_rows = int(np.sum(counts == counts[0])) if len(counts) else 0
 
     def rows(x0: Any, arguments: Any, parameters: Mapping[str, Any]) -> Any:
         def advanced(carry: Any, count: int) -> Any:
@@ -81,13 +81,13 @@ def _run_of(method: Collocation, bracket: System, steps: int, stride: int | None
             carry = advanced(carry, int(counts[0]))
             return carry, carry[0]
 
-        carry, listed = method.start(x0), x0[None]
-        if whole:
-            carry, following = jax.lax.scan(row, carry, None, whole)
-            listed = jnp.concatenate([listed, following])
-        if whole < len(counts):
-            listed = jnp.concatenate([listed, advanced(carry, int(counts[-1]))[0][None]])
-        return listed if stride else listed[-1]
+        carry, row_states = method.start(x0), x0[None]
+        if whole_rows:
+            carry, following = jax.lax.scan(row, carry, None, whole_rows)
+            row_states = jnp.concatenate([row_states, following])
+        if whole_rows < len(counts):
+            row_states = jnp.concatenate([row_states, advanced(carry, int(counts[-1]))[0][None]])
+        return row_states if stride else row_states[-1]
 
     def batched(x: Any, arguments: Any, values: Mapping[str, Any]) -> Any:
         members: Callable[..., Any] = lambda x: rows(x, arguments, values)  # noqa: E731
@@ -98,7 +98,7 @@ def _run_of(method: Collocation, bracket: System, steps: int, stride: int | None
     compiled: Callable[..., Any] = jax.jit(batched)
 
     def run(x0: Any, *arguments: Any, **parameters: Any) -> Any:
-        x = _state(x0, bracket)
+        x = _real_state(x0, bracket)
         unknown = parameters.keys() - defaults.keys()
         if unknown:
             raise TypeError(f"unknown parameter {min(unknown)!r}; those of {bracket.name} are {', '.join(defaults)}")
@@ -112,7 +112,7 @@ def _run_of(method: Collocation, bracket: System, steps: int, stride: int | None
     return run
 
 
-def _state(x0: Any, bracket: System) -> Any:
+def _real_state(x0: Any, bracket: System) -> Any:
     """Return x0 as a real array in its own precision, or in the default precision of JAX if x0 has none."""
     x = jnp.asarray(x0)
     if jnp.iscomplexobj(x):
@@ -159,9 +159,13 @@ def _realised(system: System, structure: str) -> Realisation:
 
 def _expect_proved(system: System, realisation: Realisation, stages: int) -> None:
     """Raise `CheckError` if π is not a Poisson tensor, or if a proof about the step fails."""
-    listed = [s for group in statements.tensor(system).values() for s in group]
-    if not any(s.verdict == REFUTED for s in listed):
-        listed += gauss_statements.check(system, system, realisation, tableau(stages))
-    refuted = [f"{s.name}: refuted{f', {s.residual}' if s.residual else ''}" for s in listed if s.verdict == REFUTED]
-    if refuted:
-        raise CheckError("\n".join(f"{system.name}: {text}" for text in refuted))
+    statements_of_spec = [s for group in statements.tensor(system).values() for s in group]
+    if not any(s.verdict == REFUTED for s in statements_of_spec):
+        statements_of_spec += gauss_statements.check(system, system, realisation, tableau(stages))
+    refuted_texts = [
+        f"{s.name}: refuted{f', {s.residual}' if s.residual else ''}"
+        for s in statements_of_spec
+        if s.verdict == REFUTED
+    ]
+    if refuted_texts:
+        raise CheckError("\n".join(f"{system.name}: {text}" for text in refuted_texts))

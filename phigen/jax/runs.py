@@ -71,19 +71,19 @@ def propagator(
         batch, result = _Axes(runs, x0, parameters), jax.ShapeDtypeStruct(runs.shape(x0.shape), x0.dtype)
         return shaped(lambda x, p: runs.run(x, batch.aligned(p)).astype(x.dtype), result, x0, parameters)
 
-    def pulled(at: Any, cotangent: Any) -> Any:
-        batch = _Axes(runs, *at)
+    def pulled(arguments: Any, cotangent: Any) -> Any:
+        batch = _Axes(runs, *arguments)
 
         def transposed(x0: Any, parameters: Any, bar: Any) -> Any:
             x0_bar, bars = runs.transposed(x0, batch.aligned(parameters), bar)
             shapes = {name: np.shape(value) for name, value in parameters.items()}
             return x0_bar.astype(x0.dtype), {name: bars[name].reshape(s).astype(x0.dtype) for name, s in shapes.items()}
 
-        result = jax.tree.map(lambda v: jax.ShapeDtypeStruct(v.shape, v.dtype), at)
-        return shaped(transposed, result, *at, cotangent)
+        result = jax.tree.map(lambda v: jax.ShapeDtypeStruct(v.shape, v.dtype), arguments)
+        return shaped(transposed, result, *arguments, cotangent)
 
-    def moved(at: Any, directions: Any) -> Any:
-        batch, (x0, parameters), (along, changes) = _Axes(runs, *at), at, directions
+    def moved(arguments: Any, directions: Any) -> Any:
+        batch, (x0, parameters), (state_directions, changes) = _Axes(runs, *arguments), arguments, directions
         states = runs.shape(x0.shape)
         if runs.axes > 1:
             # Also traced for reverse mode, which never evaluates it.
@@ -93,21 +93,30 @@ def propagator(
             slopes = runs.jacobian(x, batch.aligned(p))
             return jax.tree.map(lambda v: v.astype(x.dtype), slopes)
 
-        by = {name: jax.ShapeDtypeStruct(states, x0.dtype) for name in parameters}
-        by_x0, by = shaped(jacobian, (jax.ShapeDtypeStruct((*states, states[-1]), x0.dtype), by), x0, parameters)
+        shapes = {name: jax.ShapeDtypeStruct(states, x0.dtype) for name in parameters}
+        by_x0, shapes = shaped(
+            jacobian, (jax.ShapeDtypeStruct((*states, states[-1]), x0.dtype), shapes), x0, parameters
+        )
         rows = 1 + (stride is not None)
-        result = jnp.einsum("...ij,...j->...i", by_x0, along[..., None, :] if rows == 2 else along)
-        for name, slopes in by.items():
+        result = jnp.einsum(
+            "...ij,...j->...i", by_x0, state_directions[..., None, :] if rows == 2 else state_directions
+        )
+        for name, slopes in shapes.items():
             change = jnp.broadcast_to(changes[name], x0.shape[:-1])
             result = result + slopes * change.reshape(change.shape + (1,) * rows)
         return result
 
-    def derived(at: Any, directions: Any) -> Any:
+    def derived(arguments: Any, directions: Any) -> Any:
         runs.expect_pullback()
-        at = _derived_once(at)
+        arguments = _derived_once(arguments)
         if forward:
-            return moved(at, directions)
-        return _linear(lambda v: moved(at, v), lambda bar: pulled(at, bar), directions, runs.shape(at[0].shape))
+            return moved(arguments, directions)
+        return _linear(
+            lambda v: moved(arguments, v),
+            lambda bar: pulled(arguments, bar),
+            directions,
+            runs.shape(arguments[0].shape),
+        )
 
     run = jax.custom_jvp(called)
     run.defjvp(lambda at, directions: (run(*at), derived(at, directions)))
@@ -123,21 +132,23 @@ def propagator(
     return propagate
 
 
-def _real(value: Any, what: str) -> Any:
+def _real(value: Any, argument: str) -> Any:
     """Return a real array in its own precision, or in the default precision of JAX if the argument has none."""
     array = jnp.asarray(value)
     if jnp.iscomplexobj(array):
-        raise TypeError(f"{what} must be real")
+        raise TypeError(f"{argument} must be real")
     return array.astype(jnp.result_type(float, array))
 
 
-def _linear(apply: Callable[[Any], Any], transpose: Callable[[Any], Any], at: Any, shape: tuple[int, ...]) -> Any:
+def _linear(
+    apply: Callable[[Any], Any], transpose: Callable[[Any], Any], arguments: Any, shape: tuple[int, ...]
+) -> Any:
     """Return the value of a linear map with known transpose; ``shape`` is that of the result.
 
     JAX accepts a transpose only for linear solves, so the map is the trivial solve (u, y) = (v, A v).
     """
-    zero = sum(0 * jnp.sum(leaf) for leaf in jax.tree.leaves(at))  # linear in v, as JAX requires of solutions
-    at, nothing = jax.tree.map(lambda leaf: leaf + zero, at), jnp.broadcast_to(zero, shape)
+    zero = sum(0 * jnp.sum(leaf) for leaf in jax.tree.leaves(arguments))  # linear in v, as JAX requires of solutions
+    arguments, nothing = jax.tree.map(lambda leaf: leaf + zero, arguments), jnp.broadcast_to(zero, shape)
 
     def solve(_: Any, right: Any) -> Any:
         return right[0], apply(right[0])
@@ -145,13 +156,13 @@ def _linear(apply: Callable[[Any], Any], transpose: Callable[[Any], Any], at: An
     def back(_: Any, bars: Any) -> Any:
         return transpose(bars[1]), jnp.zeros_like(bars[1])
 
-    return jax.lax.custom_linear_solve(lambda v: v, (at, nothing), solve, back)[1]
+    return jax.lax.custom_linear_solve(lambda v: v, (arguments, nothing), solve, back)[1]
 
 
 @jax.custom_jvp  # type: ignore[untyped-decorator]
-def _derived_once(at: Any) -> Any:
+def _derived_once(arguments: Any) -> Any:
     """Identity whose differentiation means that a derivative is differentiated; this is refused."""
-    return at
+    return arguments
 
 
 @_derived_once.defjvp  # type: ignore[untyped-decorator]
@@ -172,7 +183,7 @@ class _Axes:
         aligned = {}
         for name, value in parameters.items():
             array, axes = np.asarray(value), self._axes[name]
-            before = array.ndim - axes
-            missing = self._leading + self._sites[name] - axes
-            aligned[name] = array.reshape(array.shape[:before] + (1,) * missing + array.shape[before:])
+            leading_axes = array.ndim - axes
+            missing_axes = self._leading + self._sites[name] - axes
+            aligned[name] = array.reshape(array.shape[:leading_axes] + (1,) * missing_axes + array.shape[leading_axes:])
         return aligned
