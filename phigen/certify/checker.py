@@ -230,7 +230,7 @@ def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: E
 
 
 def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls) -> None:
-    """Demand that matrices that the C computes as derivatives are these derivatives, to 20 digits at some points."""
+    """Raise an error unless derivatives in the C agree with exact ones to 20 digits at some points."""
     precision, ctx.prec = ctx.prec, 300
     for point in POINTS:
         *at, t = (

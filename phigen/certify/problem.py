@@ -38,7 +38,7 @@ def problem_of(
     domain: Sequence[Sequence[float]],
     time: Sequence[float],
     ulps: float,
-    within: float,
+    tolerance: float,
 ) -> StepProblem:
     """Return the problem of a solver, with the gauge of the trajectory from ``start``.
 
@@ -56,7 +56,7 @@ def problem_of(
         time=time,
         coordinates=spec.coordinates,
         ulps=ulps,
-        within=within,
+        within=tolerance,
         timed=bool(program.time),
     )
 
@@ -87,4 +87,4 @@ def _gauge(compilation: Compilation, parameters: Mapping[str, float], start: Seq
         return []
     products = evaluate(list(program.gauge.products.roots), values)
     pairs = zip(products[1::2], products[2::2], strict=True)
-    return [along / square if square else 0.0 for along, square in pairs]
+    return [product / square if square else 0.0 for product, square in pairs]

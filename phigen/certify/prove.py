@@ -111,11 +111,11 @@ def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
 @contextmanager
 def precise() -> Iterator[None]:
     """Set the precision of balls to `BITS` bits within the block."""
-    before, ctx.prec = ctx.prec, BITS
+    previous_precision, ctx.prec = ctx.prec, BITS
     try:
         yield
     finally:
-        ctx.prec = before
+        ctx.prec = previous_precision
 
 
 def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
@@ -125,9 +125,11 @@ def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
         leaves = list[tuple[list[float], list[float]]]()
         search = _Search(certificate, problem.within, max_boxes, leaves, [])
         tree = search.tree([*certificate["domain"], certificate["time"]])
-    bound, largest = ([max(column) for column in zip(*parts, strict=True)] for parts in zip(*leaves, strict=True))
-    ulps = [b / math.ulp(x) for b, x in zip(bound, largest, strict=True)]
-    certificate |= {"bound": bound, "bound_in_ulps": ulps, "boxes": len(leaves), "tree": tree}
+    largest_bounds, largest = (
+        [max(column) for column in zip(*parts, strict=True)] for parts in zip(*leaves, strict=True)
+    )
+    ulps = [b / math.ulp(x) for b, x in zip(largest_bounds, largest, strict=True)]
+    certificate |= {"bound": largest_bounds, "bound_in_ulps": ulps, "boxes": len(leaves), "tree": tree}
     return {**certificate, "sha256": digest(json.loads(json.dumps(certificate)))}
 
 
@@ -148,11 +150,11 @@ class _Search:
         try:
             leaf = _leaf(c, X, T)
             bounds, image = step(c, X, T, leaf)
-            bound = [math.nextafter(float(mag(b)), math.inf) for b in bounds]
+            bounds_above = [math.nextafter(float(mag(b)), math.inf) for b in bounds]
             largest = [max(float(mag(x)), float(mag(y))) for x, y in zip(X, image, strict=True)]
-            ulps = max(b / math.ulp(x) for b, x in zip(bound, largest, strict=True))
+            ulps = max(b / math.ulp(x) for b, x in zip(bounds_above, largest, strict=True))
             demand(ulps <= self.within, f"the bound is {ulps:.3g} ulp where {self.within:g} are asked for")
-            self.leaves.append((bound, largest))
+            self.leaves.append((bounds_above, largest))
             return leaf
         except (RefusedError, ZeroDivisionError, ValueError) as failure:
             axis = _widest(domain)
@@ -160,15 +162,15 @@ class _Search:
                 raise _refusal(c, domain, failure, len(self.leaves)) from None
         self.divided.append(depth)
         low, high = [list(d) for d in domain], [list(d) for d in domain]
-        at = low[axis][1] = high[axis][0] = (domain[axis][0] + domain[axis][1]) / 2
-        return {"axis": axis, "at": at, "parts": [self.tree(part, depth + 1) for part in (low, high)]}
+        middle = low[axis][1] = high[axis][0] = (domain[axis][0] + domain[axis][1]) / 2
+        return {"axis": axis, "at": middle, "parts": [self.tree(part, depth + 1) for part in (low, high)]}
 
 
-def _refusal(c: dict[str, Any], domain: Box, failure: Exception, done: int) -> NoCertificateError:
+def _refusal(c: dict[str, Any], domain: Box, failure: Exception, box_count: int) -> NoCertificateError:
     names = [*c["coordinates"], "the time"]
     box = ", ".join(f"{n} in [{a:.6g}, {b:.6g}]" for n, (a, b) in zip(names, domain, strict=True) if (a, b) != (0, 0))
     reason = "a matrix may be singular" if isinstance(failure, ZeroDivisionError) else str(failure)
-    message = f"no certificate after {done} boxes: {reason}, for {box}"
+    message = f"no certificate after {box_count} boxes: {reason}, for {box}"
     return NoCertificateError(message, "a smaller box, a smaller step, or more boxes by --boxes")
 
 
@@ -204,13 +206,17 @@ def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: An
     for _ in range(PASSES):
         run = run_of(c, stage, X, T, {}, box, exact=True)
         d = [run.x[k] for k in stage["equation"]]
-        away = [mag(v) for v in centred(c, stage, X, T, {}, box, run, "away").entries()]
+        residuals = [mag(v) for v in centred(c, stage, X, T, {}, box, run, "away").entries()]
         if not stage["matrix"]:
-            away = [a.max(LEAST_REACH * max(away)) for a in away]
-        away = [a + DIFFERENCES * mag(v) for a, v in zip(away, d, strict=True)] if "difference" in stage else away
-        radii = [GROWTH * (a + 0.1 * arb(b.rad())) for a, b in zip(away, base, strict=True)]
+            residuals = [a.max(LEAST_REACH * max(residuals)) for a in residuals]
+        residuals = (
+            [a + DIFFERENCES * mag(v) for a, v in zip(residuals, d, strict=True)]
+            if "difference" in stage
+            else residuals
+        )
+        radii = [GROWTH * (a + 0.1 * arb(b.rad())) for a, b in zip(residuals, base, strict=True)]
         box = [b - v + BALL * (r + arb(2) ** -25 * mag(b - v)) for b, v, r in zip(base, d, radii, strict=True)]
-        reach = [float(1.01 * a + arb(2) ** -27 * mag(u)) for a, u in zip(away, box, strict=True)]
+        reach = [float(1.01 * a + arb(2) ** -27 * mag(u)) for a, u in zip(residuals, box, strict=True)]
         part: dict[str, Any] = {"u": [_ends(v) for v in box], "reach": reach}
         box = [interval(v) for v in part["u"]]
         try:

@@ -50,8 +50,8 @@ class GeneratedC:
         )
         if not matched:
             raise RefusedError(f"the C has no {name}")
-        listed = matched[1] or matched[2] or matched[3]
-        return [float(v) for v in re.findall(r"-?\d[\d.]*(?:e[-+]?\d+)?", listed)]
+        number_text = matched[1] or matched[2] or matched[3]
+        return [float(v) for v in re.findall(r"-?\d[\d.]*(?:e[-+]?\d+)?", number_text)]
 
     def number(self, name: str) -> float:
         """Return the number of a macro or of an enumeration constant."""
@@ -77,8 +77,8 @@ class KernelReader:
     @property
     def described(self) -> dict[str, Any]:
         """The kernel in the format of a certificate."""
-        written = {name: entries for name, entries in self.outputs.items() if name != _WORK}
-        outputs = {name: [entries[i] for i in range(len(entries))] for name, entries in written.items()}
+        described_outputs = {name: entries for name, entries in self.outputs.items() if name != _WORK}
+        outputs = {name: [entries[i] for i in range(len(entries))] for name, entries in described_outputs.items()}
         return {"operations": self.operations, "outputs": outputs}
 
     def _run(self, body: str) -> None:
@@ -216,8 +216,8 @@ def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
     """Return the polynomial for small arguments of a function, and the radius up to which it is used."""
     (argument,), body = _expect(source.function(name), name)
     branch = re.search(r"if \(fabs\(\w+\) [<>] ([\d.]+)\)", body)
-    plain = name.removeprefix("own_")
-    beyond = re.search(rf"if \(fabs\({argument}\) > [\d.]+\) return {plain}\({argument}\);", body) is not None
+    library_name = name.removeprefix("own_")
+    beyond = re.search(rf"if \(fabs\({argument}\) > [\d.]+\) return {library_name}\({argument}\);", body) is not None
     if not branch:
         raise RefusedError(f"{name} of the C has no polynomial for small arguments")
     if "near[" in body:
@@ -230,7 +230,12 @@ def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
     inner = GeneratedC(f"f({argument})\n{{\n{body}\n}}", "")
     kernel = KernelReader(inner, "f", {})
     operations = [["s", 0] if op[0] == "input" else op for op in kernel.operations]
-    return {"name": plain, "beyond": beyond and plain in LIBM, "radius": float(branch[1]), "operations": operations}
+    return {
+        "name": library_name,
+        "beyond": beyond and library_name in LIBM,
+        "radius": float(branch[1]),
+        "operations": operations,
+    }
 
 
 def _parsed(text: str, mode: str = "eval") -> Any:
@@ -309,8 +314,8 @@ def _splitting(source: GeneratedC) -> dict[str, Any]:
     row = int(source.number("ROW"))
     schedules = [_schedule(source, "flows", {"coef": 0, "ROW": row})]
     if source.has("corrector"):
-        ends = [_schedule(source, "corrector", {"coef": 0, "ROW": row, "after": after}) for after in (0, 1)]
-        schedules = [ends[0], *schedules, ends[1]]
+        correctors = [_schedule(source, "corrector", {"coef": 0, "ROW": row, "after": is_after}) for is_after in (0, 1)]
+        schedules = [correctors[0], *schedules, correctors[1]]
     moves = {str(flow): _moves(source, flow) for flow in sorted({flow for called in schedules for flow, _ in called})}
     multiples = source.numbers("multiples") if re.search(r"\bmultiples\[", source.text) else []
     return {"fractions": source.numbers("times"), "multiples": multiples, "schedules": schedules, "moves": moves}
@@ -348,11 +353,11 @@ def _called(statements: list[tuple[str, Any]], names: dict[str, int], called: li
     """Add the flows that statements call to ``called``, each with its row of coefficients, and return it."""
     for kind, about in statements:
         if kind == "call":
-            called.append([about[0], _whole(about[1], names) // names["ROW"]])
+            called.append([about[0], _integer_value(about[1], names) // names["ROW"]])
             if len(called) > MOST_FLOWS:
                 raise RefusedError(f"the C has more than {MOST_FLOWS} flows in a step")
         elif kind == "advance":
-            names["coef"] += _whole(about, names)
+            names["coef"] += _integer_value(about, names)
         else:
             variable, rounds, inner = about
             for names[variable] in rounds:
@@ -360,7 +365,7 @@ def _called(statements: list[tuple[str, Any]], names: dict[str, int], called: li
     return called
 
 
-def _whole(text: str, names: Mapping[str, int]) -> int:
+def _integer_value(text: str, names: Mapping[str, int]) -> int:
     """Return the value of sums and products of integers and names. Raises `RefusedError` for anything else."""
 
     def value(node: ast.expr) -> int:
@@ -387,10 +392,10 @@ def _whole(text: str, names: Mapping[str, int]) -> int:
 def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
     """Return the coordinates to which a flow adds changes, with the indices of the changes."""
     _, body = _expect(source.function(f"flow{flow}"), f"flow{flow}")
-    added = re.findall(r"add\(x, displacement, start, (\d+), change\[(\d+)\]\);", body)
-    if len(added) != body.count(";") - 2:
+    changes = re.findall(r"add\(x, displacement, start, (\d+), change\[(\d+)\]\);", body)
+    if len(changes) != body.count(";") - 2:
         raise RefusedError(f"flow {flow} of the C does more than to add its changes")
-    return [[int(i), int(j)] for i, j in added]
+    return [[int(i), int(j)] for i, j in changes]
 
 
 _FACTS: dict[str, Callable[[GeneratedC], dict[str, Any]]] = {

@@ -26,11 +26,11 @@ Numbers = Sequence[Any]
 
 @contextmanager
 def _precise() -> Iterator[None]:
-    before, ctx.prec = ctx.prec, BITS
+    previous_precision, ctx.prec = ctx.prec, BITS
     try:
         yield
     finally:
-        ctx.prec = before
+        ctx.prec = previous_precision
 
 
 class ExactMap:
@@ -45,12 +45,12 @@ class ExactMap:
         with _precise():
             x, t = [arb(v) for v in x], arb(t)
             for number, stage in enumerate(self._c["stages"]):
-                u = self._solved(number, stage, x, t) if "equation" in stage else []
+                u = self._solve_stage(number, stage, x, t) if "equation" in stage else []
                 run = run_of(self._c, stage, x, t, {}, u, exact=True)
                 x = [arb((v + run.x[k]).mid()) for v, k in zip(x, stage["change"], strict=True)]
             return x
 
-    def _solved(self, number: int, stage: Mapping[str, Any], x: Numbers, t: Any) -> list[Any]:
+    def _solve_stage(self, number: int, stage: Mapping[str, Any], x: Numbers, t: Any) -> list[Any]:
         """Return the unknowns of a stage, by corrections."""
         base = x if stage["based"] else [arb(0)] * len(stage["equation"])
         start = run_of(self._c, stage, x, t, {}, base, exact=True)
@@ -81,10 +81,10 @@ def observed(c: Mapping[str, Any], exact: Mapping[str, Any], library: Any, count
         x = [draw.uniform(*d) for d in c["domain"]]
         carry = [draw.uniform(-0.5, 0.5) * 2.0**-52 * abs(v) * (k % 2) / 2 for v in x]
         t = draw.uniform(*c["time"])
-        after = one_step(c, library, x, carry, t)
+        computed = one_step(c, library, x, carry, t)
         with _precise():
-            there = exact_step([arb(a) + arb(b) for a, b in zip(x, carry, strict=True)], t)
-            errors = [float(abs(arb(a) + arb(b) - e)) for a, b, e in zip(*after, there, strict=True)]
+            exact_image = exact_step([arb(a) + arb(b) for a, b in zip(x, carry, strict=True)], t)
+            errors = [float(abs(arb(a) + arb(b) - e)) for a, b, e in zip(*computed, exact_image, strict=True)]
         worst = [max(pair) for pair in zip(worst, errors, strict=True)]
     return worst
 

@@ -52,13 +52,15 @@ class Listing:
 
     def copy(self, kernel: Mapping[str, Any], **inputs: Any) -> dict[str, list[int]]:
         """Append the operations of a kernel with these indices as inputs; return the indices of its outputs."""
-        at: list[int] = []
+        operation_indices: list[int] = []
         for op, *a in kernel["operations"]:
             if op == "input":
-                at.append(inputs[a[0]][a[1]])
+                operation_indices.append(inputs[a[0]][a[1]])
             else:
-                at.append(self.add(op, *a) if op == "number" else self.add(op, *(at[i] for i in a)))
-        return {name: [at[i] for i in indices] for name, indices in kernel["outputs"].items()}
+                operation_indices.append(
+                    self.add(op, *a) if op == "number" else self.add(op, *(operation_indices[i] for i in a))
+                )
+        return {name: [operation_indices[i] for i in indices] for name, indices in kernel["outputs"].items()}
 
 
 class _Parameters(dict[str, int]):
@@ -119,18 +121,18 @@ def _splitting(facts: Mapping[str, Any], n: int) -> list[Stage]:
 
 def _flows(facts: Mapping[str, Any], schedule: Sequence[Sequence[int]], n: int) -> Stage:
     listing, rows = Listing(), dict[int, list[int]]()
-    beyond = max(0, 1 + max(i for pairs in facts["moves"].values() for i, _ in pairs) - n)  # with a monitor
-    zeros = [listing.input("exact", 0.0)] * beyond
+    extra_coordinates = max(0, 1 + max(i for pairs in facts["moves"].values() for i, _ in pairs) - n)  # with a monitor
+    zeros = [listing.input("exact", 0.0)] * extra_coordinates
     state, start = listing.inputs("x", n) + zeros, listing.inputs("start", n) + zeros
-    moved = listing.inputs("carry", n) + zeros
+    displacements = listing.inputs("carry", n) + zeros
     for flow, row in schedule:
         if row not in rows:
             rows[row] = prepared(facts, listing, row)
         change = listing.copy(facts["kernels"][f"change{flow}"], coef=rows[row], state=state)["change"]
         for i, j in facts["moves"][str(flow)]:
-            moved[i] = listing.add("add", moved[i], change[j])
-            state[i] = listing.add("add", start[i], moved[i])
-    return {"operations": listing.operations, "change": moved[:n]}
+            displacements[i] = listing.add("add", displacements[i], change[j])
+            state[i] = listing.add("add", start[i], displacements[i])
+    return {"operations": listing.operations, "change": displacements[:n]}
 
 
 def _newton(facts: Mapping[str, Any], n: int) -> list[Stage]:
@@ -139,19 +141,19 @@ def _newton(facts: Mapping[str, Any], n: int) -> list[Stage]:
     for k in range(len(facts["fractions"])):
         listing = Listing()
         y = listing.inputs("u", n)
-        out = listing.copy(facts["kernels"]["linearise"], coef=prepared(facts, listing, k), y=y)
+        outputs = listing.copy(facts["kernels"]["linearise"], coef=prepared(facts, listing, k), y=y)
         sizes = [listing.add("abs", i) for i in y]
         floor = listing.add("mul", listing.add("exact", facts["floor"]), _largest(listing, sizes))
         floor = listing.add("add", floor, listing.add("exact", 2.0**-1022))
         stages.append(
             {
                 "operations": listing.operations,
-                "change": out["increment"],
-                "equation": out["displacement"],
-                "matrix": out["jacobian"],
-                "gain": out["increment_jacobian"],
+                "change": outputs["increment"],
+                "equation": outputs["displacement"],
+                "matrix": outputs["jacobian"],
+                "gain": outputs["increment_jacobian"],
                 "start": y,
-                "away": out["displacement"],
+                "away": outputs["displacement"],
                 "scale": [listing.add("add", size, floor) for size in sizes],
                 "stops": [{"now": math.sqrt(facts["tolerance"])}, {"before": facts["nearly_solved"]}],
                 "share": 0,
@@ -177,13 +179,13 @@ def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
         products = [[listing.add("mul", mixing[j], moves[j][k]) for j in range(nodes)] for k in range(width)]
         z = [listing.sum(terms) for terms in products]
         swept += listing.copy(kernels["stage_field"], coef=coef, x=point, z=z, w=[w])["move"]
-    ends = []
+    stage_outputs = []
     for k in range(width):
         parts = [listing.sum([moves[i][k] for i in range(first, nodes, 2)]) for first in range(min(2, nodes))]
-        ends.append(listing.sum(parts))
-    change = listing.copy(kernels["stage_change"], coef=coef, x=point, z=ends)["change"]
+        stage_outputs.append(listing.sum(parts))
+    change = listing.copy(kernels["stage_change"], coef=coef, x=point, z=stage_outputs)["change"]
     squares = [listing.add("mul", x, x) for x in point[:n]]
-    size, one = listing.add("sqrt", listing.sum(squares)), listing.add("exact", 1.0)
+    size, unit = listing.add("sqrt", listing.sum(squares)), listing.add("exact", 1.0)
     stalled = {"part": facts["stalled"], "now": facts["rounding"]}
     return [
         {
@@ -194,7 +196,7 @@ def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
             "gain": [],
             "start": [listing.input("exact", 0.0)] * (nodes * width),
             "away": swept,
-            "scale": [size if k < facts["plain"] else one for k in range(width)] * nodes,
+            "scale": [size if k < facts["plain"] else unit for k in range(width)] * nodes,
             "stops": [
                 {"now": facts["solved"], "rate": LEAST_RATE},
                 stalled,
@@ -227,37 +229,37 @@ def _path(
 def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: Sequence[int], u: Sequence[int]) -> Any:
     """Append Taylor series of a path from x under p = u, and return the terms of the coordinates, from order 1."""
     starts = {f"s{i}": [j] for i, j in enumerate(x)}
-    out = listing.copy(kernel, coef=prepared(facts, listing, k), p=u, **starts)
-    return [out[f"s{i}"] for i in range(len(x))]
+    outputs = listing.copy(kernel, coef=prepared(facts, listing, k), p=u, **starts)
+    return [outputs[f"s{i}"] for i in range(len(x))]
 
 
 def _along_path(
-    facts: Mapping[str, Any], source: GeneratedC, n: int, k: int, least: int, most: int, coordinate: int
+    facts: Mapping[str, Any], source: GeneratedC, n: int, k: int, least: int, max_terms: int, coordinate: int
 ) -> Stage:
-    """Return stage k, whose series have ``least`` to ``most`` terms, as the series of ``coordinate`` proves."""
+    """Return stage k, whose series have ``least`` to ``max_terms`` terms, as the series of ``coordinate`` proves."""
     listing, kernels = Listing(), facts["kernels"]
     x, u, coef = listing.inputs("x", n), listing.inputs("u", n), prepared(facts, listing, k)
-    terms = _series(facts, PathReader(source, facts["series"], n, most).described, listing, k, x, u)
+    terms = _series(facts, PathReader(source, facts["series"], n, max_terms).described, listing, k, x, u)
     change, y = [], []
     for i, row in enumerate(terms):
         shares = [listing.add("div", t, listing.add("number", float(j + 2))) for j, t in enumerate(row)]
         change.append(listing.add("rest", listing.sum(row[:least]), i, 1, *row[least:]))
         mean = listing.add("rest", listing.sum(shares[:least]), i, least + 2, *row[least:])
         y.append(listing.add("add", x[i], mean))
-    out = listing.copy(kernels["generate"], coef=coef, y=y)
+    outputs = listing.copy(kernels["generate"], coef=coef, y=y)
     first = listing.copy(kernels["generate"], coef=coef, y=x)["slope"]
     largest = [_largest(listing, [listing.add("abs", i) for i in u])] * n
     tail = Listing()
-    below = _series(facts, PathReader(source, facts["series"], n, least + 1).described, tail, k, tail.inputs("m", n),
+    lower = _series(facts, PathReader(source, facts["series"], n, least + 1).described, tail, k, tail.inputs("m", n),
                     tail.inputs("u", n))  # fmt: skip
-    seen = _measured(facts, listing, x, terms, [max(least - 2, 1)])[coordinate]
+    measured = _measured(facts, listing, x, terms, [max(least - 2, 1)])[coordinate]
     return {
         "change": change,
-        "equation": [listing.add("neg", i) for i in out["slope"]],
-        "matrix": out["jacobian"],
+        "equation": [listing.add("neg", i) for i in outputs["slope"]],
+        "matrix": outputs["jacobian"],
         "gain": [],
         "start": first,
-        "away": [listing.add("sub", a, b) for a, b in zip(first, out["slope"], strict=True)],
+        "away": [listing.add("sub", a, b) for a, b in zip(first, outputs["slope"], strict=True)],
         "scale": largest,
         "stops": [{"now": facts["solved"]}, {"before": facts["nearly_solved"], "part": facts["shrinking"]}],
         "share": 0,
@@ -265,13 +267,13 @@ def _along_path(
         "derived": 0,
         "last": 0,
         "difference": facts["difference"],
-        "seen": [seen[0]] if least > 2 else [],
-        "seen_above": seen[1],
-        "hidden": _measured(facts, listing, x, terms, [most - 1, most]),
+        "seen": [measured[0]] if least > 2 else [],
+        "seen_above": measured[1],
+        "hidden": _measured(facts, listing, x, terms, [max_terms - 1, max_terms]),
         "path": {
             "operations": tail.operations,
-            "field": [row[0] for row in below],
-            "next": [row[least] for row in below],
+            "field": [row[0] for row in lower],
+            "next": [row[least] for row in lower],
         },
         "operations": listing.operations,
     }
@@ -311,13 +313,13 @@ def _orders(facts: Mapping[str, Any], kernel: Any, n: int, k: int, box: Sequence
     time = [arb(facts["start"])]
     run = Evaluation(c, listing.operations, {"x": list(box), "t": time}, exact=True)
     centre = [arb(v.mid()) for v in box]
-    at = Evaluation(c, listing.operations, {"x": centre, "t": time}, exact=True)
+    evaluation = Evaluation(c, listing.operations, {"x": centre, "t": time}, exact=True)
     radius = column(box) - column(centre)
     least, coordinate = 2, 0
     for order in range(1, limit + 1):
         at_order = pairs[(order - 1) * n : order * n]
         slopes = run.outputs([a for a, _ in at_order], {"x": n})[2]
-        values = column(at.x[a] for a, _ in at_order) + slopes * radius
+        values = column(evaluation.x[a] for a, _ in at_order) + slopes * radius
         ratios = [
             float(v.abs_lower() / run.x[b].abs_upper()) for v, (_, b) in zip(values.entries(), at_order, strict=True)
         ]
@@ -325,8 +327,10 @@ def _orders(facts: Mapping[str, Any], kernel: Any, n: int, k: int, box: Sequence
             break
         least, coordinate = order + 2, ratios.index(max(ratios))
     rows = [[(run.x[a], run.x[b]) for a, b in pairs[i * n : i * n + n]] for i in range(limit)]
-    small = [i + 1 for i, row in enumerate(rows) if all(a.abs_upper() * MARGIN < b.abs_lower() for a, b in row)]
-    hidden = [i for i in small if i >= least and i - 1 in small]
+    converged_orders = [
+        i + 1 for i, row in enumerate(rows) if all(a.abs_upper() * MARGIN < b.abs_lower() for a, b in row)
+    ]
+    hidden = [i for i in converged_orders if i >= least and i - 1 in converged_orders]
     if not hidden:
         raise RefusedError(f"the Taylor series of paths take more than {limit} terms")
     return least, min(hidden), coordinate
