@@ -54,10 +54,10 @@ def binaries(unit: MockupUnit, platforms: Collection[str] = ()) -> dict[str, byt
     Raises `ToolchainError` if a compilation fails, or if a platform in ``platforms`` has no compiler.
     """
     available = compilers()
-    missing = sorted(set(platforms) - set(available))
-    if missing:
+    unavailable = sorted(set(platforms) - set(available))
+    if unavailable:
         hint = "pip install ziglang compiles for all of them"
-        raise ToolchainError(f"no compiler for {', '.join(missing)}\n  hint: {hint}")
+        raise ToolchainError(f"no compiler for {', '.join(unavailable)}\n  hint: {hint}")
     libraries = {}
     with tempfile.TemporaryDirectory(prefix="phigen-") as scratch:
         folder = Path(scratch)
@@ -75,10 +75,10 @@ def archive(unit: MockupUnit, version: int, libraries: Mapping[str, bytes]) -> b
     """Return the bytes of the FMU for FMI 2 or 3."""
     contents: dict[str, bytes] = {"modelDescription.xml": unit.descriptions[version].encode()}
     for platform, library in libraries.items():
-        known = PLATFORMS[platform]
-        folder = known.folder if version == 3 else known.folder_2
+        platform_record = PLATFORMS[platform]
+        folder = platform_record.folder if version == 3 else platform_record.folder_2
         if folder:
-            contents[f"binaries/{folder}/{unit.name}{known.suffix}"] = library
+            contents[f"binaries/{folder}/{unit.name}{platform_record.suffix}"] = library
     contents |= {f"sources/{file}": text.encode() for file, text in unit.sources.items()}
     if version == 3:
         contents["sources/buildDescription.xml"] = unit.build.encode()

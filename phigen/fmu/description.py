@@ -40,12 +40,15 @@ def model_description(
 ) -> str:
     """Return the text of ``modelDescription.xml`` for FMI 2 or 3; ``sources`` are the files to compile."""
     spec = compilation.spec
-    variables = [replace(v, unit=_plain(v.unit), description=_plain(v.description)) for v in variables]
+    variables = [
+        replace(v, unit=_without_control_characters(v.unit), description=_without_control_characters(v.description))
+        for v in variables
+    ]
     root = ET.Element("fmiModelDescription", fmiVersion=f"{version}.0", modelName=spec.name)
     root.set("guid" if version == 2 else "instantiationToken", token)
     for key, text in {
-        "description": _plain(spec.title) or _plain(spec.description),
-        "license": _plain(spec.license),
+        "description": _without_control_characters(spec.title) or _without_control_characters(spec.description),
+        "license": _without_control_characters(spec.license),
     }.items():
         if text:
             root.set(key, text)
@@ -62,9 +65,9 @@ def model_description(
     _experiment(root, compilation)
     if version == 2:
         _annotations(root, compilation, version)
-    listed = ET.SubElement(root, "ModelVariables")
+    variables_element = ET.SubElement(root, "ModelVariables")
     for variable in variables:
-        (_variable_2 if version == 2 else _variable_3)(listed, variable)
+        (_variable_2 if version == 2 else _variable_3)(variables_element, variable)
     _structure(root, variables, version)
     if version == 3:
         _annotations(root, compilation, version)
@@ -113,7 +116,7 @@ def _annotations(root: ET.Element, compilation: Compilation, version: int) -> No
     spec, facts = compilation.spec, ET.Element("method")
     facts.set("order", str(compilation.order.order))
     facts.set("scheme", str(compilation.described["scheme"]))
-    facts.set("label", _plain(compilation.label))
+    facts.set("label", _without_control_characters(compilation.label))
     facts.set("profile", compilation.program.profile)
     facts.set("specSha256", spec.source_sha256)
     if version == 2:
@@ -122,13 +125,13 @@ def _annotations(root: ET.Element, compilation: Compilation, version: int) -> No
         ET.SubElement(ET.SubElement(root, "Annotations"), "Annotation", type=VENDOR).append(facts)
 
 
-def _variable_3(listed: ET.Element, variable: Variable) -> None:
-    element = ET.SubElement(listed, "Int32" if variable.whole else "Float64", _common(variable))
+def _variable_3(variables_element: ET.Element, variable: Variable) -> None:
+    element = ET.SubElement(variables_element, "Int32" if variable.whole else "Float64", _common(variable))
     _values(element, variable)
 
 
-def _variable_2(listed: ET.Element, variable: Variable) -> None:
-    scalar = ET.SubElement(listed, "ScalarVariable", _common(variable))
+def _variable_2(variables_element: ET.Element, variable: Variable) -> None:
+    scalar = ET.SubElement(variables_element, "ScalarVariable", _common(variable))
     _values(ET.SubElement(scalar, "Integer" if variable.whole else "Real"), variable)
 
 
@@ -163,7 +166,7 @@ def _structure(root: ET.Element, variables: Sequence[Variable], version: int) ->
             ET.SubElement(group, "Unknown", index=str(v.number + 1))
 
 
-def _plain(text: str) -> str:
+def _without_control_characters(text: str) -> str:
     """Return the text with spaces in place of line breaks and of characters that XML forbids."""
     return " ".join(
         "".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Cn", "Zl", "Zp") else c for c in text).split()

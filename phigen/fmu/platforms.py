@@ -60,7 +60,7 @@ def compilers() -> dict[str, Compiler]:
     if find_spec(_PACKAGE):
         zig = (sys.executable, "-m", _PACKAGE, "cc")
         return {p.folder: Compiler((*zig, "-target", p.zig), f"zig for {p.zig}", FLAGS) for p in PLATFORMS.values()}
-    this = host()
-    if this is None or not toolchain.available():
+    this_platform = host()
+    if this_platform is None or not toolchain.available():
         return {}
-    return {this.folder: replace(toolchain.find(), tuning=FLAGS)}
+    return {this_platform.folder: replace(toolchain.find(), tuning=FLAGS)}

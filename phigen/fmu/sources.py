@@ -24,22 +24,22 @@ if TYPE_CHECKING:
 def layer(compilation: Compilation, variables: Sequence[Variable], token: str) -> str:
     """Return the text of ``NAME_fmi.c``, which includes ``NAME.h``."""
     program = compilation.program
-    has = runtime_of(program)[0].switches
-    amalgam = Amalgam(program.name, has, {"solver.h": "", "fmu_model.h": _model(compilation, variables, token)})
+    switches = runtime_of(program)[0].switches
+    amalgam = Amalgam(program.name, switches, {"solver.h": "", "fmu_model.h": _model(compilation, variables, token)})
     text = amalgam.text("fmu.c")
     body = "\n".join(['#include "' + program.name + '.h"', *sorted(amalgam.headers), "", text])
-    about = [
+    lines = [
         f"{program.name} as a functional mock-up unit for co-simulation, of FMI 2.0 and 3.0.",
         "DO NOT EDIT: phigen detects changes by the checksum below.",
         f"SPDX-License-Identifier: {program.about.license}",
     ]
-    return sealed(about, fitted(body))
+    return sealed(lines, fitted(body))
 
 
 def token_of(compilation: Compilation, files: dict[str, str]) -> str:
     """Return the token that must agree between ``modelDescription.xml`` and a binary: a hash of the solver's source."""
-    about = "".join(files[name] for name in sorted(files)) + repr(first_run(compilation.spec))
-    digest = hashlib.sha256(about.encode()).hexdigest()
+    identity = "".join(files[name] for name in sorted(files)) + repr(first_run(compilation.spec))
+    digest = hashlib.sha256(identity.encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
 
 

@@ -68,16 +68,16 @@ def first_run(spec: Spec) -> Run:
 
 def variables_of(compilation: Compilation) -> tuple[Variable, ...]:
     """Return all variables in the order of their numbers, as in `first_numbers`."""
-    listed = chain.from_iterable(_kinds(compilation).values())
-    return tuple(replace(variable, number=k) for k, variable in enumerate(listed))
+    all_variables = chain.from_iterable(_kinds(compilation).values())
+    return tuple(replace(variable, number=k) for k, variable in enumerate(all_variables))
 
 
 def first_numbers(compilation: Compilation) -> dict[str, int]:
     """Return the number of the first variable of each kind. An absent kind has the number of the next kind."""
     numbers, number = {}, 0
-    for kind, listed in _kinds(compilation).items():
+    for kind, variables_of_kind in _kinds(compilation).items():
         numbers[kind] = number
-        number += len(listed)
+        number += len(variables_of_kind)
     return numbers | {"END": number}
 
 
@@ -137,10 +137,10 @@ def _attitude(program: Program) -> Iterator[Variable]:
         return
     rows = program.attitude.group.rows
     names = [f"[{i + 1},{j + 1}]" for i in range(rows) for j in range(rows)] or [f".{name}" for name in QUATERNION]
-    shown = "of the attitude matrix" if rows else "of the quaternion that rotates body into space coordinates"
+    description = "of the attitude matrix" if rows else "of the quaternion that rotates body into space coordinates"
     for k, name in enumerate(names):
-        one = k % (rows + 1) == 0 if rows else k == 0
-        yield Variable(f"attitude{name}", "output", "continuous", float(one), f"entry {shown}")
+        is_one = k % (rows + 1) == 0 if rows else k == 0
+        yield Variable(f"attitude{name}", "output", "continuous", float(is_one), f"entry {description}")
 
 
 def _position(program: Program) -> Iterator[Variable]:
