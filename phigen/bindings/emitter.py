@@ -74,48 +74,48 @@ def binding(compilation: Compilation, language: str) -> dict[str, str]:
     for file, templates in target.files.items():
         comment = "#" if file.endswith(".toml") else target.comment
         notice = f"{name} for {language}. DO NOT EDIT: phigen detects changes by the checksum below."
-        about = [notice, f"SPDX-License-Identifier: {spec.license}"]
+        notice_lines = [notice, f"SPDX-License-Identifier: {spec.license}"]
         body = "".join(render("bindings", template, values) for template in templates)
-        files[file.replace("NAME", name)] = sealed(about, body, f"{comment} ", "", "")
+        files[file.replace("NAME", name)] = sealed(notice_lines, body, f"{comment} ", "", "")
     return files
 
 
 def _values(compilation: Compilation, language: BindingLanguage) -> dict[str, object]:
     """Return the variables of the templates: names, counts and features of the solver."""
     spec, program = compilation.spec, compilation.program
-    about = interface_of(program)
+    interface = interface_of(program)
     struct = list(members(program).values())
-    observed = [("observables", len(about.observables))] if about.observables else []
+    observed = [("observables", len(interface.observables))] if interface.observables else []
     described = {p.name: _described(p.description, p.unit) for p in spec.parameters}
     return {
-        "NAME": about.name,
-        "title": plain(spec.title) or about.name,
-        "dimension": about.dimension,
-        "order": about.order,
-        "coordinates": ", ".join(about.coordinates),
-        "casimirs": ", ".join(about.casimirs),
-        "casimir_names": ", ".join(about.casimirs) or "none",
-        "casimir_count": len(about.casimirs),
-        "observables": ", ".join(about.observables),
-        "observable_count": len(about.observables),
-        "fields": [("vector_field", about.dimension), *observed],
+        "NAME": interface.name,
+        "title": plain(spec.title) or interface.name,
+        "dimension": interface.dimension,
+        "order": interface.order,
+        "coordinates": ", ".join(interface.coordinates),
+        "casimirs": ", ".join(interface.casimirs),
+        "casimir_names": ", ".join(interface.casimirs) or "none",
+        "casimir_count": len(interface.casimirs),
+        "observables": ", ".join(interface.observables),
+        "observable_count": len(interface.observables),
+        "fields": [("vector_field", interface.dimension), *observed],
         "movers": ("set_state", "kick") if program.offers("kicks") else (),
         "parameter_names": ", ".join(struct) or "none",
-        "GUARD": f"{about.name.upper()}_HPP",
-        "timed": bool(about.time),
-        "monitored": about.monitored,
-        "noise": bool(about.noise),
-        "element": about.element,
-        "rotation": about.element - 3 * about.position,
-        "after_rotation": about.element - 3 * about.position + 1,
-        "position": about.position,
+        "GUARD": f"{interface.name.upper()}_HPP",
+        "timed": bool(interface.time),
+        "monitored": interface.monitored,
+        "noise": bool(interface.noise),
+        "element": interface.element,
+        "rotation": interface.element - 3 * interface.position,
+        "after_rotation": interface.element - 3 * interface.position + 1,
+        "position": interface.position,
         "kicks": program.offers("kicks"),
         "interpolated": program.step.kind.collocates,
-        "real": language.reals[about.single],
+        "real": language.reals[interface.single],
         "parameters": [
             (field, member, repr(value), described[p])
             for field, member, (p, value) in zip(
-                _fields(struct, language), struct, about.parameters.items(), strict=True
+                _fields(struct, language), struct, interface.parameters.items(), strict=True
             )
         ],
     }
@@ -142,4 +142,4 @@ def _fields(names: Iterable[str], language: BindingLanguage) -> list[str]:
 
 
 def _occurs(field: str, fields: Iterable[str], caseless: bool) -> bool:
-    return any(field == other or (caseless and field.lower() == other.lower()) for other in fields)
+    return any(field == other_field or (caseless and field.lower() == other_field.lower()) for other_field in fields)
