@@ -58,9 +58,11 @@ class Commands(click.Group):
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             from difflib import get_close_matches
 
-            near = get_close_matches(args[0], COMMANDS, n=1)
-            more = f" Did you mean {near[0]!r}?" if near else f" There are {', '.join(COMMANDS)}."
-            ctx.fail(f"No such command {args[0]!r}.{more}")
+            similar_names = get_close_matches(args[0], COMMANDS, n=1)
+            suggestion = (
+                f" Did you mean {similar_names[0]!r}?" if similar_names else f" There are {', '.join(COMMANDS)}."
+            )
+            ctx.fail(f"No such command {args[0]!r}.{suggestion}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -81,9 +83,9 @@ class Commands(click.Group):
             sys.stdout.reconfigure(errors="backslashreplace")
         try:
             interrupts.working = True
-            done = super().main(args, prog_name, standalone_mode=False, **extra)
+            result = super().main(args, prog_name, standalone_mode=False, **extra)
             interrupts.working = False
-            code = done if isinstance(done, int) else 0
+            code = result if isinstance(result, int) else 0
         except (Exception, KeyboardInterrupt) as error:
             interrupts.working = False
             code = failures.report(error, console)

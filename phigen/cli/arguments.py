@@ -60,9 +60,9 @@ many_specs = click.argument(
 )
 
 
-def _one_of(words: Sequence[str]) -> str:
+def _one_of(choices: Sequence[str]) -> str:
     """The words as in "a, b or c"."""
-    return " or ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
+    return " or ".join([", ".join(choices[:-1]), choices[-1]]) if len(choices) > 1 else choices[0]
 
 
 def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str | None], Path | None]:

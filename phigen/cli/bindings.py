@@ -35,7 +35,9 @@ def with_bindings(
             for language in dict.fromkeys(languages):
                 files |= binding(compilation, language)
             paths = {change.path for change in changes}
-            more = [Change(folder / file, read(folder / file), text) for file, text in files.items()]
-            result.append((compilation, [*changes, *(change for change in more if change.path not in paths)]))
+            binding_changes = [Change(folder / file, read(folder / file), text) for file, text in files.items()]
+            result.append(
+                (compilation, [*changes, *(change for change in binding_changes if change.path not in paths)])
+            )
     collector.finish()
     return result

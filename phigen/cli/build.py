@@ -151,15 +151,15 @@ def _to_build(
     With --check, raises CheckError if the list has names of no spec.
     """
     folders = [file for file in spec_files if Path(found(file)).is_dir()]
-    listed = names_left_out(directory) if folders else {}
-    unknown = unknown_names(listed, {spec.name for spec in specs})
+    left_out = names_left_out(directory) if folders else {}
+    unknown = unknown_names(left_out, {spec.name for spec in specs})
     if checking and unknown:
         raise CheckError("\n".join([*unknown, "  hint: remove these lines, or check the folder of these specs too"]))
-    named = {found(file) for file in spec_files}
-    built = [spec for spec in specs if spec.name not in listed or spec.file in named]
-    if len(built) < len(specs):
-        console.note(f"{counted(len(specs) - len(built), 'spec')} left out by {directory / FILE}")
-    return built
+    named_files = {found(file) for file in spec_files}
+    chosen_specs = [spec for spec in specs if spec.name not in left_out or spec.file in named_files]
+    if len(chosen_specs) < len(specs):
+        console.note(f"{counted(len(specs) - len(chosen_specs), 'spec')} left out by {directory / FILE}")
+    return chosen_specs
 
 
 def _plan(
@@ -187,19 +187,19 @@ def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], opt
 
 def _compare(planned: Sequence[Change], command: str, diff: bool) -> None:
     """Raise CheckError unless all files are as they should be."""
-    off = [change for change in planned if change.state != "unchanged"]
+    outdated = [change for change in planned if change.state != "unchanged"]
     if diff:
-        for change in off:
+        for change in outdated:
             out(change.diff().rstrip("\n"))
-    if not off:
+    if not outdated:
         return
-    lines = [f"{change.path}: {_complaint(change)}" for change in off]
-    lone = [c for c in off if c.state == "stale" and not _has_successor(c, planned)]
+    lines = [f"{change.path}: {_complaint(change)}" for change in outdated]
+    lone = [c for c in outdated if c.state == "stale" and not _has_successor(c, planned)]
     remedies = [f"rm {shlex.join(str(c.path) for c in lone)}"] if lone else []
-    if len(off) > len(lone):
-        forced = " --force" if any(c.obstacle for c in off) else ""
+    if len(outdated) > len(lone):
+        forced = " --force" if any(c.obstacle for c in outdated) else ""
         remedies.insert(0, command + forced)
-    raise CheckError("\n".join([f"{counted(len(off), 'file')} out of date", *indented(lines), *mend(remedies)]))
+    raise CheckError("\n".join([f"{counted(len(outdated), 'file')} out of date", *indented(lines), *mend(remedies)]))
 
 
 def _complaint(change: Change) -> str:
@@ -277,15 +277,15 @@ def _expect_certificates(planned: Sequence[tuple[Compilation, list[Change]]], op
 
 
 def _report(console: Console, folder: Path, compilation: Compilation, changes: Sequence[Change]) -> None:
-    written = [_within(folder, c.path) for c in changes if c.state in ("missing", "different")]
+    written_files = [_within(folder, c.path) for c in changes if c.state in ("missing", "different")]
     removed = [_within(folder, c.path) for c in changes if c.state == "stale"]
-    said = [f"wrote {', '.join(written)}"] if written else []
-    said += [f"removed {', '.join(removed)}, which the spec no longer gives"] if removed else []
+    sentences = [f"wrote {', '.join(written_files)}"] if written_files else []
+    sentences += [f"removed {', '.join(removed)}, which the spec no longer gives"] if removed else []
     program = compilation.program
     method = compilation.named(f"order {program.order}, {compilation.label}")
-    console.note(f"{folder}: {'; '.join(said) or 'unchanged'} ({method})")
+    console.note(f"{folder}: {'; '.join(sentences) or 'unchanged'} ({method})")
     library = folder / _library(compilation.spec.name)
-    if written and library.exists():
+    if written_files and library.exists():
         console.note(f"{library} is older than its sources; --compile builds it again")
 
 

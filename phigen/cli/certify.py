@@ -151,11 +151,11 @@ def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[li
     }
     domain |= {name: [float(low), float(high)] for name, (low, high) in experiment.run.box.items()}
     for box in boxes:
-        name, _, ends = box.partition("=")
+        name, _, range_text = box.partition("=")
         if name.strip() not in domain:
             message = f"{name.strip()!r} is not a coordinate; there are {', '.join(domain)}"
             raise click.BadParameter(message, param_hint="--box")
-        domain[name.strip()] = _range(ends, "--box")
+        domain[name.strip()] = _range(range_text, "--box")
     return list(domain.values())
 
 
@@ -172,12 +172,12 @@ def _time(spec: Spec, experiment: Experiment, times: str | None) -> list[float]:
 def _range(text: str, option: str) -> list[float]:
     low, colon, high = text.partition(":")
     try:
-        ends = [float(low), float(high if colon else low)]
+        bounds = [float(low), float(high if colon else low)]
     except ValueError:
-        ends = [math.nan]
-    if not all(map(math.isfinite, ends)) or ends != sorted(ends):
+        bounds = [math.nan]
+    if not all(map(math.isfinite, bounds)) or bounds != sorted(bounds):
         raise click.BadParameter(f"{text!r} is not LOW:HIGH, two numbers in this order", param_hint=option)
-    return ends
+    return bounds
 
 
 def _observed(
@@ -196,13 +196,13 @@ def _observed(
         console.warn(f"no steps are compared: {error}")
         return []
     worst = observed(certificate, exact, library, samples)
-    beyond = [
+    exceeding = [
         name
-        for name, distance, bound in zip(certificate["coordinates"], worst, certificate["bound"], strict=True)
-        if distance > bound
+        for name, distance, claimed in zip(certificate["coordinates"], worst, certificate["bound"], strict=True)
+        if distance > claimed
     ]
-    if beyond:
-        message = f"steps of the compiled C are farther from the exact map than the bound: {', '.join(beyond)}"
+    if exceeding:
+        message = f"steps of the compiled C are farther from the exact map than the bound: {', '.join(exceeding)}"
         raise CheckError(f"{certificate['name']}: {message}\n  hint: if your libm is less accurate, --ulps 4")
     return worst
 
@@ -230,14 +230,21 @@ def _lines(summary: dict[str, Any]) -> list[str]:
     )
     rows = [("coordinate", "from", "to", "bound", "in ulps", "observed")]
     rows += [
-        (name, f"{low:.6g}", f"{high:.6g}", _short(bound), _short(ulps), "" if far is None else _short(far))
-        for name, (low, high), bound, ulps, far in columns
+        (
+            name,
+            f"{low:.6g}",
+            f"{high:.6g}",
+            _two_digits(claimed),
+            _two_digits(ulps),
+            "" if observed_text is None else _two_digits(observed_text),
+        )
+        for name, (low, high), claimed, ulps, observed_text in columns
     ]
     boxes = "1 box" if summary["boxes"] == 1 else f"{summary['boxes']} boxes"
     title = f"{summary['name']}: distance of a step of {summary['step']:g} from the exact map, certified over {boxes}"
     return [title, *(f"  {line}" for line in table(rows, right=(1, 2, 3, 4, 5)))]
 
 
-def _short(value: float) -> str:
+def _two_digits(value: float) -> str:
     """A number with two digits; 0 for subnormal numbers, the bounds of coordinates that do not move."""
     return f"{value:.2g}" if value > 1e-300 else "0"

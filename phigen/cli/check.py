@@ -98,7 +98,7 @@ def _compared(
     *,
     shown: bool,
 ) -> list[Agreement]:
-    """Compare with the second derivation; each comparison is shown as soon as it is known."""
+    """Compare with the second derivation, and print each comparison as soon as it is complete."""
     from phigen.proofs.independent import SECONDS, compare
     from phigen.symbolic.verdict import REFUTED
 
@@ -115,9 +115,9 @@ def _compared(
             comparisons.append(comparison)
             if shown:
                 out("\n".join(_lines(comparison.timed)))
-    refuted = [c.statement.name for c in comparisons if c.statement.verdict == REFUTED]
-    if refuted:
-        message = f"{examination.spec.file}: refuted by the second derivation: {', '.join(refuted)}"
+    refuted_names = [c.statement.name for c in comparisons if c.statement.verdict == REFUTED]
+    if refuted_names:
+        message = f"{examination.spec.file}: refuted by the second derivation: {', '.join(refuted_names)}"
         collector.errors.append(CheckError(message))
     return comparisons
 
@@ -185,11 +185,11 @@ def _print(examination: Examination, console: Console) -> None:
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     compilation = examination.compilation
     for group, statements in examination.groups.items():
-        shown = [s for s in statements if not (console.quiet and s.holds)]
-        if shown:
-            named = group.startswith((METHOD, SPLITTING, GAUSS))
-            out(f"  {compilation.named(group) if compilation and named else group}")
-        for statement in shown:
+        shown_statements = [s for s in statements if not (console.quiet and s.holds)]
+        if shown_statements:
+            has_subheading = group.startswith((METHOD, SPLITTING, GAUSS))
+            out(f"  {compilation.named(group) if compilation and has_subheading else group}")
+        for statement in shown_statements:
             out("\n".join(_lines(statement)))
             for part, residual in statement.failing if console.verbose else ():
                 out(f"    {'':<19}  {part}: {residual}")
@@ -208,7 +208,7 @@ def _lines(statement: Statement) -> list[str]:
 
 
 def _described(examination: Examination) -> dict[str, object]:
-    listed = [
+    entries = [
         {"group": group, **_described_statement(s)}
         for group, statements in examination.groups.items()
         for s in statements
@@ -219,7 +219,7 @@ def _described(examination: Examination) -> dict[str, object]:
         "file": examination.spec.file,
         **(examination.compilation.described if examination.compilation else {}),
         "refuted": len(examination.refuted),
-        "statements": listed,
+        "statements": entries,
         "obstacles": obstacle,
         "notes": examination.compilation.notes if examination.compilation else [],
         "unexamined": examination.unexamined,

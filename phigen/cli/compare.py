@@ -89,16 +89,16 @@ def command(
 
 
 def _orders(text: str) -> tuple[int, ...]:
-    words = [word.strip() for word in text.split(",")]
-    if not all(word.isdecimal() and 1 <= int(word) <= 16 for word in words):
+    entries = [word.strip() for word in text.split(",")]
+    if not all(word.isdecimal() and 1 <= int(word) <= 16 for word in entries):
         raise click.BadParameter(f"{text!r} is not a list of orders from 1 to 16, such as 2,4,8", param_hint="--orders")
-    return tuple(dict.fromkeys(int(word) for word in words))
+    return tuple(dict.fromkeys(int(word) for word in entries))
 
 
 def _expect_comparable(spec: Spec) -> None:
     """Refuse systems that have no conserved energy to compare by."""
-    for key, there in (("noise", spec.noise), ("time", spec.time), ("forces", spec.forces)):
-        if there:
+    for key, is_present in (("noise", spec.noise), ("time", spec.time), ("forces", spec.forces)):
+        if is_present:
             place = ("damping",) if key == "forces" and ("damping",) in spec.locations else (key,)
             message = f"phigen compare is for systems whose energy is conserved, and {place[0]} changes it"
             raise SpecError([spec.diagnostic(place, message, "phigen verify and phigen run measure one setting")])
@@ -107,8 +107,11 @@ def _expect_comparable(spec: Spec) -> None:
 def _print(comparison: Comparison, spec: Spec, run: Run) -> None:
     from phigen.tuning.building import LATE
 
-    said = "the same step" if comparison.equal == "step" else "the same CPU time"
-    out(heading(f"{spec.name}, run {run.name}") + f": {said}, up to {comparison.clock} = {comparison.horizon:.9g}\n")
+    comparison_text = "the same step" if comparison.equal == "step" else "the same CPU time"
+    out(
+        heading(f"{spec.name}, run {run.name}")
+        + f": {comparison_text}, up to {comparison.clock} = {comparison.horizon:.9g}\n"
+    )
     rows = [["", "steps", "ns/step", "run, ms", "energy error", "Casimir error", "orbit error", "Poisson defect"]]
     rows += [_row(entry) for entry in comparison.entries if not entry.refusal]
     for line in table(rows, right=range(1, 8)):
@@ -123,8 +126,8 @@ def _print(comparison: Comparison, spec: Spec, run: Run) -> None:
     refused = [entry for entry in comparison.entries if entry.refusal]
     for reason in dict.fromkeys(entry.refusal for entry in refused):
         titles = "; ".join(entry.title for entry in refused if entry.refusal == reason)
-        more = "; a larger --budget builds them" * (reason == LATE)
-        out(f"  Not measured, since {reason}{more}: {titles}.")
+        hint = "; a larger --budget builds them" * (reason == LATE)
+        out(f"  Not measured, since {reason}{hint}: {titles}.")
 
 
 def _row(entry: ComparedMethod) -> list[str]:
@@ -140,12 +143,12 @@ def _described(comparison: Comparison, spec: Spec, run: Run) -> dict[str, object
     from phigen.cli.run_summary import finite
 
     entries = [{**asdict(entry), "seconds": entry.seconds} for entry in comparison.entries]
-    about = {
+    document = {
         "name": spec.name,
         "run": run.name,
         "equal": comparison.equal,
         "horizon": comparison.horizon,
         "unit": comparison.unit,
     }
-    described: dict[str, object] = finite({**about, "methods": entries})
+    described: dict[str, object] = finite({**document, "methods": entries})
     return described

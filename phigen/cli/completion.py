@@ -12,23 +12,23 @@ from phigen.cli.sources import SUFFIXES, load_one
 from phigen.errors import PhigenError
 
 
-def specs(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem[str]]:
+def specs(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[CompletionItem[str]]:
     """Return bundled specs, and the spec files and folders here; if none match, the shell completes file names."""
-    named = bundled_names(ctx, parameter, begun)
-    if not named:
-        return [CompletionItem(begun, type="file")]
-    near = [path for path in sorted(Path().glob("[!.]*")) if path.name.startswith(begun)]
-    files = [path.name for path in near if path.suffix in SUFFIXES]
-    folders = [f"{path.name}/" for path in near if path.is_dir()]
-    return [CompletionItem(name) for name in (*files, *folders, *named)]
+    bundled = bundled_names(ctx, parameter, prefix)
+    if not bundled:
+        return [CompletionItem(prefix, type="file")]
+    matching_paths = [path for path in sorted(Path().glob("[!.]*")) if path.name.startswith(prefix)]
+    files = [path.name for path in matching_paths if path.suffix in SUFFIXES]
+    folders = [f"{path.name}/" for path in matching_paths if path.is_dir()]
+    return [CompletionItem(name) for name in (*files, *folders, *bundled)]
 
 
-def bundled_names(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+def bundled_names(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[str]:
     """Bundled specs."""
-    return [name for name in resources.bundled() if name.startswith(begun)]
+    return [name for name in resources.bundled() if name.startswith(prefix)]
 
 
-def runs(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+def runs(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[str]:
     """The runs of the specs given so far; none of a spec with errors, which a shell has no place for."""
     run_names: list[str] = []
     # click stops at an option without value, before it has told which parameter the other words belong to.
@@ -37,4 +37,4 @@ def runs(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[str
             run_names += load_one(source).runs
         except PhigenError:
             continue
-    return [name for name in dict.fromkeys(run_names) if name.startswith(begun)]
+    return [name for name in dict.fromkeys(run_names) if name.startswith(prefix)]

@@ -31,41 +31,41 @@ class Console:
     def __post_init__(self) -> None:
         self._display = Display(lambda: not self.quiet and sys.stderr.isatty(), self.detail)
 
-    def _say(self, message: str) -> None:
+    def _write_line(self, message: str) -> None:
         with self._display.room(), suppress(OSError):  # stderr itself cannot be written
             click.echo(message, err=True, color=_colour())
 
     def error(self, message: str) -> None:
         """Report a failure; never silenced."""
-        self._say(_coloured(message))
+        self._write_line(_coloured(message))
 
     def warn(self, message: str) -> None:
         """Report a warning: work continues."""
         if not self.quiet:
-            self._say(_coloured(f"warning: {message}"))
+            self._write_line(_coloured(f"warning: {message}"))
 
     def note(self, message: str) -> None:
         """Report progress, unless the console is quiet."""
         if not self.quiet:
-            self._say(message)
+            self._write_line(message)
 
     def detail(self, message: str) -> None:
         """Report a detail that is shown with -v only."""
         if self.verbose:
-            self._say(message)
+            self._write_line(message)
 
     @contextmanager
     def heeding(self) -> Iterator[None]:
         """Within this context, warnings of phigen's library are messages like those of its commands."""
         with warnings.catch_warnings():
-            plain = warnings.showwarning
+            library_function = warnings.showwarning
 
             def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
                 if not issubclass(category, PhigenWarning):
-                    plain(message, category, *place, **more)
+                    library_function(message, category, *place, **more)
                 elif not self.quiet:
                     text = str(message)
-                    self._say(_coloured(text if ": warning:" in text.split("\n")[0] else f"warning: {text}"))
+                    self._write_line(_coloured(text if ": warning:" in text.split("\n")[0] else f"warning: {text}"))
 
             warnings.showwarning = show
             warnings.simplefilter("always", PhigenWarning)
@@ -105,13 +105,13 @@ def verbosity(command: F) -> F:
 
         return callback
 
-    for short, name, text in (
+    for short_option, name, text in (
         ("-v", "verbose", "Print more: the stages with their seconds; tracebacks of internal errors."),
         ("-q", "quiet", "Print results and errors only."),
     ):
-        command = click.option(short, f"--{name}", is_flag=True, expose_value=False, callback=store(name), help=text)(
-            command
-        )
+        command = click.option(
+            short_option, f"--{name}", is_flag=True, expose_value=False, callback=store(name), help=text
+        )(command)
     return command
 
 
@@ -186,9 +186,9 @@ def _coloured(message: str) -> str:
     lines = message.split("\n")
     for i, line in enumerate(lines):
         for word, colour in (("error:", "red"), ("warning:", "yellow"), ("refuted", "red")):
-            place = line.find(word)
-            if place >= 0 and not line.startswith("    "):
+            start = line.find(word)
+            if start >= 0 and not line.startswith("    "):
                 styled = click.style(word, fg=colour, bold=True)
-                lines[i] = line[:place] + styled + line[place + len(word) :]
+                lines[i] = line[:start] + styled + line[start + len(word) :]
                 break
     return "\n".join(lines)

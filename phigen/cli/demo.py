@@ -97,7 +97,7 @@ def _errors(system: System, experiment: Experiment, t: Floats, x: Floats) -> tup
 
     solution = exact_solution(system, experiment.run, experiment.parameters, x[0], t)
     exact = np.column_stack([solution[c] for c in system.coordinates])
-    off = np.max(np.abs(x - exact), axis=1) / np.max(np.abs(exact), axis=1)
+    distance = np.max(np.abs(x - exact), axis=1) / np.max(np.abs(exact), axis=1)
     columns = {c: x[:, i] for i, c in enumerate(system.coordinates)}
     (casimir,) = evaluate(list(system.casimirs.values())[:1], {**columns, **experiment.parameters})
-    return off, np.abs(casimir / casimir[0] - 1), exact
+    return distance, np.abs(casimir / casimir[0] - 1), exact

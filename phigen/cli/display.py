@@ -30,7 +30,7 @@ class Display:
     def watching(self) -> Iterator[None]:
         """Within this context, show the stages of this thread."""
         try:
-            with progress.watched(self._told):
+            with progress.watched(self._receive_stages):
                 yield
         finally:
             self._over.set()
@@ -51,9 +51,9 @@ class Display:
                 self._visible = False
             yield
 
-    def _told(self, stages: tuple[Stage, ...]) -> None:
-        begins, self._stages = len(stages) > len(self._stages), stages
-        if begins:
+    def _receive_stages(self, stages: tuple[Stage, ...]) -> None:
+        is_new_stage, self._stages = len(stages) > len(self._stages), stages
+        if is_new_stage:
             self._began(_path(stages))
         if not stages:
             self.erase()
@@ -64,9 +64,9 @@ class Display:
     def _paint(self) -> None:
         while not self._over.wait(PERIOD):
             with self._lock:
-                stages, now = self._stages, time.perf_counter()
-                if stages and now - self._start > PATIENCE and not self._over.is_set():
-                    self._draw(f"{_path(stages)}, {now - stages[0].began:.0f} s")
+                stages, time_now = self._stages, time.perf_counter()
+                if stages and time_now - self._start > PATIENCE and not self._over.is_set():
+                    self._draw(f"{_path(stages)}, {time_now - stages[0].began:.0f} s")
 
     def _draw(self, line: str) -> None:
         width = shutil.get_terminal_size().columns - 1

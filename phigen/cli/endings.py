@@ -48,8 +48,8 @@ def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: E
     run, names, h = experiment.run, solver.interface, experiment.h
     assert run.stop is not None
     g = experiment.function(run.stop, solver)
-    most = end.steps + 1 if end else run.steps
-    zero = where_zero(experiment.begun(solver), h, most, g, experiment.begin, timed=bool(names.time))
+    max_steps = end.steps + 1 if end else run.steps
+    zero = where_zero(experiment.begun(solver), h, max_steps, g, experiment.begin, timed=bool(names.time))
     if zero is None:
         console.note("stop: is not met")
         return None
@@ -85,34 +85,34 @@ def timed(experiment: E, solver: AnySolver, every: float | None = None, at: str 
     """Return the experiment with the times of stored states: equal distances, or a list, up to the end."""
     if every is None and at is None and experiment.run.every is not None:
         every = float(experiment.run.every)
-    listed = _listed(at) if at is not None else [float(t) for t in experiment.run.at] if every is None else []
-    if every is None and not listed:
+    time_list = _parse_times(at) if at is not None else [float(t) for t in experiment.run.at] if every is None else []
+    if every is None and not time_list:
         return experiment
     if experiment.end is None and solver.interface.monitored:  # the session itself measures the time of its steps
-        whole = after_steps(experiment.begun(solver), experiment.h, experiment.run.steps)
-        experiment = replace(experiment, end=whole)
+        end_time = after_steps(experiment.begun(solver), experiment.h, experiment.run.steps)
+        experiment = replace(experiment, end=end_time)
     times = (
         _regular(experiment, solver, every)
         if every is not None
-        else _chosen(experiment, solver, listed, at is not None)
+        else _times_in_run(experiment, solver, time_list, at is not None)
     )
     return replace(experiment, times=tuple(times))
 
 
-def _chosen(experiment: Experiment, solver: AnySolver, times: list[float], asked: bool) -> list[float]:
+def _times_in_run(experiment: Experiment, solver: AnySolver, times: list[float], asked: bool) -> list[float]:
     """Return the listed times in order, without the start and times beyond a stop.
 
     Times ``asked`` for on the command line must be before the end; those of the spec are dropped if the run ends
     earlier.
     """
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
-    beyond = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]
+    too_late = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]
     stopped = experiment.end is not None and experiment.end.stopped
-    before = [t for t in times if (t - begin) * sign < 0]
-    outside = before + ([] if stopped else beyond)
-    if outside and asked:
-        raise click.BadParameter(f"{outside[0]!r} is not between {begin!r} and {end!r}", param_hint="--at")
-    times = sorted({*times} - {begin, *before, *beyond}, reverse=sign < 0)
+    too_early = [t for t in times if (t - begin) * sign < 0]
+    outside_times = too_early + ([] if stopped else too_late)
+    if outside_times and asked:
+        raise click.BadParameter(f"{outside_times[0]!r} is not between {begin!r} and {end!r}", param_hint="--at")
+    times = sorted({*times} - {begin, *too_early, *too_late}, reverse=sign < 0)
     _expect_whole(experiment, solver, times, "--at")
     return times
 
@@ -139,7 +139,7 @@ def _expect_whole(experiment: Experiment, solver: AnySolver, times: Sequence[flo
             raise click.BadParameter(f"{message} {time!r} is between two", param_hint=option)
 
 
-def _listed(at: str) -> list[float]:
+def _parse_times(at: str) -> list[float]:
     text: Any = Path(at).read_text(encoding="utf-8") if Path(at).is_file() else at
     try:
         times = [float(word) for word in text.replace(",", " ").split()]

@@ -42,13 +42,13 @@ def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
 def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -> str:
     """The warning about an energy error, with a smaller step to try; empty if the error is not large."""
     if not math.isfinite(error):
-        said = "H is not a finite number on all of this run: do not trust these states"
-        return f"{said}\n  hint: the run begins where H is not defined, or reaches such a point"
+        warning = "H is not a finite number on all of this run: do not trust these states"
+        return f"{warning}\n  hint: the run begins where H is not defined, or reaches such a point"
     if unit.kind not in _SCALES or not error > LARGE_ENERGY_ERROR:
         return ""
-    said = f"the energy error reaches {_multiple(error)} {_SCALES[unit.kind]}: do not trust these states"
+    warning = f"the energy error reaches {_multiple(error)} {_SCALES[unit.kind]}: do not trust these states"
     tune = "" if spec.time else f"; phigen tune {spec.file} measures which step is needed"
-    return f"{said}\n  hint: try --step {advised_step(error, h, order):g}{tune}"
+    return f"{warning}\n  hint: try --step {advised_step(error, h, order):g}{tune}"
 
 
 def compares_with_rk4(compilation: Compilation, target: str, energy: Drift, steps: int) -> bool:
@@ -71,20 +71,20 @@ def rk4_warning(compilation: Compilation, problem: Problem, solver: Solver, ener
     theirs = rk4_energy_error(compilation, solver.backend, problem)
     if not theirs < energy.error / CLEARLY:
         return ""
-    said = f"the energy error reaches {energy.error:.1e} of {_SCALES[energy.unit.kind]}"
+    finding = f"the energy error reaches {energy.error:.1e} of {_SCALES[energy.unit.kind]}"
     order = f"--order {solver.order + 2 - solver.order % 2}"
     hint = f"try {order}, or --step {advised_step(energy.error, problem.step * problem.direction, solver.order):g}"
-    more = "RK4 with as much processor time reaches"
-    return f"{said}; {more} {theirs:.1e} in this run\n  hint: {hint}; phigen compare {spec.file} --equal work"
+    comparison = "RK4 with as much processor time reaches"
+    return f"{finding}; {comparison} {theirs:.1e} in this run\n  hint: {hint}; phigen compare {spec.file} --equal work"
 
 
 def sweep_warning(count: int, members: int, largest: float, h: float, order: int) -> str:
     """The warning about ``count`` members of a sweep whose energy error is large; empty if there are none."""
     if not count:
         return ""
-    said = f"{count} of {members} members have an energy error above {LARGE_ENERGY_ERROR:.0%} of their energy"
+    warning = f"{count} of {members} members have an energy error above {LARGE_ENERGY_ERROR:.0%} of their energy"
     hint = f"a smaller step for them; {advised_step(largest, h, order):g} would do for the worst, by an estimate"
-    return f"{said}, the largest {_multiple(largest)} it: do not trust their numbers\n  hint: {hint}"
+    return f"{warning}, the largest {_multiple(largest)} it: do not trust their numbers\n  hint: {hint}"
 
 
 def _multiple(error: float) -> str:

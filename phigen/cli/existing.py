@@ -49,9 +49,11 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
     from phigen.runtime.lattice_frames import is_store
     from phigen.runtime.origin import companion, read_origin
 
-    named = [(option, path.resolve()) for option, path in files.items() if path is not None]
-    if len(named) == 2 and named[0][1] == named[1][1]:
-        raise click.BadParameter(f"{named[0][0]} and {named[1][0]} name the same file", param_hint=named[1][0])
+    option_paths = [(option, path.resolve()) for option, path in files.items() if path is not None]
+    if len(option_paths) == 2 and option_paths[0][1] == option_paths[1][1]:
+        raise click.BadParameter(
+            f"{option_paths[0][0]} and {option_paths[1][0]} name the same file", param_hint=option_paths[1][0]
+        )
     force = click.get_current_context().meta.get(_FORCE) and not continued
     for option, path in files.items():
         if path is None or force or not path.exists() or not (path.is_dir() or path.is_file()):
@@ -60,14 +62,14 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
             continue  # of an interrupted run
         if path.is_dir() and not is_store(path):
             continue  # which no option replaces
-        stored = read_origin(path)
+        file_origin = read_origin(path)
         hint = "" if continued else "; --force replaces it"
-        if stored is None and not continued:
+        if file_origin is None and not continued:
             if path.suffix.lower() == ".csv":
                 hint = f" (there is no {companion(path)} to it){hint}"
             message = f"{str(path)!r} exists, and does not say which run of phigen wrote it{hint}"
             raise click.BadParameter(message, param_hint=option)
-        if stored is not None and (difference := origin.difference(stored)):
+        if file_origin is not None and (difference := origin.difference(file_origin)):
             raise click.BadParameter(f"{str(path)!r} holds {difference}{hint}", param_hint=option)
 
 

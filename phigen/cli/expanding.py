@@ -89,8 +89,8 @@ def _expansion(spec: Spec, cell: Cell, choice: str) -> Expansion:
     if count > limits.COORDINATES:
         message = f"{count} coordinates; an ordinary spec has at most {limits.COORDINATES}"
         raise LimitError([Diagnostic(f"{spec.file}: {OPTION} {choice}: {message}")])
-    if small := too_small(cell, sizes, choice):
-        raise SpecError([Diagnostic(f"{spec.file}: {small}")])
+    if complaint := too_small(cell, sizes, choice):
+        raise SpecError([Diagnostic(f"{spec.file}: {complaint}")])
     try:
         return expand(cell, sizes, bonds)
     except ValueError as error:

@@ -88,11 +88,11 @@ class Experiment:
     @property
     def rows(self) -> int:
         """Number of states that are stored: those of every stride-th step or at given times, and the last."""
-        begun = len(self.past.rows) if self.past else 1
+        first_rows = len(self.past.rows) if self.past else 1
         if self.times is not None:
             last = self.times[-1] if self.times else self.begin
-            return begun + len(self.times) + (abs(self.until - last) > 1e-9 * abs(self.until - self.begin))
-        return begun + self.run.steps // self.run.stride + (self.has_part or self.run.steps % self.run.stride > 0)
+            return first_rows + len(self.times) + (abs(self.until - last) > 1e-9 * abs(self.until - self.begin))
+        return first_rows + self.run.steps // self.run.stride + (self.has_part or self.run.steps % self.run.stride > 0)
 
     @property
     def has_part(self) -> bool:
@@ -239,8 +239,10 @@ def _set(setting: str, initial: dict[str, float], parameters: dict[str, float]) 
     name, value = setting_of(setting)
     home = parameters if name in parameters else initial
     if name not in home:
-        known = ", ".join([*parameters, *initial])
-        raise click.BadParameter(f"{name!r} is neither a parameter nor a coordinate ({known})", param_hint="--set")
+        known_names = ", ".join([*parameters, *initial])
+        raise click.BadParameter(
+            f"{name!r} is neither a parameter nor a coordinate ({known_names})", param_hint="--set"
+        )
     home[name] = value
 
 
@@ -248,8 +250,8 @@ def loaded(compilation: Compilation, target: str, console: Console) -> Solver:
     """The solver; where auto falls back to NumPy, stderr says so."""
     from phigen.api import chosen_target, solver_of
 
-    chosen = chosen_target(target, console.note)
+    target_name = chosen_target(target, console.note)
     start = time.perf_counter()
-    solver = solver_of(compilation, chosen)
-    console.detail(f"{compilation.spec.name}: {chosen} ready after {time.perf_counter() - start:.2f} s")
+    solver = solver_of(compilation, target_name)
+    console.detail(f"{compilation.spec.name}: {target_name} ready after {time.perf_counter() - start:.2f} s")
     return solver

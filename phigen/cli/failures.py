@@ -74,8 +74,8 @@ def report(error: BaseException, console: Console) -> int:
                 _show_traceback(error, console)
             return error.exit_code
         case OSError() if error.errno is not None:
-            place = _place(error)
-            console.error(f"error: {place + ': ' if place else ''}{error.strerror}")
+            location = _place(error)
+            console.error(f"error: {location + ': ' if location else ''}{error.strerror}")
             return USAGE
         case MemoryError():
             console.error("error: out of memory\n  hint: fewer sites, members, or states that are stored at a time")
@@ -127,8 +127,10 @@ def _internal(error: BaseException, console: Console) -> int:
     console.error(f"internal error: {summary}")
     if console.verbose:
         _show_traceback(error, console)
-    more = "" if console.verbose else ", and what the same command prints with -v"
-    console.error(f"  This is a bug of phigen {__version__}, not of your spec. Please report it with the spec{more}.")
+    request = "" if console.verbose else ", and what the same command prints with -v"
+    console.error(
+        f"  This is a bug of phigen {__version__}, not of your spec. Please report it with the spec{request}."
+    )
     return PhigenError.exit_code
 
 

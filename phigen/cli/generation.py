@@ -66,25 +66,25 @@ class Options:
 
     def command(self, spec_files: Sequence[str]) -> str:
         """The command line that writes the same files."""
-        words = ["phigen", "build", *spec_files]
+        arguments = ["phigen", "build", *spec_files]
         if str(self.directory) != DIRECTORY:
-            words += ["-o", str(self.directory)]
-        return shlex.join([*words, *self.words])
+            arguments += ["-o", str(self.directory)]
+        return shlex.join([*arguments, *self.words])
 
     @property
     def words(self) -> list[str]:
         """The options that reach the output, as on the command line."""
-        words = [word for target in self.targets for word in ("-t", target)]
-        words += ["--order", str(self.order)] if self.order else []
-        words += ["--scheme", self.scheme] if self.scheme else []
-        words += ["--profile", self.profile] if self.profile else []
-        words += ["--real", self.real] if self.real else []
-        words += [word for part in self.without for word in ("--without", part)]
-        words += ["--single-file"] if self.single_file else []
-        words += ["--tangent"] if self.tangent else []
-        words += ["--adjoint"] if self.adjoint else []
-        words += ["--modified", str(self.modified)] if self.modified is not None else []
-        return words
+        arguments = [word for target in self.targets for word in ("-t", target)]
+        arguments += ["--order", str(self.order)] if self.order else []
+        arguments += ["--scheme", self.scheme] if self.scheme else []
+        arguments += ["--profile", self.profile] if self.profile else []
+        arguments += ["--real", self.real] if self.real else []
+        arguments += [word for part in self.without for word in ("--without", part)]
+        arguments += ["--single-file"] if self.single_file else []
+        arguments += ["--tangent"] if self.tangent else []
+        arguments += ["--adjoint"] if self.adjoint else []
+        arguments += ["--modified", str(self.modified)] if self.modified is not None else []
+        return arguments
 
 
 def output_options(command: F) -> F:
@@ -125,18 +125,18 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     from phigen.compiler import emit
 
     spec, single = compilation.spec.written or compilation.spec, options.single_file and TARGETS[target].single_file
-    words = ["phigen build", spec.name if _is_bundled(spec) else f"{spec.name}.yaml"]
-    words += ["-t", target] if target not in spec.targets else []
-    words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
-    words += ["--scheme", options.scheme] if options.scheme not in (None, spec.scheme) else []
-    words += ["--profile", options.profile] if options.profile not in (None, spec.profile) else []
-    words += ["--real", options.real] if options.real not in (None, spec.extras.real) else []
-    words += [f"--without {part}" for part in options.without if part not in spec.extras.without]
-    words += ["--single-file"] if single else []
-    words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
-    words += ["--adjoint"] if options.adjoint and not spec.extras.adjoint else []
-    words += ["--modified", str(options.modified)] if options.modified is not None else []
-    return emit(compilation.program, target, " ".join(words), single_file=single)
+    arguments = ["phigen build", spec.name if _is_bundled(spec) else f"{spec.name}.yaml"]
+    arguments += ["-t", target] if target not in spec.targets else []
+    arguments += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
+    arguments += ["--scheme", options.scheme] if options.scheme not in (None, spec.scheme) else []
+    arguments += ["--profile", options.profile] if options.profile not in (None, spec.profile) else []
+    arguments += ["--real", options.real] if options.real not in (None, spec.extras.real) else []
+    arguments += [f"--without {part}" for part in options.without if part not in spec.extras.without]
+    arguments += ["--single-file"] if single else []
+    arguments += ["--tangent"] if options.tangent and not spec.extras.tangent else []
+    arguments += ["--adjoint"] if options.adjoint and not spec.extras.adjoint else []
+    arguments += ["--modified", str(options.modified)] if options.modified is not None else []
+    return emit(compilation.program, target, " ".join(arguments), single_file=single)
 
 
 def _is_bundled(spec: Spec) -> bool:

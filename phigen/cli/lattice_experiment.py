@@ -67,17 +67,17 @@ class LatticeExperiment(Experiment):
 
     def plan(self, solver: LatticeSolver) -> IntegrationPlan:
         """Return the requested integration."""
-        at, run = self.beginning(solver), self.run
+        beginning, run = self.beginning(solver), self.run
         if self.times is None:
-            rows = strided(at.h, run.steps, run.stride, self.end)
+            rows = strided(beginning.h, run.steps, run.stride, self.end)
         elif solver.interface.monitored:
             assert self.end is not None
             rows = timed_in_tau(self.spans, self.end)
         else:
-            rows = timed(at.h, run.steps, self.spans, self.end)
-        section, transforms = solver.section_of(run, at.values), solver.transforms_of(run)
+            rows = timed(beginning.h, run.steps, self.spans, self.end)
+        section, transforms = solver.section_of(run, beginning.values), solver.transforms_of(run)
         further: Any = {"section": section, "transforms": transforms, "past": self.past, "origin": self.origin}
-        return IntegrationPlan(at, rows, self.begin, **further)
+        return IntegrationPlan(beginning, rows, self.begin, **further)
 
 
 def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) -> tuple[Run, Start]:
@@ -92,19 +92,19 @@ def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) ->
         raise click.BadParameter(f"{source} is no {kinds}: {_reason(error)}", param_hint="--from") from None
     if state.shape != start.state.shape or not np.isfinite(state).all():
         message = f"{source} ends with a state of shape {state.shape}, the run has {start.state.shape}"
-        wrong = message if state.shape != start.state.shape else f"the last state in {source} is not finite"
-        raise click.BadParameter(wrong, param_hint="--from")
+        complaint = message if state.shape != start.state.shape else f"the last state in {source} is not finite"
+        raise click.BadParameter(complaint, param_hint="--from")
     return replace(run, start=Fraction(t)) if solver.interface.time else run, replace(start, state=state)
 
 
-def _last_of(source: Path, about: LatticeInterface, shape: tuple[int, ...]) -> tuple[Floats, float]:
+def _last_of(source: Path, interface: LatticeInterface, shape: tuple[int, ...]) -> tuple[Floats, float]:
     """The last state in a file, and its time."""
     if source.suffix.lower() == ".csv":
-        table = _table(source, about, shape)
+        table = _table(source, interface, shape)
         return table.last, float(table.t[-1])
-    with opened(source) as file, np.load(file, allow_pickle=False) as stored:
-        last = stored["last"] if "last" in stored else stored["x"][-1]
-        return np.asarray(last, dtype=np.float64), float(stored["t"][-1])
+    with opened(source) as file, np.load(file, allow_pickle=False) as archive:
+        last = archive["last"] if "last" in archive else archive["x"][-1]
+        return np.asarray(last, dtype=np.float64), float(archive["t"][-1])
 
 
 def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -> LatticeExperiment:
@@ -115,39 +115,39 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
         message = f"the run {run.name} has record: without state, and {path} has no state to continue from"
         raise click.UsageError(f"--extend: {message}; a .npz has it")
     try:
-        past = _past_of(path, run, solver.interface, start.state.shape)
+        earlier_run = _past_of(path, run, solver.interface, start.state.shape)
     except _UNREADABLE as error:
         message = f"{path} does not hold a run of {solver.interface.name}: {_reason(error)}"
         raise click.BadParameter(message, param_hint="--extend") from None
-    if past.t[0] != experiment.t0 or not np.array_equal(past.first, start.state):
-        what = f"its first row, at t = {float(past.t[0])!r}, is not the start of the run {run.name}"
-        raise click.BadParameter(f"{path} is of another run: {what}", param_hint="--extend")
-    steps = past.steps or round((float(past.t[-1]) - experiment.t0) / experiment.h)
-    steps = past.steps if solver.interface.monitored else steps  # a .csv has the times, not the steps
-    return replace(experiment, past=replace(past, steps=steps))
+    if earlier_run.t[0] != experiment.t0 or not np.array_equal(earlier_run.first, start.state):
+        complaint = f"its first row, at t = {float(earlier_run.t[0])!r}, is not the start of the run {run.name}"
+        raise click.BadParameter(f"{path} is of another run: {complaint}", param_hint="--extend")
+    steps = earlier_run.steps or round((float(earlier_run.t[-1]) - experiment.t0) / experiment.h)
+    steps = earlier_run.steps if solver.interface.monitored else steps  # a .csv has the times, not the steps
+    return replace(experiment, past=replace(earlier_run, steps=steps))
 
 
-def _past_of(path: Path, run: Run, about: LatticeInterface, shape: tuple[int, ...]) -> Past:
+def _past_of(path: Path, run: Run, interface: LatticeInterface, shape: tuple[int, ...]) -> Past:
     """Read the rows of a finished run."""
     if path.suffix.lower() == ".csv":
-        return _table(path, about, shape)
-    numbers = run.record if run.records_numbers else ("energy", *about.observables)
-    with opened(path) as file, np.load(file, allow_pickle=False) as stored:
-        t = _rows(stored["t"], "t")
-        columns = {name: _rows(stored[key_of(name, about)], name, len(t)) for name in numbers}
-        steps = int(stored["steps"])
+        return _table(path, interface, shape)
+    numbers = run.record if run.records_numbers else ("energy", *interface.observables)
+    with opened(path) as file, np.load(file, allow_pickle=False) as archive:
+        t = _rows(archive["t"], "t")
+        columns = {name: _rows(archive[key_of(name, interface)], name, len(t)) for name in numbers}
+        steps = int(archive["steps"])
         if run.records_numbers:
-            first, last = (np.asarray(stored[name], dtype=np.float64) for name in ("first", "last"))
+            first, last = (np.asarray(archive[name], dtype=np.float64) for name in ("first", "last"))
             return _checked(Past(t, first, last, columns, steps), shape)
-        x = np.asarray(stored["x"], dtype=np.float64)
+        x = np.asarray(archive["x"], dtype=np.float64)
         if x.shape != (len(t), *shape):
             raise ValueError(f"x has the shape {x.shape}, not {(len(t), *shape)}")
         return _checked(Past(t, x[0], x[-1], columns, steps, x), shape)
 
 
-def _table(path: Path, about: LatticeInterface, shape: tuple[int, ...]) -> Past:
+def _table(path: Path, interface: LatticeInterface, shape: tuple[int, ...]) -> Past:
     """Read a ``.csv`` of states; the number of steps is not in it."""
-    columns = state_columns(about, shape[1:])
+    columns = state_columns(interface, shape[1:])
     expected = [name for column in columns for name in column.names]
     with opened_text(path) as file:
         header = file.readline().strip().split(",")
@@ -158,7 +158,7 @@ def _table(path: Path, about: LatticeInterface, shape: tuple[int, ...]) -> Past:
     if not rows.size or rows.shape[1] != len(expected):
         raise ValueError("it has no rows")
     keys = {name: rows[:, expected.index(column.names[0])] for column in columns for name in [column.key]}
-    numbers = {"energy": keys["energy"]} | {name: keys[f"observable_{name}"] for name in about.observables}
+    numbers = {"energy": keys["energy"]} | {name: keys[f"observable_{name}"] for name in interface.observables}
     x = rows[:, 1 : 1 + int(np.prod(shape))].reshape(-1, *shape)
     return _checked(Past(rows[:, 0], x[0], x[-1], numbers, 0, x), shape)
 
@@ -170,13 +170,13 @@ def _rows(values: Any, name: str, count: int | None = None) -> Floats:
     return array
 
 
-def _checked(past: Past, shape: tuple[int, ...]) -> Past:
+def _checked(earlier_run: Past, shape: tuple[int, ...]) -> Past:
     """The same, where it ends with a finite state of that shape and a finite time."""
-    if past.first.shape != shape or past.last.shape != shape:
-        raise ValueError(f"its states have the shape {past.last.shape}, those of the run {shape}")
-    if not (np.isfinite(past.last).all() and np.isfinite(past.t[-1])):
+    if earlier_run.first.shape != shape or earlier_run.last.shape != shape:
+        raise ValueError(f"its states have the shape {earlier_run.last.shape}, those of the run {shape}")
+    if not (np.isfinite(earlier_run.last).all() and np.isfinite(earlier_run.t[-1])):
         raise ValueError("its last state is not finite")
-    return past
+    return earlier_run
 
 
 def _reason(error: Exception) -> str:

@@ -88,8 +88,10 @@ def run_lattice(
             raise click.UsageError("--extend continues .npz and .csv files; a .zarr is written as a whole")
         experiment = extended(experiment, output, solver)
     experiment = timed(ended(experiment, solver, console), solver, every, at)
-    whole, failure = _integrated(console, experiment, solver, output, section, resume=resume)
-    trajectory, series = (whole.ends, whole) if isinstance(whole, LatticeSeries) else (whole, series_of(whole))
+    results, failure = _integrated(console, experiment, solver, output, section, resume=resume)
+    trajectory, series = (
+        (results.ends, results) if isinstance(results, LatticeSeries) else (results, series_of(results))
+    )
     for file in (output, section):
         if file and not failure:
             mark(file, origin)
@@ -108,10 +110,10 @@ def run_lattice(
     threads = solver.backend.threads(prod(start.sizes))
     if as_json:
         sizes = {"sizes": list(start.sizes), "frames": len(trajectory), "rows": len(series)}
-        built = {"profile": compilation.program.profile, "threads": threads}
+        build_facts = {"profile": compilation.program.profile, "threads": threads}
         method = {
             "target": solver.target,
-            **built,
+            **build_facts,
             "order": solver.order,
             "step": trajectory.h,
             "steps": trajectory.steps,
@@ -126,8 +128,8 @@ def run_lattice(
             "errors": largest,
         }
         description |= {"observables": described_averages(observables, averages, run.average.of)} if observables else {}
-        if whole.crossings is not None:
-            crossed = {"expression": section_text(run), "crossings": len(whole.crossings)}
+        if results.crossings is not None:
+            crossed = {"expression": section_text(run), "crossings": len(results.crossings)}
             description["section"] = crossed
         out_json(finite(description | ({"lyapunov": described_spectrum(spectrum)} if spectrum else {})))
     else:
@@ -136,8 +138,8 @@ def run_lattice(
         _print(spec, run, start, named_method, trajectory, largest, units)
         if observables:
             print_averages(observables, averages, run.average.of)
-        if whole.crossings is not None:
-            out(f"\n  {counted_crossings(run, len(whole.crossings), section_text(run))}")
+        if results.crossings is not None:
+            out(f"\n  {counted_crossings(run, len(results.crossings), section_text(run))}")
         if spectrum:
             changed_by = f"the second half changed it by {spectrum.uncertainty:.1g}"
             out(f"\n  largest Lyapunov exponent after t = {spectrum.t:.9g}: {spectrum.largest:.4g}; {changed_by}")
@@ -146,7 +148,7 @@ def run_lattice(
     if warning and not failure:
         console.warn(warning)
     if plot:
-        _draw(spec, run, whole, errors, spectrum, plot, str(origin))
+        _draw(spec, run, results, errors, spectrum, plot, str(origin))
         console.note(wrote(plot))
     if failure:
         raise failure
@@ -171,7 +173,7 @@ def _integrated(
     finished = None if experiment.past else first
     if checkpoint and (refused := objection(checkpoint, finished, resume=resume, how="--resume")):
         raise click.UsageError(refused)
-    plan, of = experiment.plan(solver), run.record if run.records_numbers else ()
+    plan, recorded = experiment.plan(solver), run.record if run.records_numbers else ()
     try:
         if plan.transforms:
             plan.transforms.expect_frames(plan.times, plan.at.h)
@@ -180,7 +182,7 @@ def _integrated(
     with console.progress(f"{solver.interface.name} {run.name}", run.steps) as progress:
         try:
             result = solver.carried_out(
-                plan, of, output=output, checkpoints=checkpoint, resume=resume, progress=progress
+                plan, recorded, output=output, checkpoints=checkpoint, resume=resume, progress=progress
             )
         except MismatchError as error:
             raise click.UsageError(str(error)) from None
@@ -257,8 +259,8 @@ def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str
     for setting in settings:
         name, value = setting_of(setting)
         if name not in parameters:
-            known = ", ".join(parameters) or "none"
-            raise click.BadParameter(f"{name!r} is not a parameter ({known})", param_hint="--set")
+            known_names = ", ".join(parameters) or "none"
+            raise click.BadParameter(f"{name!r} is not a parameter ({known_names})", param_hint="--set")
         parameters[name] = value
     expect_positive(spec, parameters)
     return parameters
@@ -266,15 +268,15 @@ def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str
 
 def told_steps(trajectory: LatticeTrajectory) -> str:
     """``60 steps of 0.1 and a part of one``."""
-    whole, monitored = trajectory.steps * trajectory.h, trajectory.solver.interface.monitored
-    passed = trajectory.t[-1] - trajectory.t[0]
+    whole_time, monitored = trajectory.steps * trajectory.h, trajectory.solver.interface.monitored
+    elapsed = trajectory.t[-1] - trajectory.t[0]
     if monitored:
-        passed = whole if trajectory.tau is None else trajectory.tau[-1]
-    part = abs(passed - whole) > 1e-9 * max(abs(whole), abs(trajectory.h))
+        elapsed = whole_time if trajectory.tau is None else trajectory.tau[-1]
+    part = abs(elapsed - whole_time) > 1e-9 * max(abs(whole_time), abs(trajectory.h))
     return f"{trajectory.steps} steps of {trajectory.h:.9g}" + " in τ" * monitored + " and a part of one" * bool(part)
 
 
-def _shown(error: float) -> str:
+def _formatted_error(error: float) -> str:
     return f"{error:.1e}" if error else "0"
 
 
@@ -305,10 +307,10 @@ def _print(
     rows = [["largest" if BALANCE in errors else "largest change" if CHANGE in errors else "largest error", "", ""]]
     if BALANCE in errors:
         change = float(units["energy"].errors(trajectory.energy, float(trajectory.energy[0])).max())
-        rows.append([CHANGE, _shown(change), units["energy"].kind])
+        rows.append([CHANGE, _formatted_error(change), units["energy"].kind])
     for name, error in errors.items():
         label = name if BALANCE not in errors else f"{'error of the' if name == BALANCE else 'change of'} {name}"
-        rows.append([label, _shown(error), kinds[name]])
+        rows.append([label, _formatted_error(error), kinds[name]])
     for line in table(rows, right=[1]):
         out(f"  {line}")
     out(f"  {stated(units)}")

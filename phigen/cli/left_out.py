@@ -43,6 +43,6 @@ def names_left_out(directory: Path) -> dict[str, Location]:
     return names
 
 
-def unknown_names(listed: Mapping[str, Location], specs: Collection[str]) -> list[str]:
+def unknown_names(places_by_name: Mapping[str, Location], specs: Collection[str]) -> list[str]:
     """Describe the listed names that no spec has, one line each."""
-    return [f"{place}: no spec has the name {name}" for name, place in listed.items() if name not in specs]
+    return [f"{place}: no spec has the name {name}" for name, place in places_by_name.items() if name not in specs]

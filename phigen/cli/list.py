@@ -71,6 +71,6 @@ def _path_of(name: str, files: dict[str, Path]) -> str:
 
     if name in files:
         return str(files[name])
-    near = get_close_matches(name, files, n=1)
-    more = f"did you mean {near[0]!r}?" if near else "phigen list shows them"
-    raise click.UsageError(f"there is no bundled spec {name!r}; {more}")
+    similar_names = get_close_matches(name, files, n=1)
+    hint = f"did you mean {similar_names[0]!r}?" if similar_names else "phigen list shows them"
+    raise click.UsageError(f"there is no bundled spec {name!r}; {hint}")

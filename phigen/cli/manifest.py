@@ -122,8 +122,8 @@ def read(folder: Path) -> tuple[dict[str, ManifestEntry], tuple[str, ...]]:
             raise ValueError(f"build systems that do not exist: {builds}")
         return {name: _entry(name, part) for name, part in data["solvers"].items()}, builds
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise _damaged(path, what) from None
+        problem = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise _damaged(path, problem) from None
 
 
 def _entry(name: str, part: Mapping[str, Any]) -> ManifestEntry:
@@ -146,12 +146,12 @@ def _entry(name: str, part: Mapping[str, Any]) -> ManifestEntry:
 
 def _options(name: str, raw: dict[str, Any]) -> Options:
     targets = tuple(_list_of_texts(raw.pop("targets", [])))
-    without = tuple(_list_of_texts(raw.pop("without", [])))
-    options = Options(targets=targets, without=without, **raw)
+    left_out = tuple(_list_of_texts(raw.pop("without", [])))
+    options = Options(targets=targets, without=left_out, **raw)
     order, modified = options.order, options.modified
     if (
         not set(targets) <= set(TARGETS)
-        or not set(without) <= set(PARTS)
+        or not set(left_out) <= set(PARTS)
         or not (order is None or (type(order) is int and 1 <= order <= limits.ORDER))
         or not (modified is None or (type(modified) is int and 0 <= modified <= limits.CORRECTIONS))
         or options.scheme not in (None, *SCHEMES)
@@ -170,6 +170,6 @@ def _list_of_texts(value: Any) -> list[str]:
     return value
 
 
-def _damaged(path: Path, why: str) -> CheckError:
+def _damaged(path: Path, problem: str) -> CheckError:
     hint = f"restore {FILE} from version control, or remove it and vendor the solvers again"
-    return CheckError(f"{path} cannot be used: {why}\n  hint: {hint}")
+    return CheckError(f"{path} cannot be used: {problem}\n  hint: {hint}")

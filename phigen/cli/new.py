@@ -29,8 +29,8 @@ def command(console: Console, name: str, lattice: bool, output: str | None) -> N
     try:
         text = spec.starter(stem, lattice=lattice)
     except SpecError as error:  # located in a file that does not exist yet
-        (wrong,) = error.diagnostics
-        raise click.UsageError(wrong.message + (f"; {wrong.hint}" if wrong.hint else "")) from None
+        (diagnostic,) = error.diagnostics
+        raise click.UsageError(diagnostic.message + (f"; {diagnostic.hint}" if diagnostic.hint else "")) from None
     if output == "-":
         out_document(text)
         return

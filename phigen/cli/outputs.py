@@ -42,10 +42,10 @@ class Change:
 
     def diff(self) -> str:
         """Return a unified diff from the text on disk to the intended text."""
-        old = [] if self.before is None else self.before.splitlines(keepends=True)
-        new = [] if self.after is None else self.after.splitlines(keepends=True)
+        old_lines = [] if self.before is None else self.before.splitlines(keepends=True)
+        new_lines = [] if self.after is None else self.after.splitlines(keepends=True)
         source, sink = (str(self.path) if text is not None else os.devnull for text in (self.before, self.after))
-        lines = difflib.unified_diff(old, new, source, sink)
+        lines = difflib.unified_diff(old_lines, new_lines, source, sink)
         return "".join(line if line.endswith("\n") else line + "\n\\ No newline at end of file\n" for line in lines)
 
 
@@ -56,25 +56,25 @@ def changes(folder: Path, name: str, files: Mapping[str, str], targets: Iterable
     for suffix in suffixes(targets):
         path = folder / f"{name}{suffix}"
         if path.name not in files and path.is_file():
-            before = read(path)
-            if before is not None and split(before)[0] is not None:
-                result.append(Change(path, before, None))
+            text_before = read(path)
+            if text_before is not None and split(text_before)[0] is not None:
+                result.append(Change(path, text_before, None))
     return result
 
 
 def orphans(directory: Path, names: Iterable[str], targets: Iterable[str]) -> Iterator[Change]:
     """Generated files ``DIR/NAME/NAME.*`` of names that are not among the given ones."""
-    known = set(names)
+    known_names = set(names)
     endings = suffixes(targets)
     for folder in sorted(directory.iterdir()) if directory.is_dir() else []:
-        for path in [folder / f"{folder.name}{s}" for s in endings] if folder.name not in known else []:
-            before = read(path)
-            if before is not None and split(before)[0] is not None:
-                yield Change(path, before, None)
+        for path in [folder / f"{folder.name}{s}" for s in endings] if folder.name not in known_names else []:
+            text_before = read(path)
+            if text_before is not None and split(text_before)[0] is not None:
+                yield Change(path, text_before, None)
 
 
 def apply(planned: Iterable[Change]) -> None:
-    """Write all or nothing, then remove what is to go; a reader never sees half a file."""
+    """Write all files or none, then remove the obsolete files; a reader never sees a part of a file."""
     planned = list(planned)
     write_all({c.path: c.after for c in planned if c.after is not None and c.state != "unchanged"})
     for change in planned:

@@ -38,22 +38,24 @@ class StoredRows:
 
     def last(self, names: Sequence[str]) -> Floats:
         """Values of the last row; raises `KeyError` for a column that is not there."""
-        places = {name: i for i, name in enumerate(self.columns)}
-        return np.array([self.rows[-1, places[name]] for name in names])
+        column_numbers = {name: i for i, name in enumerate(self.columns)}
+        return np.array([self.rows[-1, column_numbers[name]] for name in names])
 
 
 def columns_of(names: Interface) -> list[Column]:
     """The columns of the rows of a run."""
-    turned = element_columns(names.attitude, position=names.position)
-    return trajectory_columns(names.coordinates, names.casimirs, turned, names.observables, monitored=names.monitored)
+    attitude_columns = element_columns(names.attitude, position=names.position)
+    return trajectory_columns(
+        names.coordinates, names.casimirs, attitude_columns, names.observables, monitored=names.monitored
+    )
 
 
 def recorded_columns(names: Interface, record: Sequence[str]) -> list[Column]:
-    """Return the columns that a run records: the times, and what it names; all if it names nothing."""
+    """Return the columns that a run records: times and the columns in ``record``, or all without ``record``."""
     if not record:
         return columns_of(names)
-    turned = [column.key for column in element_columns(names.attitude, position=names.position)]
-    keys = {"t", "tau"} | ({"x", *turned} if "state" in record else set())
+    attitude_keys = [column.key for column in element_columns(names.attitude, position=names.position)]
+    keys = {"t", "tau"} | ({"x", *attitude_keys} if "state" in record else set())
     keys |= {form.format(name) for name in record for form in ("{}", "casimir_{}", "observable_{}")}
     return [column for column in columns_of(names) if column.key in keys]
 
@@ -61,23 +63,27 @@ def recorded_columns(names: Interface, record: Sequence[str]) -> list[Column]:
 def past_of(path: Path, names: Interface, option: str) -> StoredRows:
     """Read the rows of a file that a run has written."""
     try:
-        past = _of_npz(path, names) if path.suffix.lower() == ".npz" else _of_csv(path)
-        if len(past.rows):
-            _expect_rows(past, [n for c in columns_of(names)[: 2 + names.monitored] for n in c.names])
-            return past
+        stored_rows = _of_npz(path, names) if path.suffix.lower() == ".npz" else _of_csv(path)
+        if len(stored_rows.rows):
+            _expect_rows(stored_rows, [n for c in columns_of(names)[: 2 + names.monitored] for n in c.names])
+            return stored_rows
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        why = f"it has no column {error}" if isinstance(error, KeyError) else str(error)
-        raise click.BadParameter(f"{path} does not hold a run of {names.name}: {why}", param_hint=option) from None
+        problem = f"it has no column {error}" if isinstance(error, KeyError) else str(error)
+        raise click.BadParameter(f"{path} does not hold a run of {names.name}: {problem}", param_hint=option) from None
     raise click.BadParameter(f"{path} has no rows", param_hint=option)
 
 
-def _expect_rows(past: StoredRows, needed: Sequence[str]) -> None:
+def _expect_rows(stored_rows: StoredRows, needed_columns: Sequence[str]) -> None:
     """`ValueError` for rows that no run has written, `KeyError` for a column that is needed and not there."""
-    if past.rows.dtype != np.float64 or past.rows.ndim != 2 or past.rows.shape[1] != len(past.columns):
-        raise ValueError(f"it has {len(past.columns)} names of columns, and rows of another length")
-    if len(set(past.columns)) < len(past.columns):
+    if (
+        stored_rows.rows.dtype != np.float64
+        or stored_rows.rows.ndim != 2
+        or stored_rows.rows.shape[1] != len(stored_rows.columns)
+    ):
+        raise ValueError(f"it has {len(stored_rows.columns)} names of columns, and rows of another length")
+    if len(set(stored_rows.columns)) < len(stored_rows.columns):
         raise ValueError("two columns have the same name")
-    if not np.isfinite(past.last(needed)).all():
+    if not np.isfinite(stored_rows.last(needed_columns)).all():
         raise ValueError("its last state is not finite")
 
 
@@ -90,8 +96,8 @@ def _of_csv(path: Path) -> StoredRows:
 
 
 def _of_npz(path: Path, names: Interface) -> StoredRows:
-    with opened(path) as file, np.load(file, allow_pickle=False) as stored:
-        stored_columns = [(column, stored[column.key]) for column in columns_of(names) if column.key in stored]
+    with opened(path) as file, np.load(file, allow_pickle=False) as archive:
+        stored_columns = [(column, archive[column.key]) for column in columns_of(names) if column.key in archive]
     for column, values in stored_columns:
         shape = values.shape[:1] if column.flat else (*values.shape[:1], len(column.names))
         if values.dtype.kind not in "fiu" or not values.ndim or values.shape != shape:
@@ -100,14 +106,16 @@ def _of_npz(path: Path, names: Interface) -> StoredRows:
     return StoredRows(header, np.column_stack([values for _, values in stored_columns]).astype(np.float64))
 
 
-def started_from(experiment: Experiment, past: StoredRows, solver: Solver) -> Experiment:
+def started_from(experiment: Experiment, rows: StoredRows, solver: Solver) -> Experiment:
     """Return the experiment from the last state of another run, with its time, if there is one, and its attitude."""
     names = solver.interface
     _, *columns = columns_of(names)
-    state = next(past.last(column.names) for column in columns if column.key == "x")
-    turned = [name for column in element_columns(names.attitude, position=names.position) for name in column.names]
-    first = past.last(turned) if turned and set(turned) <= set(past.columns) else None
-    run = replace(experiment.run, start=type(experiment.run.start)(past.t)) if names.time else experiment.run
+    state = next(rows.last(column.names) for column in columns if column.key == "x")
+    attitude_names = [
+        name for column in element_columns(names.attitude, position=names.position) for name in column.names
+    ]
+    first = rows.last(attitude_names) if attitude_names and set(attitude_names) <= set(rows.columns) else None
+    run = replace(experiment.run, start=type(experiment.run.start)(rows.t)) if names.time else experiment.run
     return replace(experiment, run=run, initial=tuple(state.tolist()), first=first)
 
 
@@ -116,17 +124,19 @@ def begun(solver: Solver, experiment: Experiment) -> Session:
 
     If it continues a finished run, it has the gauge of that run's start, or its energy level e.
     """
-    backend, past, names = solver.backend, experiment.past, solver.interface
+    backend, stored_rows, names = solver.backend, experiment.past, solver.interface
     initial = np.array(experiment.initial)
     draws = Draws(experiment.run.seed, step=experiment.made if names.noise else 0)
     try:
-        if past is None:
+        if stored_rows is None:
             return backend.start(initial, experiment.parameters, experiment.t0, experiment.first, draws)
-        here = started_from(experiment, past, solver)
-        session = backend.start(initial, experiment.parameters, past.t if names.time else 0.0, here.first, draws)
+        experiment_here = started_from(experiment, stored_rows, solver)
+        session = backend.start(
+            initial, experiment.parameters, stored_rows.t if names.time else 0.0, experiment_here.first, draws
+        )
         if names.monitored:
-            return session.placed(np.array(here.initial))
-        session.place(np.array(here.initial))
+            return session.placed(np.array(experiment_here.initial))
+        session.place(np.array(experiment_here.initial))
         return session
     except BackendError as error:
         raise solver.failure(error, experiment.h, None, experiment.parameters) from error
@@ -138,18 +148,18 @@ def extended(experiment: Experiment, path: Path, solver: Solver) -> Experiment:
     if experiment.run.record:
         message = f"the run {experiment.run.name} has record:, and its file lacks values that a continuation needs"
         raise click.UsageError(f"--extend: {message}; --from starts at a file with the state")
-    past = past_of(path, names, "--extend")
+    stored = past_of(path, names, "--extend")
     expected = [name for column in columns_of(names) for name in column.names]
     state = names.dimension + 1 + names.monitored
-    begin = past.rows[0, :state].tolist()
-    if list(past.columns) != expected or begin != [experiment.t0, *[0.0] * names.monitored, *experiment.initial]:
+    begin = stored.rows[0, :state].tolist()
+    if list(stored.columns) != expected or begin != [experiment.t0, *[0.0] * names.monitored, *experiment.initial]:
         message = f"{path} is of another run: its first row is {', '.join(map(repr, begin))}"
         raise click.BadParameter(message, param_hint="--extend")
-    continued = replace(experiment, past=past)
-    missed = past.t - continued.t0 - continued.made * continued.h
+    continued = replace(experiment, past=stored)
+    missed = stored.t - continued.t0 - continued.made * continued.h
     if continued.run.members > 1 and abs(missed) > _EQUAL * continued.made * abs(continued.h):
         message = (
-            f"{path} ends with a shorter step, at t = {past.t!r}, from which means over members cannot be continued"
+            f"{path} ends with a shorter step, at t = {stored.t!r}, from which means over members cannot be continued"
         )
         raise click.BadParameter(f"{message}; run it again from the start, to the new end", param_hint="--extend")
     return continued

@@ -68,9 +68,9 @@ class Recorder:
         self.watch = Watch(self.label, compilation.system, run, parameters, experiment.rows)
         self.sketch = Sketch(names.dimension, len(names.casimirs), experiment.rows, len(names.observables))
         self.averages = averages_of(run, len(names.observables))
-        listed = [name for column in columns_of(names) for name in column.names]
+        column_names = [name for column in columns_of(names) for name in column.names]
         self._columns = recorded_columns(names, run.record)
-        self._places = [listed.index(name) for column in self._columns for name in column.names]
+        self._places = [column_names.index(name) for column in self._columns for name in column.names]
         self.origin = origin_of(compilation.spec, run)
         self.growth = FrameGrowth(names.dimension, experiment.h) if lyapunov else None
         self.points = Thinned(1 + names.dimension, POINTS)
@@ -115,9 +115,9 @@ class Recorder:
     @property
     def time(self) -> float:
         """The physical time of the state."""
-        monitored, about = self.solver.interface.monitored, self.experiment
-        elapsed = about.h * (self.number if self._whole is not None else self.session.steps)
-        return about.begin + (self.session.time() if monitored else elapsed)
+        monitored, experiment = self.solver.interface.monitored, self.experiment
+        elapsed = experiment.h * (self.number if self._whole is not None else self.session.steps)
+        return experiment.begin + (self.session.time() if monitored else elapsed)
 
     @property
     def steps(self) -> int:
@@ -154,32 +154,34 @@ class Recorder:
         self.number = float(arrays["number"])
         if self.finder:
             self.finder.values = arrays["values"].tolist()
-            self.finder.past = [backend.restored(past.tobytes(), parameters) for past in arrays["past"]]
+            self.finder.past = [
+                backend.restored(saved_session.tobytes(), parameters) for saved_session in arrays["past"]
+            ]
         try:
             self._open(arrays)
         except (OSError, ValueError) as error:
             raise MismatchError(f"cannot resume: {error}") from None
 
-    def see(self, piece: Piece) -> None:
+    def see(self, rows_piece: Piece) -> None:
         """Record the results of a piece of the integration."""
-        about, monitored = self.experiment, self.solver.interface.monitored
-        if len(piece.numbers):
-            self.number = float(piece.numbers[-1])
-        t = about.begin + (piece.passed if monitored else about.h * piece.numbers)
-        energy = self.solver.energies(piece.x, t, self.experiment.parameters)
-        casimirs = self.solver.backend.casimirs(piece.x, self.experiment.parameters)
-        tau = about.past.last(["tau"])[0] if monitored and about.past else 0.0
-        times = [t, tau + about.h * piece.numbers] if monitored else [t]
-        observed = self.solver.observed(piece.x, t, self.experiment.parameters)
+        experiment, monitored = self.experiment, self.solver.interface.monitored
+        if len(rows_piece.numbers):
+            self.number = float(rows_piece.numbers[-1])
+        t = experiment.begin + (rows_piece.passed if monitored else experiment.h * rows_piece.numbers)
+        energy = self.solver.energies(rows_piece.x, t, self.experiment.parameters)
+        casimirs = self.solver.backend.casimirs(rows_piece.x, self.experiment.parameters)
+        tau = experiment.past.last(["tau"])[0] if monitored and experiment.past else 0.0
+        times = [t, tau + experiment.h * rows_piece.numbers] if monitored else [t]
+        observed = self.solver.observed(rows_piece.x, t, self.experiment.parameters)
         self.averages.see(t, observed)
-        rows = np.column_stack([*times, piece.x, energy, casimirs, piece.turned, observed])
-        self.watch.see(t, piece.x)
-        self.sketch.see(np.column_stack([t, piece.x, energy, casimirs, observed]))
+        rows = np.column_stack([*times, rows_piece.x, energy, casimirs, rows_piece.turned, observed])
+        self.watch.see(t, rows_piece.x)
+        self.sketch.see(np.column_stack([t, rows_piece.x, energy, casimirs, observed]))
         if "output" in self._tables:
             self._tables["output"].append(rows[:, self._places])
-        self._cross(piece.crossings)
+        self._record_crossings(rows_piece.crossings)
 
-    def _cross(self, section_points: Sequence[tuple[float, Floats]]) -> None:
+    def _record_crossings(self, section_points: Sequence[tuple[float, Floats]]) -> None:
         """Record crossings: times and states."""
         crossings = np.array([[t, *x] for t, x in section_points]).reshape(-1, 1 + self.solver.interface.dimension)
         self.points.see(crossings)
@@ -190,11 +192,11 @@ class Recorder:
         """Make the final part of a step; the last row is the last state, whichever rows are stored."""
         end, number = self.experiment.end, float(self.session.steps)
         if end is not None:
-            whole = self.session
-            self._whole = whole.steps
-            self.session, number = end.finish(whole)
-            if self.finder and number > whole.steps:
-                self._cross(self.finder.within(whole, number - whole.steps))
+            session_before = self.session
+            self._whole = session_before.steps
+            self.session, number = end.finish(session_before)
+            if self.finder and number > session_before.steps:
+                self._record_crossings(self.finder.within(session_before, number - session_before.steps))
         if number > self.number + 1e-9 * (1 + number):
             self.see(standing(self.session, number))
         self.number = number
@@ -203,7 +205,7 @@ class Recorder:
         """Return the rows of a finished run, which the file continues."""
         names = self.solver.interface
         times = 1 + names.monitored
-        state, seen = (
+        state, quantities = (
             slice(times, times + names.dimension),
             slice(times, times + names.dimension + 1 + len(names.casimirs)),
         )
@@ -211,12 +213,12 @@ class Recorder:
             part = rows[start : start + _ROWS]
             self.watch.see(part[:, 0], part[:, state])
             observed = part[:, part.shape[1] - len(names.observables) :]
-            self.sketch.see(np.column_stack([part[:, 0], part[:, seen], observed]))
+            self.sketch.see(np.column_stack([part[:, 0], part[:, quantities], observed]))
             if self.files.output and not self._goes_on(self.files.output):
                 self._tables["output"].append(part)
 
     def _goes_on(self, path: Path) -> bool:
-        """Whether the rows of a finished run stay in the file; a ``.npz`` is made anew when it is complete."""
+        """Whether rows are appended to the file of a finished run; a ``.npz`` is rewritten when the run is complete."""
         return path.suffix.lower() == ".csv"
 
     def save(self, seconds: float = 0.0) -> None:
@@ -240,14 +242,14 @@ class Recorder:
 
         The first member is the trajectory of the session itself. Raises `StepError`.
         """
-        about, names = self.experiment, self.solver.interface
-        run, parameters, steps = about.run, about.parameters, about.made + self.steps
-        part = about.h * (self.number - self.steps) if self._whole is not None else 0.0
-        x = np.tile(np.array(about.initial), (run.members, 1))
-        for h, before, count in ((about.h, 0, steps), (part, steps, 1)):
+        experiment, names = self.experiment, self.solver.interface
+        run, parameters, steps = experiment.run, experiment.parameters, experiment.made + self.steps
+        part = experiment.h * (self.number - self.steps) if self._whole is not None else 0.0
+        x = np.tile(np.array(experiment.initial), (run.members, 1))
+        for h, steps_before, count in ((experiment.h, 0, steps), (part, steps, 1)):
             if count and h:
-                clock: dict[str, Any] = {"t0": about.t0 + about.h * before} if names.time else {}
-                x = self.solver.ensemble(x, h, count, seed=run.seed, step0=before, parameters=parameters, **clock)
+                clock: dict[str, Any] = {"t0": experiment.t0 + experiment.h * steps_before} if names.time else {}
+                x = self.solver.ensemble(x, h, count, seed=run.seed, step0=steps_before, parameters=parameters, **clock)
         energy = self.solver.energies(x, np.full(len(x), self.time), parameters)
         columns = np.column_stack([x, energy])
         errors = columns.std(axis=0, ddof=1) / np.sqrt(len(x))
@@ -257,15 +259,15 @@ class Recorder:
     def finish(self, keep: bool) -> None:
         """Complete the files; ``keep`` retains the data needed to continue."""
         run, names = self.experiment, np.array(self.solver.coordinates)
-        before = 0.0
+        time_before = 0.0
         if run.past:
-            before = run.past.last(["tau"])[0] if self.solver.interface.monitored else run.past.t - run.t0
-        steps, h = round(before / run.h) + self.steps, run.h
+            time_before = run.past.last(["tau"])[0] if self.solver.interface.monitored else run.past.t - run.t0
+        steps, h = round(time_before / run.h) + self.steps, run.h
         parameters = {f"parameter_{name}": value for name, value in self.experiment.parameters.items()}
-        about = {"coordinates": names, "origin": np.array(str(self.origin))}
+        entries = {"coordinates": names, "origin": np.array(str(self.origin))}
         scalars: dict[str, dict[str, Any]] = {
-            "output": {**about, "steps": steps, "h": h, **parameters},
-            "section": about,
+            "output": {**entries, "steps": steps, "h": h, **parameters},
+            "section": entries,
         }
         for name, table in self._tables.items():
             table.close(scalars[name])
@@ -283,8 +285,8 @@ class Recorder:
 
     def trajectory(self, broken: bool) -> Trajectory:
         """Return as many rows as a figure can show; ``broken`` marks the end of a run that failed."""
-        names, about = self.solver.interface, self.experiment
-        settings = about.h, self.steps, about.parameters
+        names, experiment = self.solver.interface, self.experiment
+        settings = experiment.h, self.steps, experiment.parameters
         return self.sketch.trajectory(names.coordinates, names.casimirs, *settings, broken, names.observables)
 
     def _parts(self) -> dict[str, Any]:
@@ -331,7 +333,7 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
 
 
 @contextmanager
-def _kept(recorder: Recorder) -> Iterator[None]:
+def _disk_errors_as_interrupts(recorder: Recorder) -> Iterator[None]:
     """A full disk ends a run like an interrupt: the run can be continued from its last checkpoint."""
     try:
         yield
@@ -347,13 +349,13 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
     experiment, session, start = recorder.experiment, recorder.session, time.perf_counter()
     run, growth, failure = experiment.run, recorder.growth, None
     label = f"{recorder.solver.interface.name}, order {recorder.solver.order}"
-    with _kept(recorder), interruptible() as stop, console.progress(label, run.steps) as progress:
+    with _disk_errors_as_interrupts(recorder), interruptible() as stop, console.progress(label, run.steps) as progress:
         see_tangent = growth.see if growth else None
         flags = {"begun": recorder.watch.begun, "goes_on": experiment.has_part}
         pieces = march(session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent, **flags)
         if experiment.times is not None:
             pieces = _at_times(recorder, session, see_tangent)
-        done = False
+        is_complete = False
         try:
             for piece in pieces:
                 recorder.see(piece)
@@ -363,15 +365,15 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
                     break
                 recorder.save(CHECKPOINT_SECONDS)
             else:
-                done = True
-            done = done or (session.steps == run.steps and experiment.times is None)
-            if done:
+                is_complete = True
+            is_complete = is_complete or (session.steps == run.steps and experiment.times is None)
+            if is_complete:
                 recorder.complete()
         except BackendError as error:
             trajectory = recorder.trajectory(False)
             failure = recorder.solver.failure(error, experiment.h, trajectory, experiment.parameters)
             failure.__cause__ = error
-        interrupted = stop.requested and failure is None and not done
+        interrupted = stop.requested and failure is None and not is_complete
         if interrupted:
             recorder.save()
         recorder.finish(keep=interrupted)
@@ -381,11 +383,13 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
 
 def _at_times(recorder: Recorder, session: Session, see_tangent: Callable[[Floats], None] | None) -> Iterator[Piece]:
     """Pieces of a trajectory at requested times, from the current state of a session."""
-    about = recorder.experiment
+    experiment = recorder.experiment
     if not recorder.watch.begun:
         yield standing(session, 0.0)
-    seen = recorder.watch.good - (len(about.past.rows) if about.past else 1)
-    yield from march_at(session, about.h, about.run.steps, about.spans[seen:], recorder.finder, see_tangent)
+    rows_seen = recorder.watch.good - (len(experiment.past.rows) if experiment.past else 1)
+    yield from march_at(
+        session, experiment.h, experiment.run.steps, experiment.spans[rows_seen:], recorder.finder, see_tangent
+    )
 
 
 @dataclass(frozen=True)
@@ -403,9 +407,9 @@ def _compared_rows(experiment: Experiment, h: float) -> _Rows:
     if experiment.times is not None:
         numbers = [0.0, *(span / h for span in experiment.spans)]
         return _Rows([*numbers, *([last] if experiment.rows > len(numbers) else [])], experiment.rows)
-    whole = range(0, run.steps + 1, run.stride)
-    ends = [last] if experiment.has_part else [float(run.steps)] * (run.steps % run.stride > 0)
-    return _Rows(chain(whole, ends), len(whole) + len(ends))
+    whole_steps = range(0, run.steps + 1, run.stride)
+    last_rows = [last] if experiment.has_part else [float(run.steps)] * (run.steps % run.stride > 0)
+    return _Rows(chain(whole_steps, last_rows), len(whole_steps) + len(last_rows))
 
 
 def compared(

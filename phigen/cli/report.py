@@ -79,15 +79,15 @@ def command(
     if examination.compilation is None:
         raise examination.obstacle or AssertionError("an examination without compilation has an obstacle")
     console.note(f"{spec.name}: {len(examination.statements)} statements examined, none refuted")
-    written = command_of(spec_file, target, name, order, scheme, lyapunov, quick)
+    command_line = command_of(spec_file, target, name, order, scheme, lyapunov, quick)
     if spec.lattice:
         cell, failures = gathered_of_lattice(
-            examination, examination.compilation.by_sweeps(), run, written, scheme, lyapunov, quick, console
+            examination, examination.compilation.by_sweeps(), run, command_line, scheme, lyapunov, quick, console
         )
         page, figures = lattice_document(cell), cell.trajectory is not None
     else:
         material, failures = gathered(
-            examination, examination.compilation, experiment, written, scheme, lyapunov, quick, console
+            examination, examination.compilation, experiment, command_line, scheme, lyapunov, quick, console
         )
         page, figures = document(material), bool(material.methods)
     write_page(with_origin(page, str(origin)), figures, output, target, console)

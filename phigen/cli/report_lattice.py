@@ -18,16 +18,16 @@ def gathered_of_lattice(
     examination: Examination,
     compilation: CompiledLattice,
     run: Run | None,
-    written: str,
+    command_line: str,
     scheme: str | None,
     lyapunov: bool,
     quick: bool,
     console: Console,
 ) -> tuple[LatticeMaterial, list[PhigenError]]:
-    """Collect the material of the page, with one run and its verification, and the failures on the way."""
+    """Collect the material of the page, with one run and its verification, and the failures of its parts."""
     from phigen.report.lattice_page import LatticeMaterial
 
-    material = LatticeMaterial(examination, compilation, written)
+    material = LatticeMaterial(examination, compilation, command_line)
     if run is None:
         return material, []
     material, failure = _measured(material, compilation, run, scheme, lyapunov, quick, console)
@@ -43,7 +43,7 @@ def _measured(
     quick: bool,
     console: Console,
 ) -> tuple[LatticeMaterial, PhigenError | None]:
-    """With a run and what was verified on it, and what failed."""
+    """Material with a run, its verification, and the failures of both."""
     from dataclasses import replace
 
     import numpy as np

@@ -31,16 +31,16 @@ def gathered(
     examination: Examination,
     compilation: Compilation,
     experiment: Experiment | None,
-    written: str,
+    command_line: str,
     scheme: str | None,
     lyapunov: bool,
     quick: bool,
     console: Console,
 ) -> tuple[Material, list[PhigenError]]:
-    """Collect the material of the page, and the failures on the way."""
+    """Collect the material of the page, and the failures of its parts."""
     from phigen.cli.endings import ended, timed
 
-    material = Material(examination, compilation, written)
+    material = Material(examination, compilation, command_line)
     if experiment is None:
         note = "The spec has no runs: nothing was measured. Add one under runs: with initial, step and steps."
         return replace(material, notes=(note,)), []
@@ -58,8 +58,8 @@ def gathered(
     material = _with_constancy(material, experiment)
     study, note = studied(compilation, experiment, quick, console)
     notes = (*material.notes, note) if note else material.notes
-    where = environment() if study else {}
-    return replace(material, verification=verification, study=study, notes=notes, environment=where), failures
+    machine = environment() if study else {}
+    return replace(material, verification=verification, study=study, notes=notes, environment=machine), failures
 
 
 def _live(compilation: Compilation, experiment: Experiment, scheme: str | None, console: Console) -> Live:
@@ -115,20 +115,22 @@ def _recorded(recorder: Recorder, console: Console) -> StepError | None:
 
 
 def _opening(
-    compilation: Compilation, solver: Solver, experiment: Experiment, others: Sequence[str], console: Console
+    compilation: Compilation, solver: Solver, experiment: Experiment, other_methods: Sequence[str], console: Console
 ) -> dict[str, Trajectory]:
     """Every one of the first steps, by the solver and by other methods; nothing if the run has no more."""
     from phigen.cli.recording import Files, Recorder, compared
 
-    run, short = experiment.run, experiment.run.steps <= _OPENING
-    if run.stride == 1 and short and experiment.times is None:
+    run, is_short = experiment.run, experiment.run.steps <= _OPENING
+    if run.stride == 1 and is_short and experiment.times is None:
         return {}
     opening = replace(run, steps=min(run.steps, _OPENING), stride=1, section=None)
-    first = replace(experiment, run=opening, end=experiment.end if short else None, times=None)
+    first = replace(experiment, run=opening, end=experiment.end if is_short else None, times=None)
     recorder = Recorder(compilation, solver, first, Files(), lyapunov=False)
     failure = _recorded(recorder, console)
-    beside = {method: compared(compilation, solver, first, method, console, recorder.time)[1] for method in others}
-    return {recorder.label: recorder.trajectory(failure is not None), **beside}
+    other_trajectories = {
+        method: compared(compilation, solver, first, method, console, recorder.time)[1] for method in other_methods
+    }
+    return {recorder.label: recorder.trajectory(failure is not None), **other_trajectories}
 
 
 def _with_constancy(material: Material, experiment: Experiment) -> Material:

@@ -32,9 +32,9 @@ def command(console: Console, what: str, folder: Path, suffix: str, names: tuple
     from phigen.paper.plates import PLATES
 
     require_matplotlib()
-    wrong = [name for name in names if name not in PLATES]
-    if wrong:
-        raise click.BadParameter(f"there is no figure {wrong[0]!r}; there are {', '.join(PLATES)}",
+    unknown_plates = [name for name in names if name not in PLATES]
+    if unknown_plates:
+        raise click.BadParameter(f"there is no figure {unknown_plates[0]!r}; there are {', '.join(PLATES)}",
                                  param_hint="--figure")  # fmt: skip
     folder.mkdir(parents=True, exist_ok=True)
     plates = {}
@@ -70,11 +70,11 @@ def lines_of(figures: list[dict[str, Any]]) -> list[str]:
     lines: list[str] = []
     for figure in figures:
         rows = [("", "the paper", "measured")]
-        rows += [(f["quantity"], f["paper"], _shown(f["measured"])) for f in figure["findings"]]
+        rows += [(f["quantity"], f["paper"], _four_digits(f["measured"])) for f in figure["findings"]]
         lines += [heading(figure["title"]), *(f"  {line}" for line in table(rows)), ""]
     return lines[:-1]
 
 
-def _shown(value: float) -> str:
-    """Four digits; one of what is about round-off."""
+def _four_digits(value: float) -> str:
+    """Four digits of a number; one digit of a number near round-off."""
     return f"{value:.0e}" if 0 < abs(value) < 1e-11 else f"{value:.4g}"

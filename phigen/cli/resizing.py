@@ -41,14 +41,14 @@ def resized(spec: Spec, name: str | None, text: str | None) -> Spec:
     axes = spec.lattice.axes
     if len(sizes) != len(axes or ("sites",)):
         expected = f"the axes {', '.join(axes)}" if len(axes) > 1 else "one axis" if axes else "sites alone"
-        many = counted(len(sizes), "size")
-        raise click.BadParameter(f"{text} has {many}; {spec.name} has {expected}", param_hint=OPTION)
+        size_count = counted(len(sizes), "size")
+        raise click.BadParameter(f"{text} has {size_count}; {spec.name} has {expected}", param_hint=OPTION)
     from phigen.lattice.cell_building import cell_from_spec
 
-    if small := too_small(cell_from_spec(spec), sizes, text):
-        raise click.BadParameter(small, param_hint=OPTION)
-    other = replace(run, lattice=replace(run.lattice, sizes=sizes))
+    if complaint := too_small(cell_from_spec(spec), sizes, text):
+        raise click.BadParameter(complaint, param_hint=OPTION)
+    resized_run = replace(run, lattice=replace(run.lattice, sizes=sizes))
     # what is said of these sizes points at no line of the spec, which has others
     elsewhere = {("runs",), ("runs", run.name), ("runs", run.name, "sizes")}
-    locations = {path: at for path, at in spec.locations.items() if path not in elsewhere}
-    return replace(spec, runs={**spec.runs, run.name: other}, locations=locations)
+    locations = {path: location for path, location in spec.locations.items() if path not in elsewhere}
+    return replace(spec, runs={**spec.runs, run.name: resized_run}, locations=locations)

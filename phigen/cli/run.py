@@ -197,7 +197,7 @@ def command(
     if failure:
         raise failure
     if interrupted:
-        raise InterruptedRunError(_told(recorder))
+        raise InterruptedRunError(_print_status(recorder))
 
 
 #: Options that contradict each other, or that have no effect together.
@@ -213,9 +213,9 @@ def _expect_together(*options: dict[str, object]) -> None:
             raise click.UsageError(f"{first} and {second} exclude each other")
 
 
-def _told(recorder: Recorder) -> str:
-    done = f"interrupted after {recorder.steps} of {recorder.experiment.run.steps} steps"
-    return f"{done}; repeat the command with --resume to continue" if recorder.files.checkpoint else done
+def _print_status(recorder: Recorder) -> str:
+    status_text = f"interrupted after {recorder.steps} of {recorder.experiment.run.steps} steps"
+    return f"{status_text}; repeat the command with --resume to continue" if recorder.files.checkpoint else status_text
 
 
 def _draw(path: Path, recorder: Recorder, drawn: dict[str, Trajectory], casimirs: Any, summary: Summary) -> None:

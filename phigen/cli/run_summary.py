@@ -23,10 +23,10 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
 
     run, solver = recorder.experiment.run, recorder.solver
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
-    chosen = f"{compilation.method}, target {solver.target}, 1 thread"
+    method_text = f"{compilation.method}, target {solver.target}, 1 thread"
     times = f"{recorder.experiment.t0:.9g} … {recorder.time:.9g}"
-    past = " beyond what there was" if recorder.experiment.past else ""
-    out(f"  {told_steps(recorder)}{past}, t = {times}; {chosen}")
+    past_note = " beyond what there was" if recorder.experiment.past else ""
+    out(f"  {told_steps(recorder)}{past_note}, t = {times}; {method_text}")
     state = recorder.session.state().tolist()
     final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, state, strict=True))
     out(f"  final state: {final}\n")
@@ -45,9 +45,9 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     if recorder.finder:
         out(f"\n  {counted_crossings(run, recorder.points.seen, recorder.section_text)}")
     if spectrum := recorder.spectrum:
-        changed = f"the second half changed them by {spectrum.uncertainty:.1g}"
+        change_note = f"the second half changed them by {spectrum.uncertainty:.1g}"
         clock = spectrum.clock
-        out(f"\n  Lyapunov exponents after {clock} = {spectrum.t:.9g}, per unit of {clock}; {changed}")
+        out(f"\n  Lyapunov exponents after {clock} = {spectrum.t:.9g}, per unit of {clock}; {change_note}")
         out(f"  {', '.join(f'{value:.4g}' for value in spectrum.exponents.tolist())};  sum {spectrum.total:.1g}")
 
 
@@ -71,10 +71,10 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
     heading_of_all = "largest" if driven else "largest change" if noisy else "largest error"
     rows = [[heading_of_all, *(s.method for s in summaries), ""]]
     if first.change:
-        changes = [_shown(s.change) for s in summaries if s.change]
+        changes = [_formatted_value(s.change) for s in summaries if s.change]
         rows.append(["change of the energy", *changes, first.change.unit.kind])
     energy = "error of the energy balance" if driven else "energy"
-    rows.append([energy, *(_shown(s.energy) for s in summaries), first.energy.unit.kind])
+    rows.append([energy, *(_formatted_value(s.energy) for s in summaries), first.energy.unit.kind])
     if driven:
         rows.append(["  the integral, work done", *(f"{s.work:.4g}" for s in summaries), ""])
         rows.append(["  its integral may be off by", *(f"{s.off:.1e}" for s in summaries), ""])
@@ -85,32 +85,32 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
         for name, drift in getattr(first, kind).items():
             moves, label = drift.unit.moves and not noisy, f"{noun} {name}"
             label = f"{'change' if moves else 'error'} of the {label}" if driven or moves else label
-            rows.append([label, *(_shown(getattr(s, kind)[name]) for s in summaries), drift.unit.kind])
+            rows.append([label, *(_formatted_value(getattr(s, kind)[name]) for s in summaries), drift.unit.kind])
     if first.exact:
-        rows.append(["against closed form", *(_shown(s.exact) for s in summaries if s.exact), "relative"])
+        rows.append(["against closed form", *(_formatted_value(s.exact) for s in summaries if s.exact), "relative"])
     if any(s.good < s.rows for s in summaries):
         rows.append(["finite rows", *(f"{s.good} of {s.rows}" for s in summaries), ""])
     return rows
 
 
-def print_averages(names: Sequence[str], averages: Averages, of: Sequence[str] = ()) -> None:
-    """Print the time averages of the observables over the rows of a run, ``of`` some of them or of all."""
+def print_averages(names: Sequence[str], averages: Averages, observables: Sequence[str] = ()) -> None:
+    """Print the time averages of the observables over the rows of a run, ``observables`` some of them or of all."""
     if not averages.count:
         out("\n  observables have no means: no stored row is in the time that average: says")
         return
     first, last = averages.times
     out(f"\n  observables, means over {counted(averages.count, 'row')} from t = {first:.9g} to {last:.9g}")
-    shown = {n: a for n, a in zip(names, averages.results(), strict=True) if n in (of or names)}
+    shown_averages = {n: a for n, a in zip(names, averages.results(), strict=True) if n in (observables or names)}
     header = ["", "mean", "standard error", "least", "largest", "correlation time"]
     rows = [
         [name, f"{a.mean:.6g}", f"{a.error:.1g}", f"{a.least:.6g}", f"{a.largest:.6g}", _time_shown(a)]
-        for name, a in shown.items()
+        for name, a in shown_averages.items()
     ]
     for line in table([header, *rows], right=range(1, 6)):
         out(f"  {line}")
-    if short := [name for name, a in shown.items() if not a.resolved and math.isfinite(a.error)]:
-        named = ", ".join(short)
-        out(f"  The standard errors of {named} are too small: blocks of rows are shorter than ten correlation times.")
+    if unresolved := [name for name, a in shown_averages.items() if not a.resolved and math.isfinite(a.error)]:
+        listing = ", ".join(unresolved)
+        out(f"  The standard errors of {listing} are too small: blocks of rows are shorter than ten correlation times.")
 
 
 def _time_shown(average: Average) -> str:
@@ -126,7 +126,7 @@ def _print_means(recorder: Recorder) -> None:
         out(f"  {line}")
 
 
-def _shown(drift: Drift) -> str:
+def _formatted_value(drift: Drift) -> str:
     return f"{drift.error:.1e}" if drift.error else "0"
 
 
@@ -169,12 +169,12 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
     return description
 
 
-def described_averages(names: Sequence[str], averages: Averages, of: Sequence[str] = ()) -> dict[str, Any]:
-    """Return time averages of observables as JSON has them, ``of`` some of them or of all."""
+def described_averages(names: Sequence[str], averages: Averages, observables: Sequence[str] = ()) -> dict[str, Any]:
+    """Return time averages of observables as JSON has them, ``observables`` some of them or of all."""
     from dataclasses import asdict
 
-    listed = zip(names, averages.results(), strict=True)
-    return {name: asdict(average) for name, average in listed if name in (of or names)}
+    named_results = zip(names, averages.results(), strict=True)
+    return {name: asdict(average) for name, average in named_results if name in (observables or names)}
 
 
 def described_spectrum(spectrum: Spectrum) -> dict[str, Any]:

@@ -92,7 +92,7 @@ def command(
         _print(compilation, modified, None if full else SHOWN)
 
 
-def _show_cell(spec: Spec, most: int | None, *, as_latex: bool, as_json: bool) -> None:
+def _show_cell(spec: Spec, max_terms: int | None, *, as_latex: bool, as_json: bool) -> None:
     from phigen.cli.show_lattice import described_cell, print_cell
     from phigen.lattice.cell_building import cell_from_spec
     from phigen.notation.cell_formulas import document
@@ -103,81 +103,85 @@ def _show_cell(spec: Spec, most: int | None, *, as_latex: bool, as_json: bool) -
     elif as_json:
         out_json(described_cell(spec, cell))
     else:
-        print_cell(spec, cell, most)
+        print_cell(spec, cell, max_terms)
 
 
-def _print(compilation: Compilation, modified: int, most: int | None) -> None:
+def _print(compilation: Compilation, modified: int, max_terms: int | None) -> None:
     spec, system = compilation.spec, compilation.system
-    corrected = _modified(compilation, modified, most)
+    corrected = _modified(compilation, modified, max_terms)
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     if system.parameters:
-        listed = ", ".join(f"{p.name} = {float(p.value):.9g}{p.inequality}" for p in system.parameters)
-        section("Parameters", [listed])
+        parameter_list = ", ".join(f"{p.name} = {float(p.value):.9g}{p.inequality}" for p in system.parameters)
+        section("Parameters", [parameter_list])
     section(f"Poisson tensor: {system.shape}", assignments(brackets(compilation)))
-    section("Hamiltonian", assignments([("H", readable_one(system.hamiltonian, most))]))
+    section("Hamiltonian", assignments([("H", readable_one(system.hamiltonian, max_terms))]))
     if system.forces:
-        section("Forces: ẋ = π(∇H + ζ) + f", assignments(_forces(system, most)))
+        section("Forces: ẋ = π(∇H + ζ) + f", assignments(_forces(system, max_terms)))
     if system.noise:
-        section("Noise: dx = … + Σ σ π∇g ∘ dW", assignments(_noise(system, most)))
+        section("Noise: dx = … + Σ σ π∇g ∘ dW", assignments(_noise(system, max_terms)))
     if system.casimirs:
-        section("Casimirs", assignments(_casimirs(system, most)))
+        section("Casimirs", assignments(_casimirs(system, max_terms)))
     if system.invariants:
-        section("Invariants", assignments(_named(system.invariants, most)))
-    compilation.by_kind(partial(_print_series, most), partial(_print_splitting, most), _print_collocation)
+        section("Invariants", assignments(_named(system.invariants, max_terms)))
+    compilation.by_kind(partial(_print_series, max_terms), partial(_print_splitting, max_terms), _print_collocation)
     if corrected:
         section("Modified Hamiltonian", assignments(corrected))
     section("Generated code", _code(compilation))
 
 
-def _print_splitting(most: int | None, compilation: CompiledSplitting) -> None:
+def _print_splitting(max_terms: int | None, compilation: CompiledSplitting) -> None:
     from phigen.notation import flows
 
-    lines = assignments(flows.formulas(compilation, most))
+    lines = assignments(flows.formulas(compilation, max_terms))
     section(f"Splitting: {flows.method(compilation)}", [*lines, *_unfamiliar(lines)])
 
 
 def _print_collocation(compilation: CompiledGauss) -> None:
     from phigen.notation import collocation
 
-    said = [*assignments(collocation.equations()), *collocation.lines(compilation)]
-    section(f"Gauss collocation: {collocation.method(compilation)}", said)
+    lines = [*assignments(collocation.equations()), *collocation.lines(compilation)]
+    section(f"Gauss collocation: {collocation.method(compilation)}", lines)
 
 
 def _unfamiliar(lines: Sequence[str]) -> list[str]:
     """Definitions of the functions in these lines that have no standard name."""
     from phigen.symbolic.readable import UNFAMILIAR
 
-    met = [said for name, said in UNFAMILIAR.items() if any(re.search(rf"\b{name}\(", line) for line in lines)]
+    met = [
+        definition for name, definition in UNFAMILIAR.items() if any(re.search(rf"\b{name}\(", line) for line in lines)
+    ]
     return [f"where {', '.join(met)}"] if met else []
 
 
-def _noise(system: System, most: int | None) -> list[tuple[str, str]]:
+def _noise(system: System, max_terms: int | None) -> list[tuple[str, str]]:
     """σ and g of each source."""
-    listed: dict[str, Expression] = {}
+    terms: dict[str, Expression] = {}
     for source in system.noise:
-        listed |= {f"σ_{source.name}": source.amplitude, f"g_{source.name}": source.hamiltonian}
-    return _named(listed, most)
+        terms |= {f"σ_{source.name}": source.amplitude, f"g_{source.name}": source.hamiltonian}
+    return _named(terms, max_terms)
 
 
-def _forces(system: System, most: int | None) -> list[tuple[str, str]]:
-    """ζ without the damping, which has a line of its own, f, and the damping."""
+def _forces(system: System, max_terms: int | None) -> list[tuple[str, str]]:
+    """Print the covector ζ without damping, the vector f, and the damping."""
     from phigen.spec.model import SpecForces
 
     forces = system.spec.forces if system.spec else SpecForces()
-    listed = {f"ζ_{c}": e for c, e in forces.covector.items()} | {f"f_{c}": e for c, e in forces.vector.items()}
-    damping = [("λ", f"{readable_one(forces.damping, most)}, and ζ has λ π∇H beside that")] if forces.damping else []
-    return [*_named(listed, most), *damping]
+    terms = {f"ζ_{c}": e for c, e in forces.covector.items()} | {f"f_{c}": e for c, e in forces.vector.items()}
+    damping = (
+        [("λ", f"{readable_one(forces.damping, max_terms)}, and ζ has λ π∇H beside that")] if forces.damping else []
+    )
+    return [*_named(terms, max_terms), *damping]
 
 
-def _print_series(most: int | None, compilation: CompiledSeries) -> None:
+def _print_series(max_terms: int | None, compilation: CompiledSeries) -> None:
     from phigen.notation import generating
 
-    why = textwrap.wrap(compilation.realisation.explanation, 100)
-    maps = assignments(_maps(compilation, most))
+    reason_lines = textwrap.wrap(compilation.realisation.explanation, 100)
+    maps = assignments(_maps(compilation, max_terms))
     if any("φ" in line for line in maps):
         maps.append("where φ(s) = (1 − (√s/2) cot(√s/2))/s = 1/12 + s/720 + …")
-    section(f"Bi-realisation: {compilation.realisation.kind}", [*why, *maps])
-    series = [*_gauged(compilation), *assignments(_series(compilation, most))]
+    section(f"Bi-realisation: {compilation.realisation.kind}", [*reason_lines, *maps])
+    series = [*_gauged(compilation), *assignments(_series(compilation, max_terms))]
     section(f"Generating function: {generating.method(compilation)}", series)
 
 
@@ -192,44 +196,44 @@ def brackets(compilation: Compilation) -> list[tuple[str, str]]:
     return [(f"{{{names[i]}, {names[j]}}}", t) for (i, j), t in zip(pairs, texts, strict=True)]
 
 
-def readable_one(expression: Any, most: int | None) -> str:
+def readable_one(expression: Any, max_terms: int | None) -> str:
     """One expression as text."""
     from phigen.symbolic.readable import readable
 
-    return readable([expression], most)[0]
+    return readable([expression], max_terms)[0]
 
 
-def _named(formulas: Any, most: int | None) -> list[tuple[str, str]]:
-    return [(name, readable_one(e, most)) for name, e in formulas.items()]
+def _named(formulas: Any, max_terms: int | None) -> list[tuple[str, str]]:
+    return [(name, readable_one(e, max_terms)) for name, e in formulas.items()]
 
 
-def _casimirs(system: System, most: int | None) -> list[tuple[str, str]]:
+def _casimirs(system: System, max_terms: int | None) -> list[tuple[str, str]]:
     """The Casimirs, those of log-canonical structures as logarithms of products of powers."""
     from phigen.notation.powers import as_powers
 
-    return [(name, as_powers(e) or readable_one(e, most)) for name, e in system.casimirs.items()]
+    return [(name, as_powers(e) or readable_one(e, max_terms)) for name, e in system.casimirs.items()]
 
 
-def _maps(compilation: CompiledSeries, most: int | None) -> list[tuple[str, str]]:
+def _maps(compilation: CompiledSeries, max_terms: int | None) -> list[tuple[str, str]]:
     """α and β, of a symmetric pair α alone and what β is; of a path they are series, of which this is the beginning."""
     from phigen.notation.named_parts import texts
 
     realisation, names = compilation.realisation, compilation.system.coordinates
-    more = " + …" if realisation.path else ""
+    ellipsis = " + …" if realisation.path else ""
     maps = {f"α_{c}": e for c, e in zip(names, realisation.alpha, strict=True)}
     if not realisation.symmetric:
         maps |= {f"β_{c}": e for c, e in zip(names, realisation.beta, strict=True)}
-    result = [(name, text + more * (name in maps)) for name, text in texts(maps, most)]
+    result = [(name, text + ellipsis * (name in maps)) for name, text in texts(maps, max_terms)]
     return [*result, ("β(x, p)", "α(x, −p)")] if realisation.symmetric else result
 
 
-def _modified(compilation: Compilation, count: int, most: int | None) -> list[tuple[str, str]]:
+def _modified(compilation: Compilation, count: int, max_terms: int | None) -> list[tuple[str, str]]:
     """H̃ = H + h^p H_p + …, and its first corrections."""
     from phigen.notation.generating import modified_formulas
 
-    listed = modified_formulas(compilation, count, most)
-    names = ["H", *(f"{_power(j)} H_{j}" for j, _ in listed), "…"]
-    return [("H̃", " + ".join(names)), *((f"H_{j}", str(f)) for j, f in listed)] if listed else []
+    corrections = modified_formulas(compilation, count, max_terms)
+    names = ["H", *(f"{_power(j)} H_{j}" for j, _ in corrections), "…"]
+    return [("H̃", " + ".join(names)), *((f"H_{j}", str(f)) for j, f in corrections)] if corrections else []
 
 
 def _gauged(compilation: CompiledSeries) -> list[str]:
@@ -239,10 +243,10 @@ def _gauged(compilation: CompiledSeries) -> list[str]:
     return [f"of H - {' - '.join(subtracted)}, which has the same flow as H"] if subtracted else []
 
 
-def _series(compilation: CompiledSeries, most: int | None) -> list[tuple[str, str]]:
+def _series(compilation: CompiledSeries, max_terms: int | None) -> list[tuple[str, str]]:
     from phigen.notation.generating import series_formulas
 
-    formulas = series_formulas(compilation, most)
+    formulas = series_formulas(compilation, max_terms)
     names = [*(f"{_power(i)} S_{i}" for i, _ in formulas.listed), *(["…"] if formulas.beyond else [])]
     rows = [("S_h", " + ".join(names)), *((f"S_{i}", str(f)) for i, f in formulas.listed)]
     return [*rows, ("…", formulas.missing)] if formulas.beyond else rows

@@ -12,24 +12,24 @@ if TYPE_CHECKING:
     from phigen.spec.model import Parameter, Spec
 
 
-def print_cell(spec: Spec, cell: Cell, most: int | None) -> None:
+def print_cell(spec: Spec, cell: Cell, max_terms: int | None) -> None:
     """The formulas of a cell."""
     from phigen.notation.cell_formulas import described, sections
 
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     reach = [f"{a} {h}" for a, h in zip(cell.axes, cell.hamiltonian_reach, strict=True)]
-    more = f"; H couples sites up to {', '.join(reach)} apart" if any(cell.hamiltonian_reach) else ""
-    section("Lattice", [described(cell) + more])
+    reach_note = f"; H couples sites up to {', '.join(reach)} apart" if any(cell.hamiltonian_reach) else ""
+    section("Lattice", [described(cell) + reach_note])
     if cell.parameters:
         section("Parameters", [", ".join(map(_parameter, cell.parameters))])
-    for title, lines in sections(cell, most):
+    for title, lines in sections(cell, max_terms):
         section(title, assignments(lines))
 
 
 def _parameter(p: Parameter) -> str:
-    where = {"all": "", "sites": " at every site", "bonds": " at every bond"}[p.at]
+    domain_text = {"all": "", "sites": " at every site", "bonds": " at every bond"}[p.at]
     value = "" if p.values else f" = {float(p.value):.9g}"
-    return f"{p.name}{value}{p.inequality}{where}"
+    return f"{p.name}{value}{p.inequality}{domain_text}"
 
 
 def described_cell(spec: Spec, cell: Cell) -> dict[str, object]:

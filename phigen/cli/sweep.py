@@ -98,8 +98,8 @@ def command(
     spec = load_one(spec_file)
     sweep = _sweep_of(spec, name)
     if shown and shown not in sweep.stored:
-        stored = ", ".join(sweep.stored)
-        raise click.BadParameter(f"{shown!r} is not stored; the sweep stores {stored}", param_hint="--show")
+        stored_names = ", ".join(sweep.stored)
+        raise click.BadParameter(f"{shown!r} is not stored; the sweep stores {stored_names}", param_hint="--show")
     origin = origin_of(spec, sweep, "sweep")
     expect_same_origin({"--plot": plot}, origin)
     setting = SweepSetting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme, profile)
@@ -138,6 +138,6 @@ def _sweep_of(spec: Spec, name: str | None) -> SweepSettings:
         raise SpecError([Diagnostic(f"{spec.file}: the spec has no sweeps", hint=hint)])
     sweep = spec.sweeps.get(name) if name else next(iter(spec.sweeps.values()))
     if sweep is None:
-        known = ", ".join(spec.sweeps)
-        raise click.BadParameter(f"there is no sweep {name!r}; the spec has {known}", param_hint="--sweep")
+        sweep_names = ", ".join(spec.sweeps)
+        raise click.BadParameter(f"there is no sweep {name!r}; the spec has {sweep_names}", param_hint="--sweep")
     return sweep

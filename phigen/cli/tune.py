@@ -149,7 +149,9 @@ def problem_of(compilation: Compilation, experiment: Experiment, horizon: float 
         solver = loaded(compilation, "auto", console)
         horizon = length(ended(experiment, solver, console), solver)
     clock = "t" if compilation.spec.monitor is None else "τ"
-    return SystemProblem(start, experiment.parameters, *_times(run, horizon), clock=clock, system=compilation.system)
+    return SystemProblem(
+        start, experiment.parameters, *_time_scales(run, horizon), clock=clock, system=compilation.system
+    )
 
 
 def _of_lattice(
@@ -163,18 +165,20 @@ def _of_lattice(
     from phigen.lattice.states import start_of
     from phigen.tuning.lattice_problem import MOST_COMPARED, lattice_problem
 
-    changed = {s.partition("=")[0].strip() for s in settings}
+    changed_names = {s.partition("=")[0].strip() for s in settings}
     start = start_of(compilation.spec, run)
     values = parameters_of(compilation.spec, start, settings)
     if horizon is None and (run.until is not None or run.stop is not None):
         solver = lattice_solver_of(compilation, chosen_target("auto", console.note))
         experiment = LatticeExperiment(run, (), start.arguments | values, start=start)
         horizon = length(ended(experiment, solver, console), solver)
-    chosen = {name: value for name, value in values.items() if name in changed}
-    problem = lattice_problem(compilation, run, chosen, *_times(run, horizon))
+    changed_values = {name: value for name, value in values.items() if name in changed_names}
+    problem = lattice_problem(compilation, run, changed_values, *_time_scales(run, horizon))
     if problem.sizes != problem.whole:
-        few, many = ("×".join(map(str, sizes)) for sizes in (problem.sizes, problem.whole))
-        console.note(f"measured on {few} of the {many} sites: errors are relative, and times in proportion")
+        reduced_text, full_text = ("×".join(map(str, sizes)) for sizes in (problem.sizes, problem.whole))
+        console.note(
+            f"measured on {reduced_text} of the {full_text} sites: errors are relative, and times in proportion"
+        )
     if measure == "orbit" and len(problem.start) > MOST_COMPARED:
         message = f"orbits are compared up to {MOST_COMPARED} numbers, and this run has {len(problem.start)}"
         raise SpecError(
@@ -183,7 +187,7 @@ def _of_lattice(
     return problem
 
 
-def _times(run: Run, horizon: float | None) -> tuple[float, float, float]:
+def _time_scales(run: Run, horizon: float | None) -> tuple[float, float, float]:
     """Return a first estimate of the step, the time of a run, and its direction."""
     step = float(run.step)
     span = abs(step) * run.steps if horizon is None else horizon

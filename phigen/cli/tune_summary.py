@@ -27,10 +27,10 @@ _ROWS = 1000
 
 
 def print_tuning(tuning: Tuning, spec: Spec, run: Run) -> None:
-    """The table, what it rests on, and the lines to paste."""
-    what = "energy error" if tuning.measure == "energy" else "error of the orbit"
-    bound = f"{what} at most {tuning.accuracy:g} up to {tuning.clock} = {tuning.horizon:.9g}"
-    out(heading(f"{spec.name}, run {run.name}") + f": {bound}\n")
+    """Print the table, the conditions of the measurements, and lines to paste into the spec."""
+    error_name = "energy error" if tuning.measure == "energy" else "error of the orbit"
+    requirement = f"{error_name} at most {tuning.accuracy:g} up to {tuning.clock} = {tuning.horizon:.9g}"
+    out(heading(f"{spec.name}, run {run.name}") + f": {requirement}\n")
     rows = [["", "order", "gauge", "scheme", "step", "error", "ns/step", "run, ms", "ratio"]]
     rows += [_row(f, label, tuning) for label, f in listed(tuning)]
     for line in table(rows, right=[1, 4, 5, 6, 7, 8]):
@@ -38,9 +38,9 @@ def print_tuning(tuning: Tuning, spec: Spec, run: Run) -> None:
     out("")
     for remark in remarks(tuning):
         out(f"  {remark}")
-    if others := _other_rows(tuning):
+    if other_rows := _other_rows(tuning):
         out("")
-        for line in table([["by the scans, for", "error", "step", "run, ms"], *others], right=[1, 2, 3]):
+        for line in table([["by the scans, for", "error", "step", "run, ms"], *other_rows], right=[1, 2, 3]):
             out(f"  {line}")
     assert tuning.winner is not None
     out("\nTo paste into the spec, instead of lines with the same keys" + (" and of terms:\n" if spec.terms else ":\n"))
@@ -66,12 +66,12 @@ def print_monitors(monitors: Monitors, tuning: Tuning, run: Run) -> None:
         cells = [f"{trial.steps:.0f}", f"{gain:.3g} times", f"{1e3 * trial.seconds:.3g}"]
         cells = cells if math.isfinite(trial.steps) else ["more than can be made", "", ""]
         cells[1] = cells[1] * (trial is not monitors.plain and math.isfinite(gain))
-        rows.append([_cut(trial.setting.monitor or "none"), f"{trial.label}, order {trial.order}", *cells])
+        rows.append([_shortened(trial.setting.monitor or "none"), f"{trial.label}, order {trial.order}", *cells])
     for line in table(rows, right=[2, 3, 4]):
         out(f"  {line}")
     out("\n  With a monitor steps are equal in τ, and still Poisson maps.")
     for reason in dict.fromkeys(monitors.refused.values()):
-        names = [_cut(m) for m, why in monitors.refused.items() if why == reason]
+        names = [_shortened(m) for m, refusal in monitors.refused.items() if refusal == reason]
         out(f"  Not measured: {'; '.join(names)}: {reason}.")
     if gaining:
         best = gaining[0]
@@ -84,12 +84,12 @@ def print_monitors(monitors: Monitors, tuning: Tuning, run: Run) -> None:
         out("  No monitor saves as much as its steps cost.")
 
 
-def _cut(text: str) -> str:
+def _shortened(text: str) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
 
 def monitored_lines(trial: Trial) -> list[str]:
-    """The top-level lines of a spec that give what was measured of a monitor."""
+    """Top-level lines of a spec that select a measured monitor."""
     return replace(trial.setting, order=trial.order).lines()
 
 
@@ -141,15 +141,15 @@ def remarks(tuning: Tuning) -> Iterator[str]:
 
     best = tuning.winner
     assert best is not None
-    over, whole = f"{tuning.clock} = {best.point.time:.4g}", f"{tuning.clock} = {tuning.horizon:.6g}"
+    measured_span, full_span = f"{tuning.clock} = {best.point.time:.4g}", f"{tuning.clock} = {tuning.horizon:.6g}"
     if is_measured(best, tuning):
         yield "Errors were measured up to there" + _extrapolated(tuning)
     elif tuning.measure == "energy" and not best.curve.bounded:
-        yield f"Errors were measured up to {over}, and extrapolated (~) by their observed growth."
+        yield f"Errors were measured up to {measured_span}, and extrapolated (~) by their observed growth."
     elif tuning.measure == "energy":
-        yield f"Errors were measured up to {over}. Beyond, phigen's stay bounded but for rounding (~)."
+        yield f"Errors were measured up to {measured_span}. Beyond, phigen's stay bounded but for rounding (~)."
     else:
-        yield f"Errors were measured up to {over}; phigen's grow linearly, and so does ~ up to {whole}."
+        yield f"Errors were measured up to {measured_span}; phigen's grow linearly, and so does ~ up to {full_span}."
     if tuning.measure == "energy":
         yield stated({ENERGY: tuning.unit})
     if best.point.error * _SLACK < tuning.accuracy and best.point.step > 0.9 * best.curve.largest:
@@ -168,14 +168,14 @@ def remarks(tuning: Tuning) -> Iterator[str]:
         share = peer.cost / best.cost
         yield f"{label} is cheaper: {share:.2g} of the time. It conserves neither Casimirs nor the Poisson structure."
     for reason in dict.fromkeys(tuning.refused.values()):
-        settings = [s.described() for s, why in tuning.refused.items() if why == reason]
+        settings = [s.described() for s, refusal in tuning.refused.items() if refusal == reason]
         yield f"Not measured: {'; '.join(settings)}: {reason}."
     if not tuning.finished:
         yield "The time budget ended before all promising candidates were tried; a larger --budget tries more."
 
 
 def _automatic(tuning: Tuning) -> str:
-    """The scheme that ``scheme: auto`` would take, beside what was measured."""
+    """Sentence on the scheme that ``scheme: auto`` would take, compared with the measured best."""
     assert tuning.winner is not None
     ratio, text = tuning.automatic_ratio, f"scheme: auto takes {tuning.automatic} at order {tuning.winner.curve.order}"
     if not math.isfinite(ratio):
@@ -184,8 +184,8 @@ def _automatic(tuning: Tuning) -> str:
 
 
 def _extrapolated(tuning: Tuning) -> str:
-    rest = [label for label, f in listed(tuning) if not is_measured(f, tuning)]
-    return f"; those with ~ are extrapolated ({', '.join(rest)})." if rest else "."
+    extrapolated = [label for label, f in listed(tuning) if not is_measured(f, tuning)]
+    return f"; those with ~ are extrapolated ({', '.join(extrapolated)})." if extrapolated else "."
 
 
 def _other_rows(tuning: Tuning) -> list[list[str]]:
@@ -203,7 +203,7 @@ def _other_rows(tuning: Tuning) -> list[list[str]]:
 
 
 def lines_of(finalist: Finalist) -> list[str]:
-    """The top-level lines of a spec that give what was measured."""
+    """Top-level lines of a spec that select the measured setting."""
     setting = finalist.curve.setting
     assert setting is not None
     return replace(setting, order=finalist.curve.order).lines()
@@ -228,14 +228,14 @@ def unreached(tuning: Tuning) -> str:
     curve, point = tuning.closest
     title = curve.title
     if point.rounding > tuning.accuracy or any(at_floor(c.points) for c in tuning.curves if c.setting):
-        why = "smaller steps do not help: the remaining error is rounding"
+        explanation = "smaller steps do not help: the remaining error is rounding"
         hint = "ask for less accuracy" + (" or a shorter --horizon" if point.error > 2 * point.measured else "")
     else:
-        why = "smaller steps would take longer than the budget allows"
+        explanation = "smaller steps would take longer than the budget allows"
         hint = "a larger --budget, or less accuracy"
     return (
         f"no setting reaches {tuning.accuracy:g} up to {tuning.clock} = {tuning.horizon:.6g}: the smallest error is "
-        f"{point.error:.1e} ({title}, step {point.step:.3g}); {why}\n  hint: {hint}"
+        f"{point.error:.1e} ({title}, step {point.step:.3g}); {explanation}\n  hint: {hint}"
     )
 
 
@@ -259,7 +259,7 @@ def described(tuning: Tuning, spec: Spec, run: Run) -> dict[str, Any]:
         "classical": [_finalist(f) for f in tuning.peers],
         "present": _finalist(tuning.present) if tuning.present else None,
         "curves": [_curve(c) for c in tuning.curves],
-        "not_measured": {s.described(): why for s, why in tuning.refused.items()},
+        "not_measured": {s.described(): refusal for s, refusal in tuning.refused.items()},
         "automatic": {"scheme": tuning.automatic, "ratio": tuning.automatic_ratio} if tuning.automatic else None,
         "monitors": _monitors(tuning.monitors) if tuning.monitors else None,
     }

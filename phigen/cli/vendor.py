@@ -115,13 +115,13 @@ def command(
     )
     if options.words and not spec_files:
         raise click.UsageError("options that change what is generated need the SPEC; without it, the manifest decides")
-    (entries, known), collector = manifest.read(folder), Collector()
+    (entries, systems), collector = manifest.read(folder), Collector()
     asked = {"cmake": cmake, "meson": meson, "python": python}
-    build_systems = [system for system in FILES if asked[system] or system in known]
+    build_systems = [system for system in FILES if asked[system] or system in systems]
     orders = _from_specs(spec_files, folder, options, entries, checking, collector)
     if not spec_files:
         orders = _from_manifest(folder, entries, collector)
-    vendored = [m for m in (_made(order, collector) for order in orders) if m]
+    vendored = [m for m in (_vendored_files(order, collector) for order in orders) if m]
     if checking:
         problems = [p for m in vendored for p in _problems(folder, entries, m, spec_files)]
         problems += [] if spec_files else [*_extra(folder, entries), *_wrong_builds(folder, entries, build_systems)]
@@ -136,14 +136,16 @@ def command(
 
 def _expect_folder(folder: Path, spec_files: Sequence[str], checking: bool) -> None:
     if folder.is_file() or (folder.suffix in SUFFIXES and not folder.is_dir()):
-        words = shlex.join(["phigen", "vendor", *spec_files, str(folder), "DEST"])
-        raise click.UsageError(f"{folder} is not a folder; the last argument is the folder for the solvers: {words}")
+        suggested = shlex.join(["phigen", "vendor", *spec_files, str(folder), "DEST"])
+        raise click.UsageError(
+            f"{folder} is not a folder; the last argument is the folder for the solvers: {suggested}"
+        )
     if (folder / manifest.FILE).is_file():
         return
     message = f"{folder} holds no solvers that were vendored: there is no {folder / manifest.FILE}"
     if checking:
-        words = shlex.join(["phigen", "vendor", *(spec_files or ["SPEC"]), str(folder)])
-        raise CheckError(f"{message}\n  hint: {words} puts one there")
+        suggested = shlex.join(["phigen", "vendor", *(spec_files or ["SPEC"]), str(folder)])
+        raise CheckError(f"{message}\n  hint: {suggested} puts one there")
     if not spec_files:
         raise click.UsageError(f"{message}; to put one there: phigen vendor SPEC {folder}")
 
@@ -159,10 +161,10 @@ def _from_specs(
     """The orders of the command line. A check without options is about those of the manifest."""
     orders = []
     for spec in load_all(spec_files, collector) if spec_files else []:
-        known = entries.get(spec.name)
-        chosen = known.options if checking and known and not options.words else options
+        entry = entries.get(spec.name)
+        order_options = entry.options if checking and entry and not options.words else options
         origin = resources.bundled_name(spec.file) or manifest.relative(spec.file, folder)
-        orders.append(VendorRequest(spec, origin, chosen))
+        orders.append(VendorRequest(spec, origin, order_options))
     return orders
 
 
@@ -195,7 +197,7 @@ def _path_of_spec(folder: Path, entry: ManifestEntry) -> Path | None:
     return path if path.is_file() else None
 
 
-def _made(order: VendorRequest, collector: Collector) -> VendoredSolver | None:
+def _vendored_files(order: VendorRequest, collector: Collector) -> VendoredSolver | None:
     options = order.options
     with collector.collecting():
         compilation = options.compiled(order.spec)
@@ -221,48 +223,50 @@ def _write(
         known = entries.get(m.order.spec.name)
         changes = [Change(folder / file, read(folder / file), text) for file, text in m.files.items()]
         left = [folder / file for file in (known.files if known else ()) if file not in m.files]
-        changes += [Change(path, before, None) for path in left if (before := read(path)) is not None]
+        changes += [Change(path, text_before, None) for path in left if (text_before := read(path)) is not None]
         planned.append((m, changes))
-    listed = {**entries, **{m.order.spec.name: m.entry for m in vendored}}
-    texts = build_files(builds, {name: entry.files for name, entry in listed.items()})
-    for system in sources_lack(builds, {name: entry.files for name, entry in listed.items()}):
+    all_entries = {**entries, **{m.order.spec.name: m.entry for m in vendored}}
+    texts = build_files(builds, {name: entry.files for name, entry in all_entries.items()})
+    for system in sources_lack(builds, {name: entry.files for name, entry in all_entries.items()}):
         file, suffix = FILES[system]
         target = "numpy" if suffix == ".py" else "c"
         raise click.UsageError(f"{file} is for {suffix[1:]} files, and no solver here has one; -t {target} makes it")
-    others = [Change(folder / file, read(folder / file), text) for file, text in texts.items()]
+    build_changes = [Change(folder / file, read(folder / file), text) for file, text in texts.items()]
     obstacles = [o for m, changes in planned for c in changes if (o := _obstacle(c, entries.get(m.order.spec.name)))]
-    obstacles += [c.obstacle for c in others if c.obstacle]
+    obstacles += [c.obstacle for c in build_changes if c.obstacle]
     if obstacles and not force:
         raise CheckError("\n".join(["nothing was written", *indented(obstacles), "  hint: --force overwrites"]))
-    text = manifest.text_of(listed, builds)
+    text = manifest.text_of(all_entries, builds)
     listing = Change(folder / manifest.FILE, read(folder / manifest.FILE), text)
-    apply([*(c for _, changes in planned for c in changes), *others, listing])
+    apply([*(c for _, changes in planned for c in changes), *build_changes, listing])
     for m, changes in planned:
-        console.note(_done(folder, m, changes))
-    for change in others:
+        console.note(_print_changes(folder, m, changes))
+    for change in build_changes:
         if change.state != "unchanged":
             console.note(f"{folder}: wrote {change.path.name}")
 
 
-def _obstacle(change: Change, known: ManifestEntry | None) -> str:
+def _obstacle(change: Change, entry: ManifestEntry | None) -> str:
     """Return why a file must not be changed. The manifest also detects edits in headers, which the checksums do not
     cover."""
     if change.obstacle or change.before is None or change.before == change.after:
         return change.obstacle
-    stated = known.files.get(change.path.name) if known else None
+    stated = entry.files.get(change.path.name) if entry else None
     edited = stated is not None and stated != manifest.sha256(change.before)
     return f"{change.path} was edited by hand after phigen generated it" if edited else ""
 
 
-def _done(folder: Path, vendored: VendoredSolver, changes: Sequence[Change]) -> str:
-    written = [c.path.name for c in changes if c.state in ("missing", "different")]
+def _print_changes(folder: Path, vendored: VendoredSolver, changes: Sequence[Change]) -> str:
+    written_files = [c.path.name for c in changes if c.state in ("missing", "different")]
     removed = [c.path.name for c in changes if c.state == "stale"]
-    said = [f"wrote {', '.join(written)}"] if written else []
-    said += [f"removed {', '.join(removed)}"] if removed else []
-    said = said or [f"{vendored.order.spec.name} unchanged"]
+    sentences = [f"wrote {', '.join(written_files)}"] if written_files else []
+    sentences += [f"removed {', '.join(removed)}"] if removed else []
+    sentences = sentences or [f"{vendored.order.spec.name} unchanged"]
     if not vendored.order.found:
-        said.append("from the manifest's copy of the spec, whose file was not found")
-    return f"{folder}: {'; '.join(said)} (order {vendored.compilation.program.order}, {vendored.compilation.label})"
+        sentences.append("from the manifest's copy of the spec, whose file was not found")
+    return (
+        f"{folder}: {'; '.join(sentences)} (order {vendored.compilation.program.order}, {vendored.compilation.label})"
+    )
 
 
 # -- checking
@@ -282,19 +286,21 @@ def _problems(
 ) -> Iterator[VendorProblem]:
     """Problems with the files of one solver."""
     order = vendored.order
-    words = [as_given(order.spec), str(folder), *order.options.words] if spec_files else [str(folder)]
-    known = entries.get(order.spec.name)
-    for file in sorted({*vendored.files, *(known.files if known else ())}):
+    arguments = [as_given(order.spec), str(folder), *order.options.words] if spec_files else [str(folder)]
+    entry = entries.get(order.spec.name)
+    for file in sorted({*vendored.files, *(entry.files if entry else ())}):
         path = folder / file
-        what, edited = _complaint(path, known, vendored)
-        if what:
-            yield VendorProblem(path, what, shlex.join(["phigen", "vendor", *words, *(["--force"] if edited else [])]))
+        complaint, edited = _complaint(path, entry, vendored)
+        if complaint:
+            yield VendorProblem(
+                path, complaint, shlex.join(["phigen", "vendor", *arguments, *(["--force"] if edited else [])])
+            )
 
 
-def _complaint(path: Path, known: ManifestEntry | None, vendored: VendoredSolver) -> tuple[str, bool]:
+def _complaint(path: Path, entry: ManifestEntry | None, vendored: VendoredSolver) -> tuple[str, bool]:
     """Problem with a file, empty if there is none; and whether the file was edited by hand."""
     content = path.read_bytes() if path.is_file() else None
-    stated, expected = known.files.get(path.name) if known else None, vendored.files.get(path.name)
+    stated, expected = entry.files.get(path.name) if entry else None, vendored.files.get(path.name)
     if content is None:
         return ("missing", False) if expected is not None else ("missing, and its spec no longer gives it", False)
     if stated is None:
@@ -305,17 +311,17 @@ def _complaint(path: Path, known: ManifestEntry | None, vendored: VendoredSolver
         return "edited by hand", True
     if expected is None:
         return "its spec no longer gives it", False
-    return ("" if content == expected.encode() else f"stale: {_cause(known, vendored)}"), False
+    return ("" if content == expected.encode() else f"stale: {_cause(entry, vendored)}"), False
 
 
-def _cause(known: ManifestEntry | None, vendored: VendoredSolver) -> str:
+def _cause(entry: ManifestEntry | None, vendored: VendoredSolver) -> str:
     """Return why phigen now generates something else."""
     causes = []
-    if known and known.spec_text != vendored.order.spec.source:
+    if entry and entry.spec_text != vendored.order.spec.source:
         causes.append("its spec has changed")
-    if known and known.version != __version__:
-        causes.append(f"it was generated by phigen {known.version}, and this is {__version__}")
-    if known and known.options != vendored.order.options:
+    if entry and entry.version != __version__:
+        causes.append(f"it was generated by phigen {entry.version}, and this is {__version__}")
+    if entry and entry.options != vendored.order.options:
         causes.append("it was generated with other options")
     return "; ".join(causes) or "phigen makes something else of its spec"
 
@@ -327,9 +333,9 @@ def _wrong_builds(folder: Path, entries: Mapping[str, ManifestEntry], builds: Se
     for file, text in build_files(builds, {name: entry.files for name, entry in entries.items()}).items():
         change = Change(folder / file, read(folder / file), text)
         if change.state != "unchanged":
-            what = "missing" if change.before is None else "edited by hand" if change.obstacle else "stale"
+            problem = "missing" if change.before is None else "edited by hand" if change.obstacle else "stale"
             force = ["--force"] if change.obstacle else []
-            yield VendorProblem(change.path, what, shlex.join(["phigen", "vendor", str(folder), *force]))
+            yield VendorProblem(change.path, problem, shlex.join(["phigen", "vendor", str(folder), *force]))
 
 
 def _extra(folder: Path, entries: Mapping[str, ManifestEntry]) -> Iterator[VendorProblem]:
@@ -337,9 +343,9 @@ def _extra(folder: Path, entries: Mapping[str, ManifestEntry]) -> Iterator[Vendo
     from phigen.cli.outputs import read
     from phigen.targets.header import split
 
-    known = {file for entry in entries.values() for file in entry.files} | {file for file, _ in FILES.values()}
+    known_files = {file for entry in entries.values() for file in entry.files} | {file for file, _ in FILES.values()}
     for path in sorted(folder.iterdir()):
-        if path.suffix in suffixes() and path.is_file() and path.name not in known and split(read(path) or "")[0]:
+        if path.suffix in suffixes() and path.is_file() and path.name not in known_files and split(read(path) or "")[0]:
             yield VendorProblem(path, "extra: generated, but not in the manifest", shlex.join(["rm", str(path)]))
 
 
@@ -357,9 +363,9 @@ def _judge(folder: Path, problems: Sequence[VendorProblem]) -> None:
 def _report_check(console: Console, folder: Path, vendored: Sequence[VendoredSolver]) -> None:
     gone = [m.order for m in vendored if not m.order.found]
     for order in gone:
-        where = os.path.normpath(folder / order.spec_file) if order.spec_file else "far from here"
+        spec_place = os.path.normpath(folder / order.spec_file) if order.spec_file else "far from here"
         console.note(
-            f"{order.spec.name}: its spec ({where}) was not found, so its changes cannot be checked; "
+            f"{order.spec.name}: its spec ({spec_place}) was not found, so its changes cannot be checked; "
             "the files agree with the copy of the spec in the manifest"
         )
     files = counted(sum(len(m.files) for m in vendored), "file")

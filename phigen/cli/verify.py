@@ -150,10 +150,10 @@ def verified(
     from phigen.study.verification import verify
 
     spec = compilation.spec
-    chosen = loadable(targets or spec.targets) or (chosen_target("auto"),)
-    single = solver_of(compilation, "c") if compilation.program.single and "c" in chosen else None
+    target_names = loadable(targets or spec.targets) or (chosen_target("auto"),)
+    single = solver_of(compilation, "c") if compilation.program.single and "c" in target_names else None
     compilation = compilation.in_double
-    solvers = {target: solver_of(compilation, target) for target in chosen}
+    solvers = {target: solver_of(compilation, target) for target in target_names}
     console.detail(f"{spec.name}: built {', '.join(solvers)}")
     experiment = ended(prepared(spec, name), next(iter(solvers.values())), console)
     run = experiment.run
@@ -176,17 +176,17 @@ def verified_lattice(
     spec = compilation.spec
     run = run_of(spec, name)
     start = start_of(spec, run)
-    chosen = loadable(targets or spec.targets) or (chosen_target("auto"),)
-    single = lattice_solver_of(compilation, "c") if compilation.program.single and "c" in chosen else None
+    target_names = loadable(targets or spec.targets) or (chosen_target("auto"),)
+    single = lattice_solver_of(compilation, "c") if compilation.program.single and "c" in target_names else None
     compilation = compilation.in_double
-    solvers = {target: lattice_solver_of(compilation, target) for target in chosen}
+    solvers = {target: lattice_solver_of(compilation, target) for target in target_names}
     console.detail(f"{spec.name}: built {', '.join(solvers)}")
     experiment = LatticeExperiment(run, (), start.arguments, start=start)
     steps = max(1, ended(experiment, next(iter(solvers.values())), console).run.steps)
     begin = float(run.start) if spec.time else None
     seed = run.seed if spec.noise else None
-    asked: dict[str, Any] = {"t0": begin, "seed": seed, "quick": quick, "single": single}
-    return verify_lattice(compilation.by_sweeps(), solvers, run.name, start, float(run.step), steps, **asked)
+    run_options: dict[str, Any] = {"t0": begin, "seed": seed, "quick": quick, "single": single}
+    return verify_lattice(compilation.by_sweeps(), solvers, run.name, start, float(run.step), steps, **run_options)
 
 
 def fallen_short(verification: Verification) -> CheckError:
@@ -210,11 +210,11 @@ def print_table(v: Verification) -> None:
 
 def _row(check: Check, compared: Sequence[str]) -> list[str]:
     verdict = "" if not check.limit else "ok" if check.passed else "FAILED"
-    others = [_shown(check.others[m]) if m in check.others else "" for m in compared]
-    return [check.name, _shown(check.value), check.limit, verdict, *others]
+    other_values = [_formatted_value(check.others[m]) if m in check.others else "" for m in compared]
+    return [check.name, _formatted_value(check.value), check.limit, verdict, *other_values]
 
 
-def _shown(value: float) -> str:
+def _formatted_value(value: float) -> str:
     if math.isnan(value):
         return "–"
     if not math.isfinite(value):
@@ -223,7 +223,7 @@ def _shown(value: float) -> str:
 
 
 def described(v: Verification) -> dict[str, Any]:
-    """The verification as plain data; null stands for what is not finite."""
+    """Verification as plain data; numbers that are not finite become null."""
     from phigen.cli.run_summary import finite
 
     data: dict[str, Any] = finite(asdict(v))
