@@ -73,9 +73,9 @@ def _kernel(a: fmpq_mat) -> list[list[fmpq]]:
         if row < rank and reduced[row, j] != 0:
             pivots.append(j)
             row += 1
-    free = [j for j in range(columns) if j not in pivots]
+    free_columns = [j for j in range(columns) if j not in pivots]
     vectors = []
-    for j in free:
+    for j in free_columns:
         vector = [fmpq(0)] * columns
         vector[j] = fmpq(1)
         for r, pivot in enumerate(pivots):
@@ -109,8 +109,8 @@ def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: i
     total = _matrix(m, m)
     for i in range(m):
         total = total + ad[i] * basis[k, i]
-    changed = inverse.transpose() * total * basis.transpose()
-    return fmpq_mat(simple, simple, [changed[i, j] for i in range(simple) for j in range(simple)])
+    adjoint_matrix = inverse.transpose() * total * basis.transpose()
+    return fmpq_mat(simple, simple, [adjoint_matrix[i, j] for i in range(simple) for j in range(simple)])
 
 
 def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
@@ -188,14 +188,14 @@ class _Module:
         action = [self._action(a, lowered, extract) for a in self.ad]
         metric = fmpq_mat(d, d, [_trace(q * s) for q in lowered for s in self.tensors]).inv()
         raised = [s * self.form for s in self.tensors]
-        back = [_combination(raised, [metric[k, k2] for k in range(d)]) for k2 in range(d)]  # τ(·, f_l)
+        right_factors = [_combination(raised, [metric[k, k2] for k in range(d)]) for k2 in range(d)]  # τ(·, f_l)
         iota = _isomorphism(self.ad, action) if self.central else None
         if self.central and iota is None:
             return None
-        factors = self._factors(lowered, action, back, iota)
+        factors = self._factors(lowered, action, right_factors, iota)
         if factors is None:
             return None
-        left = [self._left(a, factors, lowered, action, back, iota) for a in range(m)]
+        left = [self._left_multiplication(a, factors, lowered, action, right_factors, iota) for a in range(m)]
         return self._completed(left, lowered, factors, iota)
 
     def _action(self, a: fmpq_mat, lowered: Sequence[fmpq_mat], extract: fmpq_mat) -> fmpq_mat:
@@ -205,7 +205,11 @@ class _Module:
         return fmpq_mat(d, m * m, [e[i, j] for e in images for i in range(m) for j in range(m)]) * extract
 
     def _factors(
-        self, lowered: Sequence[fmpq_mat], action: Sequence[fmpq_mat], back: Sequence[fmpq_mat], iota: fmpq_mat | None
+        self,
+        lowered: Sequence[fmpq_mat],
+        action: Sequence[fmpq_mat],
+        right_factors: Sequence[fmpq_mat],
+        iota: fmpq_mat | None,
     ) -> tuple[fmpq, fmpq, fmpq] | None:
         """Return c, μ, ν, from the equations on a few elements: the axioms of A are decided afterwards."""
         m, d, rows = len(self.ad), len(self.tensors), list[list[fmpq]]()
@@ -214,17 +218,17 @@ class _Module:
             bracket = [self.ad[a][k, b] for k in range(m)]
             twice = _combination(self.ad, bracket)
             for x in range(m):
-                there = sum_of(back, [lowered[k][b, x] for k in range(d)], a, m)
-                again = sum_of(back, [lowered[k][a, x] for k in range(d)], b, m)
+                first_sum = sum_of(right_factors, [lowered[k][b, x] for k in range(d)], a, m)
+                second_sum = sum_of(right_factors, [lowered[k][a, x] for k in range(d)], b, m)
                 for i in range(m):
-                    plain = self.form[b, x] * (i == a) - self.form[a, x] * (i == b)
-                    rows.append([plain, there[i] - again[i], fmpq(0), twice[i, x] / 4])
+                    form_part = self.form[b, x] * (i == a) - self.form[a, x] * (i == b)
+                    rows.append([form_part, first_sum[i] - second_sum[i], fmpq(0), twice[i, x] / 4])
             if iota is None or pairing is None:
                 continue
             rotated = _combination(action, bracket)
             for f in range(d):
-                ab = [back[f][i, b] for i in range(m)]
-                ba = [back[f][i, a] for i in range(m)]
+                ab = [right_factors[f][i, b] for i in range(m)]
+                ba = [right_factors[f][i, a] for i in range(m)]
                 for k in range(d):
                     first = sum((lowered[k][a, i] * ab[i] - lowered[k][b, i] * ba[i] for i in range(m)), fmpq(0))
                     second = pairing[b, f] * iota[k, a] - pairing[a, f] * iota[k, b]
@@ -236,13 +240,13 @@ class _Module:
         c, mu, nu = (-v / solution[3] for v in solution[:3])
         return c, mu, nu
 
-    def _left(
+    def _left_multiplication(
         self,
         a: int,
         factors: tuple[fmpq, fmpq, fmpq],
         lowered: Sequence[fmpq_mat],
         action: Sequence[fmpq_mat],
-        back: Sequence[fmpq_mat],
+        right_factors: Sequence[fmpq_mat],
         iota: fmpq_mat | None,
     ) -> fmpq_mat:
         """Return the matrix of left multiplication by an element of g."""
@@ -258,7 +262,7 @@ class _Module:
         pairing = None if iota is None else self.form * iota.inv()
         for f in range(d):
             for k in range(m):
-                left[1 + k, 1 + m + f] = mu * back[f][k, a]
+                left[1 + k, 1 + m + f] = mu * right_factors[f][k, a]
             for k in range(d):
                 left[1 + m + k, 1 + m + f] = action[a][k, f] / 2
             if pairing is not None:
@@ -277,21 +281,21 @@ class _Module:
     ) -> list[fmpq_mat] | None:
         """Return the left multiplications by all of A: those by S and z are combinations of products of g."""
         m, d, size = len(self.ad), len(self.tensors), self.size
-        one = fmpq_mat(size, size, [fmpq(int(i == j)) for i in range(size) for j in range(size)])
+        identity = fmpq_mat(size, size, [fmpq(int(i == j)) for i in range(size) for j in range(size)])
         pairs = [(a, b) for a in range(m) for b in range(a + 1)]
         values = fmpq_mat(d, len(pairs), [q[a, b] for q in lowered for a, b in pairs])
-        chosen = _pivots(values)
-        if len(chosen) < d:
+        pivot_rows = _pivots(values)
+        if len(pivot_rows) < d:
             return None
-        square = fmpq_mat(d, d, [values[k, c] for k in range(d) for c in chosen])
+        square = fmpq_mat(d, d, [values[k, c] for k in range(d) for c in pivot_rows])
         symmetric = []
-        for c in chosen:  # σ(a, b) = ½(ab + ba) − c κ(a, b)
+        for c in pivot_rows:  # σ(a, b) = ½(ab + ba) − c κ(a, b)
             a, b = pairs[c]
             product = left[a] * left[b] + left[b] * left[a]
-            symmetric.append(product * fmpq(1, 2) - one * (factors[0] * self.form[a, b]))
+            symmetric.append(product * fmpq(1, 2) - identity * (factors[0] * self.form[a, b]))
         inverse = square.inv()
         by_module = [_combination(symmetric, [inverse[c, k] for c in range(d)]) for k in range(d)]
-        everything = [one, *left, *by_module]
+        everything = [identity, *left, *by_module]
         if iota is not None:
             everything.append(self._centre(left, by_module, factors, iota))
         return everything
@@ -309,8 +313,8 @@ class _Module:
 
 def sum_of(matrices: Sequence[fmpq_mat], factors: Sequence[fmpq], column: int, rows: int) -> list[fmpq]:
     """Return a column of Σ_k factors[k]·matrices[k]."""
-    listed = [(m, f) for m, f in zip(matrices, factors, strict=True) if f != 0]
-    return [sum((m[i, column] * f for m, f in listed), fmpq(0)) for i in range(rows)]
+    nonzero_terms = [(m, f) for m, f in zip(matrices, factors, strict=True) if f != 0]
+    return [sum((m[i, column] * f for m, f in nonzero_terms), fmpq(0)) for i in range(rows)]
 
 
 def _combination(matrices: Sequence[fmpq_mat], factors: Sequence[fmpq]) -> fmpq_mat:
@@ -336,14 +340,14 @@ def _isomorphism(ad: Sequence[fmpq_mat], action: Sequence[fmpq_mat]) -> fmpq_mat
     m, d = len(ad), action[0].nrows()
     rows: list[fmpq] = []
     for weights in ([fmpq(1 + k % 3) for k in range(m)], [fmpq(1 - 2 * (k % 2) + k) for k in range(m)]):
-        there, here = _combination(action, weights), _combination(ad, weights)
+        image, preimage = _combination(action, weights), _combination(ad, weights)
         for i in range(d):
             for j in range(m):
                 row = [fmpq(0)] * (d * m)
                 for k in range(d):
-                    row[k * m + j] = row[k * m + j] + there[i, k]
+                    row[k * m + j] = row[k * m + j] + image[i, k]
                 for k in range(m):
-                    row[i * m + k] = row[i * m + k] - here[k, j]
+                    row[i * m + k] = row[i * m + k] - preimage[k, j]
                 rows += row
     for vector in _kernel(fmpq_mat(2 * d * m, d * m, rows)):
         iota = fmpq_mat(d, m, vector)
@@ -364,11 +368,11 @@ def _assembled(
     table = {(i, j): vector([left[i][k, j] for k in range(size)]) for i in range(size) for j in range(size)}
     skew = {*range(1, 1 + simple), *([size - 1] if module.central else [])}
     star = [{k: -field.one if k in skew else field.one} for k in range(size)]
-    places = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]  # of the rows of the basis
-    elements = [{places[r]: v for r, v in vector([inverse[a, r] for r in range(m)]).items()} for a in range(m)]
+    row_numbers = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]  # of the rows of the basis
+    elements = [{row_numbers[r]: v for r, v in vector([inverse[a, r] for r in range(m)]).items()} for a in range(m)]
     functional: list[Vector] = [{} for _ in range(size)]
-    for r, place in enumerate(places):
-        functional[place] = vector([basis[r, a] for a in range(m)])
+    for r, row_number in enumerate(row_numbers):
+        functional[row_number] = vector([basis[r, a] for a in range(m)])
     units = [{a: field.one} for a in range(m)]
-    table = {at: row for at, row in table.items() if row}
+    table = {position: row for position, row in table.items() if row}
     return StarAlgebra(field, size, table, star, {0: field.one}, elements, functional, elements, units)

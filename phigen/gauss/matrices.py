@@ -22,16 +22,20 @@ MOST_UNKNOWNS = 36
 
 def of_matrices(lie: LieAlgebra) -> StarAlgebra | None:
     """Return the algebra of a Lie algebra that is known by matrices with rational entries, or None."""
-    known, field = known_representation(lie), lie.field
+    representation, field = known_representation(lie), lie.field
     if not field.is_rational:
         return None
     try:
-        matrices = [{at: field.convert(e) for at, e in m.items()} for m in known.matrices] if known else _affine(lie)
+        matrices = (
+            [{position: field.convert(e) for position, e in m.items()} for m in representation.matrices]
+            if representation
+            else _affine(lie)
+        )
     except KeyError:  # entries with parameters
         return None
     if not matrices:
         return None
-    n = known.size if known else 1 + max(j for m in matrices for _, j in m)
+    n = representation.size if representation else 1 + max(j for m in matrices for _, j in m)
     form = _form(matrices, n, field)
     if form is None:
         matrices = [_doubled(m, n, field) for m in matrices]
@@ -82,11 +86,11 @@ def _projection(lie: LieAlgebra, ideal: Sequence[Vector], action: Sequence[Spars
         for j in range(i):
             for k in range(size):
                 row = {k * m + n: field.convert(c) for n, c in lie.bracket(i, j).items()}
-                for (at, q), v in action[i].items():
-                    if at == k:
+                for (position, q), v in action[i].items():
+                    if position == k:
                         add_multiple(row, {q * m + j: v}, -field.one)
-                for (at, q), v in action[j].items():
-                    if at == k:
+                for (position, q), v in action[j].items():
+                    if position == k:
                         add_multiple(row, {q * m + i: v}, field.one)
                 rows.append(row)
     return next((v for v in kernel(field, [r for r in rows if r], last + 1) if last in v), None)
@@ -127,7 +131,7 @@ def _form(matrices: Sequence[SparseMatrix], n: int, field: Field) -> SparseMatri
                 add_multiple(equations.setdefault((j, i), {}), {j * n + k: v}, field.one)
         rows += [e for e in equations.values() if e]
     for vector in kernel(field, rows, n * n):
-        entries = {divmod(at, n): v for at, v in vector.items()}
+        entries = {divmod(index, n): v for index, v in vector.items()}
         for sign in (field.one, -field.one):
             form = dict(entries)
             add_multiple(form, _transposed(entries), sign)
@@ -162,7 +166,7 @@ def _hull(generators: Sequence[SparseMatrix], n: int, field: Field) -> list[Spar
         pending += [product(candidate, g) for g in generators[1:]]
     vectors = [{i * n + j: v for (i, j), v in m.items()} for m in basis]
     reduced = kernel(field, kernel(field, vectors, n * n), n * n)
-    return [{divmod(at, n): v for at, v in vector.items()} for vector in reduced]
+    return [{divmod(index, n): v for index, v in vector.items()} for vector in reduced]
 
 
 def _assembled(
@@ -211,11 +215,11 @@ def _functional(
         symmetric.append(part)
     # the traces and the projection on symmetric elements vanish on skew elements orthogonal to g
     rows = [{i: v[k] for i, v in enumerate(symmetric) if k in v} for k in range(len(hull))]
-    others = kernel(field, [*traces, *(r for r in rows if r)], len(hull))
+    solutions = kernel(field, [*traces, *(r for r in rows if r)], len(hull))
     if Span(field, skew).dimension == len(basis):  # g is all of them, as that of se(n)
-        others = []
-    span = Span(field, [*basis, *others])
-    if span.dimension < len(basis) + len(others):
+        solutions = []
+    span = Span(field, [*basis, *solutions])
+    if span.dimension < len(basis) + len(solutions):
         return None
     values = []
     for part in skew:

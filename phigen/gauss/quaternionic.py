@@ -55,7 +55,7 @@ def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
                 for row, v in ad[k][j].items():
                     add_multiple(equations.setdefault(row, {}), {k * m + i: v}, -field.one)
             rows += [e for e in equations.values() if e]
-    maps = [{divmod(at, m): v for at, v in vector.items()} for vector in kernel(field, rows, m * m)]
+    maps = [{divmod(index, m): v for index, v in vector.items()} for vector in kernel(field, rows, m * m)]
     identity = {(i, i): field.one for i in range(m)}
     independent = Span(field, [identity, *maps])
     return [v for k, v in enumerate([identity, *maps]) if k not in independent.dependent]
@@ -64,16 +64,16 @@ def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
 def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> dict[tuple[int, int], Map] | None:
     """Return β(e_i, e_j) for all i, j, as maps, or None."""
     m, count = len(ad), len(maps)
-    places = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(m) for j in range(i + 1))}
-    four, last = field.number(4), len(places) * count
+    pair_numbers = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(m) for j in range(i + 1))}
+    four, last = field.number(4), len(pair_numbers) * count
 
-    def unknowns(i: int, j: int, of: int, sign: Scalar) -> Iterator[tuple[int, dict[int, Scalar]]]:
+    def unknowns(i: int, j: int, component: int, sign: Scalar) -> Iterator[tuple[int, dict[int, Scalar]]]:
         """Yield the components of sign·4·β(e_i, e_j)(e_of) in the unknown coefficients of the maps."""
-        place = places[max(i, j), min(i, j)]
+        pair_number = pair_numbers[max(i, j), min(i, j)]
         for number, phi in enumerate(maps):
             for (row, column), v in phi.items():
-                if column == of:
-                    yield row, {place * count + number: four * v * sign}
+                if column == component:
+                    yield row, {pair_number * count + number: four * v * sign}
 
     rows: list[dict[int, Scalar]] = []
     for a in range(m):
@@ -90,11 +90,11 @@ def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> 
     if solution is None:
         return None
     form: dict[tuple[int, int], Map] = {}
-    for (i, j), place in places.items():
+    for (i, j), pair_number in pair_numbers.items():
         value: Map = {}
         for number, phi in enumerate(maps):
-            if place * count + number in solution:
-                add_multiple(value, phi, solution[place * count + number])
+            if pair_number * count + number in solution:
+                add_multiple(value, phi, solution[pair_number * count + number])
         form[i, j] = form[j, i] = value
     return form
 
@@ -115,7 +115,7 @@ def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> lis
 def _normalised(a: Map) -> Map:
     """Return a multiple whose first entry is 1: products with it take fewer multiplications."""
     first = a[min(a)]
-    return {at: v / first for at, v in a.items()}
+    return {position: v / first for position, v in a.items()}
 
 
 def _composed(a: Mapping[tuple[int, int], Scalar], b: Mapping[tuple[int, int], Scalar]) -> Map:
@@ -132,8 +132,8 @@ def _assembled(
 
     Its basis contains 2e for the basis elements e of g, with 2a·2b = 4β + 2[a, b]. The axioms are not checked here.
     """
-    m, count, one = len(ad), len(scalars), field.one
-    span, two, half = Span(field, scalars), field.number(2), one / field.number(2)
+    m, count, unit = len(ad), len(scalars), field.one
+    span, twice_unit, one_half = Span(field, scalars), field.number(2), unit / field.number(2)
     table: dict[tuple[int, int], Vector] = {}
     for k, phi in enumerate(scalars):
         for n, psi in enumerate(scalars):
@@ -144,29 +144,29 @@ def _assembled(
     for i in range(m):
         for j in range(m):
             value = span.coordinates(form[i, j]) or {}
-            scalar = {k: v * two * two for k, v in value.items()}
+            scalar = {k: v * twice_unit * twice_unit for k, v in value.items()}
             table[count + i, count + j] = scalar | {count + k: v for k, v in ad[i][j].items()}
-    basis = [{count + j: half} for j in range(m)]
-    star = [{k: one if k < count else -one} for k in range(count + m)]
-    functional: list[Vector] = [{}] * count + [{j: two} for j in range(m)]
-    table = {at: v for at, v in table.items() if v}
-    coordinate_vectors = [{j: one} for j in range(m)]
-    return StarAlgebra(field, count + m, table, star, {0: one}, basis, functional, basis, coordinate_vectors)
+    basis = [{count + j: one_half} for j in range(m)]
+    star = [{k: unit if k < count else -unit} for k in range(count + m)]
+    functional: list[Vector] = [{}] * count + [{j: twice_unit} for j in range(m)]
+    table = {position: v for position, v in table.items() if v}
+    coordinate_vectors = [{j: unit} for j in range(m)]
+    return StarAlgebra(field, count + m, table, star, {0: unit}, basis, functional, basis, coordinate_vectors)
 
 
 def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
     """Return the algebra as a sum of two, where K is two-dimensional and has an idempotent with rational entries."""
-    field, one = algebra.field, algebra.field.one
+    field, unit = algebra.field, algebra.field.one
     idempotent = _idempotent(algebra) if count == 2 else None
     if idempotent is None:
         return algebra
     parts: list[Vector] = []
-    for factor in (idempotent, difference(algebra.unit, idempotent, one)):
-        images = [algebra.product(factor, {i: one}) for i in range(algebra.dimension)]
+    for factor in (idempotent, difference(algebra.unit, idempotent, unit)):
+        images = [algebra.product(factor, {i: unit}) for i in range(algebra.dimension)]
         dependent = Span(field, images).dependent
         parts += [image for i, image in enumerate(images) if i not in dependent]
     sum_of_two = in_basis(algebra, parts)
-    frame = [{i: one} for i, image in enumerate(sum_of_two.star) if image == {i: -one}]
+    frame = [{i: unit} for i, image in enumerate(sum_of_two.star) if image == {i: -unit}]
     span = Span(field, frame)
     return replace(sum_of_two, frame=frame, combination=[span.coordinates(e) or {} for e in sum_of_two.basis])
 

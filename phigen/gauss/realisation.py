@@ -100,7 +100,7 @@ def direct(system: System) -> Realisation:
 def collective(system: System) -> Realisation | None:
     """Return a realisation with which the step is a Poisson map, or None if none is known."""
     parts = _parts(system.coordinates, system.poisson, system.shape)
-    return None if parts is None else Realisation(tuple(_joined(parts)), True)
+    return None if parts is None else Realisation(tuple(_merged_parts(parts)), True)
 
 
 def _parts(coordinates: Sequence[str], poisson: Matrix, shape: Shape) -> list[Part] | None:
@@ -111,8 +111,8 @@ def _parts(coordinates: Sequence[str], poisson: Matrix, shape: Shape) -> list[Pa
     rates = logarithmic(coordinates, poisson)
     if rates is not None:
         scaled = sorted({i for i, _ in rates})
-        plain = tuple(i for i in everything if i not in scaled)
-        return [*([Plain(plain)] if plain else []), LogarithmicBlock(tuple(scaled), rates)]
+        plain_indices = tuple(i for i in everything if i not in scaled)
+        return [*([Plain(plain_indices)] if plain_indices else []), LogarithmicBlock(tuple(scaled), rates)]
     parts: list[Part] = []
     for indices, algebra, central in _components(shape):
         part = _part(indices, algebra, central=central)
@@ -131,14 +131,14 @@ def _parts_of_blocks(coordinates: Sequence[str], poisson: Matrix) -> list[Part] 
     for block in blocks_of_poisson:
         names = [coordinates[i] for i in block]
         entries = tuple(tuple(poisson[i][j] for j in block) for i in block)
-        within = _parts(names, entries, recognise(names, entries))
-        if within is None:
+        block_parts = _parts(names, entries, recognise(names, entries))
+        if block_parts is None:
             return None
-        parts += [_placed(part, block) for part in within]
+        parts += [_with_global_indices(part, block) for part in block_parts]
     return parts
 
 
-def _placed(part: Part, block: Sequence[int]) -> Part:
+def _with_global_indices(part: Part, block: Sequence[int]) -> Part:
     """Return a part of a block with the indices of its coordinates among all."""
     indices = tuple(block[i] for i in part.indices)
     if isinstance(part, LogarithmicBlock):
@@ -146,15 +146,17 @@ def _placed(part: Part, block: Sequence[int]) -> Part:
     return replace(part, indices=indices)
 
 
-def _joined(parts: Sequence[Part]) -> Iterator[Part]:
+def _merged_parts(parts: Sequence[Part]) -> Iterator[Part]:
     """Yield the parts: one plain part first, then one of logarithms."""
-    plain = [i for part in parts if isinstance(part, Plain) for i in part.indices]
-    if plain:
-        yield Plain(tuple(sorted(plain)))
+    plain_indices = [i for part in parts if isinstance(part, Plain) for i in part.indices]
+    if plain_indices:
+        yield Plain(tuple(sorted(plain_indices)))
     logarithms = [part for part in parts if isinstance(part, LogarithmicBlock)]
     if logarithms:
         indices = sorted(i for part in logarithms for i in part.indices)
-        yield LogarithmicBlock(tuple(indices), {at: rate for part in logarithms for at, rate in part.rates.items()})
+        yield LogarithmicBlock(
+            tuple(indices), {index: rate for part in logarithms for index, rate in part.rates.items()}
+        )
     yield from (part for part in parts if isinstance(part, AlgebraBlock))
 
 
@@ -167,17 +169,17 @@ def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
         for indices in indecomposable_parts(shape.algebra):
             yield indices, restricted(shape.algebra, indices), False
     if isinstance(shape, Affine):
-        whole = shape.extension
-        one = whole.dimension - 1
-        linear = {ij: {k: c for k, c in row.items() if k != one} for ij, row in whole.constants.items()}
+        extension = shape.extension
+        unit_index = extension.dimension - 1
+        linear = {ij: {k: c for k, c in row.items() if k != unit_index} for ij, row in extension.constants.items()}
         # A constant bracket couples its coordinates too; here it is replaced by a multiple of one of them.
-        joined = {ij: row or {ij[0]: ONE} for ij, row in linear.items()}
-        for indices in indecomposable_parts(LieAlgebra("", one, joined)):
-            pairs = [ij for ij in whole.constants if set(ij) <= set(indices)]
-            if any(one in whole.constants[ij] for ij in pairs):
-                yield indices, restricted(whole, [*indices, one]), True
+        completed = {ij: row or {ij[0]: ONE} for ij, row in linear.items()}
+        for indices in indecomposable_parts(LieAlgebra("", unit_index, completed)):
+            pairs = [ij for ij in extension.constants if set(ij) <= set(indices)]
+            if any(unit_index in extension.constants[ij] for ij in pairs):
+                yield indices, restricted(extension, [*indices, unit_index]), True
             else:
-                yield indices, restricted(whole, indices), False
+                yield indices, restricted(extension, indices), False
 
 
 def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | None:

@@ -70,8 +70,8 @@ def _images(group: AlgebraBlock, attitude: Group) -> list[Dual] | None:
     return of_basis if _is_homomorphism(algebra, of_basis) else None
 
 
-def _dual(algebra: StarAlgebra, place: int, value: Scalar) -> Dual:
-    return [value if k == place else algebra.field.zero for k in range(8)]
+def _dual(algebra: StarAlgebra, offset: int, value: Scalar) -> Dual:
+    return [value if k == offset else algebra.field.zero for k in range(8)]
 
 
 def _combination(algebra: StarAlgebra, factors: Vector, images: Sequence[Dual]) -> Dual:
@@ -95,8 +95,8 @@ def _generate(algebra: StarAlgebra, elements: list[Vector], images: list[Dual]) 
 
 def _multiplied(a: Dual, b: Dual) -> Dual:
     """Return the product of two dual quaternions."""
-    one = _times(a[:4], b[:4])
-    return [*one, *(u + v for u, v in zip(_times(a[:4], b[4:]), _times(a[4:], b[:4]), strict=True))]
+    real_part = _times(a[:4], b[:4])
+    return [*real_part, *(u + v for u, v in zip(_times(a[:4], b[4:]), _times(a[4:], b[:4]), strict=True))]
 
 
 def _times(a: Sequence[Scalar], b: Sequence[Scalar]) -> Dual:

@@ -64,22 +64,22 @@ class StageMap:
 
 def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) -> StageMap:
     """Return the points of a system in terms of the unknowns of a step; ``pace`` multiplies ∇H and covector forces."""
-    plain = tuple(i for part in realisation.parts if isinstance(part, Plain) for i in part.indices)
+    plain_indices = tuple(i for part in realisation.parts if isinstance(part, Plain) for i in part.indices)
     scaled = tuple(i for part in realisation.logarithms for i in part.indices)
     if realisation.exact:
-        plain = tuple(i for i in plain if any(not e.is_zero for e in system.poisson[i]))
-    if not (plain or scaled or realisation.groups or system.times):
-        plain = (0,)  # all brackets are zero; arrays in C have at least one entry
-    count = len(plain) + len(system.times) + len(scaled)
+        plain_indices = tuple(i for i in plain_indices if any(not e.is_zero for e in system.poisson[i]))
+    if not (plain_indices or scaled or realisation.groups or system.times):
+        plain_indices = (0,)  # all brackets are zero; arrays in C have at least one entry
+    count = len(plain_indices) + len(system.times) + len(scaled)
     starts = []
     for group in realisation.groups:
         starts.append(count)
         count += group.algebra.dimension
     unknowns = tuple(Symbol(OFFSET, k) for k in range(count))
     change = [ZERO] * system.dimension
-    for k, i in enumerate(plain):
+    for k, i in enumerate(plain_indices):
         change[i] = symbol(unknowns[k])
-    points = StageMap(system, realisation, unknowns, plain, scaled, tuple(starts), pace=pace)
+    points = StageMap(system, realisation, unknowns, plain_indices, scaled, tuple(starts), pace=pace)
     for i, offset in points.logarithms.items():
         change[i] = symbol(system.coordinates[i]) * call("expm1", offset)
     for group, first in zip(realisation.groups, starts, strict=True):
@@ -119,17 +119,17 @@ class _Scaled:
 
 def _scaled(group: AlgebraBlock, x: Sequence[Expression]) -> _Scaled:
     algebra = group.algebra
-    one = algebra.field.one
+    unit = algebra.field.one
 
     def first(coefficients: Iterable[Scalar]) -> Scalar:
-        return next(iter(coefficients), one) if algebra.field.is_rational else one
+        return next(iter(coefficients), unit) if algebra.field.is_rational else unit
 
     q = first(c for form in algebra.functional for c in form.values())
-    starred = [algebra.starred({j: one}) for j in range(algebra.dimension)]
+    starred = [algebra.starred({j: unit}) for j in range(algebra.dimension)]
     scales = [first(c for s in starred for c in algebra.product(f, s).values()) for f in algebra.frame]
     return _Scaled(
-        [_combined(algebra, combined([form], {0: one / q}), x) for form in algebra.functional],
-        [combined([f], {0: one / c}) for f, c in zip(algebra.frame, scales, strict=True)],
+        [_combined(algebra, combined([form], {0: unit / q}), x) for form in algebra.functional],
+        [combined([f], {0: unit / c}) for f, c in zip(algebra.frame, scales, strict=True)],
         [{k: v * q * scales[k] for k, v in parts.items()} for parts in algebra.combination],
     )
 
@@ -170,10 +170,10 @@ def _with_star(
     algebra: StarAlgebra, f: Mapping[int, Scalar], left: Sequence[Expression], w: Sequence[Expression]
 ) -> Expression:
     """Return x̃(wfw*)/q, where ``left`` are the values x̃(wb)/q."""
-    one = algebra.field.one
+    unit = algebra.field.one
     terms = []
     for j in range(algebra.dimension):
-        value = _combined(algebra, algebra.product(f, algebra.starred({j: one})), left)
+        value = _combined(algebra, algebra.product(f, algebra.starred({j: unit})), left)
         if not value.is_zero:
             terms.append(w[j] * value)
     return total(terms)
@@ -182,13 +182,15 @@ def _with_star(
 def at_unknowns(points: StageMap) -> dict[str, Expression]:
     """Return the coordinates and the time at a stage, in terms of the unknowns."""
     system = points.system
-    at = {c: symbol(c) + d for c, d in zip(system.coordinates, points.change, strict=True)}
-    at |= {system.coordinates[i]: symbol(system.coordinates[i]) * call("exp", z) for i, z in points.logarithms.items()}
+    stage_values = {c: symbol(c) + d for c, d in zip(system.coordinates, points.change, strict=True)}
+    stage_values |= {
+        system.coordinates[i]: symbol(system.coordinates[i]) * call("exp", z) for i, z in points.logarithms.items()
+    }
     for group, first in zip(points.realisation.groups, points.starts, strict=True):
         momenta = _momentum(group, _values(system, group), _group_element(points, group, first))
         for i, value, shift in zip(group.indices, momenta, group.shift, strict=False):
-            at[system.coordinates[i]] = value - shift
-    return at | {t: symbol(t) + symbol(points.unknowns[len(points.moved)]) for t in system.times}
+            stage_values[system.coordinates[i]] = value - shift
+    return stage_values | {t: symbol(t) + symbol(points.unknowns[len(points.moved)]) for t in system.times}
 
 
 def _element(
@@ -212,7 +214,7 @@ def _group_element(points: StageMap, group: AlgebraBlock, first: int) -> list[Ex
 
 def vector_field(
     points: StageMap,
-    at: Mapping[str, Expression],
+    stage_values: Mapping[str, Expression],
     weight: Expression = ONE,
     hold: Callable[[Expression], Expression] | None = None,
     slopes: Sequence[Expression] | None = None,
@@ -233,11 +235,11 @@ def vector_field(
     field_ = hamiltonian_vector_field(system.poisson, slopes)
     if system.forces:
         field_ = tuple(a + b for a, b in zip(field_, system.forces.vector, strict=True))
-    plain = substitute([field_[i] for i in points.moved], at)
-    derivatives = [*(weight * value for value in plain), *(weight for _ in system.times)]
+    plain_rates = substitute([field_[i] for i in points.moved], stage_values)
+    derivatives = [*(weight * value for value in plain_rates), *(weight for _ in system.times)]
     relative = [_logarithmic_rate(points, i, slopes) for i in points.scaled]
-    derivatives += [weight * value for value in substitute(relative, at)]
-    rates = [-weight * value for value in substitute(slopes, at)]
+    derivatives += [weight * value for value in substitute(relative, stage_values)]
+    rates = [-weight * value for value in substitute(slopes, stage_values)]
     for group, first in zip(realisation.groups, points.starts, strict=True):
         # A constant among the basis elements, if there is one, acts as 0: it is central.
         velocity = _element(group.algebra, group.algebra.basis, [rates[i] for i in group.indices])

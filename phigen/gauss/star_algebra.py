@@ -63,12 +63,12 @@ class StarAlgebra:
     @cached_property
     def skew(self) -> list[Vector]:
         """A basis of the skew elements."""
-        one = self.field.one
+        unit = self.field.one
         rows: list[Vector] = [{} for _ in range(self.dimension)]
         for i, image in enumerate(self.star):
             for k, v in image.items():
-                add_multiple(rows[k], {i: v}, one)
-            add_multiple(rows[i], {i: one}, one)
+                add_multiple(rows[k], {i: v}, unit)
+            add_multiple(rows[i], {i: unit}, unit)
         return kernel(self.field, rows, self.dimension)
 
     @property
@@ -78,19 +78,19 @@ class StarAlgebra:
 
     def axioms(self) -> Iterator[tuple[str, Iterator[Vector]]]:
         """Yield the axioms of the momentum map, each with residuals that are empty where it holds."""
-        n, one = range(self.dimension), self.field.one
-        units = [{i: one} for i in n]
+        n, unit = range(self.dimension), self.field.one
+        units = [{i: unit} for i in n]
         yield "A is associative", self._associators()
         yield (
             "A has the unit 1",
-            (difference(p, u, one) for u in units for p in (self.product(self.unit, u), self.product(u, self.unit))),
+            (difference(p, u, unit) for u in units for p in (self.product(self.unit, u), self.product(u, self.unit))),
         )
         yield "(ab)* = b*a* and a** = a", self._involution(units)
-        yield "E_a* = −E_a", (difference(self.starred(e), e, -one) for e in self.basis)
+        yield "E_a* = −E_a", (difference(self.starred(e), e, -unit) for e in self.basis)
         yield "E_a is a combination of the frame", self._framed()
-        yield "x̃(E_a) = x_a", (difference(self.value(e), {a: one}, one) for a, e in enumerate(self.basis))
-        yield "x̃(a*) = −x̃(a)", (difference(self.value(self.starred(u)), self.value(u), -one) for u in units)
-        yield "functionals x̃ stay such under the skew elements", self._moved()
+        yield "x̃(E_a) = x_a", (difference(self.value(e), {a: unit}, unit) for a, e in enumerate(self.basis))
+        yield "x̃(a*) = −x̃(a)", (difference(self.value(self.starred(u)), self.value(u), -unit) for u in units)
+        yield "functionals x̃ stay such under the skew elements", self._commutators_of_skew()
 
     def _associators(self) -> Iterator[Vector]:
         """Yield the (ab)c − a(bc) of basis elements; over the rationals those of all b and c together, by a."""
@@ -106,20 +106,22 @@ class StarAlgebra:
             of_products = left[i].transpose() * flat
             apart = [left[i] * m for m in left]
             together = [v for m in apart for v in m.entries()]
-            yield {at: v - w for at, (v, w) in enumerate(zip(of_products.entries(), together, strict=True)) if v != w}
+            yield {
+                index: v - w for index, (v, w) in enumerate(zip(of_products.entries(), together, strict=True)) if v != w
+            }
 
     def _associator(self, i: int, j: int, k: int) -> Vector:
-        one = self.field.one
-        left = self.product(self.table.get((i, j), {}), {k: one})
-        return difference(left, self.product({i: one}, self.table.get((j, k), {})), one)
+        unit = self.field.one
+        left = self.product(self.table.get((i, j), {}), {k: unit})
+        return difference(left, self.product({i: unit}, self.table.get((j, k), {})), unit)
 
     def _involution(self, units: Sequence[Vector]) -> Iterator[Vector]:
-        one = self.field.one
+        unit = self.field.one
         for a in units:
-            yield difference(self.starred(self.starred(a)), a, one)
+            yield difference(self.starred(self.starred(a)), a, unit)
             for b in units:
                 reverse = self.product(self.starred(b), self.starred(a))
-                yield difference(self.starred(self.product(a, b)), reverse, one)
+                yield difference(self.starred(self.product(a, b)), reverse, unit)
 
     def _framed(self) -> Iterator[Vector]:
         for e, parts in zip(self.basis, self.combination, strict=True):
@@ -127,7 +129,7 @@ class StarAlgebra:
         for f in self.frame:
             yield difference(self.starred(f), f, -self.field.one)
 
-    def _moved(self) -> Iterator[Vector]:
+    def _commutators_of_skew(self) -> Iterator[Vector]:
         """Yield x̃([u, n]) for all skew u, and the skew n on which all x̃ vanish: the n must form an ideal."""
         rows: list[Vector] = [{} for _ in self.basis]
         for i, u in enumerate(self.skew):

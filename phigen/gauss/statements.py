@@ -78,7 +78,7 @@ def _brackets(system: System, realisation: Realisation) -> Statement:
     """Decide that π has the brackets that the parts assume: of the Lie algebras, else constant."""
     n = system.dimension
     expected: dict[tuple[int, int], Expression] = {}
-    grouped = {i: group for group in realisation.groups for i in group.indices}
+    group_of = {i: group for group in realisation.groups for i in group.indices}
     for group in realisation.groups:
         expected |= _lie_poisson(system, group)
     logs = {i for part in realisation.logarithms for i in part.indices}
@@ -87,15 +87,15 @@ def _brackets(system: System, realisation: Realisation) -> Statement:
         for j in range(i):
             names = (system.coordinates[j], system.coordinates[i])
             entry, label = system.poisson[j][i], f"{{{names[0]}, {names[1]}}}"
-            if grouped.get(i) is not None and grouped.get(i) is grouped.get(j):
+            if group_of.get(i) is not None and group_of.get(i) is group_of.get(j):
                 residuals.append((label, entry - expected.get((j, i), ZERO)))
-            elif i in grouped or j in grouped:
+            elif i in group_of or j in group_of:
                 residuals.append((label, entry))
             else:
                 scales = product(symbol(system.coordinates[k]) for k in (i, j) if k in logs)
                 residuals += [(label, slope) for slope in gradient(entry * power(scales, -1), system.coordinates)]
-    named = ", ".join(f"log {system.coordinates[i]}" for i in sorted(logs))
-    name = "brackets are those of Lie algebras, and constant ones" + f", with {named}" * bool(named)
+    logarithms = ", ".join(f"log {system.coordinates[i]}" for i in sorted(logs))
+    name = "brackets are those of Lie algebras, and constant ones" + f", with {logarithms}" * bool(logarithms)
     return decide_zero(name, residuals, system.positive)
 
 
@@ -111,9 +111,11 @@ def _lie_poisson(system: System, group: AlgebraBlock) -> dict[tuple[int, int], E
 
 def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
     """Decide that J is a quadratic momentum map on a star algebra."""
-    listed = ", ".join(system.coordinates[i] for i in group.indices)
+    coordinate_names = ", ".join(system.coordinates[i] for i in group.indices)
     algebra = group.algebra
-    name = f"({listed}) = x̃(G E_a G*) is a quadratic momentum map on an algebra of dimension {algebra.dimension}"
+    name = (
+        f"({coordinate_names}) = x̃(G E_a G*) is a quadratic momentum map on an algebra of dimension {algebra.dimension}"
+    )
     failing = [axiom for axiom, residuals in algebra.axioms() if any(residuals)]
     field = algebra.field
     for a, e in enumerate(algebra.basis):

@@ -117,7 +117,7 @@ def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool =
 def _integrated(
     weights: Sequence[Fraction], mixing: Sequence[Sequence[Fraction]], values: Sequence[Sequence[Fraction]]
 ) -> list[list[Fraction]]:
-    """Return μ diag(b) V: the integrals up to the stages of what a matrix V gives at the stages, in steps."""
+    """Return μ diag(b) V: integrals up to each stage, in units of the step, of functions with stage values V."""
     columns = list(zip(*values, strict=True))
     return [[sum((m * w * v for m, w, v in zip(row, weights, column, strict=True)), Fraction(0)) for column in columns]
             for row in mixing]  # fmt: skip
@@ -150,10 +150,10 @@ def _legendre_zero(n: int, k: int) -> Decimal:
 
     x = Decimal((1 - (n - 1) / (8 * n**3)) * math.cos(math.pi * (4 * k + 3) / (4 * n + 2)))
     for _ in range(12):
-        before, value = Decimal(1), x
+        previous, value = Decimal(1), x
         for m in range(1, n):
-            before, value = value, ((2 * m + 1) * x * value - m * before) / (m + 1)
-        slope = n * (x * value - before) / (x * x - 1)
+            previous, value = value, ((2 * m + 1) * x * value - m * previous) / (m + 1)
+        slope = n * (x * value - previous) / (x * x - 1)
         x -= value / slope
     return x
 
@@ -205,24 +205,24 @@ def _prediction(
     noise: Fraction,
 ) -> list[list[Fraction]]:
     """Return μ diag(b) W diag(1/b), where W extrapolates f from the stages of some last steps to those of the next."""
-    n, (width, past) = len(nodes), band
-    known = [c - back for back in range(1, past + 1) for c in nodes]
-    extrapolation = _extrapolation(known, nodes, width * n, noise)
+    n, (width, step_count) = len(nodes), band
+    known_times = [c - steps_back for steps_back in range(1, step_count + 1) for c in nodes]
+    extrapolation = _extrapolation(known_times, nodes, width * n, noise)
     return [[v / weights[j % n] for j, v in enumerate(row)] for row in _integrated(weights, mixing, extrapolation)]
 
 
 def _extrapolation(
-    known: Sequence[Fraction], times: Sequence[Fraction], band: Fraction, noise: Fraction
+    known_times: Sequence[Fraction], times: Sequence[Fraction], band: Fraction, noise: Fraction
 ) -> list[list[Fraction]]:
-    """Return for each time in ``times`` the weights of values at the times ``known``.
+    """Return for each time in ``times`` the weights of values at the times ``known_times``.
 
     They give the best linear prediction of a signal whose spectrum is flat up to a band limit, and zero beyond, from
     values with errors of the size ``noise``.
     """
-    rows = [[_sinc(band * (a - b)) + (noise**2 if a == b else 0) for b in known] for a in known]
-    sides = [[_sinc(band * (a - b)) for b in times] for a in known]
-    solved = _solved(rows, sides)
-    return [[solved[j][i] for j in range(len(known))] for i in range(len(times))]
+    rows = [[_sinc(band * (a - b)) + (noise**2 if a == b else 0) for b in known_times] for a in known_times]
+    sides = [[_sinc(band * (a - b)) for b in times] for a in known_times]
+    weights = _linear_solutions(rows, sides)
+    return [[weights[j][i] for j in range(len(known_times))] for i in range(len(times))]
 
 
 def _sinc(x: Fraction) -> Fraction:
@@ -235,7 +235,7 @@ def _sinc(x: Fraction) -> Fraction:
     return value
 
 
-def _solved(rows: Sequence[Sequence[Fraction]], sides: Sequence[Sequence[Fraction]]) -> list[list[Fraction]]:
+def _linear_solutions(rows: Sequence[Sequence[Fraction]], sides: Sequence[Sequence[Fraction]]) -> list[list[Fraction]]:
     """Return the solutions of linear equations for several right-hand sides, by elimination."""
     n = len(rows)
     table = [[*row, *side] for row, side in zip(rows, sides, strict=True)]
