@@ -40,13 +40,13 @@ class _NoBodiesError(Exception):
 
 def split_bodies(system: System, change: str) -> SplitHamiltonian:
     """Return the two parts of H in the relative coordinates of this name. Raises `SpecError`, located at the key."""
-    listed = hamiltonian_terms(system)
-    ring = ring_of(system, listed)
-    terms = [Term(e, ring.tower.convert(e)) for e in listed]
+    summands = hamiltonian_terms(system)
+    ring = ring_of(system, summands)
+    terms = [Term(e, ring.tower.convert(e)) for e in summands]
     try:
-        bodies, others = _bodies(ring, terms)
+        bodies, other_terms = _bodies(ring, terms)
         motions, remainder = CHANGES[change](bodies)
-        alone, coupled = _divided(ring, bodies, others)
+        alone, coupled = _commuting_terms(ring, bodies, other_terms)
         flow = Flow(motions.hamiltonian, tuple(motions.increments(ring.coordinates)), motions.manner, motion=motions)
         a = _with_others(ring, flow, alone)
         b = _remainder(system, ring, remainder, coupled, _positions(ring, bodies), moving=change != "jacobi")
@@ -75,59 +75,60 @@ def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[T
     body_of = {c: i for axis in axes for i, c in enumerate(axis)}
     momenta = [[conjugate(ring, c) for c in axis] for axis in axes]
     if missing := [c for axis in axes for c in axis if conjugate(ring, c) is None]:
-        why = f"{ring.coordinates[missing[0]]} has no canonical momentum p with {{q, p}} = 1, as velocities are none"
-        raise _NoBodiesError(f"{why}; poisson: {{canonical: {{q: […], p: […]}}}} has them")
+        reason = f"{ring.coordinates[missing[0]]} has no canonical momentum p with {{q, p}} = 1, as velocities are none"
+        raise _NoBodiesError(f"{reason}; poisson: {{canonical: {{q: […], p: […]}}}} has them")
     coefficients = ring.terms(ring.tower.combine(t.element for t in terms), ring.state)
-    known: set[Monomial] = set()
+    used_monomials: set[Monomial] = set()
     strengths: dict[tuple[int, int], Expression] = {}
     for d in distances:
         monomial = _power(ring, d.variable, 1)
-        ends = {(body_of[b], body_of[a]) for a, b in d.pairs}
-        if monomial not in coefficients or len(ends) > 1 or len(d.pairs) < len(axes):
+        body_pairs = {(body_of[b], body_of[a]) for a, b in d.pairs}
+        if monomial not in coefficients or len(body_pairs) > 1 or len(d.pairs) < len(axes):
             continue
-        known.add(monomial)
-        strengths[ends.pop()] = ring.expression(-coefficients[monomial])
+        used_monomials.add(monomial)
+        strengths[body_pairs.pop()] = ring.expression(-coefficients[monomial])
     masses = []
     for i in range(len(axes[0])):
         places = [ring.tower.names.index(ring.coordinates[axis[i] or 0]) for axis in momenta]
-        squares = [_power(ring, place, 2) for place in places]
+        squares = [_power(ring, position, 2) for position in places]
         weights: list[Poly] = [coefficients.get(square, ring.tower.zero) for square in squares]
         name = ring.coordinates[axes[0][i]]
         if weights[0] == 0 or any(weight != weights[0] for weight in weights):
             raise _NoBodiesError(f"the body at {name} has no kinetic energy p**2/(2*m)")
         if i and not any((i, j) in strengths for j in range(i)):
             raise _NoBodiesError(f"the body at {name} is not attracted by those before it")
-        known.update(squares)
+        used_monomials.update(squares)
         masses.append(power(ring.expression(2 * weights[0]), -1))
     positions, conjugates = (
-        tuple(zip(*([ring.coordinates[c or 0] for c in axis] for axis in of), strict=True)) for of in (axes, momenta)
+        tuple(zip(*([ring.coordinates[c or 0] for c in axis] for axis in names), strict=True))
+        for names in (axes, momenta)
     )
     bodies = AttractingBodies(positions, conjugates, tuple(masses), strengths)
-    return bodies, [t for t in terms if not known.issuperset(ring.terms(t.element, ring.state))]
+    return bodies, [t for t in terms if not used_monomials.issuperset(ring.terms(t.element, ring.state))]
 
 
 def _distance(ring: Ring, generator: Generator) -> _Distance | None:
     """Return the distance of a generator, if its argument is a sum of squares of differences of two coordinates."""
     (argument,) = generator.arguments
-    inside, tower = ring.support(argument), ring.tower
+    support, tower = ring.support(argument), ring.tower
     pairs = []
     for monomial, coefficient in ring.terms(argument, ring.state).items():
-        places = [v for v, exponent in enumerate(monomial) if exponent]
-        if len(places) == 2 and coefficient == -2:
-            a, b = (ring.coordinates.index(tower.names[v]) for v in places)
+        variables = [v for v, exponent in enumerate(monomial) if exponent]
+        if len(variables) == 2 and coefficient == -2:
+            a, b = (ring.coordinates.index(tower.names[v]) for v in variables)
             pairs.append((min(a, b), max(a, b)))
     squares = tower.combine(
         (tower.variable(ring.coordinates[a]) - tower.variable(ring.coordinates[b])) ** 2 for a, b in pairs
     )
-    return _Distance(tower.names.index(generator.name), tuple(pairs)) if inside and argument == squares else None
+    return _Distance(tower.names.index(generator.name), tuple(pairs)) if support and argument == squares else None
 
 
 def _axes(pairs: Iterator[tuple[int, int]]) -> list[list[int]]:
     """Return the coordinates along each axis, which differences connect, in the order of the coordinates."""
     axes: list[set[int]] = []
     for pair in pairs:
-        joined = {*pair}.union(*(axis for axis in axes if not axis.isdisjoint(pair)))
-        axes = [*(axis for axis in axes if axis.isdisjoint(pair)), joined]
+        merged = {*pair}.union(*(axis for axis in axes if not axis.isdisjoint(pair)))
+        axes = [*(axis for axis in axes if axis.isdisjoint(pair)), merged]
     return sorted(map(sorted, axes))
 
 
@@ -135,12 +136,14 @@ def _power(ring: Ring, variable: int, exponent: int) -> Monomial:
     return tuple(exponent * (k == variable) for k in range(len(ring.tower.gens)))
 
 
-def _divided(ring: Ring, bodies: AttractingBodies, others: Sequence[Term]) -> tuple[list[Term], list[Term]]:
+def _commuting_terms(
+    ring: Ring, bodies: AttractingBodies, other_terms: Sequence[Term]
+) -> tuple[list[Term], list[Term]]:
     """Return the terms that commute with all coordinates of the bodies, and the others."""
-    inside = {ring.coordinates.index(name) for name in bodies.names}
-    partners = {j for i in inside for j in (i, *ring.brackets_of[i])}
-    alone = [t for t in others if partners.isdisjoint(ring.support(t.element))]
-    return alone, [t for t in others if t not in alone]
+    body_coordinates = {ring.coordinates.index(name) for name in bodies.names}
+    partners = {j for i in body_coordinates for j in (i, *ring.brackets_of[i])}
+    alone = [t for t in other_terms if partners.isdisjoint(ring.support(t.element))]
+    return alone, [t for t in other_terms if t not in alone]
 
 
 def _with_others(ring: Ring, flow: Flow, terms: Sequence[Term]) -> Flow:
@@ -165,22 +168,22 @@ def _remainder(
 ) -> Flow | None:
     """Return the flow of B, or None where B is 0; a ``moving`` remainder contains momenta."""
     shifting = [t for t in terms if positions.issuperset(ring.support(t.element))]
-    others = [t for t in terms if t not in shifting]
+    other_terms = [t for t in terms if t not in shifting]
     if moving and not remainder.is_zero and terms:
         raise _NoBodiesError(f"the further term {shortened(terms[0].expression)} may not commute with p_0**2/(2*m_0)")
     h = total([remainder, *(t.expression for t in shifting)])
-    if h.is_zero and not others:
+    if h.is_zero and not other_terms:
         return None
     if h.is_zero:
-        return _flow(ring, others)
-    for term in others:
+        return _flow(ring, other_terms)
+    for term in other_terms:
         if decide_zero("", [("", bracket(system, h, term.expression))]).verdict != PROVED:
             raise _NoBodiesError(f"the further term {shortened(term.expression)} does not commute with the attractions")
     slope = gradient(symbol(TIME) * h, system.coordinates)
-    moved = hamiltonian_vector_field(system.poisson, slope)
-    names = [c for c, e in zip(system.coordinates, moved, strict=True) if not e.is_zero]
-    flow = Flow(h, tuple(moved), f"{', '.join(names)} {SHIFTED}")
-    return _with_others(ring, flow, others)
+    field = hamiltonian_vector_field(system.poisson, slope)
+    names = [c for c, e in zip(system.coordinates, field, strict=True) if not e.is_zero]
+    flow = Flow(h, tuple(field), f"{', '.join(names)} {SHIFTED}")
+    return _with_others(ring, flow, other_terms)
 
 
 def _positions(ring: Ring, bodies: AttractingBodies) -> frozenset[int]:

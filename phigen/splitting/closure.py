@@ -65,14 +65,14 @@ def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
 
 
 def _closed(
-    ring: Ring, rates: Mapping[int, Poly], start: Monomial, known: Mapping[Monomial, Row]
+    ring: Ring, rates: Mapping[int, Poly], start: Monomial, known_rows: Mapping[Monomial, Row]
 ) -> dict[Monomial, Row] | None:
     """Return the rows of all monomials in the repeated derivatives of one; None if there seem to be infinitely many."""
     rows: dict[Monomial, Row] = {}
     pending = [start]
     while pending:
         m = pending.pop()
-        if m in rows or m in known:
+        if m in rows or m in known_rows:
             continue
         limit = MOST_COORDINATES if all(sum(k) <= 1 for k in (*rows, m)) else MOST_MONOMIALS
         if len(rows) >= limit or sum(m) > MOST_DEGREE:
@@ -87,8 +87,8 @@ def _row(ring: Ring, rates: Mapping[int, Poly], m: Monomial) -> Row:
     parts = []
     for v, rate in rates.items():
         if m[v]:
-            rest = ring.monomial((*m[:v], m[v] - 1, *m[v + 1 :]))
-            parts.append(m[v] * rest * rate)
+            cofactor = ring.monomial((*m[:v], m[v] - 1, *m[v + 1 :]))
+            parts.append(m[v] * cofactor * rate)
     terms = ring.terms(ring.tower.combine(parts), rates)
     return {k: c for k, c in terms.items() if not ring.tower.is_zero(c)}
 
@@ -98,7 +98,7 @@ def _motions(ring: Ring, rows: Mapping[Monomial, Row], starts: Mapping[Monomial,
     label = {m: k for k, m in enumerate(rows) if any(m)}
     for m, row in rows.items():
         merged = {label[k] for k in (m, *row) if any(k)}
-        label = {k: min(merged) if old in merged else old for k, old in label.items()}
+        label = {k: min(merged) if old_label in merged else old_label for k, old_label in label.items()}
     for label_of_system in sorted(set(label.values())):
         monomials = [m for m in rows if label.get(m) == label_of_system]
         basis = sorted((m for m in monomials if m in starts), key=lambda m: starts[m])

@@ -106,10 +106,10 @@ def coloured(neighbours: Sequence[set[int]], supports: Sequence[Collection[int]]
     while uncoloured:
         i = max(uncoloured, key=lambda i: (len(neighbour_colours[i]), len(neighbours[i]), -i))
         uncoloured.remove(i)
-        shared = [sum(users[k] for k in supports[i]) for users in sharing]
-        free = [c for c in range(len(sharing)) if c not in neighbour_colours[i]]
-        colours[i] = max(free, key=lambda c: (shared[c], -c)) if free else len(sharing)
-        if not free:
+        usage = [sum(users[k] for k in supports[i]) for users in sharing]
+        free_colours = [c for c in range(len(sharing)) if c not in neighbour_colours[i]]
+        colours[i] = max(free_colours, key=lambda c: (usage[c], -c)) if free_colours else len(sharing)
+        if not free_colours:
             sharing.append(Counter())
         sharing[colours[i]].update(supports[i])
         for j in neighbours[i]:

@@ -42,11 +42,11 @@ def exponential_less_one(a: NDArray[np.float64]) -> NDArray[np.float64]:
     squarings = 0
     while norm > MAX_PADE_NORM:
         norm, squarings = norm / 2, squarings + 1
-    c, a, one = [float(v) for v in PADE], a * 0.5**squarings, np.eye(n)
+    c, a, identity = [float(v) for v in PADE], a * 0.5**squarings, np.eye(n)
     b = a @ a
-    even = ((c[6] * b + c[4] * one) @ b + c[2] * one) @ b + one
-    odd = a @ ((c[5] * b + c[3] * one) @ b + c[1] * one)
-    f = np.linalg.solve(even - odd, 2 * odd)
+    even_part = ((c[6] * b + c[4] * identity) @ b + c[2] * identity) @ b + identity
+    odd = a @ ((c[5] * b + c[3] * identity) @ b + c[1] * identity)
+    f = np.linalg.solve(even_part - odd, 2 * odd)
     for _ in range(squarings):
         f = 2 * f + f @ f
     return np.asarray(f)

@@ -68,8 +68,8 @@ class EulerMotion:
         yield from identities()
 
     def _placed(self, names: Sequence[str], values: Vector) -> list[Expression]:
-        placed = dict(zip(self.coordinates, values, strict=True))
-        return [placed.get(name, ZERO) for name in names]
+        values_by_name = dict(zip(self.coordinates, values, strict=True))
+        return [values_by_name.get(name, ZERO) for name in names]
 
 
 @dataclass(frozen=True)
@@ -101,13 +101,13 @@ class Addition:
         """Return the changes of the x_i."""
         s, c, _ = functions_of(self.kappa, self.p, self.r)
         low, _, high = self.sorted(self.levels)
-        above, below = [e - low for e in self.levels], [high - e for e in self.levels]
+        gaps_below, gaps_above = [e - low for e in self.levels], [high - e for e in self.levels]
         square, z = s**2, self.p * self.kappa**2
-        roots = [sqrt(c**2 + e * square) for e in above]
+        roots = [sqrt(c**2 + e * square) for e in gaps_below]
         # On the separatrix C > 0, but may be negative by rounding.
         sigma = self._at_lowest([call("choose", self.r, c, root) for root in roots], roots)
         versine = 8 * z * power(1 + z, -2)  # 1 − C
-        losses = self._at_lowest([versine] * 3, [d * square / (1 + r) for d, r in zip(below, roots, strict=True)])
+        losses = self._at_lowest([versine] * 3, [d * square / (1 + r) for d, r in zip(gaps_above, roots, strict=True)])
         divisor = c**2 - low * square
         # Where D is small, 1 − σ_j and 1 − σ_k are not.
         gaps = [
@@ -124,8 +124,10 @@ class Addition:
         second, third, _ = self.conditions
         first_two = ((chosen[0], others[0]), (others[1], chosen[1]))
         pairs = zip(first_two, others[:2], strict=True)
-        placed = [call("choose", third, call("choose", second, *values), other) for values, other in pairs]
-        return [*placed, call("choose", third, others[2], chosen[2])]
+        selected = [
+            call("choose", third, call("choose", second, *values), alternative) for values, alternative in pairs
+        ]
+        return [*selected, call("choose", third, others[2], chosen[2])]
 
 
 def levels_of(x: Vector, factors: Vector) -> list[Expression]:
@@ -146,8 +148,8 @@ def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Express
     """Return three values in the order of the E_i with these conditions, the lowest first."""
     second, third, last = conditions
     lower, upper = call("choose", second, *values[:2]), call("choose", second, values[1], values[0])
-    low, rest = call("choose", third, lower, values[2]), call("choose", third, values[2], lower)
-    return low, call("choose", last, rest, upper), call("choose", last, upper, rest)
+    low, upper_pair = call("choose", third, lower, values[2]), call("choose", third, values[2], lower)
+    return low, call("choose", last, upper_pair, upper), call("choose", last, upper, upper_pair)
 
 
 def _ends(
@@ -174,7 +176,7 @@ def identities() -> Iterator[tuple[str, Expression]]:
     of 1 − (E_m − E_j)S². The factors σ_j σ_k − D are compared with their form for small S.
     """
     names = [Symbol("body", kind, i) for kind in ("x", "a") for i in range(3)]
-    x, factors = ([symbol(name) for name in of] for of in (names[:3], names[3:]))
+    x, factors = ([symbol(name) for name in symbol_names] for symbol_names in (names[:3], names[3:]))
     name = Symbol("body", "S")
     s, levels = symbol(name), levels_of(x, factors)
     for m, (j, k) in enumerate(CYCLIC):
@@ -185,9 +187,9 @@ def identities() -> Iterator[tuple[str, Expression]]:
             u, v = 1 - sigma[a], 1 - sigma[b]
             yield f"σ_{a + 1} σ_{b + 1} - D", levels[m] * s**2 - (u + v - u * v) - gap
         changes = _ends(x, factors, sigma, s, divisor, gaps)
-        ends = [e + change for e, change in zip(x, changes, strict=True)]
+        end_values = [e + change for e, change in zip(x, changes, strict=True)]
         for i, (slope, (a, b)) in enumerate(zip(derivatives(changes, name), CYCLIC, strict=True)):
-            yield f"dx_{i + 1}'/dt", slope * (sigma[j] * sigma[k]) - factors[i] * ends[a] * ends[b]
+            yield f"dx_{i + 1}'/dt", slope * (sigma[j] * sigma[k]) - factors[i] * end_values[a] * end_values[b]
     yield from _function_identities()
 
 

@@ -120,7 +120,7 @@ def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
     further = None if e is None else _quotients(ring, images[a], e ** (a + 1))
     if root is not None and directed is not None and further is not None:
         angle = root.scale * ring.expression(root.element * ring.tower.variable(TIME))
-        units = [[v / root.scale**k for v in listed] for k, listed in ((a, directed), (a + 1, further))]
+        units = [[v / root.scale**k for v in entries] for k, entries in ((a, directed), (a + 1, further))]
         first = [ring.expression(v) for v in images[0]]
         return _circular(first, units, angle, a) if root.positive else _hyperbolic(first, units, angle, a)
     return _without_quotients(ring, powers[0], images, -c, a)
@@ -132,15 +132,15 @@ def _without_quotients(
     """Return the solution by functions of s = ct²: sin and 1 − cos of the angle √s from those of its half."""
     t, s = symbol(TIME), ring.expression(c * ring.tower.variable(TIME) ** 2)
     if a == 1:
-        return _turned(ring, matrix, images, s)
+        return _solution_of_scaled_matrix(ring, matrix, images, s)
     first, second, third = ([ring.expression(v) for v in image] for image in images[:3])
     speed = t * call("sinroot", s / 4)
-    versine, rest = _HALF * speed**2, t**3 * call("arcroot", s)
-    increments = tuple(t * u + (versine * v + rest * w) for u, v, w in zip(first, second, third, strict=True))
+    versine, arc_rest = _HALF * speed**2, t**3 * call("arcroot", s)
+    increments = tuple(t * u + (versine * v + arc_rest * w) for u, v, w in zip(first, second, third, strict=True))
     return Solution(increments, "turned and shifted")
 
 
-def _turned(ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], s: Expression) -> Solution:
+def _solution_of_scaled_matrix(ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], s: Expression) -> Solution:
     """Return the solution for a = 1, with A = fM: the static factor f of all entries multiplies the time.
 
     M²w is computed as M times Mw where that takes fewer operations than its entries, as for cross products.
@@ -149,8 +149,8 @@ def _turned(ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], s: Exp
     once = [ring.expression(v / factor) for v in images[0]]
     twice = [ring.expression(v / factor**2) for v in images[1]]
     rows = [[ring.expression(e / factor) for e in row] for row in matrix]
-    again = [total(e * v for e, v in zip(row, once, strict=True)) for row in rows]
-    twice = min(twice, again, key=lambda entries: len(list(topological(entries))))
+    second_images = [total(e * v for e, v in zip(row, once, strict=True)) for row in rows]
+    twice = min(twice, second_images, key=lambda entries: len(list(topological(entries))))
     speed = symbol(TIME) * ring.expression(factor) * call("sinroot", s / 4)
     sine, versine = speed * call("cosroot", s / 4), _HALF * speed**2
     return Solution(tuple(sine * u + versine * v for u, v in zip(once, twice, strict=True)), "turned")
@@ -172,8 +172,8 @@ def _circular(
     sine, versine = call("sin", angle), call("versin", angle)
     if a == 1:
         return Solution(tuple(sine * u + versine * v for u, v in zip(*units, strict=True)), "turned")
-    rest, t = angle - sine, symbol(TIME)
-    increments = tuple(t * f + (versine * u + rest * v) for f, u, v in zip(first, *units, strict=True))
+    difference, t = angle - sine, symbol(TIME)
+    increments = tuple(t * f + (versine * u + difference * v) for f, u, v in zip(first, *units, strict=True))
     return Solution(increments, "turned and shifted")
 
 
@@ -186,8 +186,8 @@ def _hyperbolic(
         increments = tuple(2 * s * (c * u + s * v) for u, v in zip(*units, strict=True))
         return Solution(increments, "moved along hyperbolas")
     sine, versine, t = 2 * s * c, 2 * s**2, symbol(TIME)
-    rest = sine - angle
-    increments = tuple(t * f + (versine * u + rest * v) for f, u, v in zip(first, *units, strict=True))
+    difference = sine - angle
+    increments = tuple(t * f + (versine * u + difference * v) for f, u, v in zip(first, *units, strict=True))
     return Solution(increments, "moved along hyperbolas and shifted")
 
 
@@ -214,7 +214,7 @@ def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
     if any(x != 0 and y == 0 for x, y in pairs):
         return None
     divided = [divmod(x, y) for x, y in pairs if y != 0]
-    candidates = [quotient for quotient, rest in divided if rest == 0][:1]
+    candidates = [quotient for quotient, remainder in divided if remainder == 0][:1]
     candidates += [guess[i][i] for i in range(len(guess)) if guess[i][i] != 0]
     return next((d for d in candidates if all(ring.tower.is_zero(x - d * y) for x, y in pairs)), None)
 
@@ -222,7 +222,11 @@ def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
 def _quotients(ring: Ring, elements: Sequence[Poly], divisor: Poly) -> list[Expression] | None:
     """Return the elements over the divisor, if all quotients are in the ring."""
     divided = [divmod(e, divisor) for e in elements]
-    return None if any(rest != 0 for _, rest in divided) else [ring.expression(quotient) for quotient, _ in divided]
+    return (
+        None
+        if any(remainder != 0 for _, remainder in divided)
+        else [ring.expression(quotient) for quotient, _ in divided]
+    )
 
 
 @dataclass(frozen=True)

@@ -104,9 +104,9 @@ def flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool = True) -> Flow:
     """
     motions = [_flow_of_motion(ring, term, term.motion) for term in terms if term.motion]
     if motions:
-        others = [term for term in terms if not term.motion]
-        pieces = [*motions, *([flow_of(ring, others)] if others else [])]
-        return pieces[0] if len(pieces) == 1 else replace(composed(ring.coordinates, pieces), pieces=tuple(pieces))
+        remaining = [term for term in terms if not term.motion]
+        flows = [*motions, *([flow_of(ring, remaining)] if remaining else [])]
+        return flows[0] if len(flows) == 1 else replace(composed(ring.coordinates, flows), pieces=tuple(flows))
     admitted = (CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES) if numeric else (CLOSED_FORMS,)
     for methods in admitted[:-1]:
         try:
@@ -153,10 +153,10 @@ def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:
         point = {c: symbol(c) + e for c, e in zip(coordinates, so_far, strict=True) if not e.is_zero}
         so_far = [e + m for e, m in zip(so_far, substitute(flow.increment, point), strict=True)]
     manner = "; then ".join(f.manner for f in ordered)
-    pieces = tuple(ordered) if len(ordered) > 1 else ()
+    factors = tuple(ordered) if len(ordered) > 1 else ()
     exponentials = tuple(e for f in ordered for e in f.exponentials)
     hamiltonian = total(f.hamiltonian for f in ordered)
-    return Flow(hamiltonian, tuple(so_far), manner, pieces=pieces, exponentials=exponentials)
+    return Flow(hamiltonian, tuple(so_far), manner, pieces=factors, exponentials=exponentials)
 
 
 def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, methods: int = CLOSED_FORMS) -> Flow | str:
@@ -195,12 +195,12 @@ def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False, methods: 
     Linear first integrals are substituted where that helps. The field need not be that of a Hamiltonian. ``linear``
     and ``methods`` are those of `joint_flow`.
     """
-    direct = _solved(ring, field, linear)
+    direct = _increments(ring, field, linear)
     if not isinstance(direct, str):
         return direct
     alternative = None if linear else _nonlinear(ring, field)
     if alternative is None and methods > CLOSED_FORMS:
-        numerical = _solved(ring, field, linear, methods)
+        numerical = _increments(ring, field, linear, methods)
         alternative = None if isinstance(numerical, str) else numerical
     return alternative or direct
 
@@ -220,7 +220,7 @@ def _on_sphere(ring: Ring, field: Sequence[Poly]) -> Solved | None:
     return Solved([increments.get(i, ZERO) for i in range(len(field))], f"{names} {manner}", ())
 
 
-def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False, methods: int = CLOSED_FORMS) -> Solved | str:
+def _increments(ring: Ring, field: Sequence[Poly], linear: bool = False, methods: int = CLOSED_FORMS) -> Solved | str:
     """Return the increments along a vector field, or the reason why there are none."""
     motion = motion_of(ring, field)
     increments: list[Expression] = [ZERO] * len(ring.coordinates)
@@ -238,40 +238,45 @@ def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False, methods: in
         except NoClosedFormError as error:
             static = matrices.solve(ring, equations) if methods >= EXPONENTIALS else None
             if static:
-                increments = _placed(increments, equations.coordinates, static.increments)
+                increments = _with_replacements(increments, equations.coordinates, static.increments)
                 manners.setdefault(BY_MATRIX, []).extend(equations.coordinates)
                 exponentials.append(static.exponential)
                 continue
-            small = small_matrices.solve(ring, equations) if methods >= SMALL_MATRICES else None
-            if small:
-                increments = _placed(increments, equations.coordinates, small.increments)
-                manners.setdefault(small.manner, []).extend(equations.coordinates)
+            closed_form = small_matrices.solve(ring, equations) if methods >= SMALL_MATRICES else None
+            if closed_form:
+                increments = _with_replacements(increments, equations.coordinates, closed_form.increments)
+                manners.setdefault(closed_form.manner, []).extend(equations.coordinates)
                 continue
             names = ", ".join(ring.coordinates[i] for i in equations.coordinates)
             return f"phigen has no closed form for the motion of {names} along its flow: {error}"
-        increments = _placed(increments, equations.coordinates, solution.increments)
+        increments = _with_replacements(increments, equations.coordinates, solution.increments)
         manners.setdefault(solution.manner, []).extend(equations.coordinates)
-    descriptions = [f"{', '.join(ring.coordinates[i] for i in moved)} {manner}" for manner, moved in manners.items()]
+    descriptions = [
+        f"{', '.join(ring.coordinates[i] for i in changed_indices)} {manner}"
+        for manner, changed_indices in manners.items()
+    ]
     shifted = tuple(manners.get(exponential.SHIFTED, ()))
     return Solved(increments, "; ".join(descriptions) or "nothing moves", shifted, tuple(exponentials))
 
 
-def _placed(increments: Sequence[Expression], places: Sequence[int], values: Sequence[Expression]) -> list[Expression]:
+def _with_replacements(
+    increments: Sequence[Expression], places: Sequence[int], values: Sequence[Expression]
+) -> list[Expression]:
     """Return the increments with those of some coordinates replaced."""
-    known = dict(zip(places, values, strict=True))
-    return [known.get(i, e) for i, e in enumerate(increments)]
+    replacements = dict(zip(places, values, strict=True))
+    return [replacements.get(i, e) for i, e in enumerate(increments)]
 
 
 def _with_integrals(ring: Ring, field: Sequence[Poly]) -> Solved | None:
     """Return the increments with linear first integrals substituted as constants, or None."""
     smaller = reduced(ring, field)
-    solution = None if smaller is None else _solved(smaller.ring, smaller.field)
+    solution = None if smaller is None else _increments(smaller.ring, smaller.field)
     if smaller is None or solution is None or isinstance(solution, str):
         return None
     changes = substitute(solution.increments, smaller.integrals)
-    along = dict(zip(ring.coordinates, changes, strict=True))
+    change_of = dict(zip(ring.coordinates, changes, strict=True))
     for i, form in smaller.forms.items():
-        changes[i] = -substitute([form], along)[0]
+        changes[i] = -substitute([form], change_of)[0]
     names = ", ".join(ring.coordinates[i] for i in smaller.forms)
     return Solved(changes, f"{solution.manner}; {names} by linear integrals", ())
 
@@ -289,7 +294,7 @@ def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
     name = Symbol("integral", "factor")
     rates = [symbol(name) * ring.tower.expression(f / factor) for f in field]
     tower = Tower([*(s for s in ring.tower.symbols if s != TIME), name, TIME], rates, ring.tower.variables)
-    solution = _solved(replace(ring, tower=tower, poisson=()), tower.convert_all(rates))
+    solution = _increments(replace(ring, tower=tower, poisson=()), tower.convert_all(rates))
     if isinstance(solution, str):
         return None
     return replace(solution, increments=substitute(solution.increments, {name: ring.expression(factor)}), shifted=())
@@ -301,8 +306,8 @@ def _as_written(ring: Ring, g: Expression, solution: Solved) -> list[Expression]
     An example is g = (x − y)⁴.
     """
     slope = gradient(symbol(TIME) * g, ring.coordinates)
-    written = hamiltonian_vector_field(ring.brackets, slope)
-    mixed = [written[i] if i in solution.shifted else e for i, e in enumerate(solution.increments)]
+    field = hamiltonian_vector_field(ring.brackets, slope)
+    mixed = [field[i] if i in solution.shifted else e for i, e in enumerate(solution.increments)]
     return min(solution.increments, mixed, key=lambda increments: _operations(ring, increments))
 
 

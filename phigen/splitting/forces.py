@@ -43,23 +43,23 @@ def force_flows(system: System) -> tuple[Flow, ...]:
     try:
         closed = _closed_flows(system, forces)
     except SpecError:
-        whole = _flow(system, field, SMALL_MATRICES)
-        if isinstance(whole, Flow):
-            return (whole,)
+        common_flow = _flow(system, field, SMALL_MATRICES)
+        if isinstance(common_flow, Flow):
+            return (common_flow,)
         raise
-    whole = closed[0] if len(closed) == 1 else _flow(system, field, EXPONENTIALS)
-    return (whole,) if isinstance(whole, Flow) else closed
+    common_flow = closed[0] if len(closed) == 1 else _flow(system, field, EXPONENTIALS)
+    return (common_flow,) if isinstance(common_flow, Flow) else closed
 
 
 def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
     """Return the flows of the forces in closed form, with as few summands as possible."""
     tangent = hamiltonian_vector_field(system.poisson, forces.covector)
-    whole = _flow(system, tuple(a + b for a, b in zip(tangent, forces.vector, strict=True)))
-    if isinstance(whole, Flow):
-        return (whole,)
+    common_flow = _flow(system, tuple(a + b for a, b in zip(tangent, forces.vector, strict=True)))
+    if isinstance(common_flow, Flow):
+        return (common_flow,)
     return (
         *_tangent_flows(system, forces, tangent),
-        *_pieces(system, forces.vector, list(_components(forces.vector)), ("forces", "vector")),
+        *_summand_flows(system, forces.vector, list(_components(forces.vector)), ("forces", "vector")),
     )
 
 
@@ -67,13 +67,16 @@ def _tangent_flows(system: System, forces: Forces, tangent: Field) -> tuple[Flow
     """Return the flows of πζ: one flow, one for each covector, or those of damping and of the other covectors."""
     try:
         covectors = list(_covectors(system, forces.covector))
-        return tuple(_pieces(system, tangent, covectors, ("forces", "covector"), ("damping",)))
+        return tuple(_summand_flows(system, tangent, covectors, ("forces", "covector"), ("damping",)))
     except SpecError:
         if forces.damping.is_zero:
             raise
     undamped = hamiltonian_vector_field(system.poisson, forces.undamped)
     covectors = list(_covectors(system, forces.undamped))
-    return (*_damping_flows(system, forces.damping), *_pieces(system, undamped, covectors, ("forces", "covector")))
+    return (
+        *_damping_flows(system, forces.damping),
+        *_summand_flows(system, undamped, covectors, ("forces", "covector")),
+    )
 
 
 def _damping_flows(system: System, damping: Expression) -> list[Flow]:
@@ -82,20 +85,29 @@ def _damping_flows(system: System, damping: Expression) -> list[Flow]:
         flow for block in blocks(system.coordinates, system.poisson) for flow in _damped_block(system, damping, block)
     ]
     updated = [{k for k, e in enumerate(flow.increment) if not e.is_zero} for flow in flows]
-    read = [{k for k, c in enumerate(system.coordinates) if c in symbols_of(*flow.increment)} for flow in flows]
+    read_coordinates = [
+        {k for k, c in enumerate(system.coordinates) if c in symbols_of(*flow.increment)} for flow in flows
+    ]
     neighbours = [
-        {j for j in range(len(flows)) if j != i and (updated[i] & read[j] or updated[j] & read[i])}
+        {
+            j
+            for j in range(len(flows))
+            if j != i and (updated[i] & read_coordinates[j] or updated[j] & read_coordinates[i])
+        }
         for i in range(len(flows))
     ]
     colours = coloured(neighbours, updated)
-    return [_joined([f for f, k in zip(flows, colours, strict=True) if k == colour]) for colour in sorted(set(colours))]
+    return [
+        _merged_flows([f for f, k in zip(flows, colours, strict=True) if k == colour])
+        for colour in sorted(set(colours))
+    ]
 
 
-def _joined(flows: Sequence[Flow]) -> Flow:
+def _merged_flows(flows: Sequence[Flow]) -> Flow:
     """Return flows that neither update nor read what the others update, as one flow."""
     increment, force = (
-        tuple(total(entries) for entries in zip(*listed, strict=True))
-        for listed in ([f.increment for f in flows], [f.force for f in flows])
+        tuple(total(entries) for entries in zip(*vectors, strict=True))
+        for vectors in ([f.increment for f in flows], [f.force for f in flows])
     )
     return Flow(ZERO, increment, "; ".join(f.manner for f in flows), force=force)
 
@@ -107,13 +119,17 @@ def _damped_block(system: System, damping: Expression, block: Sequence[int]) -> 
     variables = [
         v for v in ring.state if ring.tower.depends_on(ring.tower.gens[v], [system.coordinates[i] for i in block])
     ]
-    constant, rest = [ZERO] * system.dimension, [ZERO] * system.dimension
+    constant, remainder = [ZERO] * system.dimension, [ZERO] * system.dimension
     for i in block:
         parts = ring.terms(ring.tower.convert(slopes[i]), variables)
         constant[i] = ring.expression(parts.pop((0,) * len(ring.tower.gens), ring.tower.zero))
-        rest[i] = total(ring.expression(c * ring.monomial(m)) for m, c in parts.items())
-    single = [[e if k == i else ZERO for k in range(system.dimension)] for i, e in enumerate(rest)]
-    for summands in ([[a + b for a, b in zip(constant, rest, strict=True)]], [constant, rest], [constant, *single]):
+        remainder[i] = total(ring.expression(c * ring.monomial(m)) for m, c in parts.items())
+    single = [[e if k == i else ZERO for k in range(system.dimension)] for i, e in enumerate(remainder)]
+    for summands in (
+        [[a + b for a, b in zip(constant, remainder, strict=True)]],
+        [constant, remainder],
+        [constant, *single],
+    ):
         flows = [_damped(system, damping, b) for b in summands if any(not e.is_zero for e in b)]
         if all(isinstance(flow, Flow) for flow in flows):
             yield from (flow for flow in flows if isinstance(flow, Flow) and flow.moving)
@@ -143,16 +159,16 @@ def _components(vector: Sequence[Expression]) -> Iterator[tuple[str, Field]]:
             yield f"f = {shortened(f)}", tuple(f if k == i else ZERO for k in range(len(vector)))
 
 
-def _pieces(
+def _summand_flows(
     system: System, field: Field, summands: Sequence[tuple[str, Field]], *keys: tuple[str, ...]
 ) -> Iterator[Flow]:
     """Yield the flow of a field or, where it is not elementary, the flows of its summands.
 
     ``keys`` are the keys of the spec that may have defined the field.
     """
-    whole = _flow(system, field) if summands else ""
-    if isinstance(whole, Flow):
-        yield whole
+    common_flow = _flow(system, field) if summands else ""
+    if isinstance(common_flow, Flow):
+        yield common_flow
         return
     for name, summand in summands:
         flow = _flow(system, summand)

@@ -37,15 +37,17 @@ def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
     fields = [_field_monomials(ring, t) for t in terms]
     users: dict[_Place, list[int]] = {}
     for k, field in enumerate(fields):
-        for place in field:
-            users.setdefault(place, []).append(k)
+        for monomial in field:
+            users.setdefault(monomial, []).append(k)
     label = list(range(len(terms)))
-    for place, sharing in users.items():
+    for monomial, sharing in users.items():
         for n, a in enumerate(sharing):
             for b in sharing[:n]:
-                if label[a] != label[b] and fields[a][place] + fields[b][place] == 0:
-                    label = [label[b] if old == label[a] else old for old in label]
-    classes = [[t for t, k in zip(terms, label, strict=True) if k == chosen] for chosen in dict.fromkeys(label)]
+                if label[a] != label[b] and fields[a][monomial] + fields[b][monomial] == 0:
+                    label = [label[b] if old_label == label[a] else old_label for old_label in label]
+    classes = [
+        [t for t, k in zip(terms, label, strict=True) if k == class_label] for class_label in dict.fromkeys(label)
+    ]
     sums = [t for group in classes for t in (_sum_with_flow(ring, group) or group)]
     return sums if len(sums) < len(terms) else None
 
@@ -72,18 +74,18 @@ def _with_linear(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
     """Return the terms, with a sum of those that are linear in an algebra, unless all of these commute."""
     algebra = _algebra(ring)
     linear: list[Term] = []
-    others: list[Term] = []
+    other_terms: list[Term] = []
     for term in terms:
-        pieces = monomial_terms(ring, term.element)
-        linear_pieces = [p for p in pieces if _is_linear(ring, p.element, algebra)]
+        monomials = monomial_terms(ring, term.element)
+        linear_pieces = [p for p in monomials if _is_linear(ring, p.element, algebra)]
         linear += linear_pieces
-        if len(linear_pieces) < len(pieces):
-            rest = ring.tower.combine([term.element, *(-p.element for p in linear_pieces)])
-            others.append(Term(ring.expression(rest), rest) if linear_pieces else term)
+        if len(linear_pieces) < len(monomials):
+            remainder = ring.tower.combine([term.element, *(-p.element for p in linear_pieces)])
+            other_terms.append(Term(ring.expression(remainder), remainder) if linear_pieces else term)
     if all(ring.commute(a.element, b.element) for n, a in enumerate(linear) for b in linear[:n]):
         return None
     sum_of_linear = _sum_with_flow(ring, linear)
-    return [*others, *sum_of_linear] if sum_of_linear else None
+    return [*other_terms, *sum_of_linear] if sum_of_linear else None
 
 
 def _algebra(ring: Ring) -> frozenset[int]:

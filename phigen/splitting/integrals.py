@@ -40,12 +40,12 @@ def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
     integrals: dict[str, Expression] = {}
     for relation in relations:  # a relation is 1 at its last place, where the other relations are 0
         pivot = moving[max(relation)]
-        others = total(
+        other_terms = total(
             number(rational(c)) * symbol(ring.coordinates[moving[k]]) for k, c in relation.items() if moving[k] != pivot
         )
         name = Symbol("integral", ring.coordinates[pivot])
-        integrals[name] = symbol(ring.coordinates[pivot]) + others
-        forms[pivot] = others
+        integrals[name] = symbol(ring.coordinates[pivot]) + other_terms
+        forms[pivot] = other_terms
     values = {ring.coordinates[i]: symbol(n) - e for (i, e), n in zip(forms.items(), integrals, strict=True)}
     expressions = substitute([ring.tower.expression(f) for f in field], values)
     symbols = [*(s for s in ring.tower.symbols if s != TIME), *integrals, TIME]

@@ -83,8 +83,8 @@ class KeplerMotion:
         self, coordinates: Sequence[str], values: tuple[list[Expression], list[Expression]]
     ) -> list[Expression]:
         names = [e.value for e in (*self.position, *self.momentum)]
-        placed = dict(zip(names, [*values[0], *values[1]], strict=True))
-        return [placed.get(name, ZERO) for name in coordinates]
+        values_by_name = dict(zip(names, [*values[0], *values[1]], strict=True))
+        return [values_by_name.get(name, ZERO) for name in coordinates]
 
 
 @dataclass(frozen=True)

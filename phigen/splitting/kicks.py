@@ -49,9 +49,9 @@ def kicks(system: System, splitting: SplitHamiltonian) -> tuple[Kick, ...]:
     for part in proved or (0, 1):
         v, t = elements[part], elements[1 - part]
         gradient = _bracket(ring, v, _bracket(ring, v, t))
-        small = len(gradient.to_dict()) <= limit
-        if proved or (small and ring.commute(v, gradient)):
-            kick_parts.append(Kick(part, _modified(ring, splitting.flows[part], v, gradient) if small else None))
+        is_small = len(gradient.to_dict()) <= limit
+        if proved or (is_small and ring.commute(v, gradient)):
+            kick_parts.append(Kick(part, _modified(ring, splitting.flows[part], v, gradient) if is_small else None))
     return tuple(kick_parts)
 
 
@@ -62,12 +62,12 @@ def modified_kick(system: System, kick: Flow, other: Flow) -> Flow | None:
     nine bodies has more monomials than fit.
     """
     v = kick.hamiltonian
-    both = v + symbol(KICK) * bracket(system, v, bracket(system, v, other.hamiltonian))
-    places = [i for i, c in enumerate(system.coordinates) if c in symbols_of(both)]
-    if kick.force or not all(system.poisson[i][j].is_zero for i in places for j in places):
+    modified_potential = v + symbol(KICK) * bracket(system, v, bracket(system, v, other.hamiltonian))
+    kicked_indices = [i for i, c in enumerate(system.coordinates) if c in symbols_of(modified_potential)]
+    if kick.force or not all(system.poisson[i][j].is_zero for i in kicked_indices for j in kicked_indices):
         return None
-    slope = gradient(symbol(TIME) * both, system.coordinates)
-    return Flow(both, tuple(hamiltonian_vector_field(system.poisson, slope)), kick.manner)
+    slope = gradient(symbol(TIME) * modified_potential, system.coordinates)
+    return Flow(modified_potential, tuple(hamiltonian_vector_field(system.poisson, slope)), kick.manner)
 
 
 def _graded(ring: Ring, v: Poly, t: Poly) -> bool:
@@ -77,18 +77,24 @@ def _graded(ring: Ring, v: Poly, t: Poly) -> bool:
     functions of Q too. If brackets within P are linear in P, then {·, ·} lowers degrees in P by one; V has degree 0,
     and T at most 2.
     """
-    inside = set(ring.support(v))
+    potential_coordinates = set(ring.support(v))
     everything = range(len(ring.coordinates))
     while True:
-        more = {k for i in inside for j in everything for k in ring.support(ring.poisson[i][j])} - inside
-        if not more:
+        bracket_support = {
+            k for i in potential_coordinates for j in everything for k in ring.support(ring.poisson[i][j])
+        } - potential_coordinates
+        if not bracket_support:
             break
-        inside |= more
-    outside = [i for i in everything if i not in inside]
+        potential_coordinates |= bracket_support
+    other_coordinates = [i for i in everything if i not in potential_coordinates]
     return (
-        all((i, j) in ring.zero_pairs for i in inside for j in inside)
-        and all(degree(ring, ring.poisson[i][j], outside) <= 1 for i in outside for j in outside)
-        and degree(ring, t, outside) <= 2
+        all((i, j) in ring.zero_pairs for i in potential_coordinates for j in potential_coordinates)
+        and all(
+            degree(ring, ring.poisson[i][j], other_coordinates) <= 1
+            for i in other_coordinates
+            for j in other_coordinates
+        )
+        and degree(ring, t, other_coordinates) <= 2
     )
 
 

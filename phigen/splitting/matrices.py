@@ -106,8 +106,8 @@ def _static_rows(ring: Ring, motion: LinearMotion) -> dict[Monomial, dict[Monomi
         m: {k: c for k, c in zip(motion.basis, row, strict=True) if c != 0}
         for m, row in zip(motion.basis, motion.matrix, strict=True)
     }
-    one = (0,) * len(motion.basis[0])
-    pending = [(one, m) for m in reversed(motion.basis[: len(motion.coordinates)])]
+    constant_monomial = (0,) * len(motion.basis[0])
+    pending = [(constant_monomial, m) for m in reversed(motion.basis[: len(motion.coordinates)])]
     rows: dict[Monomial, dict[Monomial, Poly]] = {}
     while pending:
         factor, m = pending.pop()

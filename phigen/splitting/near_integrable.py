@@ -56,8 +56,8 @@ def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> i
     names = [p.name for p in system.parameters if p.small and p.name in ring.tower.names]
     declared = [ring.tower.names.index(name) for name in names]
     if declared and not any(_divided_by(ring, term, names) for part in parts for term in part):
-        small = [all(_vanishes_with(ring, term, declared) for term in part) for part in parts]
-        return small.index(True) if sum(small) == 1 else None
+        is_small = [all(_vanishes_with(ring, term, declared) for term in part) for part in parts]
+        return is_small.index(True) if sum(is_small) == 1 else None
     perturbations = [k for k, part in enumerate(parts) if not any(term.motion for term in part)]
     if len(perturbations) != 1:
         return None
@@ -73,8 +73,8 @@ def _vanishes_with(ring: Ring, term: Term, variables: Sequence[int]) -> bool:
 def _divided_by(ring: Ring, term: Term, names: Sequence[str]) -> bool:
     """Whether a term has a function of these parameters as a denominator."""
     powers = term.element.degrees()[len(ring.tower.symbols) :]
-    used = (g for g, degree in zip(ring.tower.generators, powers, strict=True) if degree > 0)
-    return any(g.kind == "reciprocal" and ring.tower.depends_on(g.arguments[0], names) for g in used)
+    occurring = (g for g, degree in zip(ring.tower.generators, powers, strict=True) if degree > 0)
+    return any(g.kind == "reciprocal" and ring.tower.depends_on(g.arguments[0], names) for g in occurring)
 
 
 def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:
@@ -95,12 +95,14 @@ def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> li
     """Return the terms without the monomials of the motions; terms without such monomials stay as written."""
     untouched, remaining = [], []
     for term in terms:
-        shared = {m for motion in motions for m in ring.terms(motion.element, ring.state) if _is_of(ring, term, motion)}
+        shared_monomials = {
+            m for motion in motions for m in ring.terms(motion.element, ring.state) if _is_of(ring, term, motion)
+        }
         monomials = ring.terms(term.element, ring.state)
-        if shared.isdisjoint(monomials):
+        if shared_monomials.isdisjoint(monomials):
             untouched.append(term)
         else:
-            remaining += [c * ring.monomial(m) for m, c in monomials.items() if m not in shared]
+            remaining += [c * ring.monomial(m) for m, c in monomials.items() if m not in shared_monomials]
     monomials_left = [t for e in remaining for t in monomial_terms(ring, e)]
     return [*untouched, *joined(ring, monomials_left)]
 
@@ -119,16 +121,19 @@ def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, 
         momenta = [j for i in positions if (j := conjugate(ring, i)) is not None]
         if not positions or len(momenta) < len(positions):
             continue
-        elements = [t.element for t, inside in zip(terms, supports, strict=True) if inside <= {*positions, *momenta}]
+        elements = [t.element for t, support in zip(terms, supports, strict=True) if support <= {*positions, *momenta}]
         coefficients = ring.terms(ring.tower.combine(elements), ring.state)
         pull = coefficients.get(_exponents(size, ring.tower.names.index(generator.name), 1))
-        places = [ring.tower.names.index(ring.coordinates[j]) for j in momenta]
-        squares: list[Poly] = [coefficients.get(_exponents(size, place, 2), ring.tower.zero) for place in places]
+        momentum_indices = [ring.tower.names.index(ring.coordinates[j]) for j in momenta]
+        squares: list[Poly] = [
+            coefficients.get(_exponents(size, momentum_index, 2), ring.tower.zero)
+            for momentum_index in momentum_indices
+        ]
         if pull is None or squares[0] == 0 or any(square != squares[0] for square in squares):
             continue
-        q, p = (tuple(symbol(ring.coordinates[i]) for i in of) for of in (positions, momenta))
+        q, p = (tuple(symbol(ring.coordinates[i]) for i in indices) for indices in (positions, momenta))
         motion = KeplerMotion(q, p, ring.expression(2 * squares[0]), ring.expression(-pull))
-        kinetic = [squares[0] * ring.tower.gens[place] ** 2 for place in places]
+        kinetic = [squares[0] * ring.tower.gens[momentum_index] ** 2 for momentum_index in momentum_indices]
         yield motion, ring.tower.combine([*kinetic, pull * ring.tower.variable(generator.name)])
 
 
@@ -139,9 +144,9 @@ def is_inverse_distance(generator: Generator) -> bool:
 
 def _distance_from(ring: Ring, arguments: Sequence[Poly]) -> tuple[int, ...]:
     """Return the coordinates whose squares sum to the argument of a root; none if it is of another form."""
-    inside = ring.support(arguments[0])
-    squares = ring.tower.combine(ring.tower.variable(ring.coordinates[i]) ** 2 for i in inside)
-    return inside if len(inside) in _DIMENSIONS and arguments[0] == squares else ()
+    support = ring.support(arguments[0])
+    squares = ring.tower.combine(ring.tower.variable(ring.coordinates[i]) ** 2 for i in support)
+    return support if len(support) in _DIMENSIONS and arguments[0] == squares else ()
 
 
 def conjugate(ring: Ring, i: int) -> int | None:

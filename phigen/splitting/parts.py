@@ -44,10 +44,10 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
     Kepler motions are single terms if ``motions``, and so are free rigid bodies if ``rigid`` too. A near-integrable
     H is split in its two parts. Raises `SpecError`, located at the Hamiltonian, with the term that has no flow.
     """
-    listed = hamiltonian_terms(system)
-    ring = ring_of(system, listed)
+    summands = hamiltonian_terms(system)
+    ring = ring_of(system, summands)
     # A constant H is one term, so that there is a flow, in which nothing moves.
-    terms = terms_of(ring, listed) or [Term(system.hamiltonian, ring.tower.convert(system.hamiltonian))]
+    terms = terms_of(ring, summands) or [Term(system.hamiltonian, ring.tower.convert(system.hamiltonian))]
     invariants = _invariants(system, ring)
     refused: NoFlowError | None = None
     best: SplitHamiltonian | None = None
@@ -55,10 +55,10 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
     conflicts = Conflicts(ring)
     for candidate in _candidates(system, conflicts, terms, motions=motions, rigid=rigid):
         parts = conflicts.grouped(candidate)
-        small = small_part(system, ring, parts)
-        if (small is None, len(parts)) > least[:2]:
+        small_index = small_part(system, ring, parts)
+        if (small_index is None, len(parts)) > least[:2]:
             continue
-        rank: tuple[float, ...] = (small is None, len(parts), _lost(ring, parts, invariants), 0)
+        rank: tuple[float, ...] = (small_index is None, len(parts), _lost_invariant_count(ring, parts, invariants), 0)
         if rank >= least:
             continue
         try:
@@ -68,12 +68,16 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
             continue
         rank = (*rank[:-1], sum(flow.calls_remainders for flow in flows))
         if rank < least:
-            best, least = SplitHamiltonian(flows, small=small), rank
+            best, least = SplitHamiltonian(flows, small=small_index), rank
         if best and best.small is not None:
             break  # two parts, one of them small: no other grouping is better
     if best is None:
         raise _refusal(system, refused)
-    return best if best.small is not None else SplitHamiltonian(tuple(_whole(ring, _merged(ring, list(best.flows)))))
+    return (
+        best
+        if best.small is not None
+        else SplitHamiltonian(tuple(_exact_linear_flow(ring, _merged(ring, list(best.flows)))))
+    )
 
 
 def _invariants(system: System, ring: Ring) -> list[Poly]:
@@ -87,7 +91,7 @@ def _invariants(system: System, ring: Ring) -> list[Poly]:
     return elements
 
 
-def _lost(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly]) -> int:
+def _lost_invariant_count(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly]) -> int:
     """Return the number of invariants that some part does not preserve.
 
     s_1 + s_2 is constant along s_1·s_2, but not along x_1 x_2.
@@ -102,22 +106,22 @@ def _candidates(
     """Yield the terms as written, squares whole, with motions, by blocks, without companions, and in groups."""
     yield terms
     ring = conflicts.ring
-    whole = _with_whole_summands(ring, hamiltonian_terms(system))
-    if whole:
-        yield whole
+    whole_terms = _with_whole_summands(ring, hamiltonian_terms(system))
+    if whole_terms:
+        yield whole_terms
     with_moving = with_motions(ring, terms, rigid=rigid) if motions else None
     if with_moving:
         yield with_moving
         moving = [t for t in with_moving if t.motion]
-        for grouped in groupings(ring, [t for t in with_moving if not t.motion]):
-            yield [*moving, *grouped]
+        for grouping in groupings(ring, [t for t in with_moving if not t.motion]):
+            yield [*moving, *grouping]
     blocked = by_blocks(system, ring, terms)
     if blocked:
         yield blocked
     yield from _without_companions(system, conflicts, terms)
-    for grouped in groupings(ring, terms):
-        yield grouped
-        yield from _without_companions(system, conflicts, grouped)
+    for grouping in groupings(ring, terms):
+        yield grouping
+        yield from _without_companions(system, conflicts, grouping)
 
 
 def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term] | None:
@@ -125,18 +129,18 @@ def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term]
 
     (v·m)² on so(3) rotates m about v, while its monomials do not commute.
     """
-    whole: list[Term] = []
-    others: list[Expression] = []
+    whole_terms: list[Term] = []
+    remaining: list[Expression] = []
     for e in listed:
         element = ring.tower.convert(e)
         support = ring.support(element)
         mixed = any((i, j) not in ring.zero_pairs for i in support for j in support)
         term = Term(e, element)
         if mixed and len(ring.terms(element, ring.state)) > 1 and isinstance(joint_flow(ring, [term]), Flow):
-            whole.append(term)
+            whole_terms.append(term)
         else:
-            others.append(e)
-    return [*whole, *terms_of(ring, others)] if whole else None
+            remaining.append(e)
+    return [*whole_terms, *terms_of(ring, remaining)] if whole_terms else None
 
 
 def _without_companions(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:
@@ -171,7 +175,7 @@ def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
     return flows
 
 
-def _whole(ring: Ring, flows: list[Flow]) -> list[Flow]:
+def _exact_linear_flow(ring: Ring, flows: list[Flow]) -> list[Flow]:
     """Return one flow if the equations of the sum of all parts are linear: the exact flow, by a matrix exponential."""
     if len(flows) == 1:
         return flows

@@ -34,20 +34,20 @@ def with_companions(system: System, conflicts: Conflicts, terms: Sequence[Term])
         affected = [t for t in terms if not conflicts.monomials(t).isdisjoint(of_companion)]
         if not affected:
             continue
-        others = [t for t in terms if t not in affected]
+        other_terms = [t for t in terms if t not in affected]
         sum_of_affected = ring.tower.combine(t.element for t in affected)
-        present = ring.terms(sum_of_affected, ring.state)
+        monomials_present = ring.terms(sum_of_affected, ring.state)
         multiples: list[Poly] = []
         for monomial, coefficient in of_companion.items():
-            inverse = ring.tower.inverse(coefficient) if monomial in present else None
+            inverse = ring.tower.inverse(coefficient) if monomial in monomials_present else None
             if inverse is not None:
-                multiple = ring.tower.combine([present[monomial] * inverse])
+                multiple = ring.tower.combine([monomials_present[monomial] * inverse])
                 if multiple not in multiples:
                     multiples.append(multiple)
         for multiple in multiples:
             remainder = ring.tower.combine([sum_of_affected, -multiple * companion.element])
             subtracted = Term(ring.expression(multiple) * companion.expression, multiple * companion.element)
-            yield [*others, *joined(ring, monomial_terms(ring, remainder)), subtracted]
+            yield [*other_terms, *joined(ring, monomial_terms(ring, remainder)), subtracted]
 
 
 def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> Iterator[Term]:
@@ -70,10 +70,10 @@ def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> 
 def _closure(ring: Ring, coordinates: set[int]) -> tuple[int, ...]:
     """Return the closure of coordinates under brackets."""
     while True:
-        more = {k for i in coordinates for j in coordinates for k in ring.support(ring.poisson[i][j])}
-        if more <= coordinates:
+        added = {k for i in coordinates for j in coordinates for k in ring.support(ring.poisson[i][j])}
+        if added <= coordinates:
             return tuple(sorted(coordinates))
-        coordinates = coordinates | more
+        coordinates = coordinates | added
 
 
 def _casimirs_within(system: System, inside: Sequence[int]) -> list[Expression]:

@@ -44,7 +44,7 @@ class AttractingBodies:
     @property
     def names(self) -> tuple[str, ...]:
         """The coordinates of all bodies, positions first."""
-        return tuple(name for of in (self.positions, self.momenta) for body in of for name in body)
+        return tuple(name for names in (self.positions, self.momenta) for body in names for name in body)
 
     @property
     def kinetic(self) -> Expression:
@@ -122,11 +122,11 @@ class RelativeMotions:
         """Return the changes of all coordinates for changes of the relative ones."""
         axes = len(of_centre)
         changes: dict[str, Expression] = dict(zip(_names("R", 0, axes), of_centre, strict=True))
-        for i, both in enumerate(values, 1):
-            for kind, of in zip("QP", both, strict=True):
-                changes |= dict(zip(_names(kind, i, axes), of, strict=True))
-        listed = [self.spread.get(name, ZERO) for name in names]
-        return substitute(listed, changes)
+        for i, pair in enumerate(values, 1):
+            for kind, values_of_kind in zip("QP", pair, strict=True):
+                changes |= dict(zip(_names(kind, i, axes), values_of_kind, strict=True))
+        all_changes = [self.spread.get(name, ZERO) for name in names]
+        return substitute(all_changes, changes)
 
 
 def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
@@ -159,14 +159,14 @@ def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
 
 def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> Iterator[tuple[Expression, Expression]]:
     """Yield the M_i with symbols, and the m_i with the differences of these symbols, unless m_i is a number."""
-    before = ZERO
+    previous = ZERO
     for i, (m, sum_of_masses) in enumerate(zip(masses, mass, strict=True)):
         if m.is_number:
-            before = before + m
+            previous = previous + m
             continue
         value = symbol(Symbol("mass", i))
-        yield from ((sum_of_masses, value), (m, value - before))
-        before = value
+        yield from ((sum_of_masses, value), (m, value - previous))
+        previous = value
 
 
 def democratic_heliocentric(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
@@ -175,7 +175,7 @@ def democratic_heliocentric(bodies: AttractingBodies) -> tuple[RelativeMotions, 
     q, p = (list(map(_vector, names)) for names in (bodies.positions, bodies.momenta))
     inverse = power(total(masses), -1)
     shares = [m * inverse for m in masses]
-    momentum = [total(of[axis] for of in p) for axis in axes]
+    momentum = [total(momentum_of_body[axis] for momentum_of_body in p) for axis in axes]
     count = len(q)
     forms = [_difference(q[i], q[0]) for i in range(1, count)]
     conjugate = [_difference(p[i], [shares[i] * e for e in momentum]) for i in range(1, count)]
@@ -219,13 +219,13 @@ def _spread_from_jacobi(bodies: AttractingBodies, mass: Sequence[Expression]) ->
 
 def _spread_from_star(bodies: AttractingBodies, shares: Sequence[Expression]) -> dict[str, Expression]:
     """Return the changes of the coordinates for those of democratic heliocentric coordinates."""
-    axes, spread, others = bodies.axes, dict[str, Expression](), range(1, len(shares))
-    of_q, of_p = ([changes_of(kind, i, axes) for i in others] for kind in "QP")
+    axes, spread, planets = bodies.axes, dict[str, Expression](), range(1, len(shares))
+    of_q, of_p = ([changes_of(kind, i, axes) for i in planets] for kind in "QP")
     weighted = [total(m * d[axis] for m, d in zip(shares[1:], of_q, strict=True)) for axis in range(axes)]
     star = _difference(changes_of("R", 0, axes), weighted)
     spread |= zip(bodies.positions[0], star, strict=True)
     spread |= zip(bodies.momenta[0], [-total(d[axis] for d in of_p) for axis in range(axes)], strict=True)
-    for i in others:
+    for i in planets:
         spread |= zip(bodies.positions[i], _sum(star, of_q[i - 1]), strict=True)
         spread |= zip(bodies.momenta[i], of_p[i - 1], strict=True)
     return spread

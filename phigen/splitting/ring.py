@@ -95,9 +95,9 @@ class Ring:
             while pending:
                 powers = self.terms(pending.pop(), [reciprocal])
                 for monomial, coefficient in powers.items():
-                    quotient, rest = divmod(coefficient, q) if monomial[reciprocal] else (coefficient, 1)
+                    quotient, remainder = divmod(coefficient, q) if monomial[reciprocal] else (coefficient, 1)
                     lower = (*monomial[:reciprocal], max(monomial[reciprocal] - 1, 0), *monomial[reciprocal + 1 :])
-                    if rest == 0:
+                    if remainder == 0:
                         pending.append(quotient * self.monomial(lower))
                     else:
                         final.append(coefficient * self.monomial(monomial))
@@ -122,13 +122,13 @@ class Ring:
     def terms(self, element: Poly, variables: Collection[int]) -> dict[Monomial, Poly]:
         """Return the element as a polynomial in some of the variables, with coefficients in the others."""
         groups: dict[Monomial, dict[Monomial, Any]] = {}
-        chosen = frozenset(variables)
-        inside = [int(i in chosen) for i in range(len(self.tower.gens))]
+        chosen_variables = frozenset(variables)
+        mask = [int(i in chosen_variables) for i in range(len(self.tower.gens))]
         for m, c in element.to_dict().items():
             exponents = tuple(map(int, m))
-            key = tuple(map(mul, exponents, inside))
-            rest = tuple(map(sub, exponents, key))
-            groups.setdefault(key, {})[rest] = c
+            key = tuple(map(mul, exponents, mask))
+            other_exponents = tuple(map(sub, exponents, key))
+            groups.setdefault(key, {})[other_exponents] = c
         return {m: self.tower.context.from_dict(part) for m, part in groups.items()}
 
     def monomial(self, exponents: Monomial) -> Poly:
@@ -144,17 +144,17 @@ class Ring:
         for m, c in element.to_dict().items():
             key = tuple(int(m[i]) for i in self.state)
             groups.setdefault(key, {})[tuple(int(m[i]) for i in static)] = number(rational(c))
-        fixed = [self.values[i] for i in static]
-        collected = {key: horner(part, fixed) for key, part in sorted(groups.items())}
+        static_values = [self.values[i] for i in static]
+        collected = {key: horner(part, static_values) for key, part in sorted(groups.items())}
         return horner(collected, [self.values[i] for i in self.state])
 
 
-def ring_of(system: System, more: Iterable[Expression] = (), symbols: Sequence[str] = ()) -> Ring:
-    """Return the ring of a system, with the time, further static ``symbols``, and the functions in ``more``."""
-    listed = list(more)
-    roots = [system.hamiltonian, *listed, *(e for row in system.poisson for e in row)]
+def ring_of(system: System, further: Iterable[Expression] = (), symbols: Sequence[str] = ()) -> Ring:
+    """Return the ring of a system, with the time, further static ``symbols``, and the functions in ``further``."""
+    further_expressions = list(further)
+    roots = [system.hamiltonian, *further_expressions, *(e for row in system.poisson for e in row)]
     tower = Tower([*system.coordinates, *system.parameter_names, *symbols, TIME], roots, system.coordinates)
     images = tower.convert_all(roots)
-    n, start = system.dimension, 1 + len(listed)
+    n, start = system.dimension, 1 + len(further_expressions)
     poisson = tuple(tuple(images[start + i * n : start + (i + 1) * n]) for i in range(n))
     return Ring(tower, system.coordinates, poisson, system.poisson, system.times)

@@ -21,8 +21,8 @@ def rotors(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[EulerMotion, Pol
     for triple in combinations(range(len(ring.coordinates)), 3):
         if not _rotates(ring, triple):
             continue
-        inside = [t.element for t, support in zip(terms, supports, strict=True) if support <= {*triple}]
-        coefficients = ring.terms(ring.tower.combine(inside), ring.state)
+        within_triple = [t.element for t, support in zip(terms, supports, strict=True) if support <= {*triple}]
+        coefficients = ring.terms(ring.tower.combine(within_triple), ring.state)
         squares = [_power(ring, i, 2) for i in triple]
         element = ring.tower.combine(coefficients[m] * ring.monomial(m) for m in squares if m in coefficients)
         field = ring.field(element) if element != 0 else []
@@ -30,9 +30,9 @@ def rotors(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[EulerMotion, Pol
             _factor(ring, field[i], triple[j], triple[k]) for i, (j, k) in zip(triple, CYCLIC, strict=True) if field
         ]
         names = tuple(ring.coordinates[i] for i in triple)
-        known = [ring.expression(f) for f in factors if f is not None]
-        if len(known) == 3:
-            yield EulerMotion(names, tuple(known), ring.expression(element)), element
+        level_expressions = [ring.expression(f) for f in factors if f is not None]
+        if len(level_expressions) == 3:
+            yield EulerMotion(names, tuple(level_expressions), ring.expression(element)), element
 
 
 def _rotates(ring: Ring, triple: tuple[int, ...]) -> bool:

@@ -21,8 +21,8 @@ from phigen.symbolic.tower import Poly, rational
 def solve(ring: Ring, i: int, rate: Poly, moving: Collection[int]) -> Solution | None:
     """Return the increment of coordinate i, if its rate depends on no other moving variables than functions of it."""
     name = ring.coordinates[i]
-    others = [ring.coordinates[j] for j in range(len(ring.coordinates)) if j != i]
-    if any(ring.tower.depends_on(ring.tower.gens[v], others) for v in _variables(ring, rate) if v in moving):
+    other_names = [ring.coordinates[j] for j in range(len(ring.coordinates)) if j != i]
+    if any(ring.tower.depends_on(ring.tower.gens[v], other_names) for v in _variables(ring, rate) if v in moving):
         return None
     return _quadratic(ring, name, rate, moving) or _exponential(ring, name, rate, moving) or _power(ring, name, rate)
 
@@ -49,8 +49,8 @@ def _quadratic(ring: Ring, name: str, rate: Poly, moving: Collection[int]) -> So
 
 
 def _exponential(ring: Ring, name: str, rate: Poly, moving: Collection[int]) -> Solution | None:
-    k, rest = divmod(ring.tower.derivative(rate, name), rate)
-    if rest != 0 or any(v in moving for v in _variables(ring, k)):
+    k, remainder = divmod(ring.tower.derivative(rate, name), rate)
+    if remainder != 0 or any(v in moving for v in _variables(ring, k)):
         return None
     factor = ring.expression(k)
     grown = ring.expression(ring.tower.combine([k * rate * ring.tower.variable(TIME)]))
@@ -58,8 +58,8 @@ def _exponential(ring: Ring, name: str, rate: Poly, moving: Collection[int]) -> 
 
 
 def _power(ring: Ring, name: str, rate: Poly) -> Solution | None:
-    n, rest = divmod(ring.tower.derivative(rate, name) * ring.tower.variable(name), rate)
-    if rest != 0 or not n.is_constant() or n == 1:
+    n, remainder = divmod(ring.tower.derivative(rate, name) * ring.tower.variable(name), rate)
+    if remainder != 0 or not n.is_constant() or n == 1:
         return None
     degree = rational(n.leading_coefficient()) if n != 0 else Fraction(0)
     exponent, z = number(1 - degree), symbol(name)

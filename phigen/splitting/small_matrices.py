@@ -53,15 +53,15 @@ def solve(ring: Ring, motion: LinearMotion) -> Solution | None:
 def _of_two_rows(ring: Ring, motion: LinearMotion) -> Solution:
     """Return the solution by functions of s = dt²; 1 − cos √s is s sinroot(s/4)²/2."""
     (a, b), (c, d) = motion.matrix
-    half = ring.tower.constant(Fraction(1, 2)) * (a + d)
+    half_trace = ring.tower.constant(Fraction(1, 2)) * (a + d)
     w = [ring.monomial(m) for m in motion.basis]
-    turned = [ring.expression((a - half) * w[0] + b * w[1]), ring.expression(c * w[0] + (d - half) * w[1])]
+    rotated = [ring.expression((a - half_trace) * w[0] + b * w[1]), ring.expression(c * w[0] + (d - half_trace) * w[1])]
     t = symbol(TIME)
-    s = t**2 * ring.expression(a * d - b * c - half * half)
-    growth, turn = call("expm1", t * ring.expression(half)), call("sinroot", s / 4)
-    sine, loss = t * turn * call("cosroot", s / 4), s * turn**2 / 2
+    s = t**2 * ring.expression(a * d - b * c - half_trace * half_trace)
+    growth, sine_factor = call("expm1", t * ring.expression(half_trace)), call("sinroot", s / 4)
+    sine, loss = t * sine_factor * call("cosroot", s / 4), s * sine_factor**2 / 2
     increments = [
-        growth * e + (growth + 1) * (sine * v - loss * e) for e, v in zip(map(ring.expression, w), turned, strict=True)
+        growth * e + (growth + 1) * (sine * v - loss * e) for e, v in zip(map(ring.expression, w), rotated, strict=True)
     ]
     return Solution(tuple(increments[: len(motion.coordinates)]), BY_CAYLEY_HAMILTON)
 

@@ -79,14 +79,14 @@ class _Sphere:
         return None
 
     def _drawn(self, v: Sequence[Expression], strength: Expression) -> list[Expression]:
-        along = dot(v, self.x) / dot(v, v)
-        part = [along * e for e in v]  # x_v
+        projection = dot(v, self.x) / dot(v, v)
+        part = [projection * e for e in v]  # x_v
         pull = call("tanh", self.t / 2 * strength * self.square)
-        across = [c - 2 * e for c, e in zip(self.x, part, strict=True)]
+        reflected = [c - 2 * e for c, e in zip(self.x, part, strict=True)]
         radius = sqrt(self.square)
-        reached = sqrt(total((c + pull * e) ** 2 for c, e in zip(self.x, across, strict=True)))
+        reached = sqrt(total((c + pull * e) ** 2 for c, e in zip(self.x, reflected, strict=True)))
         scale = -radius * pull * call("inv0", reached + radius)
-        return self._mirrored([scale * e for e in across])
+        return self._mirrored([scale * e for e in reflected])
 
     def _mirrored(self, e: Sequence[Expression]) -> list[Expression]:
         """Return 2(y(y·e)/|y|² − e), which is −2x where y = 0.
@@ -94,15 +94,15 @@ class _Sphere:
         There x is opposite to β, and rounding leaves no direction.
         """
         y = [c - d for c, d in zip(self.x, e, strict=True)]
-        along = dot(y, e) * call("inv0", dot(y, y))
-        return [2 * (c * along - d) for c, d in zip(y, e, strict=True)]
+        projection = dot(y, e) * call("inv0", dot(y, y))
+        return [2 * (c * projection - d) for c, d in zip(y, e, strict=True)]
 
     def _shifts(self, a: Sequence[Sequence[Poly]]) -> Iterator[Poly]:
         """Yield the candidates for the number g that A has on the diagonal in addition to a matrix of rank 1."""
         yield from (a[i][i] for i in range(self.size))
         for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)) if self.size == 3 else ():
-            quotient, rest = divmod(a[i][j] * a[i][k], a[j][k]) if a[j][k] != 0 else (0, 1)
-            if rest == 0:
+            quotient, remainder = divmod(a[i][j] * a[i][k], a[j][k]) if a[j][k] != 0 else (0, 1)
+            if remainder == 0:
                 yield a[i][i] - quotient
 
     def _monomial(self, *factors: int) -> Monomial:
@@ -122,7 +122,7 @@ class _Sphere:
             for row in beta
         ]
         x = [ring.monomial(self._monomial(k)) for k in n]
-        inner, square = (ring.tower.combine(a * b for a, b in zip(x, other, strict=True)) for other in (product, x))
+        inner, square = (ring.tower.combine(a * b for a, b in zip(x, vector, strict=True)) for vector in (product, x))
         expected = [inner * x[k] - square * product[k] for k in n]
         actual = [ring.tower.combine(c * ring.monomial(m) for m, c in rate.items()) for rate in rates]
         return all(ring.tower.is_zero(a - b) for a, b in zip(actual, expected, strict=True))

@@ -36,11 +36,11 @@ def check(system: System, splitting: SplitHamiltonian, noise: Sequence[tuple[str
     ``noise`` are flows of sources by their names.
     """
     flows = splitting.flows
-    plain = substitute([f.hamiltonian for f in flows], {KICK: ZERO})
-    modified = plain != [f.hamiltonian for f in flows]
+    hamiltonians = substitute([f.hamiltonian for f in flows], {KICK: ZERO})
+    modified = hamiltonians != [f.hamiltonian for f in flows]
     numbered = [(f"{flow.letter}_{k}", flow) for k, flow in enumerate(flows, 1)]
     name = "H = " + " + ".join(n for n, flow in numbered if not flow.force) + " at κ = 0" * modified
-    yield decide_zero(name, [("", system.hamiltonian - total(plain))], system.positive)
+    yield decide_zero(name, [("", system.hamiltonian - total(hamiltonians))], system.positive)
     if any(flow.force for flow in flows):
         yield _force_statement(system, numbered)
     for k, flow in enumerate(flows, 1):
@@ -49,9 +49,9 @@ def check(system: System, splitting: SplitHamiltonian, noise: Sequence[tuple[str
     for source, flow in noise:
         yield replace(_flow_statement(system, flow, 0), name=f"the flow of g of the noise {source}")
     if splitting.kick is not None:
-        yield from _kick_statements(system, splitting, plain)
+        yield from _kick_statements(system, splitting, hamiltonians)
         for time in system.times:
-            v, name = plain[splitting.kick], f"H_{1 + splitting.kick}"
+            v, name = hamiltonians[splitting.kick], f"H_{1 + splitting.kick}"
             rate = bracket(system, v, gradient(v, [time])[0])
             yield decide_zero(f"{{{name}, ∂{name}/∂{time}}} = 0", [("", rate)], system.positive)
 
@@ -142,7 +142,7 @@ def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
 
 def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
     """Yield the residuals that vanish if a flow is that of its vector field, with labels."""
-    if any(piece.motion for piece in flow.pieces):
+    if any(part_flow.motion for part_flow in flow.pieces):
         yield from _composition_residuals(system, flow)
     elif flow.motion:
         yield from _motion_residuals(system, flow, flow.motion)
@@ -152,14 +152,14 @@ def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
 
 def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
     """Yield the residuals of a composition: pieces are flows, sum to the whole, commute, and are composed."""
-    pieces = flow.pieces
-    for piece in pieces:
-        yield from _residuals(system, piece)
-    yield "sum of the pieces", flow.hamiltonian - total(piece.hamiltonian for piece in pieces)
-    for i, piece in enumerate(pieces):
-        for other in pieces[:i]:
-            yield "bracket of two pieces", bracket(system, piece.hamiltonian, other.hamiltonian)
-    increment = composed(system.coordinates, pieces).increment
+    part_flows = flow.pieces
+    for part_flow in part_flows:
+        yield from _residuals(system, part_flow)
+    yield "sum of the pieces", flow.hamiltonian - total(part_flow.hamiltonian for part_flow in part_flows)
+    for i, part_flow in enumerate(part_flows):
+        for earlier_flow in part_flows[:i]:
+            yield "bracket of two pieces", bracket(system, part_flow.hamiltonian, earlier_flow.hamiltonian)
+    increment = composed(system.coordinates, part_flows).increment
     for c, a, b in zip(system.coordinates, flow.increment, increment, strict=True):
         yield f"composition for {c}", a - b
 

@@ -19,8 +19,8 @@ def summands(e: Expression, coordinates: Collection[str], factor: Expression = O
     elif e.op == "neg":
         yield from summands(e.args[0], coordinates, neg(factor))
     elif e.op == "mul" and any(_static(a, coordinates) for a in e.args):
-        constant, rest = e.args if _static(e.args[0], coordinates) else e.args[::-1]
-        yield from summands(rest, coordinates, constant * factor)
+        constant, cofactor = e.args if _static(e.args[0], coordinates) else e.args[::-1]
+        yield from summands(cofactor, coordinates, constant * factor)
     else:
         yield factor * e
 
