@@ -66,17 +66,20 @@ def bonds_in(path: Path, parameters: Collection[str]) -> tuple[NDArray[np.int64]
     table = _table(path)
     names = table.names or ENDS
     _expect_columns(table, names, parameters)
-    ends = table.rows[:, [names.index(end) for end in ENDS]]
-    for wrong, what in (
+    bond_ends = table.rows[:, [names.index(end) for end in ENDS]]
+    for is_wrong, problem in (
         (~np.isfinite(table.rows).all(axis=1), "not all its numbers are finite"),
-        ((ends != np.round(ends)).any(axis=1) | (ends < 0).any(axis=1), "sites are whole numbers, counted from 0"),
-        ((ends >= limits.SITES).any(axis=1), f"a site beyond the limit of {limits.SITES} sites"),
-        (ends[:, 0] == ends[:, 1], "a bond has two different ends"),
+        (
+            (bond_ends != np.round(bond_ends)).any(axis=1) | (bond_ends < 0).any(axis=1),
+            "sites are whole numbers, counted from 0",
+        ),
+        ((bond_ends >= limits.SITES).any(axis=1), f"a site beyond the limit of {limits.SITES} sites"),
+        (bond_ends[:, 0] == bond_ends[:, 1], "a bond has two different ends"),
     ):
-        if wrong.any():
-            raise ValueError(f"{table.line(int(np.argmax(wrong)))}: {what}")
+        if is_wrong.any():
+            raise ValueError(f"{table.line(int(np.argmax(is_wrong)))}: {problem}")
     columns = {name: table.rows[:, k].copy() for k, name in enumerate(names) if name not in ENDS}
-    return ends.astype(np.int64), columns
+    return bond_ends.astype(np.int64), columns
 
 
 def _expect_columns(table: NumberTable, names: Sequence[str], parameters: Collection[str]) -> None:
@@ -86,9 +89,9 @@ def _expect_columns(table: NumberTable, names: Sequence[str], parameters: Collec
     repeated = [name for k, name in enumerate(names) if name in names[:k]]
     if repeated:
         raise ValueError(f"two columns have the name {shown(repeated[0])}")
-    missing = [end for end in ENDS if end not in names]
-    if missing:
-        raise ValueError(f"there is no column {missing[0]!r}; a and b are the ends of bonds")
+    missing_columns = [end for end in ENDS if end not in names]
+    if missing_columns:
+        raise ValueError(f"there is no column {missing_columns[0]!r}; a and b are the ends of bonds")
     unknown = [name for name in names if name not in (*ENDS, *parameters)]
     if unknown:
         hint = did_you_mean(unknown[0], parameters) or (one_of(parameters) if parameters else "")
@@ -135,8 +138,8 @@ def _array(path: Path, shape: tuple[int, ...]) -> Floats:
             raise ValueError(str(error)) from None
     array = np.asarray(array, dtype=np.float64)
     if not np.isfinite(array).all():
-        place = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
-        raise ValueError(f"not all values are finite, the first at {list(place)}")
+        index = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"not all values are finite, the first at {list(index)}")
     return array
 
 
@@ -152,5 +155,5 @@ def _header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype]:
 
 def _expect_shape(file_shape: tuple[int, ...], shape: tuple[int, ...]) -> None:
     if file_shape != shape:
-        actual, needed = ("×".join(map(str, s)) or "1" for s in (file_shape, shape))
-        raise ValueError(f"{actual} values, not {needed}")
+        actual, expected = ("×".join(map(str, s)) or "1" for s in (file_shape, shape))
+        raise ValueError(f"{actual} values, not {expected}")

@@ -28,8 +28,10 @@ def divided(e: Expression, exponents: Mapping[str, int]) -> Expression:
 
 def common_powers(values: Sequence[Expression], names: Iterable[str]) -> dict[str, int]:
     """Return the exponents of the powers of symbols that divide all expressions."""
-    listed = [exponents for _, exponents in _factored(values, names)]
-    lowest = {name: min(exponents.get(name, 0) for exponents in listed) for name in names} if listed else {}
+    exponent_maps = [exponents for _, exponents in _factored(values, names)]
+    lowest = (
+        {name: min(exponents.get(name, 0) for exponents in exponent_maps) for name in names} if exponent_maps else {}
+    )
     return {name: k for name, k in lowest.items() if k > 0}
 
 
@@ -83,8 +85,8 @@ def _factored(values: Sequence[Expression], names: Iterable[str]) -> list[Factor
                 base, exponents = args[0]
                 return power(base, node.value), {name: k * int(node.value) for name, k in exponents.items()}
             case "add" | "sub":
-                present = args[0][1].keys() | args[1][1].keys()
-                common = {name: min(exponents.get(name, 0) for _, exponents in args) for name in present}
+                bases = args[0][1].keys() | args[1][1].keys()
+                common = {name: min(exponents.get(name, 0) for _, exponents in args) for name in bases}
                 rests = [_multiplied((e, {n: of_e.get(n, 0) - k for n, k in common.items()})) for e, of_e in args]
                 return rebuild(node, rests), common
         return rebuild(node, [_multiplied(a) for a in args]), {}
@@ -93,6 +95,6 @@ def _factored(values: Sequence[Expression], names: Iterable[str]) -> list[Factor
 
 
 def _multiplied(value: Factored) -> Expression:
-    rest, exponents = value
+    cofactor, exponents = value
     nonzero = {name: k for name, k in sorted(exponents.items()) if k}
-    return mul(rest, powers(nonzero)) if nonzero else rest
+    return mul(cofactor, powers(nonzero)) if nonzero else cofactor

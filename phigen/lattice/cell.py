@@ -145,8 +145,8 @@ class Cell:
     @cached_property
     def poisson_reach(self) -> tuple[int, ...]:
         """Largest offset along each axis in the brackets: of their second field, and of the symbols of their values."""
-        others = [symbol(other) for _, other in self.bracket]
-        return self._reach([*others, *self.bracket.values()])
+        second_fields = [symbol(other) for _, other in self.bracket]
+        return self._reach([*second_fields, *self.bracket.values()])
 
     @cached_property
     def hamiltonian_reach(self) -> tuple[int, ...]:
@@ -191,14 +191,14 @@ def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
     """Return, for each field f, the terms of ∂H/∂f at a site of a grid, from all densities that mention the site."""
     terms_by_field: dict[str, list[Contribution]] = {f: [] for f in cell.fields}
     for term in cell.terms:
-        named = {name: p for name, p in cell.places(term).items() if p[0] in cell.fields}
+        field_places = {name: p for name, p in cell.places(term).items() if p[0] in cell.fields}
         low, high = cell.extent(term)
-        slopes = gradient(term, list(named))
-        for (base, offset), slope in zip(named.values(), slopes, strict=True):
+        slopes = gradient(term, list(field_places))
+        for (base, offset), slope in zip(field_places.values(), slopes, strict=True):
             if not slope.is_zero:
                 slope_here, origin = cell.shifted(slope, minus(offset)), steps(minus(offset))
                 terms_by_field[base].append(Contribution(slope_here, plus(low, origin), plus(high, origin)))
-    return {f: tuple(listed) for f, listed in terms_by_field.items()}
+    return {f: tuple(terms) for f, terms in terms_by_field.items()}
 
 
 def forces(cell: Cell) -> dict[str, Expression]:
@@ -208,7 +208,7 @@ def forces(cell: Cell) -> dict[str, Expression]:
     """
     if cell.relation != GRID:
         return dict(zip(cell.fields, gradient(cell.hamiltonian, cell.fields), strict=True))
-    return {f: total(c.expression for c in listed) for f, listed in contributions(cell).items()}
+    return {f: total(c.expression for c in terms) for f, terms in contributions(cell).items()}
 
 
 def bond_forces(cell: Cell) -> dict[str, Expression]:
@@ -237,4 +237,4 @@ def _tangent(cell: Cell, covector: Mapping[str, Expression]) -> dict[str, Expres
     for (f, other), entry in cell.bracket.items():
         base, offset = cell.place(other)
         rates[f].append(entry * cell.shifted(covector[base], offset))
-    return {f: total(listed) for f, listed in rates.items()}
+    return {f: total(terms) for f, terms in rates.items()}

@@ -116,8 +116,8 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
 def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
     """Return one line on all sizes that do not fit, for a splitting with this number of ``colours``; else ""."""
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
-    needed = f"as a splitting with {colours} colours needs; {' and '.join(distinct.values())} would do"
-    return f"{' and '.join(distinct)}, {needed}" if wrong_sizes else ""
+    requirement = f"as a splitting with {colours} colours needs; {' and '.join(distinct.values())} would do"
+    return f"{' and '.join(distinct)}, {requirement}" if wrong_sizes else ""
 
 
 def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
@@ -136,16 +136,16 @@ def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression
     """Return the brackets between different sites in both orders."""
     at_sites = (p.name for p in spec.parameters if p.at == "sites")
     neighbours = Neighbours((*spec.coordinates, *at_sites), lattice.axes)
-    both: dict[tuple[str, str], Expression] = {}
+    brackets: dict[tuple[str, str], Expression] = {}
     for (f, g), value in lattice.brackets.items():
-        both[f, g] = value
+        brackets[f, g] = value
         if lattice.axes:
             base, offset = neighbours.place(g)
             mirrored = neighbours.shifted([neg(value)], minus(offset))[0]
-            both[base, neighbours.at(f, minus(offset))] = mirrored
+            brackets[base, neighbours.at(f, minus(offset))] = mirrored
         else:
-            both[g, f] = neg(value)
-    return {pair: e for pair, e in both.items() if not e.is_zero}
+            brackets[g, f] = neg(value)
+    return {pair: e for pair, e in brackets.items() if not e.is_zero}
 
 
 def _not_along_bonds(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:

@@ -32,19 +32,19 @@ def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
 
 def _graded(cell: Cell, v: CellFlow, t: CellFlow) -> bool:
     """Whether {V, {V, {V, T}}} = 0 follows from degrees."""
-    inside = {f for s, _ in v.summands for f in _fields(cell, s.expression)}
+    potential_fields = {f for s, _ in v.summands for f in _fields(cell, s.expression)}
     while True:
-        entries = [e for (f, _), e in cell.bracket.items() if f in inside]
-        more = {f for e in entries for f in _fields(cell, e)} - inside
-        if not more:
+        entries = [e for (f, _), e in cell.bracket.items() if f in potential_fields]
+        bracket_fields = {f for e in entries for f in _fields(cell, e)} - potential_fields
+        if not bracket_fields:
             break
-        inside |= more
-    outside = set(cell.fields) - inside
+        potential_fields |= bracket_fields
+    other_fields = set(cell.fields) - potential_fields
     pairs = [(f, cell.place(g)[0], e) for (f, g), e in cell.bracket.items()]
     return (
-        not any(f in inside and g in inside for f, g, _ in pairs)
-        and all(_degree(cell, e, outside) <= 1 for f, g, e in pairs if f in outside and g in outside)
-        and all(_degree(cell, s.expression, outside) <= 2 for s, _ in t.summands)
+        not any(f in potential_fields and g in potential_fields for f, g, _ in pairs)
+        and all(_degree(cell, e, other_fields) <= 1 for f, g, e in pairs if f in other_fields and g in other_fields)
+        and all(_degree(cell, s.expression, other_fields) <= 2 for s, _ in t.summands)
     )
 
 
@@ -54,10 +54,10 @@ def _fields(cell: Cell, e: Expression) -> set[str]:
 
 def _degree(cell: Cell, e: Expression, fields: set[str]) -> float:
     names = [n for n, (f, _) in cell.places(e).items() if f in cell.fields]
-    others = [n for n in symbols_of(e) if n not in names]
-    ring = Ring(Tower([*names, *others], [e], names), tuple(names), (), ())
-    chosen = [i for i, n in enumerate(names) if cell.place(n)[0] in fields]
-    return degree(ring, ring.tower.convert(e), chosen)
+    parameters = [n for n in symbols_of(e) if n not in names]
+    ring = Ring(Tower([*names, *parameters], [e], names), tuple(names), (), ())
+    field_indices = [i for i, n in enumerate(names) if cell.place(n)[0] in fields]
+    return degree(ring, ring.tower.convert(e), field_indices)
 
 
 def _modified(cell: Cell, splitting: CellSplitting, v: CellFlow, t: CellFlow) -> CellFlow | None:
@@ -90,7 +90,7 @@ def _slopes(cell: Cell, summands: Sequence[Summand], field: str) -> Iterator[Sum
         places = {n: o for n, (f, o) in cell.places(s.expression).items() if f == field}
         for slope, offset in zip(gradient(s.expression, list(places)), places.values(), strict=True):
             if not slope.is_zero:
-                back = [-int(o) for o in offset]
-                low = tuple(x + b for x, b in zip(s.low, back, strict=True))
-                high = tuple(x + b for x, b in zip(s.high, back, strict=True))
+                opposite_offset = [-int(o) for o in offset]
+                low = tuple(x + b for x, b in zip(s.low, opposite_offset, strict=True))
+                high = tuple(x + b for x, b in zip(s.high, opposite_offset, strict=True))
                 yield Summand(cell.shifted(slope, minus(offset)), low, high)

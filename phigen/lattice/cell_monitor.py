@@ -43,8 +43,8 @@ def expect_applicable(cell: Cell, spec: Spec) -> None:
     elif spec.scheme == "series":
         message, hint = "monitor: log needs H = A + B split in two", "scheme: splitting"
     elif cell.time or cell.forces or cell.noise:
-        what = "time" if cell.time else "forces" if cell.forces else "noise"
-        message = f"monitor: log is not offered with {what}: e = -H(x0) would not be constant"
+        feature = "time" if cell.time else "forces" if cell.forces else "noise"
+        message = f"monitor: log is not offered with {feature}: e = -H(x0) would not be constant"
     elif spec.extras.adjoint:
         message = "monitor: gradients (adjoint) are not offered with it for lattices"
         hint = "phigen show --expand 3 prints an ordinary spec of three sites, which has them"
@@ -104,17 +104,17 @@ def rates_of(
 ) -> tuple[PartRates, list[tuple[str, BondSum]]]:
     """Return the kernels of the energies of both parts, and the sums over pairs that they read, by their names."""
     energies, slopes, sums = list[Kernel](), list[Kernel](), list[tuple[str, BondSum]]()
-    shared = Symbol(GATHERED, "energy")
+    sum_symbol = Symbol(GATHERED, "energy")
     for k, flow in enumerate(flows, 1):
         at_site, of_pair = (total(s.expression for s, _ in flow.summands if s.bond == bond) for bond in (False, True))
         name, purpose = f"part{k}", f"the density of H_{k}"
         energies.append(site_kernel(cell, name, purpose, [at_site], "out", role=Role.ENERGY))
-        sums.append((name, BondSum({shared: of_pair})))
+        sums.append((name, BondSum({sum_symbol: of_pair})))
         if tangent:
             name, purpose = f"part{k}_slope", f"{purpose}, along a variation"
             slopes.append(site_kernel(cell, name, purpose, along(cell, [at_site]), "out", role=Role.ENERGY_SLOPE))
             (slope,) = along(cell, [of_pair])
-            sums.append((name, BondSum({varied_sum(shared): slope})))
+            sums.append((name, BondSum({varied_sum(sum_symbol): slope})))
     first, second = energies
     return PartRates((first, second), negative, tuple(slopes)), sums
 
@@ -125,6 +125,6 @@ def fact(flows: Sequence[CellFlow], negative: int) -> str:
 
 
 def delayed(increments: Sequence[Expression], slopes: Sequence[Expression]) -> list[Expression]:
-    """Return the variations of the increments of a flow whose time varies too, by `LATE`."""
+    """Return the variations of the increments of a flow, with a variation `LATE` of the time of the flow."""
     rates = (gradient(e, [TIME])[0] for e in increments)
     return [slope + rate * symbol(LATE) for slope, rate in zip(slopes, rates, strict=True)]

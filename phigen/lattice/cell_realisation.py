@@ -66,10 +66,10 @@ class CellRealisation:
             return {f: x - e for f, x, e in zip(fields, start, values, strict=True)}
         constant = substitute(values, dict.fromkeys(fields, ZERO))
         solution, _ = elimination([[not d.is_zero for d in row] for row in slopes])
-        known: dict[str, Expression] = {Symbol("r", i): start[i] - c for i, c in enumerate(constant)}
+        solutions: dict[str, Expression] = {Symbol("r", i): start[i] - c for i, c in enumerate(constant)}
         for i, row in enumerate(slopes):
-            known |= {Symbol("J", i, j): d + 1 if i == j else d for j, d in enumerate(row)}
-        return dict(zip(fields, substitute(solution, known), strict=True))
+            solutions |= {Symbol("J", i, j): d + 1 if i == j else d for j, d in enumerate(row)}
+        return dict(zip(fields, substitute(solution, solutions), strict=True))
 
 
 def realise_cell(cell: Cell, form: PoissonForm | None, choice: BirealisationChoice) -> CellRealisation:
@@ -101,7 +101,7 @@ def _of_neighbours(cell: Cell, choice: BirealisationChoice) -> CellRealisation:
         hint = "brackets that are constant, or become so for log f in place of some fields f"
         raise refuse("scheme series: no bi-realisation is known for these brackets, which couple neighbours", hint)
     logarithmic, constants = coordinates
-    half, displacement, increment = number(Fraction(1, 2)), {}, {}
+    one_half, displacement, increment = number(Fraction(1, 2)), {}, {}
     for f in cell.fields:
         terms = [
             constant * (symbol(other) if cell.place(other)[0] in logarithmic else ONE) * symbol(momentum(other))
@@ -110,24 +110,24 @@ def _of_neighbours(cell: Cell, choice: BirealisationChoice) -> CellRealisation:
         ]
         stencil_sum = total(terms)
         if f in logarithmic:
-            growth = call("expm1", -(half * stencil_sum))
+            growth = call("expm1", -(one_half * stencil_sum))
             displacement[f] = symbol(f) * growth
             increment[f] = -(symbol(f) * (growth * (1 + 1 / (1 + growth))))
         else:
-            displacement[f], increment[f] = -(half * stencil_sum), stencil_sum
-    named = ", ".join(f"log {f}" if f in logarithmic else f for f in cell.fields)
+            displacement[f], increment[f] = -(one_half * stencil_sum), stencil_sum
+    coordinate_names = ", ".join(f"log {f}" if f in logarithmic else f for f in cell.fields)
     kind = KIND if logarithmic else "constant"
-    return CellRealisation(kind, displacement, increment, f"π is constant in {named}", None, logarithmic)
+    return CellRealisation(kind, displacement, increment, f"π is constant in {coordinate_names}", None, logarithmic)
 
 
 def _logarithms(cell: Cell) -> tuple[frozenset[str], dict[tuple[str, str], Expression]] | None:
     """Return the fewest fields whose logarithms make π constant, and π in these coordinates, or None."""
     for count in range(len(cell.fields) + 1):
-        for chosen in itertools.combinations(cell.fields, count):
-            constants = {pair: _constant(cell, *pair, chosen) for pair in cell.bracket}
-            known = {pair: c for pair, c in constants.items() if c is not None}
-            if len(known) == len(constants):
-                return frozenset(chosen), known
+        for logarithmic in itertools.combinations(cell.fields, count):
+            constants = {pair: _constant(cell, *pair, logarithmic) for pair in cell.bracket}
+            constant_brackets = {pair: c for pair, c in constants.items() if c is not None}
+            if len(constant_brackets) == len(constants):
+                return frozenset(logarithmic), constant_brackets
     return None
 
 

@@ -62,36 +62,36 @@ class _TogetherError(_NoFlowError):
 def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
     if not cell.is_local or cell.relation == PAIRS:
         raise _NoFlowError("brackets couple sites" if not cell.is_local else "every site is a neighbour of all others")
-    still, rest = _slopes(cell)
+    fixed_slopes, own_slopes = _slopes(cell)
     sums = _sums(cell)
-    _flow(cell, still, [0], sums)  # raises: without a flow here, no colouring has one
-    for colour in _colours(cell, colouring, still):
-        flow = _flow(cell, still, [colour], sums)
+    _flow(cell, fixed_slopes, [0], sums)  # raises: without a flow here, no colouring has one
+    for colour in _colours(cell, colouring, fixed_slopes):
+        flow = _flow(cell, fixed_slopes, [colour], sums)
         if colouring.seams and colour is not None:
-            there = symbol(Symbol(BEGINS, colour, *(0 for _ in cell.axes)))
-            (beside,) = _flow(cell, still, [None], sums, there).motions
-            flow = replace(flow, beside=beside)
+            seam_weight = symbol(Symbol(BEGINS, colour, *(0 for _ in cell.axes)))
+            (seam_motion,) = _flow(cell, fixed_slopes, [None], sums, seam_weight).motions
+            flow = replace(flow, beside=seam_motion)
         yield flow
-    if any(not e.is_zero for e in rest.values()):
-        single = [{f: e if g == f else ZERO for f in cell.fields} for g, e in rest.items() if not e.is_zero]
+    if any(not e.is_zero for e in own_slopes.values()):
+        single = [{f: e if g == f else ZERO for f in cell.fields} for g, e in own_slopes.items() if not e.is_zero]
         colours: list[int | None] = [*range(colouring.count)]
         try:
-            yield _flow(cell, rest, colours)
+            yield _flow(cell, own_slopes, colours)
         except _NoFlowError:
             yield from [_flow(cell, b, colours) for b in single]
 
 
 def _slopes(cell: Cell) -> tuple[Covector, Covector]:
     """Return ∂H/∂f at a site, by field: the terms that do not depend on the site itself, and the rest."""
-    at = SiteFields(cell, sums_by_field(cell))
-    slopes = [at.slope(f) for f in cell.fields]
+    site_fields = SiteFields(cell, sums_by_field(cell))
+    slopes = [site_fields.slope(f) for f in cell.fields]
     ring = bracketless_ring(cell.fields, slopes)
-    still, rest = {}, {}
+    fixed_slopes, own_slopes = {}, {}
     for f, element in zip(cell.fields, ring.tower.convert_all(slopes), strict=True):
         parts = ring.terms(element, ring.state)
-        still[f] = ring.expression(parts.pop((0,) * len(ring.tower.gens), ring.tower.zero))
-        rest[f] = total(ring.expression(c * ring.monomial(m)) for m, c in parts.items())
-    return still, rest
+        fixed_slopes[f] = ring.expression(parts.pop((0,) * len(ring.tower.gens), ring.tower.zero))
+        own_slopes[f] = total(ring.expression(c * ring.monomial(m)) for m, c in parts.items())
+    return fixed_slopes, own_slopes
 
 
 def _sums(cell: Cell) -> tuple[BondSum, ...]:
@@ -103,11 +103,11 @@ def _sums(cell: Cell) -> tuple[BondSum, ...]:
     return tuple(replace(s, chosen="here") for s in sums)
 
 
-def _colours(cell: Cell, colouring: Colouring, still: Covector) -> list[int | None]:
+def _colours(cell: Cell, colouring: Colouring, fixed_slopes: Covector) -> list[int | None]:
     """Return the colours that are damped one after the other; a single one where sites are independent."""
     if cell.relation == GRAPH:
         return [0]
-    places = cell.places(*still.values(), *([cell.forces.damping] if cell.forces.damping is not None else []))
+    places = cell.places(*fixed_slopes.values(), *([cell.forces.damping] if cell.forces.damping is not None else []))
     neighbours = {offset for base, offset in places.values() if base in cell.fields and any(offset)}
     if not neighbours:
         return [None] if colouring.count > 1 else [0]
@@ -124,11 +124,13 @@ def _flow(
     weight: Expression = ONE,
 ) -> CellFlow:
     """Return the flow of λππb for a covector b at sites of these colours, or where ``weight`` is 1."""
-    at, n = SiteFields(cell), cell.fields
+    site_fields, n = SiteFields(cell), cell.fields
     fields_in_covector = {f for f, e in covector.items() if set(symbols_of(e)) & set(n)}
     b = {f: e if fields_in_covector or e.is_zero else symbol(Symbol(FORCE, f)) for f, e in covector.items()}
-    factor = at.damping() * (symbol(Symbol(CHOSEN)) if cell.relation == GRAPH and not fields_in_covector else weight)
-    rates = {f: factor * at.tangent(f, lambda g, _: at.tangent(g, lambda h, _: b[h])) for f in n}
+    factor = site_fields.damping() * (
+        symbol(Symbol(CHOSEN)) if cell.relation == GRAPH and not fields_in_covector else weight
+    )
+    rates = {f: factor * site_fields.tangent(f, lambda g, _: site_fields.tangent(g, lambda h, _: b[h])) for f in n}
     ring = bracketless_ring(n, rates.values())
     solution = solved(ring, ring.tower.convert_all([rates[f] for f in n]))
     if isinstance(solution, str):

@@ -42,11 +42,11 @@ class Power:
             values = self._values(term, x, rate, parameters, lambda array, offset: shifted(array, offset))
             power += float(np.broadcast_to(evaluate([term], values)[0], sizes)[inside_ends(cell, extent, sizes)].sum())
         if not self._coupled.is_zero:
-            ends = np.transpose(np.triu_indices(sizes[0], 1)) if cell.relation == PAIRS else parameters["bonds"]
+            bond_ends = np.transpose(np.triu_indices(sizes[0], 1)) if cell.relation == PAIRS else parameters["bonds"]
             values = self._values(
-                self._coupled, x, rate, parameters, lambda array, end: array[ends[:, ENDS.index(str(end[0]))]]
+                self._coupled, x, rate, parameters, lambda array, end: array[bond_ends[:, ENDS.index(str(end[0]))]]
             )
-            power += float(np.broadcast_to(evaluate([self._coupled], values)[0], len(ends)).sum())
+            power += float(np.broadcast_to(evaluate([self._coupled], values)[0], len(bond_ends)).sum())
         return power
 
     def _rate(self, density: Expression) -> Expression:
@@ -57,17 +57,17 @@ class Power:
         return along_motion + total(slopes[len(names) :])
 
     def _values(
-        self, term: Expression, x: Floats, rate: Floats, parameters: Mapping[str, Any], at: Any
+        self, term: Expression, x: Floats, rate: Floats, parameters: Mapping[str, Any], instant: Any
     ) -> dict[str, Any]:
         values = {n: v for n, v in parameters.items() if n not in self.cell.neighbours.names}
-        named = {str(n.key[0]) for n in _variations(term)} | set(self.cell.places(term))
-        for name in named:
+        used_names = {str(n.key[0]) for n in _variations(term)} | set(self.cell.places(term))
+        for name in used_names:
             base, offset = self.cell.place(name)
             if base in self.cell.fields:
                 k = self.cell.fields.index(base)
-                values |= {name: at(x[k], offset), variation(name): at(rate[k], offset)}
+                values |= {name: instant(x[k], offset), variation(name): instant(rate[k], offset)}
             else:
-                values[name] = at(np.broadcast_to(parameters[base], x.shape[1:]), offset)
+                values[name] = instant(np.broadcast_to(parameters[base], x.shape[1:]), offset)
         return values
 
 
@@ -89,48 +89,48 @@ def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: 
     for axis, boundary in enumerate(cell.boundary):
         if boundary != PERIODIC:
             shape = [-1 if a == axis else 1 for a in range(len(sizes))]
-            place = np.arange(sizes[axis]).reshape(shape)
-            mask = mask & (place + low[axis] >= 0) & (place + high[axis] < sizes[axis])
+            positions = np.arange(sizes[axis]).reshape(shape)
+            mask = mask & (positions + low[axis] >= 0) & (positions + high[axis] < sizes[axis])
     return mask
 
 
-def integral(values: Floats, h: float, places: Floats | None = None) -> tuple[Floats, float]:
+def integral(values: Floats, h: float, row_positions: Floats | None = None) -> tuple[Floats, float]:
     """Return the integrals of P from the first time to each, and an estimate of their error.
 
-    ``values`` (steps + 1,) are taken at times ``h`` apart. The integrals end at these times or, with ``places``
+    ``values`` (steps + 1,) are taken at times ``h`` apart. The integrals end at these times or, with ``row_positions``
     (rows,), after these numbers of steps, which may have a fraction. Beyond the last value, the polynomial through
     the values before it is integrated.
     """
-    fine, coarse = (_integrals_to(values, count, h, places) for count in (FINE_NODES, COARSE_NODES))
+    fine, coarse = (_integrals_to(values, count, h, row_positions) for count in (FINE_NODES, COARSE_NODES))
     return fine, float(np.abs(fine - coarse).max())
 
 
-def _integrals_to(values: Floats, count: int, h: float, places: Floats | None) -> Floats:
+def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | None) -> Floats:
     """Return the integrals from the first time to each, by polynomials through ``count`` values."""
     intervals = len(values) - 1
     integrals = np.append(
         0.0, h * np.cumsum(_interval_integrals(values, count, np.arange(intervals), np.ones(intervals)))
     )
-    if places is None:
+    if row_positions is None:
         return integrals
-    whole = np.clip(np.floor(places + 1e-9).astype(int), 0, intervals)
-    part = np.where(np.abs(places - whole) > 1e-9, places - whole, 0.0)
-    return np.asarray(integrals[whole] + h * _interval_integrals(values, count, whole, part))
+    whole_intervals = np.clip(np.floor(row_positions + 1e-9).astype(int), 0, intervals)
+    part = np.where(np.abs(row_positions - whole_intervals) > 1e-9, row_positions - whole_intervals, 0.0)
+    return np.asarray(integrals[whole_intervals] + h * _interval_integrals(values, count, whole_intervals, part))
 
 
-def _interval_integrals(values: Floats, count: int, begins: NDArray[np.int64], lengths: Floats) -> Floats:
+def _interval_integrals(values: Floats, count: int, stencil_starts: NDArray[np.int64], lengths: Floats) -> Floats:
     """Return the integral over each interval, by the polynomial through the ``count`` values around the interval.
 
-    Intervals begin at the values numbered ``begins``; their ``lengths`` are in units of the distance of two values.
+    Intervals begin at the values numbered ``stencil_starts``; ``lengths`` are in units of the distance of two values.
     """
     count = min(count, len(values))
-    starts = np.clip(begins - (count // 2 - 1), 0, len(values) - count)
+    starts = np.clip(stencil_starts - (count // 2 - 1), 0, len(values) - count)
     powers = np.arange(count)
     vandermonde = np.arange(count)[None, :] ** powers[:, None]
-    integrals = np.zeros(len(begins))
-    for place, length in {*zip((begins - starts).tolist(), lengths.tolist(), strict=True)}:
-        moments = ((place + length) ** (powers + 1) - float(place) ** (powers + 1)) / (powers + 1)
+    integrals = np.zeros(len(stencil_starts))
+    for position, length in {*zip((stencil_starts - starts).tolist(), lengths.tolist(), strict=True)}:
+        moments = ((position + length) ** (powers + 1) - float(position) ** (powers + 1)) / (powers + 1)
         weights = np.linalg.solve(vandermonde.astype(np.float64), moments)
-        chosen = np.flatnonzero((begins - starts == place) & (lengths == length))
-        integrals[chosen] = sum(w * values[starts[chosen] + k] for k, w in enumerate(weights))
+        selected = np.flatnonzero((stencil_starts - starts == position) & (lengths == length))
+        integrals[selected] = sum(w * values[starts[selected] + k] for k, w in enumerate(weights))
     return integrals

@@ -51,8 +51,8 @@ class Expansion:
     def neighbour(self, site: Site, offset: Offset) -> Site | None:
         """Return the site at an offset, or None beyond an open end."""
         position = plus(site, offset)
-        inside = [0 <= n < size for n, size in zip(position, self.sizes, strict=True)]
-        if any(b == OPEN and not i for b, i in zip(self.cell.boundary, inside, strict=True)):
+        is_inside = [0 <= n < size for n, size in zip(position, self.sizes, strict=True)]
+        if any(b == OPEN and not i for b, i in zip(self.cell.boundary, is_inside, strict=True)):
             return None
         return tuple(n % size for n, size in zip(position, self.sizes, strict=True))
 
@@ -68,9 +68,9 @@ class Expansion:
 
     def between(self, expression: Expression, a: Site, b: Site, bond: int | None = None) -> Expression:
         """Return a density of a bond, or of a pair, between two sites."""
-        where = dict(zip(ENDS, (a, b), strict=True))
+        site_of_end = dict(zip(ENDS, (a, b), strict=True))
         places = self.cell.places(expression)
-        values = {n: symbol(self.names[base, where[str(end[0])]]) for n, (base, end) in places.items()}
+        values = {n: symbol(self.names[base, site_of_end[str(end[0])]]) for n, (base, end) in places.items()}
         if bond is not None:
             bond_parameters = (p.name for p in self.cell.parameters if p.at == "bonds")
             values |= {n: symbol(self.bond_names[n, bond]) for n in bond_parameters}
@@ -108,8 +108,8 @@ class Expansion:
         for (f_end, g_end), value in self.cell.bond_bracket.items():
             (f, at_f), (g, at_g) = self.cell.place(f_end), self.cell.place(g_end)
             for k, (a, b) in enumerate(self.bonds):
-                where = {"a": (a,), "b": (b,)}
-                pair = self.names[f, where[str(at_f[0])]], self.names[g, where[str(at_g[0])]]
+                positions = {"a": (a,), "b": (b,)}
+                pair = self.names[f, positions[str(at_f[0])]], self.names[g, positions[str(at_g[0])]]
                 entries.setdefault(pair, []).append(self.between(value, (a,), (b,), k))
         sums = {pair: total(terms) for pair, terms in entries.items()}
         return {pair: e for pair, e in sums.items() if not e.is_zero}
@@ -127,7 +127,7 @@ class Expansion:
                 if kind == "product":
                     casimirs[name] = product_of(values.values())
                 else:
-                    casimirs |= {_free(name, site, used_names): e for site, e in values.items()}
+                    casimirs |= {_unused_name(name, site, used_names): e for site, e in values.items()}
         return casimirs
 
     def forces(self) -> SpecForces:
@@ -136,8 +136,8 @@ class Expansion:
         if not cell_forces:
             return cell_forces
         covector, vector = (
-            {self.names[f, site]: total(self._terms(e, site)) for f, e in listed.items() for site in self.sites}
-            for listed in (cell_forces.covector, cell_forces.vector)
+            {self.names[f, site]: total(self._terms(e, site)) for f, e in force_terms.items() for site in self.sites}
+            for force_terms in (cell_forces.covector, cell_forces.vector)
         )
         damping = cell_forces.damping
         if damping is not None and self.cell.places(damping):
@@ -168,7 +168,7 @@ class Expansion:
         for site in self.sites:
             for name, source in self.cell.noise.items():
                 parts = [self.at(e, site) or ZERO for e in (source.hamiltonian, source.amplitude)]
-                sources[_free(name, site, used_names)] = SpecNoise(*parts)
+                sources[_unused_name(name, site, used_names)] = SpecNoise(*parts)
         return sources
 
     def matrix(self) -> MatrixForm:
@@ -223,16 +223,16 @@ def expand(cell: Cell, sizes: Sequence[int], bonds: Sequence[Sequence[int]] = ()
     if len(sizes) != (len(cell.axes) or 1) or any(n < 1 for n in sizes):
         required_sizes = f"{len(cell.axes)}, along {', '.join(cell.axes)}" if cell.axes else "the number of sites"
         raise ValueError(f"sizes are {required_sizes}; not {'x'.join(map(str, sizes))}")
-    ends = tuple((int(a), int(b)) for a, b in bonds)
-    if any(not (0 <= n < sizes[0]) for pair in ends for n in pair) or any(a == b for a, b in ends):
+    bond_ends = tuple((int(a), int(b)) for a, b in bonds)
+    if any(not (0 <= n < sizes[0]) for pair in bond_ends for n in pair) or any(a == b for a, b in bond_ends):
         raise ValueError(f"bonds are pairs of different sites between 0 and {sizes[0] - 1}")
     used_names = {p.name for p in cell.parameters if p.at == "all"} | {*cell.casimirs, *cell.invariants, *cell.times}
     sites = list(product(*map(range, sizes)))
     local = (n for n in cell.neighbours.names if n not in cell.increments)
-    names = {(n, s): _free(n, s, used_names) for n in local for s in sites}
+    names = {(n, s): _unused_name(n, s, used_names) for n in local for s in sites}
     bond_parameters = [p.name for p in cell.parameters if p.at == "bonds"]
-    bond_names = {(n, k): _free(n, (k,), used_names) for n in bond_parameters for k in range(len(ends))}
-    return Expansion(cell, tuple(sizes), ends, names, bond_names)
+    bond_names = {(n, k): _unused_name(n, (k,), used_names) for n in bond_parameters for k in range(len(bond_ends))}
+    return Expansion(cell, tuple(sizes), bond_ends, names, bond_names)
 
 
 def ring(sites: int) -> list[tuple[int, int]]:
@@ -262,7 +262,7 @@ def _decimal(value: float) -> Fraction:
     return Fraction(repr(float(value)))
 
 
-def _free(name: str, site: Site, used_names: set[str]) -> str:
+def _unused_name(name: str, site: Site, used_names: set[str]) -> str:
     """Return ``x_1_2``, followed by underscores until the name is unused, and record it in ``used_names``."""
     candidate = "_".join([name, *map(str, site)])
     while candidate in used_names:

@@ -24,10 +24,10 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
     count, flows = plan.parts.colouring.count, plan.flows
     positive = tuple(p.name for p in cell.parameters if p.positive)
     parts = [number(len(colours)) * s.expression for flow in flows for s, colours in flow.summands]
-    rest = number(count) * total(s.expression for s in summands_of(cell)) - total(substitute(parts, {KICK: ZERO}))
+    difference = number(count) * total(s.expression for s in summands_of(cell)) - total(substitute(parts, {KICK: ZERO}))
     modified = any(KICK in symbols_of(flow.hamiltonian) for flow in flows)
     name = "H = " + " + ".join(f"H_{k}" for k, f in enumerate(flows, 1) if not f.force) + " at κ = 0" * modified
-    yield decide_zero(name, [("", rest)], positive, f"sites of {count} colours" if count > 1 else "")
+    yield decide_zero(name, [("", difference)], positive, f"sites of {count} colours" if count > 1 else "")
     if cell.forces:
         yield _forces(cell, flows, count, positive)
     for k, flow in enumerate(flows, 1):
@@ -43,7 +43,7 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
 
 def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequence[str]) -> Statement:
     """Decide that the force parts sum to πζ + f."""
-    at = SiteFields(cell, sums_by_field(cell))
+    site_fields = SiteFields(cell, sums_by_field(cell))
     force_flows = [flow for flow in flows if flow.force]
     residuals = []
     for colour in range(count):
@@ -52,7 +52,10 @@ def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequenc
             values = {**motion.components, Symbol(CHOSEN): ONE}
             for f, e in zip(motion.rates, substitute(list(motion.rates.values()), values), strict=True):
                 rates[f].append(e)
-        residuals += [(f, at.tangent(f, at.push) + at.impulse(f) - total(listed)) for f, listed in rates.items()]
+        residuals += [
+            (f, site_fields.tangent(f, site_fields.push) + site_fields.impulse(f) - total(terms))
+            for f, terms in rates.items()
+        ]
     name = "πζ + f = " + " + ".join(f"F_{k}" for k, flow in enumerate(flows, 1) if flow.force)
     return decide_zero(name, residuals, positive)
 

@@ -48,12 +48,12 @@ def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow,
     """
     if not cell.forces:
         return ()
-    at = SiteFields(cell, sums_by_field(cell))
-    tangent = {f: at.tangent(f, at.push) for f in cell.fields}
-    impulse = {f: at.impulse(f) for f in cell.fields}
-    whole = _flow(cell, colouring, {f: tangent[f] + impulse[f] for f in cell.fields})
-    if isinstance(whole, CellFlow):
-        return (whole,) if whole.motions else ()
+    site_fields = SiteFields(cell, sums_by_field(cell))
+    tangent = {f: site_fields.tangent(f, site_fields.push) for f in cell.fields}
+    impulse = {f: site_fields.impulse(f) for f in cell.fields}
+    common_flow = _flow(cell, colouring, {f: tangent[f] + impulse[f] for f in cell.fields})
+    if isinstance(common_flow, CellFlow):
+        return (common_flow,) if common_flow.motions else ()
     components = [(f"f = {shortened(e)}", {f: e}) for f, e in impulse.items()]
     flows = (*_tangent_flows(cell, colouring, host), *_summand_flows(cell, colouring, impulse, components, host))
     return tuple(flow for flow in flows if flow.motions)
@@ -61,10 +61,10 @@ def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow,
 
 def _tangent_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
     """Return the flows of πζ: one flow, one for each covector, or those of damping and of the other covectors."""
-    at = SiteFields(cell, sums_by_field(cell))
-    tangent = {f: at.tangent(f, at.push) for f in cell.fields}
+    site_fields = SiteFields(cell, sums_by_field(cell))
+    tangent = {f: site_fields.tangent(f, site_fields.push) for f in cell.fields}
     try:
-        covectors = [(f"ζ_{f}", _alone(cell, at, f)) for f in cell.fields]
+        covectors = [(f"ζ_{f}", _tangent_of_covector(cell, site_fields, f)) for f in cell.fields]
         return tuple(_summand_flows(cell, colouring, tangent, covectors, host))
     except SpecError:
         if cell.forces.damping is None:
@@ -80,8 +80,8 @@ def _summand_flows(
     cell: Cell, colouring: Colouring, field: Rates, summands: Sequence[tuple[str, Rates]], host: Host
 ) -> Iterator[CellFlow]:
     """Yield the flow of a field or, where it is not elementary, the flows of its summands."""
-    whole = _flow(cell, colouring, field)
-    for name, summand in [("", field)] if isinstance(whole, CellFlow) else summands:
+    common_flow = _flow(cell, colouring, field)
+    for name, summand in [("", field)] if isinstance(common_flow, CellFlow) else summands:
         flow = _flow(cell, colouring, summand)
         if isinstance(flow, str):
             message = f"scheme splitting: the force {name} has no elementary flow on the lattice: {flow}"
@@ -90,9 +90,9 @@ def _summand_flows(
         yield flow
 
 
-def _alone(cell: Cell, at: SiteFields, field: str) -> dict[str, Expression]:
+def _tangent_of_covector(cell: Cell, site_fields: SiteFields, field: str) -> dict[str, Expression]:
     """Return π of the one covector ζ_field, by field."""
-    return {f: at.tangent(f, lambda g, d: at.push(g, d) if g == field else ZERO) for f in cell.fields}
+    return {f: site_fields.tangent(f, lambda g, d: site_fields.push(g, d) if g == field else ZERO) for f in cell.fields}
 
 
 def _flow(cell: Cell, colouring: Colouring, rates: Rates) -> CellFlow | str:
@@ -138,8 +138,8 @@ def noise_flows(
 
 
 def _of_unit_time(flow: CellFlow) -> CellFlow:
-    def at_unit_time(listed: Rates) -> dict[str, Expression]:
-        return dict(zip(listed, substitute(list(listed.values()), {TIME: ONE}), strict=True))
+    def at_unit_time(rates: Rates) -> dict[str, Expression]:
+        return dict(zip(rates, substitute(list(rates.values()), {TIME: ONE}), strict=True))
 
     motions = tuple(replace(m, increments=at_unit_time(m.increments)) for m in flow.motions)
     return replace(flow, increment=tuple(substitute(flow.increment, {TIME: ONE})), motions=motions)
@@ -149,8 +149,8 @@ def casimir_rate(cell: Cell, name: str) -> Expression:
     """Return a density of dC/dt under the vector force f; πζ does not change a Casimir."""
     density, kind = cell.casimirs[name]
     vector, terms = cell.forces.vector, []
-    named = {n: p for n, p in cell.places(density).items() if p[0] in vector}
-    for (base, offset), slope in zip(named.values(), gradient(density, list(named)), strict=True):
+    field_places = {n: p for n, p in cell.places(density).items() if p[0] in vector}
+    for (base, offset), slope in zip(field_places.values(), gradient(density, list(field_places)), strict=True):
         force = cell.shifted(vector[base], offset) if cell.axes else vector[base]
         terms.append(slope / density * force if kind == "product" else slope * force)
     return total(terms)
@@ -169,8 +169,8 @@ def force_statements(cell: Cell) -> Iterator[Statement]:
     for name in cell.casimirs:
         rate = casimir_rate(cell, name)
         conserved = decide_zero(f"the forces keep {name}", [(f"d{name}/dt", rate)], positive, "for all sizes")
-        changed = f"the vector force changes {name}, a site adds {shortened(rate)} to its rate"
-        yield conserved if conserved.holds else Statement(changed, PROVED)
+        detail = f"the vector force changes {name}, a site adds {shortened(rate)} to its rate"
+        yield conserved if conserved.holds else Statement(detail, PROVED)
     if cell.forces.damping is not None:
         yield Statement("the damping changes H at the rate −Σ λ |π∇H|²", PROVED, "since π is skew, for all sizes")
 
@@ -187,23 +187,23 @@ def noise_statements(cell: Cell) -> Iterator[Statement]:
         periodic = replace(cell, boundary=(PERIODIC,) * len(cell.axes))
         sizes = [1 + 2 * r for r in cell.poisson_reach] if cell.axes else [2]
         box = expand(periodic, [max(n, 2) for n in sizes], [(0, 1)] * (cell.relation == GRAPH))
-        where = f"on {len(box.sites)} sites"
+        box_text = f"on {len(box.sites)} sites"
         system = system_from_spec(box.spec())
     else:
         slopes = {f: Symbol("slope", f) for f in cell.fields}
         rows = tuple(tuple(cell.bracket.get((f, g), ZERO) for g in cell.fields) for f in cell.fields)
         energy = total(symbol(slopes[f]) * symbol(f) for f in cell.fields)
-        free = tuple(Parameter(s, Fraction(1)) for s in slopes.values())
+        gradient_parameters = tuple(Parameter(s, Fraction(1)) for s in slopes.values())
         system = build_system(
-            cell.name, cell.fields, (*cell.parameters, *free), MatrixForm(rows), energy,
+            cell.name, cell.fields, (*cell.parameters, *gradient_parameters), MatrixForm(rows), energy,
             time=cell.time, forces=cell.forces, noise=cell.noise,
         )  # fmt: skip
-        where = "at every site, whatever H is"
+        box_text = "at every site, whatever H is"
     varying = [p.name for p in cell.parameters if p.at == "sites"]
     for statement in checks.noise_statements(system):
         theta = statement.name.partition("θ = ")[2]
         condition = "where θ is the same at all sites" if any(n in names_in(theta) for n in varying) else ""
-        yield replace(statement, detail="; ".join(filter(None, [statement.detail, where, condition])))
+        yield replace(statement, detail="; ".join(filter(None, [statement.detail, box_text, condition])))
 
 
 def _acting(cell: Cell) -> list[Expression]:

@@ -76,12 +76,12 @@ class GraphSearch(PartSearch):
 
     def _support(self, term: tuple[Summand, int]) -> list[Coordinate]:
         summand, kind = term
-        where: dict[Offset, int] = {}
+        site_numbers: dict[Offset, int] = {}
         if kind != WHOLE:
             end = _CHOSEN_END[kind]
-            where = {(): INSIDE, (end,): INSIDE, (_OTHER[end],): OUTSIDE}
+            site_numbers = {(): INSIDE, (end,): INSIDE, (_OTHER[end],): OUTSIDE}
         places = self.cell.places(summand.expression).values()
-        return sorted({(f, where.get(o, ANYWHERE)) for f, o in places if f in self.cell.fields})
+        return sorted({(f, site_numbers.get(o, ANYWHERE)) for f, o in places if f in self.cell.fields})
 
     def _coupled(self, a: Coordinate, b: Coordinate) -> bool:
         """Whether two coordinates can have a bracket, at one site or along a bond."""
@@ -140,17 +140,19 @@ class _SiteEquation:
                 rates.setdefault(f, []).append(entry * symbol(name))
         if self.place != INSIDE:
             sums += self._bond_motions(rates)
-        self.rates = {f: total(listed) for f, listed in rates.items()}
-        used = {n for e in (*self.rates.values(), *self.forces.values()) for n in _gathered_in(e)}
-        self.gathered = merged_ends([replace(s, values={n: e for n, e in s.values.items() if n in used}) for s in sums])
+        self.rates = {f: total(terms) for f, terms in rates.items()}
+        gathered_symbols = {n for e in (*self.rates.values(), *self.forces.values()) for n in _gathered_in(e)}
+        self.gathered = merged_ends(
+            [replace(s, values={n: e for n, e in s.values.items() if n in gathered_symbols}) for s in sums]
+        )
 
     def _bond_forces(self) -> list[BondSum]:
         """Return the forces of bonds on this site, at the end to which the energy of a bond belongs in this part."""
-        sums, chosen = [], {ANYWHERE: "", INSIDE: "here", OUTSIDE: "there"}[self.place]
+        sums, selection = [], {ANYWHERE: "", INSIDE: "here", OUTSIDE: "there"}[self.place]
         for end in ENDS:
             coloured_end = {ANYWHERE: None, INSIDE: end, OUTSIDE: _OTHER[end]}[self.place]
             density = total(s.expression for s, kind in self.part if s.bond and _CHOSEN_END.get(kind) == coloured_end)
-            sums += [] if density.is_zero else [BondSum(_forces_at(self.cell, density, end), end, chosen)]
+            sums += [] if density.is_zero else [BondSum(_forces_at(self.cell, density, end), end, selection)]
         return sums
 
     def _bond_motions(self, rates: dict[str, list[Expression]]) -> list[BondSum]:
@@ -158,7 +160,7 @@ class _SiteEquation:
 
         A rate is a sum of monomials in the fields of this site, each times a sum over the neighbours.
         """
-        chosen = "there" if self.place == OUTSIDE else ""
+        selection = "there" if self.place == OUTSIDE else ""
         values: dict[str, dict[str, Expression]] = {"a": {}, "b": {}}
         sum_symbols: dict[tuple[str, str], Symbol] = {}
         for f, end, rate in bond_rates(self.cell, total(s.expression for s, _ in self.part if not s.bond)):
@@ -167,9 +169,9 @@ class _SiteEquation:
                 if key not in sum_symbols:
                     sum_symbols[key] = Symbol(GATHERED, f, len(sum_symbols))
                     rates.setdefault(f, []).append(monomial * symbol(sum_symbols[key]))
-                known = values[end].get(sum_symbols[key], ZERO)
-                values[end][sum_symbols[key]] = known + factor
-        return [BondSum(v, end, chosen) for end, v in values.items() if v]
+                earlier_sum = values[end].get(sum_symbols[key], ZERO)
+                values[end][sum_symbols[key]] = earlier_sum + factor
+        return [BondSum(v, end, selection) for end, v in values.items() if v]
 
 
 def bond_rates(cell: Cell, density: Expression) -> Iterator[tuple[str, str, Expression]]:
@@ -237,13 +239,13 @@ def with_first_end(cell: Cell, e: Expression, end: str) -> Expression:
 def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
     """Return one sum for both ends where both are proved to be equal; all sums get the same symbols."""
     names = dict.fromkeys(n for s in sums for n in s.values)
-    full = [replace(s, values={n: s.values.get(n, ZERO) for n in names}) for s in sums]
-    full = [s for s in full if any(not e.is_zero for e in s.values.values())]
-    if len(full) == 2 and full[0].chosen == full[1].chosen != "here":
-        differences = [(n, full[0].values[n] - full[1].values[n]) for n in names]
+    completed = [replace(s, values={n: s.values.get(n, ZERO) for n in names}) for s in sums]
+    completed = [s for s in completed if any(not e.is_zero for e in s.values.values())]
+    if len(completed) == 2 and completed[0].chosen == completed[1].chosen != "here":
+        differences = [(n, completed[0].values[n] - completed[1].values[n]) for n in names]
         if decide_zero("", differences).verdict == PROVED:
-            return (replace(full[0], end=""),)
-    return tuple(full)
+            return (replace(completed[0], end=""),)
+    return tuple(completed)
 
 
 def _forces_at(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
@@ -255,8 +257,8 @@ def _forces_at(cell: Cell, density: Expression, end: str) -> dict[str, Expressio
 
 def _moving_forces(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
     """Return the forces of `_forces_at` that the vector field reads."""
-    read = symbols_of(*field_at_site(cell, {f: symbol(_gathered(f)) for f in cell.fields}))
-    return {name: e for name, e in _forces_at(cell, density, end).items() if name in read}
+    read_symbols = symbols_of(*field_at_site(cell, {f: symbol(_gathered(f)) for f in cell.fields}))
+    return {name: e for name, e in _forces_at(cell, density, end).items() if name in read_symbols}
 
 
 def _monomials(cell: Cell, rate: Expression) -> Iterator[tuple[Expression, Expression]]:

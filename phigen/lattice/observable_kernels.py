@@ -71,11 +71,11 @@ def _density(cell: Cell, name: str, *, single: bool) -> Expression:
     value = cell.observables[name]
     if reduction.kind in ADDITIVE:
         return _within(cell, value)
-    there = _present(cell, value)
-    if there == ONE:
+    is_present = _present(cell, value)
+    if is_present == ONE:
         return value
     largest = (2 - Fraction(1, 2**23)) * 2**127 if single else Fraction(sys.float_info.max)
-    return call("choose", there, value, number(-largest if reduction.kind == "max" else largest))
+    return call("choose", is_present, value, number(-largest if reduction.kind == "max" else largest))
 
 
 def _within(cell: Cell, density: Expression) -> Expression:

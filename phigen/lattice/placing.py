@@ -25,29 +25,29 @@ def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
     distances = _distances(bonds, sites)
     centred = distances**2 - (distances**2).mean(axis=0)
     values, vectors = np.linalg.eigh(-(centred - centred.mean(axis=1, keepdims=True)) / 2)
-    places = np.zeros((sites, 2))
+    positions = np.zeros((sites, 2))
     for k in range(min(2, sites)):
         axis = vectors[:, -1 - k] * np.sqrt(max(values[-1 - k], 0.0))
-        places[:, k] = axis * (np.sign(axis[np.argmax(np.abs(axis))]) or 1.0)
-    places += 1e-3 * np.random.default_rng(0).normal(size=places.shape)  # so that no two sites coincide
+        positions[:, k] = axis * (np.sign(axis[np.argmax(np.abs(axis))]) or 1.0)
+    positions += 1e-3 * np.random.default_rng(0).normal(size=positions.shape)  # so that no two sites coincide
     for _ in range(ROUNDS):
-        lengths = np.linalg.norm(places[:, None] - places[None], axis=2)
+        lengths = np.linalg.norm(positions[:, None] - positions[None], axis=2)
         weights = distances / np.where(lengths > 0, lengths, 1.0)
-        places = (weights.sum(axis=1)[:, None] * places - weights @ places) / sites
-    places -= places.min(axis=0)
-    places /= places.max() or 1.0
-    return np.asarray(places + (1.0 - places.max(axis=0)) / 2)
+        positions = (weights.sum(axis=1)[:, None] * positions - weights @ positions) / sites
+    positions -= positions.min(axis=0)
+    positions /= positions.max() or 1.0
+    return np.asarray(positions + (1.0 - positions.max(axis=0)) / 2)
 
 
 def _distances(bonds: NDArray[np.int64], sites: int) -> Floats:
     """Return the numbers of bonds between sites (sites, sites); unconnected sites are farther apart than all others."""
-    joined = np.eye(sites, dtype=np.float32)
+    connected = np.eye(sites, dtype=np.float32)
     for a, b in bonds:
-        joined[a, b] = joined[b, a] = 1.0
+        connected[a, b] = connected[b, a] = 1.0
     reached, distances = np.eye(sites, dtype=np.float32), np.full((sites, sites), np.inf)
     np.fill_diagonal(distances, 0.0)
     for steps in range(1, sites):
-        further = np.minimum(reached @ joined, 1.0)
+        further = np.minimum(reached @ connected, 1.0)
         if (further == reached).all():
             break
         distances[(further > 0) & (reached == 0)], reached = steps, further

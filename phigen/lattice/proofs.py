@@ -60,15 +60,19 @@ def casimirs(cell: Cell) -> Iterator[Statement]:
     """Yield π∇C = 0 for each Casimir: for the Casimirs of every site, for the sum, or for the product."""
     for name, (density, kind) in cell.casimirs.items():
         title = f"{name} is a Casimir"
-        where = {"sites": "at every site", "sum": "the sum over all sites", "product": "the product of all sites"}[kind]
+        domain_text = {
+            "sites": "at every site",
+            "sum": "the sum over all sites",
+            "product": "the product of all sites",
+        }[kind]
         if cell.relation != GRID:
-            yield _worst(title, f"{where}, for every {_any(cell)}", _casimir_of_graphs(cell, name))
+            yield _worst(title, f"{domain_text}, for every {_any(cell)}", _casimir_of_graphs(cell, name))
             continue
         terms = _of_site(cell, name, density) if kind == "sites" else _of_sum(cell, name, density, kind == "product")
-        statement = _decided(cell, title, terms, f"{where}, for all sizes")
+        statement = _decided(cell, title, terms, f"{domain_text}, for all sizes")
         if statement.verdict != REFUTED and OPEN in cell.boundary and (kind != "sites" or not _closed(cell)):
-            ends = _at_ends(cell, title, partial(_casimirs_of_box, name), where)
-            statement = ends if ends.verdict != PROVED else statement
+            end_statements = _at_ends(cell, title, partial(_casimirs_of_box, name), domain_text)
+            statement = end_statements if end_statements.verdict != PROVED else statement
         yield statement
 
 
@@ -85,8 +89,8 @@ def invariants(cell: Cell) -> Iterator[Statement]:
         terms.append((f"{label} where all sites are alike", _uniform(cell, rate)))
         statement = _decided(cell, title, terms, f"{label} telescopes, for all sizes")
         if statement.verdict != REFUTED and OPEN in cell.boundary:
-            ends = _at_ends(cell, title, partial(_invariant_of_box, name))
-            statement = ends if ends.verdict != PROVED else statement
+            end_statements = _at_ends(cell, title, partial(_invariant_of_box, name))
+            statement = end_statements if end_statements.verdict != PROVED else statement
         yield statement
 
 
@@ -102,7 +106,7 @@ def euler(cell: Cell, density: Expression) -> dict[str, Expression]:
     places = cell.places(density)
     for (base, offset), slope in zip(places.values(), gradient(density, list(places)), strict=True):
         slopes_by_symbol[base].append(cell.shifted(slope, minus(offset)))
-    return {n: total(listed) for n, listed in slopes_by_symbol.items()}
+    return {n: total(terms) for n, terms in slopes_by_symbol.items()}
 
 
 def rate_of(cell: Cell, density: Expression) -> Expression:
@@ -120,9 +124,9 @@ def _uniform(cell: Cell, density: Expression) -> Expression:
 
 def _decided(cell: Cell, name: str, residuals: Iterable[Labelled], detail: str = "") -> Statement:
     """Return `decide_zero` of the residuals; a positive parameter at sites is positive at every site."""
-    listed, positive_parameters = list(residuals), {p.name for p in cell.parameters if p.positive}
-    positive = [n for n in symbols_of(*(e for _, e in listed)) if n.partition("[")[0] in positive_parameters]
-    return decide_zero(name, listed, positive, detail)
+    residual_list, positive_parameters = list(residuals), {p.name for p in cell.parameters if p.positive}
+    positive = [n for n in symbols_of(*(e for _, e in residual_list)) if n.partition("[")[0] in positive_parameters]
+    return decide_zero(name, residual_list, positive, detail)
 
 
 # --- grids
@@ -150,15 +154,15 @@ def _jacobi(cell: Cell) -> Iterator[Labelled]:
     The terms come from all ordered pairs of coordinates, so each sum is twice that of the identity.
     """
     partners, sums = _partners(cell), dict[tuple[Point, ...], list[Expression]]()
-    for f, listed in partners.items():
+    for f, bracket_partners in partners.items():
         first = (f, steps(cell.origin))
-        for second, entry in listed:
-            named = {n: p for n, p in cell.places(entry).items() if p[0] in cell.fields}
-            for (base, where), slope in zip(named.values(), gradient(entry, list(named)), strict=True):
+        for second, entry in bracket_partners:
+            field_places = {n: p for n, p in cell.places(entry).items() if p[0] in cell.fields}
+            for (base, position), slope in zip(field_places.values(), gradient(entry, list(field_places)), strict=True):
                 for (h, offset), other in partners[base]:
-                    third = (h, plus(where, offset))
+                    third = (h, plus(position, offset))
                     if third not in (first, second):
-                        term = slope * cell.shifted(other, where)
+                        term = slope * cell.shifted(other, position)
                         triple, sign, translation = _canonical((first, second, third))
                         sums.setdefault(triple, []).append(number(sign) * cell.shifted(term, translation))
     for triple, terms in sorted(sums.items(), key=lambda item: item[0]):
@@ -177,11 +181,11 @@ def _canonical(triple: tuple[Point, Point, Point]) -> tuple[tuple[Point, ...], i
 
 def _of_site(cell: Cell, name: str, density: Expression) -> Iterator[Labelled]:
     """Yield {C, f} for all f that have a bracket with some argument of C."""
-    named = {n: p for n, p in cell.places(density).items() if p[0] in cell.fields}
+    field_places = {n: p for n, p in cell.places(density).items() if p[0] in cell.fields}
     partners, sums = _partners(cell), dict[Point, list[Expression]]()
-    for (base, where), slope in zip(named.values(), gradient(density, list(named)), strict=True):
+    for (base, position), slope in zip(field_places.values(), gradient(density, list(field_places)), strict=True):
         for (h, offset), entry in partners[base]:
-            sums.setdefault((h, plus(where, offset)), []).append(slope * cell.shifted(entry, where))
+            sums.setdefault((h, plus(position, offset)), []).append(slope * cell.shifted(entry, position))
     for (h, offset), terms in sums.items():
         yield f"{{{name}, {cell.at(h, offset)}}}", total(terms)
 
@@ -189,8 +193,8 @@ def _of_site(cell: Cell, name: str, density: Expression) -> Iterator[Labelled]:
 def _of_sum(cell: Cell, name: str, density: Expression, product: bool) -> Iterator[Labelled]:
     """Yield {f, Σ C}, or {f, Π C}/Π C, for all f of a site."""
     slopes = _logarithmic(cell, density) if product else euler(cell, density)
-    for f, listed in _partners(cell).items():
-        terms = [entry * cell.shifted(slopes[g], offset) for (g, offset), entry in listed]
+    for f, bracket_partners in _partners(cell).items():
+        terms = [entry * cell.shifted(slopes[g], offset) for (g, offset), entry in bracket_partners]
         yield f"{{{f}, {name}}}", total(terms)
 
 
@@ -199,7 +203,7 @@ def _logarithmic(cell: Cell, density: Expression) -> dict[str, Expression]:
     places = cell.places(density)
     for (base, offset), slope in zip(places.values(), gradient(density, list(places)), strict=True):
         slopes_by_symbol[base].append(cell.shifted(slope / density, minus(offset)))
-    return {n: total(listed) for n, listed in slopes_by_symbol.items()}
+    return {n: total(terms) for n, terms in slopes_by_symbol.items()}
 
 
 # --- open ends
@@ -223,14 +227,14 @@ def _box(cell: Cell) -> tuple[int, ...]:
     return tuple(2 * (w + p) + 1 for w, p in zip(widths, cell.poisson_reach, strict=True))
 
 
-def _at_ends(cell: Cell, name: str, examine: Callable[[System], Statement], where: str = "") -> Statement:
+def _at_ends(cell: Cell, name: str, examine: Callable[[System], Statement], domain_text: str = "") -> Statement:
     """Return a statement on a box with open ends; in one dimension, on all smaller boxes as well."""
     sizes = _box(cell)
     count = len(cell.fields)
     for size in sizes:
         count *= size
     if count > _MAX_BOX_COORDINATES:
-        prefix = f"{where}, " if where else ""
+        prefix = f"{domain_text}, " if domain_text else ""
         return Statement(name, UNDECIDED, f"{prefix}proved away from open ends; a box with ends is too large")
     least = 1 + max(*cell.hamiltonian_reach, *cell.poisson_reach)
     boxes = [(n,) for n in range(least, sizes[0] + 1)] if len(sizes) == 1 else [sizes]
@@ -238,18 +242,18 @@ def _at_ends(cell: Cell, name: str, examine: Callable[[System], Statement], wher
         system = system_from_spec(expand(cell, box).spec())
         statement = examine(system)
         if statement.verdict != PROVED:
-            shown = "×".join(map(str, box))
+            box_text = "×".join(map(str, box))
             residual = statement.residual
-            return Statement(name, statement.verdict, f"at open ends, {shown} sites: {statement.detail}", residual)
+            return Statement(name, statement.verdict, f"at open ends, {box_text} sites: {statement.detail}", residual)
     return Statement(name, PROVED, "at open ends too")
 
 
 def _casimirs_of_box(name: str, system: System) -> Statement:
     names = [n for n in system.declared if n == name or n.startswith(f"{name}_")]
-    listed = [(n, system.casimirs[n]) for n in names]
+    named_casimirs = [(n, system.casimirs[n]) for n in names]
     residuals = [
         (f"{{{c}, {n}}}", rate)
-        for n, casimir in listed
+        for n, casimir in named_casimirs
         for c, rate in zip(
             system.coordinates,
             hamiltonian_vector_field(system.poisson, gradient(casimir, system.coordinates)),
@@ -273,37 +277,41 @@ def _any(cell: Cell) -> str:
     return "graph" if cell.relation == "graph" else "number of sites"
 
 
-def _small(cell: Cell) -> Iterator[tuple[str, System]]:
+def _representative_systems(cell: Cell) -> Iterator[tuple[str, System]]:
     """Yield the systems that represent all graphs or numbers of sites, each with its name."""
     graphs: Sequence[tuple[int, Sequence[tuple[int, int]]]] = [(1, ()), (2, ())]
     if cell.relation == "graph":
         graphs = [(1, ()), *((1 + max(max(b) for b in bonds), bonds) for bonds in GRAPHS)]
     for sites, bonds in graphs:
-        shown = ", ".join(f"{a}–{b}" for a, b in bonds)
-        description = f"the graph {shown}" if bonds else f"{sites} site{'s' * (sites > 1)}"
+        bonds_text = ", ".join(f"{a}–{b}" for a, b in bonds)
+        description = f"the graph {bonds_text}" if bonds else f"{sites} site{'s' * (sites > 1)}"
         yield description, system_from_spec(expand(cell, (sites,), bonds).spec())
 
 
 def _tensor_of_graphs(cell: Cell) -> tuple[Statement, ...]:
     from phigen.geometry.checks import skew_symmetry
 
-    every = f"for every {_any(cell)}"
-    skew = _worst("π is skew", every, ((what, skew_symmetry(system)) for what, system in _small(cell)))
+    scope = f"for every {_any(cell)}"
+    skew = _worst(
+        "π is skew",
+        scope,
+        ((graph_name, skew_symmetry(system)) for graph_name, system in _representative_systems(cell)),
+    )
     if skew.verdict == REFUTED:
         return (skew,)
-    statements = ((what, jacobi_identity(system)) for what, system in _small(cell))
-    detail = f"{every}, from those of at most two bonds" if cell.relation == "graph" else every
+    statements = ((graph_name, jacobi_identity(system)) for graph_name, system in _representative_systems(cell))
+    detail = f"{scope}, from those of at most two bonds" if cell.relation == "graph" else scope
     return skew, _worst(JACOBI, detail, statements)
 
 
 def _casimir_of_graphs(cell: Cell, name: str) -> Iterator[tuple[str, Statement]]:
-    for what, system in _small(cell):
-        yield what, _casimirs_of_box(name, system)
+    for graph_name, system in _representative_systems(cell):
+        yield graph_name, _casimirs_of_box(name, system)
 
 
 def _invariant_of_graphs(cell: Cell, name: str) -> Iterator[tuple[str, Statement]]:
-    for what, system in _small(cell):
-        yield what, _invariant_of_box(name, system)
+    for graph_name, system in _representative_systems(cell):
+        yield graph_name, _invariant_of_box(name, system)
 
 
 def pair_symmetry(cell: Cell) -> Iterator[Statement]:
@@ -319,9 +327,9 @@ def pair_symmetry(cell: Cell) -> Iterator[Statement]:
 def _worst(name: str, detail: str, statements: Iterator[tuple[str, Statement]]) -> Statement:
     """Return one statement for several: refuted if one is, proved if all are."""
     unproved: Statement | None = None
-    for what, s in statements:
+    for graph_name, s in statements:
         if s.verdict == REFUTED:
-            return Statement(name, REFUTED, f"{what}: {s.detail}", s.residual)
+            return Statement(name, REFUTED, f"{graph_name}: {s.detail}", s.residual)
         if s.verdict != PROVED and (unproved is None or s.verdict == UNDECIDED):
-            unproved = Statement(name, s.verdict, f"{what}: {s.detail}", s.residual)
+            unproved = Statement(name, s.verdict, f"{graph_name}: {s.detail}", s.residual)
     return unproved or Statement(name, PROVED, detail)

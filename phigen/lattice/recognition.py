@@ -94,16 +94,16 @@ def _readings(coordinates: Sequence[str]) -> Iterator[dict[str, tuple[str, Site]
         return
     (count,) = groups
     choices = [tuple(range(count))] * (count <= 3) + [(k,) for k in range(count) if count > 1]
-    for chosen in choices:
-        places = {c: _split(c, chosen) for c in coordinates}
+    for digits_read in choices:
+        places = {c: _split(c, digits_read) for c in coordinates}
         if _is_full(places):
             yield places
 
 
-def _split(name: str, chosen: Sequence[int]) -> tuple[str, Site]:
+def _split(name: str, digits_read: Sequence[int]) -> tuple[str, Site]:
     parts = re.split(r"([0-9]+)", name)
-    site = tuple(int(parts[2 * k + 1]) for k in chosen)
-    for k in chosen:
+    site = tuple(int(parts[2 * k + 1]) for k in digits_read)
+    for k in digits_read:
         parts[2 * k + 1] = ""
     return re.sub(r"_+", "_", "".join(parts)).strip("_") or "x", site
 
@@ -137,7 +137,7 @@ def _lattice(
     names = _names(spec, coordinates, boundary)
     at_sites = {names.sites[p.name][0] for p in spec.parameters if p.name in names.sites}
     parameters = _parameters(spec, names, at_sites)
-    local, far = _brackets(spec, poisson, names)
+    local, neighbour_brackets = _brackets(spec, poisson, names)
     casimirs, kinds = _casimirs(spec, names)
     lattice_spec = Spec(
         scheme="auto",
@@ -150,7 +150,7 @@ def _lattice(
         invariants=_invariants(spec, names),
         order=spec.order,
         title=spec.title,
-        lattice=Lattice(names.space.axes, boundary, brackets=far, kinds=kinds),
+        lattice=Lattice(names.space.axes, boundary, brackets=neighbour_brackets, kinds=kinds),
     )
     _prove(spec, poisson, lattice_spec, names)
     return replace(lattice_spec, runs={n: _run(spec, run, names) for n, run in spec.runs.items()})
@@ -168,15 +168,15 @@ def _names(spec: Spec, coordinates: Mapping[str, tuple[str, Site]], boundary: tu
     for name in numbered:
         stem, site = _split(name, range(len(sizes)))
         by_stem.setdefault(stem, {})[name] = site
-    for stem, listed in by_stem.items():
-        if set(listed.values()) == all_sites and len(listed) == len(all_sites) and stem not in fields:
-            places |= {name: (stem, site) for name, site in listed.items()}
+    for stem, sites_of_stem in by_stem.items():
+        if set(sites_of_stem.values()) == all_sites and len(sites_of_stem) == len(all_sites) and stem not in fields:
+            places |= {name: (stem, site) for name, site in sites_of_stem.items()}
     sites = {n: (f, tuple(a - b for a, b in zip(s, first, strict=True))) for n, (f, s) in places.items()}
     stems = tuple(dict.fromkeys(f for f, _ in sites.values()))
-    others = {p.name for p in spec.parameters if p.name not in sites} | {*SPEC_FUNCTIONS}
-    used_names = {*stems, *others}
+    other_names = {p.name for p in spec.parameters if p.name not in sites} | {*SPEC_FUNCTIONS}
+    used_names = {*stems, *other_names}
     letters = [a for a in ("i", "j", "k", "l", "m", "n") if a not in used_names and f"N_{a}" not in used_names]
-    if len(letters) < len(sizes) or {*stems} & others:
+    if len(letters) < len(sizes) or {*stems} & other_names:
         raise _NoLatticeError
     axes = tuple(letters[: len(sizes)])
     return _SiteNames(fields, sizes, boundary, sites, Neighbours(stems, axes))
@@ -186,11 +186,11 @@ def _parameters(spec: Spec, names: _SiteNames, at_sites: set[str]) -> tuple[Para
     parameters = [p for p in spec.parameters if p.name not in names.sites]
     for stem in sorted(at_sites):
         values = {names.sites[p.name][1]: p for p in spec.parameters if names.sites.get(p.name, ("",))[0] == stem}
-        listed = [values[s] for s in sorted(values)]
-        equal = len({p.value for p in listed}) == 1
-        array = None if equal else Values(listed=tuple(p.value for p in listed))
-        positive = all(p.positive for p in listed)
-        parameters.append(Parameter(stem, listed[0].value, positive, listed[0].description, "sites", array))
+        site_values = [values[s] for s in sorted(values)]
+        equal = len({p.value for p in site_values}) == 1
+        array = None if equal else Values(listed=tuple(p.value for p in site_values))
+        positive = all(p.positive for p in site_values)
+        parameters.append(Parameter(stem, site_values[0].value, positive, site_values[0].description, "sites", array))
     return tuple(parameters)
 
 
@@ -295,10 +295,10 @@ def _brackets(
         f, site = names.sites[c]
         for d, entry in zip(spec.coordinates, row, strict=True):
             if not entry.is_zero:
-                g, there = names.sites[d]
-                pair = f, names.space.at(g, _offset(there, site, names))
+                g, second_site = names.sites[d]
+                pair = f, names.space.at(g, _offset(second_site, site, names))
                 kinds.setdefault(pair, {})[site] = _translated(entry, names, site)[1]
-    local, far = {}, dict[tuple[str, str], Expression]()
+    local, neighbour_brackets = {}, dict[tuple[str, str], Expression]()
     for (f, g), entries in kinds.items():
         if len({_key(e, names) for e in entries.values()}) != 1:
             raise _NoLatticeError
@@ -306,9 +306,9 @@ def _brackets(
         base, offset = names.space.place(g)
         if not any(offset):
             local[f, g] = first
-        elif (base, names.space.at(f, tuple(-int(o) for o in offset))) not in far:
-            far[f, g] = first
-    return local, far
+        elif (base, names.space.at(f, tuple(-int(o) for o in offset))) not in neighbour_brackets:
+            neighbour_brackets[f, g] = first
+    return local, neighbour_brackets
 
 
 def _casimirs(spec: Spec, names: _SiteNames) -> tuple[dict[str, Expression], dict[str, str]]:
@@ -327,12 +327,12 @@ def _casimirs(spec: Spec, names: _SiteNames) -> tuple[dict[str, Expression], dic
             with suppress(_NoLatticeError):
                 density_here = _translated(e, names)[1]
                 by_value.setdefault(_key(density_here, names), []).append((name, density_here))
-    for listed in by_value.values():
-        if len(listed) == prod(names.sizes):
-            name = re.sub(r"[0-9_]+$", "", listed[0][0]) or "C"
+    for same_value in by_value.values():
+        if len(same_value) == prod(names.sizes):
+            name = re.sub(r"[0-9_]+$", "", same_value[0][0]) or "C"
             while name in used_names or name in densities:
                 name += "_"
-            densities[name], kinds[name] = listed[0][1], "sites"
+            densities[name], kinds[name] = same_value[0][1], "sites"
     return densities, kinds
 
 
@@ -382,13 +382,13 @@ def _run(spec: Spec, run: Run, names: _SiteNames) -> Run:
         by_field.setdefault(f, {})[site] = value
     state = {f: Values(listed=tuple(v[s] for s in sorted(v))) for f, v in by_field.items()}
     arrays: dict[str, dict[Site, Fraction]] = {}
-    changed = {names.sites[n][0] for n in run.parameters if n in names.sites}
+    changed_names = {names.sites[n][0] for n in run.parameters if n in names.sites}
     for p in spec.parameters:
         stem, site = names.sites.get(p.name, ("", ()))
-        if stem in changed:
+        if stem in changed_names:
             arrays.setdefault(stem, {})[site] = run.parameters.get(p.name, p.value)
-    listed = {stem: Values(listed=tuple(v[s] for s in sorted(v))) for stem, v in arrays.items()}
+    site_arrays = {stem: Values(listed=tuple(v[s] for s in sorted(v))) for stem, v in arrays.items()}
     numbers = {n: v for n, v in run.parameters.items() if n not in names.sites}
-    lattice = LatticeRunSettings(names.sizes, state, (), listed)
+    lattice = LatticeRunSettings(names.sizes, state, (), site_arrays)
     none: dict[str, Any] = {"exact": {}, "section": None, "stop": None}  # of lattices they are about observables
     return replace(run, initial=(), parameters=numbers, lattice=lattice, **none)

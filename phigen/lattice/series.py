@@ -161,22 +161,22 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
     """Return α and β with p = h(∇H + ζ) + Σ ΔW σ∇g at all sites that they mention."""
-    at = SiteFields(cell, sums_by_field(cell))
+    site_fields = SiteFields(cell, sums_by_field(cell))
     covectors: dict[str, Expression] = {}
     for name in symbols_of(*maps.values()):
         if isinstance(name, Symbol) and name.kind == MOMENTUM:
             field, offset = cell.place(str(name.key[0]))
-            slope = at.slope(field, offset)
-            slope = slope + at.push(field, offset) if cell.forces else slope
-            covectors[name] = symbol(TIME) * slope + at.noise(field, offset)
+            slope = site_fields.slope(field, offset)
+            slope = slope + site_fields.push(field, offset) if cell.forces else slope
+            covectors[name] = symbol(TIME) * slope + site_fields.noise(field, offset)
     return dict(zip(maps, substitute(list(maps.values()), covectors), strict=True))
 
 
 def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, Expression], dict[str, Expression]]:
     """Return y and the increment of x, with half of the impulse hf before the motion and half after it."""
-    at, half = SiteFields(cell), number(Fraction(1, 2))
-    impulse = {f: symbol(TIME) * at.impulse(f) for f in cell.fields}
-    start: dict[str, Expression] = {initial(f): symbol(initial(f)) + half * e for f, e in impulse.items()}
+    site_fields, one_half = SiteFields(cell), number(Fraction(1, 2))
+    impulse = {f: symbol(TIME) * site_fields.impulse(f) for f in cell.fields}
+    start: dict[str, Expression] = {initial(f): symbol(initial(f)) + one_half * e for f, e in impulse.items()}
     middle = dict(zip(realisation.middle, substitute(list(realisation.middle.values()), start), strict=True))
     return middle, {f: e + impulse[f] for f, e in realisation.increment.items()}
 
@@ -184,18 +184,20 @@ def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, E
 def _stages(spec: Spec) -> tuple[Order, str, tuple[float, ...]]:
     """Return the composition of steps of order 2 that gives the order of a spec; odd orders round up."""
     order, composition = spec.wanted_order, spec.composition
-    even = order + order % 2
-    note = "" if even == order else f"order {order} was asked for; a symmetric method has even order"
-    if even == 2 and composition in ("auto", "none"):
+    even_order = order + order % 2
+    note = "" if even_order == order else f"order {order} was asked for; a symmetric method has even order"
+    if even_order == 2 and composition in ("auto", "none"):
         return Order(2, 1, note), "none", (1.0,)
-    method = find(composition, even)
+    method = find(composition, even_order)
     if method is None:
         place = spec.locations.get(("composition",)) or spec.locations.get(("order",))
-        known = orders(composition) if composition != "none" else []
-        listed = ", ".join(map(str, [2, *known] if composition in ("auto", "none") else known)) or "none"
+        offered_orders = orders(composition) if composition != "none" else []
+        order_list = (
+            ", ".join(map(str, [2, *offered_orders] if composition in ("auto", "none") else offered_orders)) or "none"
+        )
         offering = (
             "the series on lattices offers" if composition in ("auto", "none") else f"composition {composition} offers"
         )
-        message = f"scheme series: {offering} the orders {listed}, not {even}"
+        message = f"scheme series: {offering} the orders {order_list}, not {even_order}"
         raise SpecError([Diagnostic(message, place, "composition: auto" * (composition != "auto"))])
-    return Order(even, 1, note), method.name, method.fractions
+    return Order(even_order, 1, note), method.name, method.fractions

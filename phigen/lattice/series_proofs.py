@@ -29,11 +29,11 @@ from phigen.symbolic.verdict import Statement, decide_zero
 def check(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
     """Yield the statements on the bi-realisation, then those on a stage."""
     system, realisation = plan.realisation.site or _on_a_box(cell, plan.realisation)
-    where = (
+    domain_text = (
         "" if plan.realisation.site else f"on {system.dimension // len(cell.fields)} sites, as on all by translation"
     )
     for statement in axioms.check(system, realisation):
-        detail = "; ".join(filter(None, [statement.detail, where]))
+        detail = "; ".join(filter(None, [statement.detail, domain_text]))
         yield replace(statement, name=statement.name.removeprefix("bi-realisation: "), detail=detail)
     yield from _stage(cell, plan)
 
@@ -42,8 +42,8 @@ def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
     """Yield the equation of a stage and its order."""
     realisation, positive = plan.realisation, tuple(p.name for p in cell.parameters if p.positive)
     alpha: dict[str, Expression] = {initial(f): symbol(f) + e for f, e in realisation.displacement.items()}
-    written = substitute([realisation.middle[f] for f in cell.fields], alpha)
-    residuals = [(f, w - symbol(f)) for f, w in zip(cell.fields, written, strict=True)]
+    substituted = substitute([realisation.middle[f] for f in cell.fields], alpha)
+    residuals = [(f, w - symbol(f)) for f, w in zip(cell.fields, substituted, strict=True)]
     yield decide_zero("y, as it is written, solves α(y, p) = x", residuals, positive)
     rates = derivatives(list(plan.increment.values()), TIME)
     noise_symbols = [n for n, (base, _) in cell.places(*rates).items() if base in cell.increments]

@@ -28,18 +28,18 @@ def site_kernel(
     """
     if cell.vanishing:
         values = cancelled(values, [name for name, (base, _) in cell.places(*values).items() if base in cell.vanishing])
-    used = symbols_of(*values)
+    used_symbols = symbols_of(*values)
     places = cell.places(*values)
 
     def of_kind(*kinds: str) -> tuple[str, ...]:
-        return tuple(n for n in used if kind_of(n) in kinds)
+        return tuple(n for n in used_symbols if kind_of(n) in kinds)
 
-    plain = tuple(p.name for p in cell.parameters if p.at == "all")
-    first = {"coef": coefficients.slots} if coefficients else {"params": plain}
-    first |= {"t": cell.times} if cell.time in used else {}
+    common_parameters = tuple(p.name for p in cell.parameters if p.at == "all")
+    first = {"coef": coefficients.slots} if coefficients else {"params": common_parameters}
+    first |= {"t": cell.times} if cell.time in used_symbols else {}
     weights = of_kind(PRESENT, CHOSEN, BEGINS)
     inputs = {**first, "site": tuple(places), "present": weights, "gathered": of_kind(GATHERED)}
-    bonds = tuple(p.name for p in cell.parameters if p.at == "bonds" and p.name in used)
+    bonds = tuple(p.name for p in cell.parameters if p.at == "bonds" and p.name in used_symbols)
     inputs |= {"bonds": bonds} if bonds else {}
     inputs |= {"varied": of_kind(VARIATION)} if of_kind(VARIATION) else {}
     inputs |= {"start": of_kind(INITIAL)} if of_kind(INITIAL) else {}

@@ -94,10 +94,10 @@ class Colouring:
 
     def on_seams(self) -> set[int]:
         """Return the colours of sites on a seam; a single seam of width 1 lacks the last colour of a period."""
-        along = [(s, w) for s, w in zip(self.seams, self.weights, strict=True) if w]
-        if len(along) > 1 or along[0][0].wide > 1:
+        seam_weights = [(s, w) for s, w in zip(self.seams, self.weights, strict=True) if w]
+        if len(seam_weights) > 1 or seam_weights[0][0].wide > 1:
             return set(range(self.count))
-        ((seam, weight),) = along
+        ((seam, weight),) = seam_weights
         return {weight * k % self.count for k in range(seam.period - 1)}
 
     def with_seams(self, cell: Cell) -> Colouring:
@@ -152,15 +152,15 @@ def _seam(cell: Cell, axis: int, period: int) -> Seam:
     if period == 1:
         return Seam()
     reach, poisson_reach = cell.hamiltonian_reach[axis], cell.poisson_reach[axis]
-    moved = reach + poisson_reach
-    between = all(
+    separation = reach + poisson_reach
+    is_between = all(
         offset in (cell.origin, cell.place(other)[1])
         for (_, other), entry in cell.bracket.items()
         for _, offset in cell.places(entry).values()
     )
-    wide = reach if cell.is_local else reach + moved if between else 2 * moved + poisson_reach
+    wide = reach if cell.is_local else reach + separation if is_between else 2 * separation + poisson_reach
     damping = [] if cell.forces.damping is None else cell.places(cell.forces.damping).values()
-    return Seam(period, max([wide, *(reach + abs(steps(offset)[axis]) for _, offset in damping)]), moved)
+    return Seam(period, max([wide, *(reach + abs(steps(offset)[axis]) for _, offset in damping)]), separation)
 
 
 def merged_colours(motions: Sequence[SiteMotion], count: int) -> tuple[SiteMotion, ...]:
@@ -337,16 +337,20 @@ class PartSearch:
         by_term: dict[int, tuple[Summand, list[int]]] = {}
         for summand, colour in (*part, *((replace(s, expression=symbol(KICK) * s.expression), c) for s, c in more)):
             by_term.setdefault(id(summand.expression), (summand, []))[1].append(colour)
-        listed = tuple((s, tuple(c)) for s, c in by_term.values())
+        coloured_summands = tuple((s, tuple(c)) for s, c in by_term.values())
         # the expression of one bond or pair determines the cost of the flow
         bond_terms = {n: e for m in motions for gathered in m.gathered for n, e in gathered.values.items()}
         increments = tuple(substitute([e for m in motions for e in m.increments.values()], bond_terms))
-        hamiltonian = total(s.expression for s, _ in listed)
+        hamiltonian = total(s.expression for s, _ in coloured_summands)
         manner = "; ".join(dict.fromkeys(m.manner for m in motions))
         merged = merged_colours(motions, self.colouring.count)
-        return CellFlow(hamiltonian, increments, manner, merged, listed, beside=self._beside(part, more))
+        return CellFlow(
+            hamiltonian, increments, manner, merged, coloured_summands, beside=self._seam_motion(part, more)
+        )
 
-    def _beside(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]) -> SiteMotion | None:
+    def _seam_motion(
+        self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
+    ) -> SiteMotion | None:
         """Return the motion of sites near seams, or None if the part has the terms of all sites."""
         all_classes = {(id(s.expression), c) for s, _ in (*part, *more) for c in range(self.colouring.count)}
         if not self.colouring.seams or all_classes == {(id(s.expression), c) for s, c in (*part, *more)}:
@@ -467,13 +471,13 @@ class PartSearch:
             return []
         cell = self.cell
         ring = site_ring(cell, [t.expression for t in terms])
-        listed = [Term(t.expression, ring.tower.convert(t.expression)) for t in terms]
-        joint = joint_flow(ring, listed)
+        ring_terms = [Term(t.expression, ring.tower.convert(t.expression)) for t in terms]
+        joint = joint_flow(ring, ring_terms)
         try:
             flows = (
                 [joint]
                 if isinstance(joint, Flow)
-                else [flow_of(ring, group, numeric=False) for group in Conflicts(ring).grouped(listed)]
+                else [flow_of(ring, group, numeric=False) for group in Conflicts(ring).grouped(ring_terms)]
             )
         except NoFlowError as error:
             raise NoPartError(error.term.expression, error.reason) from None
@@ -488,7 +492,7 @@ class PartSearch:
             for (f, g), entry in cell.bracket.items():
                 if f in increments:
                     rates[f].append(entry * slopes[g])
-            field = {f: total(listed) for f, listed in rates.items()}
+            field = {f: total(ring_terms) for f, ring_terms in rates.items()}
             motions = [SiteMotion(c, increments, (), field, increments, flow.manner) for c in colours if increments]
             summands = ((Summand(flow.hamiltonian, steps, steps), colours),)
             merged = merged_colours(motions, self.colouring.count)
@@ -560,10 +564,13 @@ def field_at_site(cell: Cell, gathered: Mapping[str, Expression]) -> tuple[Expre
 
     ``gathered`` is as in `SiteFields`.
     """
-    at = SiteFields(cell, gathered)
+    site_fields = SiteFields(cell, gathered)
     if not cell.forces:
-        return tuple(at.tangent(f, at.slope) for f in cell.fields)
-    return tuple(at.tangent(f, lambda g, d: at.slope(g, d) + at.push(g, d)) + at.impulse(f) for f in cell.fields)
+        return tuple(site_fields.tangent(f, site_fields.slope) for f in cell.fields)
+    return tuple(
+        site_fields.tangent(f, lambda g, d: site_fields.slope(g, d) + site_fields.push(g, d)) + site_fields.impulse(f)
+        for f in cell.fields
+    )
 
 
 def present(cell: Cell, low: Sequence[int], high: Sequence[int], offset: Sequence[int]) -> Expression:
@@ -588,8 +595,8 @@ def _opposite(offset: Offset) -> tuple[int, ...]:
 def bracketless_ring(coordinates: Sequence[str], expressions: Iterable[Expression]) -> Ring:
     """Return a ring with these coordinates, in which all other symbols are constant, and no bracket."""
     roots = list(expressions)
-    others = [n for n in symbols_of(*roots) if n not in coordinates and n != TIME]
-    tower = Tower([*coordinates, *others, TIME], roots, coordinates)
+    constants = [n for n in symbols_of(*roots) if n not in coordinates and n != TIME]
+    tower = Tower([*coordinates, *constants, TIME], roots, coordinates)
     return Ring(tower, tuple(coordinates), (), ())
 
 
@@ -598,8 +605,8 @@ def site_ring(cell: Cell, expressions: Sequence[Expression], symbols: Sequence[s
     n = cell.fields
     brackets = tuple(tuple(cell.bracket.get((f, g), ZERO) for g in n) for f in n)
     roots = [*expressions, *(e for row in brackets for e in row)]
-    others = [s for s in symbols_of(*roots) if s not in n and s != TIME]
-    tower = Tower([*n, *dict.fromkeys([*others, *symbols]), TIME], roots, n)
+    constants = [s for s in symbols_of(*roots) if s not in n and s != TIME]
+    tower = Tower([*n, *dict.fromkeys([*constants, *symbols]), TIME], roots, n)
     images = tower.convert_all([e for row in brackets for e in row])
     size = len(n)
     poisson = tuple(tuple(images[i * size : (i + 1) * size]) for i in range(size))

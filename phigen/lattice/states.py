@@ -127,8 +127,8 @@ class _Reader:
         values = values_by_field[""]
         if values.random != "sphere":
             return self.arrays.read(values, shape, "initial")
-        drawn = np.random.default_rng(values.seed).normal(size=shape)
-        return np.asarray(float(values.scale) * drawn / np.sqrt((drawn**2).sum(axis=0)))
+        random_vectors = np.random.default_rng(values.seed).normal(size=shape)
+        return np.asarray(float(values.scale) * random_vectors / np.sqrt((random_vectors**2).sum(axis=0)))
 
     def _bonds(self, lattice_run: LatticeRunSettings) -> tuple[Bonds, dict[str, Floats]]:
         if not isinstance(lattice_run.bonds, str):
@@ -169,15 +169,17 @@ class _Arrays:
                 array = array.reshape(shape)
         elif values.random:
             random = np.random.default_rng(values.seed)
-            drawn = random.normal(size=shape) if values.random == "normal" else random.uniform(-1, 1, size=shape)
-            array = float(values.scale) * drawn
+            random_values = (
+                random.normal(size=shape) if values.random == "normal" else random.uniform(-1, 1, size=shape)
+            )
+            array = float(values.scale) * random_values
         else:
             array = np.zeros(shape)
         if values.formula is not None:
             array += evaluate([values.formula], self.indices)[0]
         if array.shape != shape:
-            needed, actual = "×".join(map(str, shape)), "×".join(map(str, array.shape))
-            raise self.refused(name, f"{actual} values, not {needed}")
+            expected, actual = "×".join(map(str, shape)), "×".join(map(str, array.shape))
+            raise self.refused(name, f"{actual} values, not {expected}")
         if not np.all(np.isfinite(array)):
             raise self.refused(name, "not all values are finite")
         return array

@@ -114,13 +114,15 @@ class SplittingPlan:
         """The lines of the header about the method."""
         choice = self.choice
         count, method = len(choice.splitting.flows), choice.method
-        marked = [f"H_{k}" for k, flow in enumerate(self.flows, 1) if flow.by_colour]
-        if count == 1 and not marked:
+        coloured_parts = [f"H_{k}" for k, flow in enumerate(self.flows, 1) if flow.by_colour]
+        if count == 1 and not coloured_parts:
             return ["scheme: the exact flow of H, which is elementary", "step: explicit"]
         parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
-        why = f", since {choice.why}" if choice.why else ""
+        reason = f", since {choice.why}" if choice.why else ""
         flows = (
-            f"{len(choice.schedule().flows)} flows" if not marked else f"{', '.join(marked)} for each colour of sites"
+            f"{len(choice.schedule().flows)} flows"
+            if not coloured_parts
+            else f"{', '.join(coloured_parts)} for each colour of sites"
         )
         monitor = [] if self.negative is None else [cell_monitor.fact(self.flows, self.negative)]
         relative = [f"coordinates of flows: {self.bodies.change.replace('_', ' ')}"] if self.bodies else []
@@ -128,7 +130,7 @@ class SplittingPlan:
             *monitor,
             *relative,
             f"scheme: splitting, H = {parts}, with the exact flow of each",
-            f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows}{why}",
+            f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows}{reason}",
             "step: explicit",
         ]
 
@@ -233,7 +235,7 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
 
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
     """Yield the flows of the terms of a part that begin on seams, one for each set of seams."""
-    colours = {colour for _, listed in flow.summands for colour in listed}
+    colours = {colour for _, summand_colours in flow.summands for colour in summand_colours}
     if colours and colours.isdisjoint(colouring.on_seams()):
         return
     for window in colouring.windows[1:]:
@@ -543,11 +545,11 @@ def _operations(step: Sweeps) -> dict[str, int]:
     times = Counter(part for part, _ in step.schedule.flows)
     if step.by_colour:  # for each colour but the first and the last
         times = Counter(dict.fromkeys(range(len(step.parts)), 2 * step.schedule.stages))
-    counted: Counter[str] = Counter()
+    totals: Counter[str] = Counter()
     for part, sweeps in enumerate(step.parts):
         for sweep in (s for s in sweeps if s.window is None):
-            for what, number in operation_counts(sweep.kernel.roots).items():
-                counted[what] += number * times[part]
+            for operation, number in operation_counts(sweep.kernel.roots).items():
+                totals[operation] += number * times[part]
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
-        counted.update(operation_counts(kernel.roots))
-    return dict(counted)
+        totals.update(operation_counts(kernel.roots))
+    return dict(totals)

@@ -18,14 +18,14 @@ def along(cell: Cell, values: Sequence[Expression]) -> list[Expression]:
     slots: dict[str, Symbol] = {n: variation(n) for n, (f, _) in cell.places(*values).items() if f in cell.fields}
     slots |= {n: varied_sum(n) for n in symbols_of(*values) if isinstance(n, Symbol) and n.kind == GATHERED}
     slopes = (zip(slots.values(), gradient(e, list(slots)), strict=True) for e in values)
-    return [total(d * symbol(v) for v, d in listed if not d.is_zero) for listed in slopes]
+    return [total(d * symbol(v) for v, d in row if not d.is_zero) for row in slopes]
 
 
 def along_start(values: Sequence[Expression]) -> list[Expression]:
     """Return the derivatives of values along the variations of the fields at the start of a stage."""
     starts = {n: variation(str(n.key[0])) for n in symbols_of(*values) if isinstance(n, Symbol) and n.kind == INITIAL}
     slopes = (zip(starts.values(), gradient(e, list(starts)), strict=True) for e in values)
-    return [total(d * symbol(v) for v, d in listed if not d.is_zero) for listed in slopes]
+    return [total(d * symbol(v) for v, d in row if not d.is_zero) for row in slopes]
 
 
 def varied_sum(name: Symbol) -> Symbol:
