@@ -74,9 +74,15 @@ class Declarations:
 
     def _counters(self) -> dict[str, tuple[str, str]]:
         """The names of indices and sizes, which are no part of a density."""
-        why, hint = "this expression must be the same for all sites", "a parameter at: sites has a value for each site"
-        listed = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
-        return {n: (f"{why}; {n!r} depends on the site" if n[:2] != "N_" else f"{why} and sizes", hint) for n in listed}
+        reason, hint = (
+            "this expression must be the same for all sites",
+            "a parameter at: sites has a value for each site",
+        )
+        index_names = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
+        return {
+            n: (f"{reason}; {n!r} depends on the site" if n[:2] != "N_" else f"{reason} and sizes", hint)
+            for n in index_names
+        }
 
     def indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
         """Names that may have an index: those that depend on the site."""
@@ -89,7 +95,7 @@ class Declarations:
         bonds = {
             n: (f"{n!r} belongs to the bond, not to its ends", f"write {n} without an index") for n in same if ends
         }
-        at_bonds = {n: bonds.get(n, why) for n, why in self._at_bonds(names).items()}
+        at_bonds = {n: bonds.get(n, reason) for n, reason in self._at_bonds(names).items()}
         return Indices(neighbours, varying, {**same, **at_bonds}, ends)
 
     def bond_scope(self, *, dated: bool = False) -> AllowedNames:
@@ -98,12 +104,12 @@ class Declarations:
         names = scope.names
         indices = self.indices(names, ENDS)
         local = indices.names if indices else {}
-        what = "a pair" if self.relation == "pairs" else "a bond"
-        ends = {n: (f"{n!r} needs an end of {what}", f"write {n}[a] or {n}[b]") for n in local}
-        others = {n: e for n, e in names.items() if n not in local}
-        others |= {n: symbol(n) for n, p in self.parameters.items() if p.at == "bonds"}
-        refused = self.refused | self._counters() | ends | ({} if dated else self._timeless())
-        return AllowedNames(others, refused, open=self.incomplete, indices=indices)
+        domain = "a pair" if self.relation == "pairs" else "a bond"
+        messages = {n: (f"{n!r} needs an end of {domain}", f"write {n}[a] or {n}[b]") for n in local}
+        common_names = {n: e for n, e in names.items() if n not in local}
+        common_names |= {n: symbol(n) for n, p in self.parameters.items() if p.at == "bonds"}
+        refused = self.refused | self._counters() | messages | ({} if dated else self._timeless())
+        return AllowedNames(common_names, refused, open=self.incomplete, indices=indices)
 
     def site_numbers(self) -> AllowedNames:
         """For values at sites: the indices, counted from 0, and the sizes."""
@@ -116,11 +122,15 @@ class Declarations:
         if "[" not in node.text:
             index = self.coordinate(node)
             return None if index is None else (self.coordinates[index], self.neighbours.origin)
-        known = {c: symbol(c) for c in self.coordinates}
-        scope = AllowedNames({}, {c: (f"{c!r} has no end", f"write {c}[a] or {c}[b]") for c in known})
+        symbols_of_coordinates = {c: symbol(c) for c in self.coordinates}
+        scope = AllowedNames({}, {c: (f"{c!r} has no end", f"write {c}[a] or {c}[b]") for c in symbols_of_coordinates})
         if self.lattice is not None:
             refused = {n: (f"{n!r} is not a coordinate", "") for n in (*self.parameters, *self.definitions)}
-            scope = AllowedNames(known, open=self.incomplete, indices=Indices(self.neighbours, known, refused, ends))
+            scope = AllowedNames(
+                symbols_of_coordinates,
+                open=self.incomplete,
+                indices=Indices(self.neighbours, symbols_of_coordinates, refused, ends),
+            )
         value = self.formula(node, scope)
         if value is None or value.op != "symbol" or self.lattice is None:
             return None
@@ -133,9 +143,9 @@ class Declarations:
         names = {n: symbol(n) for n in (*self.coordinates, *self.parameters)}
         names |= {n: e for n, e in self.definitions.items() if n not in self.dated} | dict(extra or {})
         bonds = self._at_bonds(names)
-        known = {n: e for n, e in names.items() if n not in bonds}
+        allowed_names = {n: e for n, e in names.items() if n not in bonds}
         refused = self._timeless() | self.refused | self._counters() | bonds
-        return AllowedNames(known, refused, open=self.incomplete, indices=self.indices(known))
+        return AllowedNames(allowed_names, refused, open=self.incomplete, indices=self.indices(allowed_names))
 
     def dated_scope(self) -> AllowedNames:
         """Everything declared: for functions on phase space that may depend on the time."""
@@ -143,7 +153,7 @@ class Declarations:
         dated = {n: self.definitions[n] for n in self.dated} | ({self.time: symbol(self.time)} if self.time else {})
         bonds = self._at_bonds(dated)
         dated = {n: e for n, e in dated.items() if n not in bonds}
-        refused = {n: why for n, why in scope.refused.items() if n not in dated} | bonds
+        refused = {n: reason for n, reason in scope.refused.items() if n not in dated} | bonds
         names = {**scope.names, **dated}
         return replace(scope, names=names, refused=refused, indices=self.indices(names))
 
@@ -153,24 +163,26 @@ class Declarations:
         refused = {n: (f"this must not depend on the time, as {n!r} does", hint) for n in sorted(self.dated)}
         return refused | ({self.time: (f"this must not depend on the time {self.time!r}", hint)} if self.time else {})
 
-    def constants(self, what: str, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
-        """Return parameters and definitions of parameters only; ``what`` names the value in messages about other
+    def constants(self, value_name: str, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
+        """Return parameters and definitions of parameters only; ``value_name`` names the value in messages about other
         names."""
         names = {n: symbol(n) for n in self.parameters}
         names |= {n: e for n, e in self.definitions.items() if n not in self.varying | self.dated}
         bonds = self._at_bonds(names)
         names = {n: e for n, e in names.items() if n not in bonds}
         refused = self._timeless()
-        refused |= {n: (f"{what} must not depend on the coordinate {n!r}", "") for n in self.coordinates}
-        refused |= {n: (f"{what} must not depend on coordinates, as {n!r} does", "") for n in self.varying} | bonds
+        refused |= {n: (f"{value_name} must not depend on the coordinate {n!r}", "") for n in self.coordinates}
+        refused |= {
+            n: (f"{value_name} must not depend on coordinates, as {n!r} does", "") for n in self.varying
+        } | bonds
         return AllowedNames(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
 
-    def dated_constants(self, what: str) -> AllowedNames:
+    def dated_constants(self, value_name: str) -> AllowedNames:
         """The same and the time."""
-        scope = self.constants(what)
+        scope = self.constants(value_name)
         dated = {n: self.definitions[n] for n in self.dated - self.varying}
         dated |= {self.time: symbol(self.time)} if self.time else {}
-        refused = {n: why for n, why in scope.refused.items() if n not in dated}
+        refused = {n: reason for n, reason in scope.refused.items() if n not in dated}
         return replace(scope, names={**scope.names, **dated}, refused=refused)
 
     def numbers(self) -> AllowedNames:
@@ -180,15 +192,15 @@ class Declarations:
         return AllowedNames({}, {n: (f"expected a number; {n!r} is not constant", hint) for n in declared})
 
     def inside(self, within: tuple[Any, ...], coordinates: tuple[str, ...], message: str) -> Declarations:
-        """Declarations for a structure with coordinates of its own; ``message`` begins the refusal of other names."""
-        lost = [c for c in self.coordinates if c not in coordinates]
-        gone = {n for n, e in self.definitions.items() if any(s in lost for s in symbols_of(e))}
+        """Declarations for an inner structure with other coordinates; errors on outer names begin with ``message``."""
+        excluded = [c for c in self.coordinates if c not in coordinates]
+        gone = {n for n, e in self.definitions.items() if any(s in excluded for s in symbols_of(e))}
         return replace(
             self,
             within=within,
             coordinates=coordinates,
             definitions={n: e for n, e in self.definitions.items() if n not in gone},
-            refused=self.refused | {n: (f"{message} {n!r}", "") for n in [*lost, *sorted(gone)]},
+            refused=self.refused | {n: (f"{message} {n!r}", "") for n in [*excluded, *sorted(gone)]},
         )
 
     # --- values
@@ -234,22 +246,22 @@ class Declarations:
         """The names of arguments of the generated functions."""
         return (TIMED_ARGUMENTS if self.time else ARGUMENTS) | (NOISY_ARGUMENTS if self.noisy else frozenset())
 
-    def declare(self, node: Scalar, what: str) -> bool:
+    def declare(self, node: Scalar, kind: str) -> bool:
         """Whether expressions may use the name; an error is reported if it is not free."""
         name, first = node.text, self.nodes.get(node.text)
         if name in SPEC_FUNCTIONS:
-            self.reader.error(node, f"the {what} {name!r} has the name of a function", RENAME)
+            self.reader.error(node, f"the {kind} {name!r} has the name of a function", RENAME)
         elif first is not None:
-            where = f"line {first.location.line}, column {first.location.column}"
-            self.reader.error(node, f"the name {name!r} is declared twice; the first is in {where}")
-        elif what == "parameter" and name in self.arguments:
+            first_place = f"line {first.location.line}, column {first.location.column}"
+            self.reader.error(node, f"the name {name!r} is declared twice; the first is in {first_place}")
+        elif kind == "parameter" and name in self.arguments:
             self.reader.error(node, f"a parameter cannot be called {name!r}", argument_hint(name))
             self.nodes[name] = node  # so that its uses are no errors too
             return True
         elif self.lattice and name in (*self.lattice.indices, *(f"N_{i}" for i in self.lattice.indices)):
-            self.reader.error(node, f"the {what} {name!r} has the name of an index or size of the lattice", RENAME)
+            self.reader.error(node, f"the {kind} {name!r} has the name of an index or size of the lattice", RENAME)
         elif self.lattice and self.lattice.graph and name in (self.lattice.graph, "bonds"):  # an argument of solvers
-            self.reader.error(node, f"the {what} {name!r} has the name of the bonds of the lattice", RENAME)
+            self.reader.error(node, f"the {kind} {name!r} has the name of the bonds of the lattice", RENAME)
         else:
             self.nodes[name] = node
             return True
@@ -300,21 +312,21 @@ def _lattice(raw: Raw | None, reader: Reader) -> Lattice | None:
 
 
 def _declare_parameters(raw: Raw, declared: Declarations) -> None:
-    others = {
+    reserved = {
         *declared.coordinates,
         *filter(None, [declared.time]),
         *raw.get("parameters", {}),
         *raw.get("definitions", {}),
     } - {*CONSTANTS}
-    why = "the value of a parameter is a number"
-    numbers = AllowedNames({}, {n: (why, f"what depends on {n!r} can be a definition") for n in others})
+    hint_text = "the value of a parameter is a number"
+    numbers = AllowedNames({}, {n: (hint_text, f"what depends on {n!r} can be a definition") for n in reserved})
     for name, (key, value) in raw.get("parameters", {}).items():
         if not declared.declare(key, "parameter"):
             continue
         options: dict[str, Any] = {"value": value} if isinstance(value, Scalar) else value or {}
-        at, entry, array = options.get("at", "all"), options.get("value"), None
-        _expect_place(name, at, declared)
-        if at != "all" and not (isinstance(entry, Scalar) and entry.is_numeric):
+        domain, entry, array = options.get("at", "all"), options.get("value"), None
+        _expect_place(name, domain, declared)
+        if domain != "all" and not (isinstance(entry, Scalar) and entry.is_numeric):
             number, array = None, values(entry, declared)
         elif entry is not None and not isinstance(entry, Scalar):
             number = declared.reader.problems.add(
@@ -329,22 +341,24 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
             )
         bounded = Parameter(name, Fraction(1), positive, nonnegative=nonnegative)
         if number is not None and bounded.refuses(number):
-            said = f"is {bounded.bound} by declaration, but its value is {options['value'].text}"
-            declared.reader.error(options["value"], f"the parameter {name!r} {said}")
+            message = f"is {bounded.bound} by declaration, but its value is {options['value'].text}"
+            declared.reader.error(options["value"], f"the parameter {name!r} {message}")
         # A value with an error is reported; the name stays declared, so that its uses are not reported too.
         value = Fraction(1) if number is None else number
         description, unit = options.get("description", ""), options.get("unit", "")
-        small = options.get("small", False)
-        declared.parameters[name] = Parameter(name, value, positive, description, at, array, unit, small, nonnegative)
+        is_small = options.get("small", False)
+        declared.parameters[name] = Parameter(
+            name, value, positive, description, domain, array, unit, is_small, nonnegative
+        )
 
 
-def _expect_place(name: str, at: str, declared: Declarations) -> None:
+def _expect_place(name: str, domain: str, declared: Declarations) -> None:
     """Report a parameter with values at sites or bonds where the spec has none."""
-    relations = {"sites": ("grid", "graph", "pairs"), "bonds": ("graph",)}.get(at)
+    relations = {"sites": ("grid", "graph", "pairs"), "bonds": ("graph",)}.get(domain)
     if relations and declared.relation not in relations:
-        needs = "a lattice with a graph" if at == "bonds" and declared.relation else "specs with lattice:"
+        needs = "a lattice with a graph" if domain == "bonds" and declared.relation else "specs with lattice:"
         place = declared.reader.locations["parameters", name, "at"]
-        declared.reader.problems.add(f"parameters: at: {at} is for {needs}", place)
+        declared.reader.problems.add(f"parameters: at: {domain} is for {needs}", place)
 
 
 def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> None:
@@ -352,15 +366,15 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
     uses = {name: names_in(node.text) if node else [] for name, node in sources.items()}
     coordinates = set(declared.coordinates)
     # Placeholders: only the members of a cycle, which is an error, see one.
-    known = declared.dated_scope()
-    names = {**known.names, **{name: symbol(name) for name in sources}}
+    scope = declared.dated_scope()
+    names = {**scope.names, **{name: symbol(name) for name in sources}}
     for name in _in_order(uses, entries, declared.reader):
         if any(u in coordinates or u in declared.varying for u in uses[name]):
             declared.varying.add(name)
         if any(u == declared.time or u in declared.dated for u in uses[name]):
             declared.dated.add(name)
-        here = replace(known, names=names, indices=declared.indices(names))
-        expression = declared.formula(sources[name], here)
+        definition_scope = replace(scope, names=names, indices=declared.indices(names))
+        expression = declared.formula(sources[name], definition_scope)
         # After an error the name stays declared, so that its uses are not reported too.
         declared.definitions[name] = names[name] = symbol(name) if expression is None else expression
 
@@ -369,7 +383,7 @@ def _in_order(
     uses: Mapping[str, list[str]], keys: Mapping[str, tuple[Scalar, Node | None]], reader: Reader
 ) -> list[str]:
     """Return the definitions, each after the ones it uses; cycles are reported and broken."""
-    graph = {name: [u for u in used if u in uses] for name, used in uses.items()}
+    graph = {name: [u for u in used_names if u in uses] for name, used_names in uses.items()}
     while True:
         try:
             return list(TopologicalSorter(graph).static_order())

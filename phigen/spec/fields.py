@@ -116,7 +116,7 @@ _FORMS: dict[str, tuple[Kind, str]] = {
 }
 
 
-def _structure(what: str, nested: int, *more: RecordKey) -> Record:
+def _structure(subject: str, nested: int, *further_keys: RecordKey) -> Record:
     """A Poisson structure in one of its forms; products and pull-backs hold others, ``nested`` levels deep."""
     forms = [RecordKey(form, *described) for form, described in _FORMS.items()]
     if nested:
@@ -145,12 +145,19 @@ def _structure(what: str, nested: int, *more: RecordKey) -> Record:
         forms.append(RecordKey("pullback", pullback, "a structure in other coordinates"))
     keys = tuple(f.key for f in forms)
     instead: tuple[str, ...] = ()
-    if what == "poisson":
+    if subject == "poisson":
         instead = ("bonds",)
-        along = "graphs: {x[a]: {x[b]: f}} for the bracket of the ends of a bond; alone, or beside a form"
-        forms.append(RecordKey("bonds", MapOf(NEIGHBOUR, MapOf(NEIGHBOUR, FORMULA)), along))
+        bond_help = "graphs: {x[a]: {x[b]: f}} for the bracket of the ends of a bond; alone, or beside a form"
+        forms.append(RecordKey("bonds", MapOf(NEIGHBOUR, MapOf(NEIGHBOUR, FORMULA)), bond_help))
     example = "{lie_algebra: {name: so(3)}}"
-    return Record(what, (*more, *forms), one=keys, exactly=True, instead=instead, example="" if more else example)
+    return Record(
+        subject,
+        (*further_keys, *forms),
+        one=keys,
+        exactly=True,
+        instead=instead,
+        example="" if further_keys else example,
+    )
 
 
 BOUNDARY = OneOf(("periodic", "open"))
@@ -410,8 +417,8 @@ SWEEP = Record(
 )
 
 
-def _switch(key: str, *words: str) -> Kind:
-    return OneOf(words)
+def _switch(key: str, *help_text: str) -> Kind:
+    return OneOf(help_text)
 
 
 #: Hints for keys of runs outside of runs.

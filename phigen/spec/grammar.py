@@ -162,8 +162,8 @@ def tokens(source: str, report: Report) -> list[Token] | None:
 
 def names_in(source: str) -> list[str]:
     """The names an expression mentions, in order, without reporting errors."""
-    listed = tokens(source, lambda message, index, hint="", *, limit=False: None)
-    return [t.text for t in listed or [] if t.kind == "name"]
+    token_list = tokens(source, lambda message, index, hint="", *, limit=False: None)
+    return [t.text for t in token_list or [] if t.kind == "name"]
 
 
 def parse(source: str, scope: AllowedNames, report: Report) -> Expression | None:
@@ -248,19 +248,19 @@ class Parser:
 
     def misplaced(self) -> _AbandonedError:
         """The error for a token after a complete operand."""
-        token, before = self.here, self.tokens[self.position - 1]
+        token, previous = self.here, self.tokens[self.position - 1]
         if token.text in ("[", "]"):
             return self.bracket(token)
         if token.text in (")", ","):
             hint = "there is no ( before it" if token.text == ")" else "decimals have a point"
             return self.abandon(f"unexpected {token.text!r}", token.index, hint)
-        if before.kind == "number" and token.text.startswith("_"):
+        if previous.kind == "number" and token.text.startswith("_"):
             return self.abandon(f"unexpected {shown(token.text)} after a number", token.index, "digits are not grouped")
         if token.text[0] in "<>":
             return self.abandon(
                 f"unexpected {token.text!r}", token.index, "comparisons stand in if(a < b, …), in observables and stop"
             )
-        hint = f"products are written with *: {before.text[-20:]}*{token.text[:20]}"
+        hint = f"products are written with *: {previous.text[-20:]}*{token.text[:20]}"
         return self.abandon(f"an operator is missing before {shown(token.text)}", token.index, hint)
 
     def sum(self) -> Expression:
@@ -275,11 +275,11 @@ class Parser:
         left = self.sign()
         while token := self.accept("*", "/"):
             self.count(token)
-            after = self.here.index
+            following = self.here.index
             right = self.sign()
             if token.text == "/":
                 if right.is_zero:
-                    self.report("division by zero", after)
+                    self.report("division by zero", following)
                     right = ONE
                 right = self.raised(right, Fraction(-1), token)
             left = self.bounded(mul(left, right), token)
@@ -328,8 +328,8 @@ class Parser:
             return self.call(token) if self.here.text == "(" else self.name(token)
         if token.text in ("[", "]"):
             raise self.bracket(token)
-        before = self.tokens[self.position - 2].text if self.position > 1 else ""
-        hint = "powers are written **; there is no //" if token.text == "/" and before == "/" else ""
+        previous = self.tokens[self.position - 2].text if self.position > 1 else ""
+        hint = "powers are written **; there is no //" if token.text == "/" and previous == "/" else ""
         raise self.abandon(f"unexpected {token.text!r}", token.index, hint)
 
     def bracket(self, token: Token) -> _AbandonedError:
@@ -379,8 +379,10 @@ class Parser:
             return self.piecewise(token, opening)
         if arity is None:
             declared = token.text in self.scope.names or token.text in CONSTANTS
-            known = [*SPEC_FUNCTIONS, *(PIECEWISE_FUNCTIONS if self.scope.piecewise else ())]
-            guess = did_you_mean(token.text, known, OTHER_FUNCTIONS) or "functions are " + ", ".join(known)
+            function_names = [*SPEC_FUNCTIONS, *(PIECEWISE_FUNCTIONS if self.scope.piecewise else ())]
+            guess = did_you_mean(token.text, function_names, OTHER_FUNCTIONS) or "functions are " + ", ".join(
+                function_names
+            )
             hint = f"products are written with *: {token.text}*(…)" if declared else guess
             raise self.abandon(f"{shown(token.text)} is not a function", token.index, hint)
         arguments = [] if self.here.text == ")" else [self.nested(self.sum, opening)]
@@ -428,8 +430,8 @@ class Parser:
     def applied(self, token: Token, arguments: list[Expression]) -> Expression:
         function, first = token.text, arguments[0]
         if all(a.is_number for a in arguments) and not _defined(function, *(a.value for a in arguments)):
-            written = ", ".join(str(a.value) for a in arguments)
-            self.report(f"{function}({written}) is not defined", token.index)
+            argument_text = ", ".join(str(a.value) for a in arguments)
+            self.report(f"{function}({argument_text}) is not defined", token.index)
             return ONE
         return sqrt(first) if function == "sqrt" else call(function, *arguments)
 
@@ -485,8 +487,8 @@ _PIECEWISE: Mapping[str, Callable[..., Expression]] = {
 
 
 def _brief(value: Fraction) -> str:
-    written = str(value)
-    return written if len(written) <= 40 else f"{float(value):.3e}"
+    printed = str(value)
+    return printed if len(printed) <= 40 else f"{float(value):.3e}"
 
 
 def _defined(function: str, *arguments: Fraction) -> bool:

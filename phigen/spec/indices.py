@@ -77,8 +77,8 @@ class Indices:
         axes = self.neighbours.axes
         example = f"an index is an axis and a whole number: [{axes[0]}+1]"
         if token.kind == "name":
-            listed = f"{'axes are' if len(axes) > 1 else 'the axis is'} {', '.join(axes)}"
-            return f"{shown(token.text)} is not an axis", token.index, did_you_mean(token.text, axes) or listed
+            axes_text = f"{'axes are' if len(axes) > 1 else 'the axis is'} {', '.join(axes)}"
+            return f"{shown(token.text)} is not an axis", token.index, did_you_mean(token.text, axes) or axes_text
         if token.kind == "end":
             return "this index is never closed", token.index, example
         return f"the index begins with {shown(token.text)}, not with an axis", token.index, example
@@ -89,8 +89,8 @@ class Indices:
             return 0
         token = parser.advance()
         if token.kind != "number" or not token.text.isdigit():
-            what = shown(token.text) if token.text else "nothing"
-            raise parser.abandon(f"the offset {what} is not a whole number", token.index, "offsets are 1, 2, …")
+            token_text = shown(token.text) if token.text else "nothing"
+            raise parser.abandon(f"the offset {token_text} is not a whole number", token.index, "offsets are 1, 2, …")
         if len(token.text) > 4 or int(token.text) > limits.OFFSET:
             message = f"the offset {token.text[:20]} is larger than the limit of {limits.OFFSET}"
             raise parser.abandon(message, token.index, limit=True)

@@ -68,7 +68,7 @@ class Kind:
     expected = "a value"
 
     def read(self, node: Node, path: Path, reader: Reader) -> Any:
-        """The value of a node, or ``None`` after reporting what is wrong."""
+        """Value of a node; ``None`` after reporting an error."""
         raise NotImplementedError
 
     def schema(self) -> Schema:
@@ -97,11 +97,11 @@ class Text(Kind):
         if len(node.text) > longest:
             return reader.error(node, f"the text has {len(node.text)} characters, the limit is {longest}", limit=True)
         text = node.text.strip("\n") if self.lines else node.text.strip()
-        bad = [c for c in text if is_unprintable(c) and c not in ("\n\t" if self.lines else "")]
-        if bad == ["\n"] * len(bad) and bad:
-            return reader.error(node, f"{label(path)}expected one line of text, found {len(bad) + 1} lines")
-        if bad:
-            return reader.error(node, f"the text contains the character {describe(bad[0])}")
+        unprintable = [c for c in text if is_unprintable(c) and c not in ("\n\t" if self.lines else "")]
+        if unprintable == ["\n"] * len(unprintable) and unprintable:
+            return reader.error(node, f"{label(path)}expected one line of text, found {len(unprintable) + 1} lines")
+        if unprintable:
+            return reader.error(node, f"the text contains the character {describe(unprintable[0])}")
         return text
 
     def schema(self) -> Schema:
@@ -335,16 +335,16 @@ class Record(Kind):
         return f"a mapping ({self.what})" if " " in self.what else "a mapping"
 
     def read(self, node: Node, path: Path, reader: Reader) -> dict[str, Any] | None:
-        known = {f.key for f in self.fields}
+        fields_by_key = {f.key for f in self.fields}
         if not isinstance(node, MappingNode):
             return self.mismatch(node, path, reader, self.instructions(node))
         values = {}
         for name, (key, item) in node.entries.items():
-            if name in known:
+            if name in fields_by_key:
                 value = self._read_value(name, key, item, path, reader)
                 if value is not None:
                     values[name] = value
-        for name in [name for name in node.entries if name not in known]:
+        for name in [name for name in node.entries if name not in fields_by_key]:
             meant, value = self._read_unknown(name, node, path, reader)
             if value is not None:
                 values.setdefault(meant, value)
@@ -369,7 +369,7 @@ class Record(Kind):
         under the name of another program often have another form.
         """
         key, item = node.entries[name]
-        hint, meant = self._hint(name, node), self._meant(name, node)
+        hint, meant = self._hint(name, node), self._resembled_key(name, node)
         reader.error(key, f"{self.what} has no key {shown(name)}", hint)
         if not meant:
             return meant, None
@@ -382,37 +382,37 @@ class Record(Kind):
             reader.problems.restore(before)
         return meant, value
 
-    def _meant(self, name: str, node: MappingNode) -> str:
+    def _resembled_key(self, name: str, node: MappingNode) -> str:
         """Return the existing key that an unknown name resembles, if it is not given yet; or ""."""
-        known = [f.key for f in self.fields]
-        key = intended(name, known, MEANT)
+        keys = [f.key for f in self.fields]
+        key = intended(name, keys, MEANT)
         if key in node.entries and key != MEANT.get(name):
-            others = [k for k in known if k not in node.entries and not k.startswith(f"{key}_")]
-            key = intended(name, others, MEANT) or key
+            candidates = [k for k in keys if k not in node.entries and not k.startswith(f"{key}_")]
+            key = intended(name, candidates, MEANT) or key
         return key
 
     def _hint(self, name: str, node: MappingNode) -> str:
         """Hint for an unknown key: the place of the key, or the name that is probably meant."""
-        meant, known = MEANT.get(name, name), [f.key for f in self.fields]
-        misplaced = self.elsewhere.get(name) or ("" if meant in known else self.elsewhere.get(meant, ""))
-        key = self._meant(name, node)
+        meant, keys = MEANT.get(name, name), [f.key for f in self.fields]
+        misplaced = self.elsewhere.get(name) or ("" if meant in keys else self.elsewhere.get(meant, ""))
+        key = self._resembled_key(name, node)
         return misplaced or (f"did you mean {key!r}?" if key else "") or self.instructions()
 
     def instructions(self, node: Node | None = None) -> str:
         """Hint with the form of the mapping, for a node of another form; if the node names a key, with this key."""
-        named = next((f for f in self.fields if isinstance(node, Scalar) and f.key == node.text), None)
-        if named is not None and isinstance(named.kind, Record) and named.kind.example:
-            return f"write {{{named.key}: {named.kind.example}}}"
+        named_field = next((f for f in self.fields if isinstance(node, Scalar) and f.key == node.text), None)
+        if named_field is not None and isinstance(named_field.kind, Record) and named_field.kind.example:
+            return f"write {{{named_field.key}: {named_field.kind.example}}}"
         example = f"for example {self.example}; " if self.example else ""
         return f"{example}keys: " + ", ".join(f.key for f in self.fields)
 
     def check_presence(self, node: MappingNode, reader: Reader) -> None:
         """Report missing keys, and keys that exclude each other."""
-        known = [f.key for f in self.fields]
-        strange = set(node.entries) - set(known)  # reported already
-        present = {*node.entries, *(self._meant(name, node) for name in strange)}
+        keys = [f.key for f in self.fields]
+        strange = set(node.entries) - set(keys)  # reported already
+        present_keys = {*node.entries, *(self._resembled_key(name, node) for name in strange)}
         for key_field in self.fields:
-            if key_field.required and key_field.key not in present:
+            if key_field.required and key_field.key not in present_keys:
                 reader.error(
                     node,
                     f"{self.what}: the key {key_field.key!r} is missing",
@@ -425,7 +425,7 @@ class Record(Kind):
         if self.exactly and not forms and not strange and not any(name in node.entries for name in self.instead):
             reader.error(node, f"{self.what}: one of {', '.join(self.one)} is needed")
         if self.some and not node.entries:
-            reader.error(node, f"{self.what}: one of {', '.join(known)} is needed")
+            reader.error(node, f"{self.what}: one of {', '.join(keys)} is needed")
 
     def schema(self) -> Schema:
         properties = {}
@@ -440,8 +440,8 @@ class Record(Kind):
             schema["minProperties"] = 1
         if self.exactly:
             exclusive: Schema = {"oneOf": [{"required": [key]} for key in self.one]}
-            others = [{"required": [key]} for key in self.instead]
-            schema |= {"anyOf": [exclusive, *others]} if others else exclusive
+            alternatives = [{"required": [key]} for key in self.instead]
+            schema |= {"anyOf": [exclusive, *alternatives]} if alternatives else exclusive
         elif self.one:
             schema["not"] = {"required": list(self.one)}
         return schema

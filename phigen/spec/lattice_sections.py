@@ -31,12 +31,14 @@ def densities(raw: Any, declared: Declarations) -> tuple[Expression, Expression]
     if not isinstance(raw, dict):
         return declared.formula(raw, declared.dated_scope()) or ZERO, ZERO
     sites, coupling = declared.formula(raw.get("sites"), declared.dated_scope()), ZERO
-    for key, needed in COUPLINGS.items():
+    for key, relation_needed in COUPLINGS.items():
         node = raw.get(key)
         if node is None:
             continue
-        if declared.relation != needed:
-            declared.reader.error(node, f"hamiltonian: {key} needs {_WANTED[needed]}", "x[i+1] couples sites of a grid")
+        if declared.relation != relation_needed:
+            declared.reader.error(
+                node, f"hamiltonian: {key} needs {_WANTED[relation_needed]}", "x[i+1] couples sites of a grid"
+            )
         else:
             coupling = declared.formula(node, declared.bond_scope(dated=True)) or ZERO
     if declared.lattice is None:
@@ -143,8 +145,8 @@ def _sizes(name: str, raw: Raw, declared: Declarations) -> tuple[int, ...]:
             )
         return ()
     if len(sizes) != number:
-        what = f"{counted(number, 'axis', 'axes')} {', '.join(axes)}" if axes else "the number of sites"
-        _fail(name, "sizes", f"sizes: {counted(len(sizes), 'size')} for {what}", declared)
+        expected = f"{counted(number, 'axis', 'axes')} {', '.join(axes)}" if axes else "the number of sites"
+        _fail(name, "sizes", f"sizes: {counted(len(sizes), 'size')} for {expected}", declared)
     sites = 1
     for size in sizes:
         sites *= size or 1
@@ -216,7 +218,7 @@ def _state(name: str, initial: Any, declared: Declarations) -> dict[str, Values]
         for c, (key, _) in initial.items():
             if c not in fields and not declared.incomplete:
                 declared.reader.error(key, f"{shown(c)} is not a coordinate", did_you_mean(c, fields))
-        if missing := [c for c in fields if c not in initial]:
-            _fail(name, "initial", f"initial: no value for {', '.join(missing[:10])}", declared)
+        if missing_fields := [c for c in fields if c not in initial]:
+            _fail(name, "initial", f"initial: no value for {', '.join(missing_fields[:10])}", declared)
         state = {c: values(node, declared) for c, (_, node) in initial.items()}
     return {c: v for c, v in state.items() if v is not None}

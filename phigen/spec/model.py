@@ -216,7 +216,7 @@ class Overrides(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class AverageChoice:
-    """``average:`` of a run: rows from the time ``after`` on, None for all, in at least so many ``blocks``.
+    """``average:`` of a run: rows from the time ``after`` on, None for all rows, in at least ``blocks`` blocks.
 
     The averages are those ``of`` some observables, of all if it is empty.
     """
@@ -332,10 +332,10 @@ class Statistic:
     @classmethod
     def read(cls, word: str, observables: Iterable[str]) -> Statistic | None:
         """Return what ``M``, ``mean(M)``, ``std(M)`` or ``error(M)`` asks for; None if that is nothing."""
-        function, opened, rest = word.partition("(")
-        name = rest.removesuffix(")").strip() if opened else function
-        known = name in observables and (not opened or (function in STATISTICS and rest.endswith(")")))
-        return cls(name, function if opened else "") if known else None
+        function, bracket, argument = word.partition("(")
+        name = argument.removesuffix(")").strip() if bracket else function
+        is_known = name in observables and (not bracket or (function in STATISTICS and argument.endswith(")")))
+        return cls(name, function if bracket else "") if is_known else None
 
 
 @dataclass(frozen=True)

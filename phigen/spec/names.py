@@ -26,8 +26,8 @@ NOISY_ARGUMENTS = frozenset(["seed", "member", "step0", "increments"])
 
 def argument_hint(name: str) -> str:
     """Return why a parameter cannot have the ``name`` of an argument."""
-    other = f"{name}_0" if len(name) > 1 else f"{name}{name}"
-    return f"parameters are passed by name in Python, where {name}= is an argument of solvers; call it {other}, say"
+    proposed = f"{name}_0" if len(name) > 1 else f"{name}{name}"
+    return f"parameters are passed by name in Python, where {name}= is an argument of solvers; call it {proposed}, say"
 
 
 #: Names in other programs, which users may type here.

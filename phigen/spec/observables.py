@@ -55,15 +55,15 @@ def _reduction(name: str, entry: Mapping[str, Any], declared: Declarations) -> R
     kind = next((k for k in REDUCTIONS if entry.get(k) is not None), None)
     if kind is None:
         return None
-    over, add = entry.get("over", "sites"), declared.reader.problems.add
+    domain, add = entry.get("over", "sites"), declared.reader.problems.add
     place = declared.reader.locations["observables", name, kind]
     if declared.lattice is None:
         add(f"observables: {kind} is over the sites of a lattice", place, "give the formula alone")
         return None
-    relation, declaration = _RELATIONS.get(over, (declared.relation, ""))
+    relation, declaration = _RELATIONS.get(domain, (declared.relation, ""))
     if relation != declared.relation:
         place = declared.reader.locations["observables", name, "over"]
         hint = "x[i+1] is a neighbour on a grid" if declared.relation == "grid" else ""
-        add(f"observables: over: {over} needs {declaration}", place, hint)
+        add(f"observables: over: {domain} needs {declaration}", place, hint)
         return None
-    return Reduction(kind, over)
+    return Reduction(kind, domain)

@@ -36,9 +36,11 @@ Pairs = dict[tuple[int, int], tuple[Scalar, Expression]]
 
 def poisson_form(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
     """The form of ``poisson:``, or ``None`` after errors."""
-    for form, read in _FORMS.items():
+    for form, read_form in _FORMS.items():
         if form in raw:
-            return read(raw[form], declared if form in ("matrix", "brackets") else replace(declared, indexed=False))
+            return read_form(
+                raw[form], declared if form in ("matrix", "brackets") else replace(declared, indexed=False)
+            )
     return None
 
 
@@ -53,23 +55,25 @@ def _of_neighbours(table: Mapping[str, Any], declared: Declarations) -> dict[tup
     brackets: dict[tuple[str, str], tuple[Scalar, Expression]] = {}
     space, scope = declared.neighbours, declared.scope()
     for key, row in table.values():
-        for other, cell in (row or {}).values():
-            if "[" not in other.text or key.text not in declared.coordinates:
+        for second_field, cell in (row or {}).values():
+            if "[" not in second_field.text or key.text not in declared.coordinates:
                 continue
-            place, value = declared.neighbour(other), declared.formula(cell, scope)
+            place, value = declared.neighbour(second_field), declared.formula(cell, scope)
             if place is None or value is None:
                 continue
             base, offset = place
             if not any(offset):
-                declared.reader.error(other, f"{other.text!r} is at the site itself", f"write {base}")
+                declared.reader.error(second_field, f"{second_field.text!r} is at the site itself", f"write {base}")
                 continue
-            back = base, space.at(key.text, minus(offset))
-            if back in brackets and space.shifted([neg(value)], minus(offset))[0] is not brackets[back][1]:
-                where = brackets[back][0].location
-                message = f"{{{key.text}, {other.text}}} is not written as the negative of its mirror image"
-                declared.reader.error(other, message, f"that is in line {where.line}, column {where.column}")
-            elif back not in brackets:
-                brackets[key.text, space.at(base, offset)] = other, value
+            mirrored = base, space.at(key.text, minus(offset))
+            if mirrored in brackets and space.shifted([neg(value)], minus(offset))[0] is not brackets[mirrored][1]:
+                first_place = brackets[mirrored][0].location
+                message = f"{{{key.text}, {second_field.text}}} is not written as the negative of its mirror image"
+                declared.reader.error(
+                    second_field, message, f"that is in line {first_place.line}, column {first_place.column}"
+                )
+            elif mirrored not in brackets:
+                brackets[key.text, space.at(base, offset)] = second_field, value
     return {pair: value for pair, (_, value) in brackets.items()}
 
 
@@ -82,16 +86,18 @@ def _along_bonds(table: Mapping[str, Any], declared: Declarations) -> dict[tuple
     space, scope = declared.neighbours, declared.bond_scope()
     for key, row in table.values():
         first = declared.neighbour(key, ENDS)
-        for other, cell in (row or {}).values():
-            second, value = declared.neighbour(other, ENDS), declared.formula(cell, scope)
+        for second_field, cell in (row or {}).values():
+            second, value = declared.neighbour(second_field, ENDS), declared.formula(cell, scope)
             if first is None or second is None or value is None:
                 continue
             pair = space.at(*first), space.at(*second)
             if {first[1], second[1]} != {(end,) for end in ENDS}:
-                declared.reader.error(other, "a bracket along a bond couples its two ends, a and b", "x[a] with x[b]")
+                declared.reader.error(
+                    second_field, "a bracket along a bond couples its two ends, a and b", "x[a] with x[b]"
+                )
             elif pair[::-1] in brackets and brackets[pair[::-1]] is not neg(value):
                 message = f"{{{pair[0]}, {pair[1]}}} is not written as the negative of {{{pair[1]}, {pair[0]}}}"
-                declared.reader.error(other, message, "give one of them")
+                declared.reader.error(second_field, message, "give one of them")
             elif pair[::-1] not in brackets:
                 brackets[pair] = value
     return brackets
@@ -105,16 +111,18 @@ def _entries(
     rows: Rows, path: tuple[Any, ...], declared: Declarations, scope: AllowedNames, size: int
 ) -> tuple[tuple[Expression, ...], ...] | None:
     """A size×size matrix of expressions; errors name the row."""
-    what, before = ".".join(str(p) for p in path if isinstance(p, str)), len(declared.reader.problems.found)
+    key_path, error_count = ".".join(str(p) for p in path if isinstance(p, str)), len(declared.reader.problems.found)
     if len(rows) != size:
         hint = "one for each coordinate" if size == len(declared.coordinates) else "the matrix must be square"
-        _fail(declared, path, f"{what}: expected {counted(size, 'row')}, found {len(rows)}", hint)
+        _fail(declared, path, f"{key_path}: expected {counted(size, 'row')}, found {len(rows)}", hint)
     matrix = []
     for i, row in enumerate(rows):
         if row is not None and len(row) != size:
-            _fail(declared, (*path, i), f"{what}: row {i + 1} has {counted(len(row), 'entry', 'entries')}, not {size}")
+            _fail(
+                declared, (*path, i), f"{key_path}: row {i + 1} has {counted(len(row), 'entry', 'entries')}, not {size}"
+            )
         matrix.append(tuple(declared.formula(cell, scope) or ZERO for cell in row or ()))
-    return tuple(matrix) if len(declared.reader.problems.found) == before else None
+    return tuple(matrix) if len(declared.reader.problems.found) == error_count else None
 
 
 def _matrix(rows: Rows, declared: Declarations) -> PoissonForm | None:
@@ -138,13 +146,13 @@ def _brackets(table: Mapping[str, Any], declared: Declarations) -> PoissonForm:
     scope = declared.scope()
     for key, row in table.values():
         i = declared.coordinate(key)
-        for other, cell in (row or {}).values():
-            if "[" in other.text and declared.relation == "grid":  # see `_of_neighbours`
+        for second_name, cell in (row or {}).values():
+            if "[" in second_name.text and declared.relation == "grid":  # see `_of_neighbours`
                 continue
-            j = declared.coordinate(other)
+            j = declared.coordinate(second_name)
             value = declared.formula(cell, scope)
             if i is not None and j is not None and value is not None:
-                _state(pairs, (i, j), (key, other), value, declared)
+                _state(pairs, (i, j), (key, second_name), value, declared)
     n = len(declared.coordinates)
     matrix = [[ZERO] * n for _ in range(n)]
     for (i, j), (_, value) in pairs.items():
@@ -160,23 +168,23 @@ def _state(
     if i == j:
         declared.reader.error(b, f"the bracket of {a.text!r} with itself is always 0", "remove it")
     elif (j, i) in pairs and pairs[j, i][1] is not neg(value):
-        where = pairs[j, i][0].location
+        first_place = pairs[j, i][0].location
         message = f"{{{a.text}, {b.text}}} is not written as the negative of {{{b.text}, {a.text}}}"
-        hint = f"the other is in line {where.line}, column {where.column}; give one of them"
+        hint = f"the other is in line {first_place.line}, column {first_place.column}; give one of them"
         declared.reader.error(b, message, hint)
     else:
         pairs[i, j] = b, value
 
 
 def _canonical(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
-    seen: dict[str, str] = {}
+    roles: dict[str, str] = {}
     for key in ("q", "p"):
         for node in raw.get(key, ()):
             if node is None or declared.coordinate(node) is None:
                 continue
-            if node.text in seen:
-                declared.reader.error(node, f"canonical: {node.text!r} is already in {seen[node.text]}")
-            seen.setdefault(node.text, key)
+            if node.text in roles:
+                declared.reader.error(node, f"canonical: {node.text!r} is already in {roles[node.text]}")
+            roles.setdefault(node.text, key)
     if "q" not in raw or "p" not in raw:
         return None
     q, p = raw["q"], raw["p"]
@@ -267,7 +275,7 @@ def _nambu(nodes: list[Scalar | None], declared: Declarations) -> PoissonForm | 
 
 
 def _product(entries: list[Mapping[str, Any] | None], declared: Declarations) -> PoissonForm | None:
-    seen: dict[str, Scalar] = {}
+    places_by_name: dict[str, Scalar] = {}
     blocks: list[tuple[tuple[str, ...], PoissonForm | None]] = []
     for i, block in enumerate(entries):
         if "coordinates" not in (block or {}):  # reported where blocks are read
@@ -275,25 +283,28 @@ def _product(entries: list[Mapping[str, Any] | None], declared: Declarations) ->
             continue
         nodes = [node for node in (block or {}).get("coordinates", ()) if node is not None]
         for node in nodes:
-            if declared.coordinate(node) is not None and node.text in seen:
+            if declared.coordinate(node) is not None and node.text in places_by_name:
                 declared.reader.error(node, f"product: {node.text!r} is in two blocks")
-            seen[node.text] = node
+            places_by_name[node.text] = node
         names = tuple(node.text for node in nodes)
         message = "brackets in a block of a product depend on its own coordinates only, not on"
         inner = declared.inside((*declared.within, "product", i), names, message)
         blocks.append((names, poisson_form(block or {}, inner)))
-    missing = [c for c in declared.coordinates if c not in seen]
-    if missing and all(names for names, _ in blocks) and not declared.incomplete:
+    missing_names = [c for c in declared.coordinates if c not in places_by_name]
+    if missing_names and all(names for names, _ in blocks) and not declared.incomplete:
         return _fail(
-            declared, ("product",), f"product: {missing[0]!r} is in no block", "every coordinate belongs to one block"
+            declared,
+            ("product",),
+            f"product: {missing_names[0]!r} is in no block",
+            "every coordinate belongs to one block",
         )
     complete = tuple((names, form) for names, form in blocks if form is not None)
     return ProductForm(complete) if len(complete) == len(blocks) else None
 
 
 def _pullback(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
-    image, other = raw.get("map"), raw.get("of")
-    if image is None or other is None:
+    image, inner_form = raw.get("map"), raw.get("of")
+    if image is None or inner_form is None:
         return None
     n = len(declared.coordinates)
     if len(image) != n and not declared.incomplete:
@@ -304,9 +315,9 @@ def _pullback(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | N
             declared.reader.error(key, f"pullback: {name!r} is in use already", "choose another name")
     names = tuple(image)
     forward = [declared.formula(node, declared.scope()) for _, node in image.values()]
-    within = (*declared.within, "pullback", "of")
-    inner = declared.inside(within, names, "this structure is in the coordinates of the map and cannot use")
-    form = poisson_form(other, inner)
+    inner_path = (*declared.within, "pullback", "of")
+    inner = declared.inside(inner_path, names, "this structure is in the coordinates of the map and cannot use")
+    form = poisson_form(inner_form, inner)
     backward = _inverse(raw["inverse"], declared, inner) if "inverse" in raw else None
     if form is None or None in forward:
         return None
@@ -318,9 +329,9 @@ def _inverse(
 ) -> tuple[Expression, ...] | None:
     for key, _ in entries.values():
         declared.coordinate(key)
-    missing = [c for c in declared.coordinates if c not in entries]
-    if missing and not declared.incomplete:
-        return _fail(declared, ("pullback", "inverse"), f"pullback: inverse does not give {missing[0]!r}")
+    missing_names = [c for c in declared.coordinates if c not in entries]
+    if missing_names and not declared.incomplete:
+        return _fail(declared, ("pullback", "inverse"), f"pullback: inverse does not give {missing_names[0]!r}")
     return tuple(inner.formula(entries[c][1], inner.scope()) or ZERO for c in declared.coordinates if c in entries)
 
 

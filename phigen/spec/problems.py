@@ -51,8 +51,8 @@ def _numbered(word: str, choices: Iterable[str]) -> list[str]:
 
 def one_of(choices: Iterable[str]) -> str:
     """``one of a, b, c``, or ``write a`` if there is no other, for hints."""
-    listed = list(choices)
-    return f"write {listed[0]}" if len(listed) == 1 else "one of " + ", ".join(listed)
+    choice_list = list(choices)
+    return f"write {choice_list[0]}" if len(choice_list) == 1 else "one of " + ", ".join(choice_list)
 
 
 def counted(number: int, noun: str, plural: str = "") -> str:
@@ -89,7 +89,7 @@ class Problems:
 
     def forget(self, line: int) -> None:
         """Drop the errors of a line, which follow from one that is reported instead."""
-        self.found = {at: d for at, d in self.found.items() if at[0].line != line}
+        self.found = {position: d for position, d in self.found.items() if position[0].line != line}
 
     def stop(self, message: str, location: Location, hint: str = "", *, limit: bool = False) -> SpecError:
         """Record an error after which nothing can be read, and return the exception to raise."""
@@ -97,13 +97,13 @@ class Problems:
         return self.error()
 
     def error(self) -> SpecError:
-        """The exception that holds what was found; a `LimitError` if all of it are limits."""
+        """Exception with all problems; a `LimitError` if all problems are exceeded limits."""
         ordered = [self.found[key] for key in sorted(self.found, key=lambda key: key[0])]
         if len(ordered) >= limits.ERRORS:
             ordered.append(Diagnostic(f"there may be more: only {limits.ERRORS} errors are listed"))
         return (LimitError if self.only_limits else SpecError)(ordered)
 
     def finish(self) -> None:
-        """Raise what was found, if anything was."""
+        """Raise the exception with all problems, if there are any."""
         if self.found:
             raise self.error()

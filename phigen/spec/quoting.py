@@ -10,7 +10,7 @@ def needs_quotes(line: str, column: int) -> bool:
 
 def quoted(line: str) -> str:
     """The line with quotes about the keys and values that contain an index."""
-    out, part, depth, index, quote = "", "", 0, False, ""
+    written, part, depth, index, quote = "", "", 0, False, ""
     for position, character in enumerate(line + "\n"):
         following = line[position + 1 : position + 2]
         if quote:
@@ -22,10 +22,10 @@ def quoted(line: str) -> str:
         elif character in "()":
             depth += 1 if character == "(" else -1
         elif character == "\n" or (depth <= 0 and (character in "{}[]," or (character == ":" and following in " \n"))):
-            out, part = out + _finished(part) + character, ""
+            written, part = written + _finished(part) + character, ""
             continue
         part += character
-    return out.rstrip("\n")
+    return written.rstrip("\n")
 
 
 def _ends_name(text: str) -> bool:

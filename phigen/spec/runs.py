@@ -52,12 +52,12 @@ def run(
     steps = _steps_until(name, raw, until - start, step, declared) if until is not None else None
     duration = declared.number(raw.get("duration"), numbers)
     steps = steps if until is not None else _steps(name, raw, duration, step, declared)
-    every = declared.number(raw.get("every"), numbers)
-    if every is not None and every <= 0:
+    interval = declared.number(raw.get("every"), numbers)
+    if interval is not None and interval <= 0:
         _fail(name, "every", f"every: {raw['every'].text} is not positive", declared)
-    elif every is not None and "stride" in raw:
+    elif interval is not None and "stride" in raw:
         _fail(name, "every", "every and stride exclude each other", declared, "give one of them")
-    listed = _times(name, raw, start, until, step, steps, declared)
+    row_times = _row_times(name, raw, start, until, step, steps, declared)
     if "direction" in raw and "section" not in raw:
         example = "x1" if declared.lattice is None else "M"
         hint = f"section: {example} records where {example} passes through 0"
@@ -83,8 +83,8 @@ def run(
         direction=raw.get("direction") or "rising",
         duration=duration,
         until=until,
-        every=every,
-        at=listed,
+        every=interval,
+        at=row_times,
         stop=crossed(name, "stop", raw, declared, replace(watched, piecewise=True)),
         average=_average(name, raw.get("average"), declared, averaged),
         record=_recorded(name, raw.get("record"), declared, recordable),
@@ -102,19 +102,19 @@ def _box(
     for name, (key, nodes) in raw.items():
         if not nodes:
             continue  # the reader reported it
-        ends = [declared.number(node, declared.numbers()) for node in nodes]
-        known = declared.coordinate(key) is not None
-        if len(ends) != 2 or None in ends or ends[0] > ends[1]:  # type: ignore[operator]
-            if None not in ends:
+        bounds = [declared.number(node, declared.numbers()) for node in nodes]
+        is_coordinate = declared.coordinate(key) is not None
+        if len(bounds) != 2 or None in bounds or bounds[0] > bounds[1]:  # type: ignore[operator]
+            if None not in bounds:
                 texts = ", ".join(node.text for node in nodes if node is not None)
                 message = f"box: [{texts}] is not [LOW, HIGH], two numbers in this order"
                 declared.reader.error(nodes[0] or key, message, f"{name}: [-1, 1]")
-        elif known:
-            box[name] = (ends[0], ends[1])
+        elif is_coordinate:
+            box[name] = (bounds[0], bounds[1])
     return box  # type: ignore[return-value]
 
 
-def _times(
+def _row_times(
     name: str,
     raw: Mapping[str, Any],
     start: Fraction,
@@ -125,8 +125,8 @@ def _times(
 ) -> tuple[Fraction, ...]:
     """The times of ``at``, each once, in the order in which they come."""
     nodes = raw.get("at") or ()
-    if nodes and (other := next((key for key in ("every", "stride") if key in raw), None)):
-        _fail(name, "at", f"at and {other} exclude each other", declared, "give one of them")
+    if nodes and (conflicting_key := next((key for key in ("every", "stride") if key in raw), None)):
+        _fail(name, "at", f"at and {conflicting_key} exclude each other", declared, "give one of them")
     end = until if until is not None else start + step * steps if step and steps else None
     times = []
     for node in nodes:
@@ -148,17 +148,19 @@ def _recorded(
     name: str, nodes: Sequence[Scalar | None] | None, declared: Declarations, recordable: Mapping[str, str]
 ) -> tuple[str, ...]:
     """Return ``record`` of a run; ``recordable`` has the columns that there are, and why others are none."""
-    words: list[str | None] = []
+    columns_asked: list[str | None] = []
     for node in nodes or ():
         word = node.text if node is not None else None
         if node is not None and recordable.get(node.text, "?"):
-            known = [column for column, reason in recordable.items() if not reason]
+            recordable_columns = [column for column, reason in recordable.items() if not reason]
             reason = recordable.get(node.text) or "is no column of the output"
-            hint = "state records all fields" if node.text in recordable else did_you_mean(node.text, known)
-            declared.reader.error(node, f"record: {shown(node.text)} {reason}", hint or one_of(known))
+            hint = (
+                "state records all fields" if node.text in recordable else did_you_mean(node.text, recordable_columns)
+            )
+            declared.reader.error(node, f"record: {shown(node.text)} {reason}", hint or one_of(recordable_columns))
             word = None
-        words.append(word)
-    return without_repetition(words, ("runs", name, "record"), declared)
+        columns_asked.append(word)
+    return without_repetition(columns_asked, ("runs", name, "record"), declared)
 
 
 def _average(
@@ -167,35 +169,35 @@ def _average(
     """Return ``average`` of a run, ``of`` observables that are one number."""
     if raw is None:
         return AverageChoice()
-    listed = without_repetition(
+    selected = without_repetition(
         [node and node.text for node in raw.get("of", ())], ("runs", name, "average", "of"), declared
     )
     for node in raw.get("of", ()):
         if node is not None and node.text not in averaged and not declared.incomplete:
             hint = did_you_mean(node.text, averaged) or f"observables that are one number: {', '.join(averaged)}"
             declared.reader.error(node, f"average: of: {shown(node.text)} is no observable that is one number", hint)
-    return AverageChoice(declared.number(raw.get("after"), declared.numbers()), raw.get("blocks"), listed)
+    return AverageChoice(declared.number(raw.get("after"), declared.numbers()), raw.get("blocks"), selected)
 
 
 def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
     """Report averages that begin after the end of a run with steps of equal time."""
-    after, end = run_.average.after, run_.until
+    start_time, end = run_.average.after, run_.until
     end = run_.start + run_.step * run_.steps if end is None else end
-    if after is not None and (end - after) * run_.step < 0:
+    if start_time is not None and (end - start_time) * run_.step < 0:
         place = declared.reader.locations["runs", run_.name, "average", "after"]
-        message = f"average: after: {float(after):.9g} is not before the end of the run, t = {float(end):.9g}"
+        message = f"average: after: {float(start_time):.9g} is not before the end of the run, t = {float(end):.9g}"
         declared.reader.problems.add(message, place, "the average is over the rows from that time on")
 
 
 def crossed(
     name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: AllowedNames
 ) -> Expression | None:
-    """An expression whose zeros are looked for along the run, so that it has to change."""
+    """Expression whose zeros are searched along the run; an error is reported if it is constant."""
     section = declared.formula(raw.get(key), scope)
     constant = {n for n, p in declared.parameters.items() if p.at == "all"}
     if section is not None and not declared.incomplete and constant.issuperset(symbols_of(section)):
-        what = "a coordinate" if declared.lattice is None else "an observable"
-        _fail(name, key, f"{key}: {shown(raw[key].text)} depends neither on {what} nor on the time", declared)
+        required = "a coordinate" if declared.lattice is None else "an observable"
+        _fail(name, key, f"{key}: {shown(raw[key].text)} depends neither on {required} nor on the time", declared)
     return section
 
 
@@ -212,19 +214,19 @@ def _steps(
         return raw.get("steps")
     if duration is None or step is None:
         return None
-    ratio, written = (
+    ratio, span_text = (
         duration / step,
         f"{raw['duration'].text} is {float(duration / step):.9g} steps of {raw['step'].text}",
     )
     steps = round(ratio)
     if whole(ratio) is None:
-        _fail(name, "duration", f"the duration {written}, not a whole number", declared, f"steps: {max(1, steps)}")
+        _fail(name, "duration", f"the duration {span_text}, not a whole number", declared, f"steps: {max(1, steps)}")
     elif steps < 1:
         hint = "a step backwards in time needs a negative duration" if step < 0 else "the duration must be positive"
-        _fail(name, "duration", f"the duration {written}", declared, hint)
+        _fail(name, "duration", f"the duration {span_text}", declared, hint)
     elif steps > limits.STEPS:
         location = declared.reader.locations["runs", name, "duration"]
-        message = f"the duration {written}, more than the limit of {limits.STEPS}"
+        message = f"the duration {span_text}, more than the limit of {limits.STEPS}"
         declared.reader.problems.add(message, location, limit=True)
     else:
         return steps
@@ -280,9 +282,9 @@ def _initial(name: str, raw: Any, declared: Declarations) -> tuple[Fraction, ...
         return ()
     if isinstance(raw, dict):
         values = {k: (declared.coordinate(key), _single(node, scope, key, declared)) for k, (key, node) in raw.items()}
-        missing = [c for c in declared.coordinates if c not in values]
-        if missing:
-            _fail(name, "initial", f"initial: no value for {', '.join(missing[:10])}", declared)
+        missing_names = [c for c in declared.coordinates if c not in values]
+        if missing_names:
+            _fail(name, "initial", f"initial: no value for {', '.join(missing_names[:10])}", declared)
         return tuple(values[c][1] or Fraction(0) for c in declared.coordinates if c in values)
     if raw is None:
         return ()
@@ -295,8 +297,8 @@ def _single(node: Any, scope: AllowedNames, key: Scalar, declared: Declarations)
     """The number where an ordinary spec has one, and a lattice may have an array."""
     if node is None or isinstance(node, Scalar):
         return declared.number(node, scope)
-    what = "a list" if isinstance(node, list) else "a mapping"
-    declared.reader.error(key, f"{key.text}: expected a number, found {what}")
+    form = "a list" if isinstance(node, list) else "a mapping"
+    declared.reader.error(key, f"{key.text}: expected a number, found {form}")
     return None
 
 
@@ -333,11 +335,11 @@ def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declaratio
             message = f"the name {name!r} is reserved in the exact solution of a run"
             declared.reader.error(declared.nodes[name], message, "choose another name")
     dated = {n: declared.definitions[n] for n in declared.dated - declared.varying}
-    at = dict(zip(dated, substitute(list(dated.values()), {declared.time: symbol(ELAPSED)}), strict=True))
-    scope = declared.constants("an exact solution", symbols | at)
+    time_values = dict(zip(dated, substitute(list(dated.values()), {declared.time: symbol(ELAPSED)}), strict=True))
+    scope = declared.constants("an exact solution", symbols | time_values)
     hints = {c: (scope.refused[c][0], f"initial values are written x0_{c}") for c in declared.coordinates}
     # A coordinate t is no obstacle: an exact solution is about the time.
-    refused = {n: why for n, why in {**scope.refused, **hints}.items() if n not in symbols}
+    refused = {n: reason for n, reason in {**scope.refused, **hints}.items() if n not in symbols}
     scope = AllowedNames(scope.names, refused, scope.open)
     values = {}
     for name, (key, node) in raw.items():
@@ -347,13 +349,13 @@ def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declaratio
     return values
 
 
-def without_repetition(words: Any, path: tuple[Any, ...], declared: Declarations) -> tuple[str, ...]:
+def without_repetition(entries: Any, path: tuple[Any, ...], declared: Declarations) -> tuple[str, ...]:
     """A list of words, each once; repetitions are reported."""
-    seen: list[str] = []
-    for index, word in enumerate(words):
-        if word in seen:
+    distinct: list[str] = []
+    for index, word in enumerate(entries):
+        if word in distinct:
             location = declared.reader.locations[*path, index]
             declared.reader.problems.add(f"{path[-1]}: {word} is given twice", location)
         elif word is not None:
-            seen.append(word)
-    return tuple(seen)
+            distinct.append(word)
+    return tuple(distinct)

@@ -20,8 +20,8 @@ def spectrum_of(name: str, raw: Mapping[str, Any], declared: Declarations) -> Sp
     if entries is None or not _is_allowed(name, "spectrum", raw, declared):
         return None
     fields = [_field(node, "spectrum", declared) for node in entries.get("of") or () if node is not None]
-    after = declared.number(entries.get("after"), declared.numbers())
-    return SpectrumChoice(tuple(f for f in fields if f), after) if all(fields) and fields else None
+    start_time = declared.number(entries.get("after"), declared.numbers())
+    return SpectrumChoice(tuple(f for f in fields if f), start_time) if all(fields) and fields else None
 
 
 def correlation_of(
@@ -32,24 +32,24 @@ def correlation_of(
     if entries is None or not _is_allowed(name, "correlation", raw, declared):
         return None
     assert declared.lattice is not None
-    of, other, axis = (entries.get(key) for key in ("of", "with", "axis"))
-    first = _field(of, "correlation", declared) if of is not None else ""
-    second = _field(other, "correlation", declared) if other is not None else first
+    first_field, second_field, axis = (entries.get(key) for key in ("of", "with", "axis"))
+    first = _field(first_field, "correlation", declared) if first_field is not None else ""
+    second = _field(second_field, "correlation", declared) if second_field is not None else first
     axes, up_to = declared.lattice.axes, entries.get(UP_TO)
     if axis is not None and axis.text not in axes:
         hint = did_you_mean(axis.text, axes) or one_of(axes)
         declared.reader.error(axis, f"correlation: {shown(axis.text)} is not an axis", hint)
         return None
-    along = axis.text if axis is not None else axes[0]
-    after = declared.number(entries.get("after"), declared.numbers())
+    axis_name = axis.text if axis is not None else axes[0]
+    start_time = declared.number(entries.get("after"), declared.numbers())
     if not (first and second) or up_to is None:
         return None
-    size = dict(zip(axes, sizes, strict=False)).get(along)
+    size = dict(zip(axes, sizes, strict=False)).get(axis_name)
     if size is not None and up_to >= size:
-        message = f"correlation: {UP_TO}: {up_to} is farther than {size - 1}, the last distance along {along}"
+        message = f"correlation: {UP_TO}: {up_to} is farther than {size - 1}, the last distance along {axis_name}"
         declared.reader.problems.add(message, declared.reader.locations["runs", name, "correlation", UP_TO])
         return None
-    return CorrelationChoice(first, second, along, up_to, after)
+    return CorrelationChoice(first, second, axis_name, up_to, start_time)
 
 
 def _is_allowed(name: str, key: str, raw: Mapping[str, Any], declared: Declarations) -> bool:

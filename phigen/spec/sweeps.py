@@ -38,26 +38,26 @@ def sweep(
     if run not in runs:
         hint = did_you_mean(run, runs) or "runs: holds the experiments of a spec"
         _fail((*place, "run"), f"there is no run {shown(run)}" if run else "the spec has no runs", declared, hint)
-    words: dict[str, Any] = {}
+    entries: dict[str, Any] = {}
     axes: list[Axis] = []
     for key, (node, value) in (raw.get("over") or {}).items():
         if isinstance(value, Scalar) and key in _WORDS and key not in declared.parameters:
-            words[key] = _WORDS[key].read(value, (key,), declared.reader)
+            entries[key] = _WORDS[key].read(value, (key,), declared.reader)
         elif value is not None:
             axes += _axis(node, value, declared)
     result = SweepSettings(
         name=name,
         run=run,
         over=tuple(axes),
-        random=words.get("random") or 0,
-        seed=words.get("seed") or 0,
-        file=words.get("file") or "",
+        random=entries.get("random") or 0,
+        seed=entries.get("seed") or 0,
+        file=entries.get("file") or "",
         keep=_kept(raw.get("keep"), place, declared, observables),
         frames=raw.get("frames", 0),
         target=raw.get("target", "auto"),
         description=raw.get("description", ""),
     )
-    incomplete = len(axes) + len(words) < len(raw.get("over") or {}) or None in words.values()
+    incomplete = len(axes) + len(entries) < len(raw.get("over") or {}) or None in entries.values()
     _expect_sense(result, runs.get(run), place, declared, incomplete=incomplete)
     if run in runs and (end := end_of_its_own(result, runs[run], monitored=monitored)):
         _fail((*place, "run") if raw.get("run") else place, end, declared, "give the run steps: instead")
@@ -68,30 +68,30 @@ def _kept(
     nodes: Sequence[Scalar | None] | None, place: tuple[Any, ...], declared: Declarations, observables: Collection[str]
 ) -> tuple[str, ...]:
     """Return ``keep``: words of `KEPT`, and statistics of observables."""
-    words: list[str | None] = []
+    quantities: list[str | None] = []
     for node in nodes or ():
         word = node.text.replace(" ", "") if node is not None else None
         if node is not None and word not in KEPT and Statistic.read(str(word), observables) is None:
-            known = [*KEPT, *observables]
-            hint = did_you_mean(node.text, known) or one_of(
-                [*known, *(f"{of}({name})" for name in observables for of in STATISTICS)]
+            allowed = [*KEPT, *observables]
+            hint = did_you_mean(node.text, allowed) or one_of(
+                [*allowed, *(f"{statistic}({name})" for name in observables for statistic in STATISTICS)]
             )
             declared.reader.error(node, f"keep: {shown(node.text)} is not known", hint)
             word = None
-        words.append(word)
-    return without_repetition(words, (*place, "keep"), declared) if nodes is not None else ("final",)
+        quantities.append(word)
+    return without_repetition(quantities, (*place, "keep"), declared) if nodes is not None else ("final",)
 
 
 def end_of_its_own(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
     """Refusal of a run that does not end, for all members, with its last whole step; otherwise empty."""
-    said = f"all members of a sweep make the same number of whole steps; the run {run.name} ends"
+    statement = f"all members of a sweep make the same number of whole steps; the run {run.name} ends"
     if run.stop is not None:
-        return f"{said} where its stop: is met"
-    moved = {"step", "start"} & {axis.name for axis in sweep.over}
-    if run.duration is not None and "step" in moved:
-        return f"{said} after the duration {float(run.duration):.9g}"
-    if run.until is not None and (monitored or moved or whole((run.until - run.start) / run.step) is None):
-        return f"{said} at the time {float(run.until):.9g}"
+        return f"{statement} where its stop: is met"
+    varied = {"step", "start"} & {axis.name for axis in sweep.over}
+    if run.duration is not None and "step" in varied:
+        return f"{statement} after the duration {float(run.duration):.9g}"
+    if run.until is not None and (monitored or varied or whole((run.until - run.start) / run.step) is None):
+        return f"{statement} at the time {float(run.until):.9g}"
     return ""
 
 
@@ -105,9 +105,11 @@ def _fail(place: tuple[Any, ...], message: str, declared: Declarations, hint: st
 def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
     """The values of one name: a list, or a range; none where there are errors."""
     name, numbers = key.text, declared.numbers()
-    known = [*declared.parameters, *(() if declared.lattice else declared.coordinates), *SWEEP_NAMES]
-    if name not in known and not declared.incomplete:
-        declared.reader.error(key, f"over: {shown(name)} is not a parameter or a coordinate", did_you_mean(name, known))
+    allowed_names = [*declared.parameters, *(() if declared.lattice else declared.coordinates), *SWEEP_NAMES]
+    if name not in allowed_names and not declared.incomplete:
+        declared.reader.error(
+            key, f"over: {shown(name)} is not a parameter or a coordinate", did_you_mean(name, allowed_names)
+        )
         return []
     if name == "start" and name not in (*declared.parameters, *declared.coordinates) and not declared.time:
         declared.reader.error(key, "over: start: this system has no time", "time: t declares the name of the time")
@@ -125,27 +127,27 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
             return []
         axis = Axis(name, tuple(float(v) for v in values if v is not None))
     else:
-        ends = [declared.number(value.get(end), numbers) for end in ("from", "to")]
-        if None in ends:
+        bounds = [declared.number(value.get(end), numbers) for end in ("from", "to")]
+        if None in bounds:
             declared.reader.error(key, f"over: {name} needs from and to", "{from: 1, to: 3, count: 100}")
             return []
-        first, last = (float(end or 0) for end in ends)
+        first, last = (float(end or 0) for end in bounds)
         axis = Axis(name, (), (first, last), value.get("count", 0), value.get("scale", "linear"))
     lowest = min(axis.values or axis.ends)
     if axis.scale == "log" and lowest <= 0:
         declared.reader.error(key, f"over: {name} on a logarithmic scale reaches {lowest:g}")
     parameter = declared.parameters.get(name)
     if parameter is not None and parameter.refuses(lowest):
-        said = f"is {parameter.bound} by declaration, but reaches {lowest:g}"
-        declared.reader.error(key, f"over: the parameter {name!r} {said}")
+        message = f"is {parameter.bound} by declaration, but reaches {lowest:g}"
+        declared.reader.error(key, f"over: the parameter {name!r} {message}")
     return [axis]
 
 
 def _draws(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
     """The numbers of draws, along a dimension of the sweep."""
     if isinstance(value, list):
-        read = [Integer(0, limits.SWEEP_SEED).read(node, ("seed",), declared.reader) for node in value if node]
-        numbers = tuple(float(n) for n in read if n is not None)
+        draw_counts = [Integer(0, limits.SWEEP_SEED).read(node, ("seed",), declared.reader) for node in value if node]
+        numbers = tuple(float(n) for n in draw_counts if n is not None)
         return [Axis("seed", numbers)] if len(numbers) == len(value) else []
     if "count" not in value or len(value) > 1:
         declared.reader.error(key, "over: seed has a count, and no other key", "seed: {count: 10}")
@@ -157,21 +159,26 @@ def _expect_sense(
     sweep: SweepSettings, run: Run | None, place: tuple[Any, ...], declared: Declarations, *, incomplete: bool
 ) -> None:
     grid = [axis for axis in sweep.over if axis.size]
-    drawn = [axis for axis in sweep.over if not axis.size]
-    over = (*place, "over")
+    random_axes = [axis for axis in sweep.over if not axis.size]
+    axes_place = (*place, "over")
     if sweep.file and (sweep.over or sweep.random):
-        _fail(over, "over: a file holds all values; remove the other keys", declared)
+        _fail(axes_place, "over: a file holds all values; remove the other keys", declared)
     if sweep.random and grid:
-        _fail(over, f"over: {grid[0].name} has a count, but random members are drawn", declared, "leave out the count")
-    if drawn and not (sweep.random or incomplete or any(axis.name == "seed" for axis in grid)):
+        _fail(
+            axes_place,
+            f"over: {grid[0].name} has a count, but random members are drawn",
+            declared,
+            "leave out the count",
+        )
+    if random_axes and not (sweep.random or incomplete or any(axis.name == "seed" for axis in grid)):
         hint = "add a count, or seed: {count: 10} for 10 random members"
-        _fail((*over, drawn[0].name), f"over: {drawn[0].name} has no count", declared, hint)
+        _fail((*axes_place, random_axes[0].name), f"over: {random_axes[0].name} has no count", declared, hint)
     if not (sweep.over or sweep.file or incomplete):
-        _fail(over, "over: there is nothing to vary", declared)
+        _fail(axes_place, "over: there is nothing to vary", declared)
     members = sweep.random or prod(axis.size for axis in grid)
     if members > limits.SWEPT:
         hint = "split it into several sweeps, or draw random members"
-        _fail(over, f"{members} members, the limit is {limits.SWEPT}", declared, hint, limit=True)
+        _fail(axes_place, f"{members} members, the limit is {limits.SWEPT}", declared, hint, limit=True)
     if run is not None and sweep.frames > run.steps:
         message = f"frames: every {sweep.frames} steps, but the run {run.name} has only {run.steps}"
         _fail((*place, "frames"), message, declared)
