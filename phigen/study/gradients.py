@@ -183,7 +183,7 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
         v = np.where(value != 0, v, np.abs(v))  # a parameter may have to be 0 or positive
         yield (
             float(np.sum(bar * v)),
-            lambda e, name=name, value=value, v=v: (run.x, {**run.parameters, name: _plain(value + e * v)}),  # type: ignore[misc]
+            lambda e, name=name, value=value, v=v: (run.x, {**run.parameters, name: _as_number(value + e * v)}),  # type: ignore[misc]
         )
 
 
@@ -224,6 +224,6 @@ def _directions(size: int, count: int) -> Floats:
     return np.random.default_rng(2).normal(size=(count, size))
 
 
-def _plain(value: Floats) -> Any:
+def _as_number(value: Floats) -> Any:
     """Return a number as a number, an array as it is."""
     return value if value.ndim else float(value)

@@ -67,13 +67,24 @@ class _Subject:
         return None if self.t0 is None else float(trajectory.t[frame])
 
     def stepped(
-        self, x: Floats, h: float, steps: int = 1, t0: float | None = None, held: Mapping[str, float] | None = None
+        self,
+        x: Floats,
+        h: float,
+        steps: int = 1,
+        t0: float | None = None,
+        held_level: Mapping[str, float] | None = None,
     ) -> Floats:
-        """Return the state after some steps from the time t0 on (by default that of the run); ``held`` fixes the energy
-        level e.
+        """Return the state after some steps from the time t0 on, by default that of the run.
+
+        ``held_level`` fixes the energy level e.
         """
         t0 = self.t0 if t0 is None else t0
-        options: dict[str, Any] = {"t0": t0, "seed": self.seed, "parameters": self.start.arguments, **(held or {})}
+        options: dict[str, Any] = {
+            "t0": t0,
+            "seed": self.seed,
+            "parameters": self.start.arguments,
+            **(held_level or {}),
+        }
         trajectory = self.solver.integrate(x, h, steps, max(1, steps), **options)
         end: Floats = trajectory.x[-1]
         return end
@@ -100,8 +111,8 @@ def verify_lattice(
     """
     cell = compilation.cell
     subject = _Subject(compilation, solvers, start, h, t0, seed)
-    most = MAX_BALANCED_SITE_STEPS if cell.driven else MOST_UPDATES
-    steps = min(steps, max(20, (min(most, FEW_UPDATES) if quick else most) // int(np.prod(start.sizes))))
+    max_updates = MAX_BALANCED_SITE_STEPS if cell.driven else MOST_UPDATES
+    steps = min(steps, max(20, (min(max_updates, FEW_UPDATES) if quick else max_updates) // int(np.prod(start.sizes))))
     name, stride = compilation.spec.name, max(1, steps // FRAMES)
     with progress.stage(f"{name}: {steps} steps"):
         trajectory = subject.solver.integrate(
@@ -120,9 +131,9 @@ def verify_lattice(
             checks += _noise(cell, subject, quick=quick)
     checks += _single(cell, subject, single, trajectory) if single else []
     label = compilation.named(compilation.method)
-    said = f"{stated(units_of(cell, trajectory))} {WORST_SITE} {_sampled(stride)}".strip()
+    unit_note = f"{stated(units_of(cell, trajectory))} {WORST_SITE} {_sampled(stride)}".strip()
     clock = "τ" if subject.solver.interface.monitored else "t"
-    return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, said, clock=clock)
+    return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, unit_note, clock=clock)
 
 
 def _sampled(stride: int) -> str:
@@ -136,8 +147,10 @@ def _without_noise(subject: _Subject) -> _Subject:
     from phigen.api import lattice_solver_of
     from phigen.compiler import compile_spec
 
-    whole = subject.compilation
-    quiet = compile_spec(replace(whole.spec, noise={}), order=whole.order.order, scheme=whole.scheme_name)
+    compilation = subject.compilation
+    quiet = compile_spec(
+        replace(compilation.spec, noise={}), order=compilation.order.order, scheme=compilation.scheme_name
+    )
     return replace(
         subject, compilation=quiet.by_sweeps(), solvers={"numpy": lattice_solver_of(quiet, "numpy")}, seed=None
     )
@@ -153,15 +166,15 @@ def _order(subject: _Subject, *, quiet: bool = False) -> Check:
     span, slopes = 4 * abs(subject.h), dict[float, float]()
     for _ in range(5):
         try:
-            far = subject.stepped(x, span / 256, 256)
-            errors = [np.abs(subject.stepped(x, span / n, n) - far).max() / size for n in (4, 8, 16)]
+            reference = subject.stepped(x, span / 256, 256)
+            errors = [np.abs(subject.stepped(x, span / n, n) - reference).max() / size for n in (4, 8, 16)]
         except StepError:
             break
         slopes |= {b: math.log2(a / b) for a, b in pairwise(errors) if 1e-11 < b < a < 0.1}
         span *= 2
     measured = slopes[min(slopes)] if slopes else math.nan
-    passed = measured >= order - ORDER_SLACK
-    return Check(name, measured, order_limit(order), passed, f"{measured:.2f} instead of {order}")
+    is_passed = measured >= order - ORDER_SLACK
+    return Check(name, measured, order_limit(order), is_passed, f"{measured:.2f} instead of {order}")
 
 
 def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) -> Iterator[Check]:
@@ -191,43 +204,43 @@ def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) 
 
 def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
     """Return the check that the energy, or the energy balance, does not drift."""
-    what = next(name for name in (ENERGY, BALANCE, CHANGE) if name in errors)
-    energy = errors[what]
-    if what == CHANGE:
+    quantity = next(name for name in (ENERGY, BALANCE, CHANGE) if name in errors)
+    energy = errors[quantity]
+    if quantity == CHANGE:
         yield Check("energy: largest change", float(energy.max()))
         return
-    yield Check(f"{what}: largest error", float(energy.max()))
-    least = max(least, works(cell, trajectory)[1] / trajectory.energy_scale) if what == BALANCE else least
+    yield Check(f"{quantity}: largest error", float(energy.max()))
+    least = max(least, works(cell, trajectory)[1] / trajectory.energy_scale) if quantity == BALANCE else least
     quarter = max(1, 3 * len(energy) // 4)
-    before, after = float(energy[:quarter].max()), float(energy[quarter:].max())
-    grown = after / before if before > 10 * least else math.nan
+    early_error, late_error = float(energy[:quarter].max()), float(energy[quarter:].max())
+    grown = late_error / early_error if early_error > 10 * least else math.nan
     judged = not cell.forces  # with forces a step is not a Poisson map
-    passed = not (judged and grown > GROWTH)
+    is_passed = not (judged and grown > GROWTH)
     limit = f"≤ {GROWTH:g}" if judged else ""
-    yield Check(f"{what}: last quarter/before", grown, limit, passed, f"grows by a factor of {grown:.1f}")
+    yield Check(f"{quantity}: last quarter/before", grown, limit, is_passed, f"grows by a factor of {grown:.1f}")
 
 
 def _reversal(subject: _Subject, trajectory: LatticeTrajectory) -> Check:
     worst = 0.0
     for k in (0, -1):
         x, t0 = trajectory.x[k], subject.time(trajectory, k)
-        after = None if t0 is None else t0 + subject.h
-        held = _held(subject.solver, x, subject.start.arguments)
-        there = subject.stepped(x, subject.h, 1, t0, held)
-        back = subject.stepped(there, -subject.h, 1, after, held)
-        worst = max(worst, float(np.abs(back - x).max()) / _size(x))
+        time_after = None if t0 is None else t0 + subject.h
+        held_level = _level_argument(subject.solver, x, subject.start.arguments)
+        forward_state = subject.stepped(x, subject.h, 1, t0, held_level)
+        returned_state = subject.stepped(forward_state, -subject.h, 1, time_after, held_level)
+        worst = max(worst, float(np.abs(returned_state - x).max()) / _size(x))
     return Check("reversibility", worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
 
 
-def _held(solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any]) -> dict[str, float]:
+def _level_argument(solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any]) -> dict[str, float]:
     """Return the argument that fixes the energy level e in steps uniform in τ; {} for other steps."""
     return {"gauge": -solver.hamiltonian(x, parameters=parameters)} if solver.interface.monitored else {}
 
 
 def _agreement(subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
     """Yield the differences between one step of the first target and one of each other target."""
-    first, *others = subject.solvers.items()
-    for target, solver in others:
+    first, *other_solvers = subject.solvers.items()
+    for target, solver in other_solvers:
         worst = 0.0
         for k in (0, -1):
             x, t0 = trajectory.x[k], subject.time(trajectory, k)
@@ -259,12 +272,15 @@ def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, trajectory: La
 
 def _noise(cell: Cell, subject: _Subject, *, quick: bool) -> Iterator[Check]:
     """Yield the checks, on a few sites, of the strong order and that steps with the largest increments succeed."""
-    about, start = subject.solver.interface, subject.start
-    some = [SOME[len(start.sizes) - 1]] * len(start.sizes)
+    interface, start = subject.solver.interface, subject.start
+    few_sizes = [SOME[len(start.sizes) - 1]] * len(start.sizes)
     if cell.relation == PAIRS:  # each site may be picked once
-        some = [min(some[0], *start.sizes)]
-    sizes = [-(-max(size, least) // p) * p for size, least, p in zip(some, about.least, about.periods, strict=True)]
-    bonds = ring(sizes[0]) if about.graph else ()
+        few_sizes = [min(few_sizes[0], *start.sizes)]
+    sizes = [
+        -(-max(size, least) // p) * p
+        for size, least, p in zip(few_sizes, interface.least, interface.periods, strict=True)
+    ]
+    bonds = ring(sizes[0]) if interface.graph else ()
     x, parameters = _on_few(cell, start, sizes, bonds)
     commuting = any(s.holds and s.name == COMMUTING for s in noise_statements(cell))
     stated = 1.0 if commuting else 0.5
@@ -285,26 +301,26 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
 
     The largest entry of DΦ π DΦᵀ − π∘Φ is relative to that of |DΦ| |π| |DΦ|ᵀ, with each field in its typical magnitude.
     """
-    about, sizes = subject.solver.interface, _few_sizes(subject)
-    whole, site_count = expand(cell, sizes, ring(sizes[0]) if about.graph else ()), int(np.prod(sizes))
-    x, parameters = _on_few(cell, subject.start, sizes, whole.bonds)
-    few = _Few(whole, subject, parameters, x)
+    interface, sizes = subject.solver.interface, _few_sizes(subject)
+    expansion, site_count = expand(cell, sizes, ring(sizes[0]) if interface.graph else ()), int(np.prod(sizes))
+    x, parameters = _on_few(cell, subject.start, sizes, expansion.bonds)
+    small_lattice = _SmallLattice(expansion, subject, parameters, x)
     usual = np.abs(trajectory.x).max(axis=0).reshape(len(x), -1)
     fields = _units(usual.max(axis=1).repeat(site_count))
-    where = f"on {'×'.join(map(str, sizes))} sites"
+    sizes_text = f"on {'×'.join(map(str, sizes))} sites"
     if not cell.forces:
-        finite, replaced = _with_finite_brackets(cell, few)
+        finite, replaced = _with_finite_brackets(cell, small_lattice)
         solvers = subject.solvers.values()
         defect = max(finite.defect(solver, f * subject.h, fields) for solver in solvers for f in (1, -1))
-        name, limit = f"Poisson identity {where}{replaced}", f"≤ {IDENTITY:.0e}"
+        name, limit = f"Poisson identity {sizes_text}{replaced}", f"≤ {IDENTITY:.0e}"
         yield Check(name, defect, limit, defect <= IDENTITY, f"is off by {defect:.1e}")
     # differences are taken in units of each field and in units of each site, and with two displacements; the
     # smallest deviation counts, as the larger ones contain the error of the differences
-    near = usual[:, _picked(subject.start, sizes).reshape(-1)]
-    each = _units(np.maximum(near, 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
-    tried = [(units, apart) for units in (fields, each) for apart in (3e-3, 3e-4)]
-    slip = min(max(few.slip(s, units, apart) for s in subject.solvers.values()) for units, apart in tried)
-    name, limit = f"tangent map against differences {where}", f"≤ {DIFFERENCES:.0e}"
+    sampled_values = usual[:, _picked(subject.start, sizes).reshape(-1)]
+    site_units = _units(np.maximum(sampled_values, 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
+    trials = [(units, apart) for units in (fields, site_units) for apart in (3e-3, 3e-4)]
+    slip = min(max(small_lattice.slip(s, units, apart) for s in subject.solvers.values()) for units, apart in trials)
+    name, limit = f"tangent map against differences {sizes_text}", f"≤ {DIFFERENCES:.0e}"
     yield Check(name, slip, limit, slip <= DIFFERENCES, f"is not the derivative of the step, {slip:.1e} off")
 
 
@@ -312,28 +328,30 @@ def _gradients(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> 
     """Yield the checks of gradients of all targets on a few sites, and of the first target on the run's lattice if
     small.
     """
-    sizes, start, about = _few_sizes(subject), subject.start, (subject.h, subject.t0)
+    sizes, start, step_and_time = _few_sizes(subject), subject.start, (subject.h, subject.t0)
     x, parameters = _on_few(cell, start, sizes, ring(sizes[0]) if subject.solver.interface.graph else ())
     usual = _units(np.abs(trajectory.x).max(axis=tuple(i for i in range(trajectory.x.ndim) if i != 1)))
-    few = [
-        gradients.of_lattice(s, x, usual.repeat(x[0].size), about[0], parameters, about[1])
+    small_runs = [
+        gradients.of_lattice(s, x, usual.repeat(x[0].size), step_and_time[0], parameters, step_and_time[1])
         for s in subject.solvers.values()
     ]
-    groups = [(few, f" on {'×'.join(map(str, sizes))} sites")]
+    groups = [(small_runs, f" on {'×'.join(map(str, sizes))} sites")]
     if start.state[0].size <= MOST_GRADED:
         units = usual.repeat(start.state[0].size)
-        whole = gradients.of_lattice(subject.solver, start.state, units, about[0], start.arguments, about[1])
-        groups.append(([whole], " on all sites"))
-    for runs, where in groups:
-        for name, value, most, reason in gradients.measured(runs, runs, where):
-            yield Check(name, value, f"≤ {most:.0e}", value <= most, reason)
+        full_run = gradients.of_lattice(
+            subject.solver, start.state, units, step_and_time[0], start.arguments, step_and_time[1]
+        )
+        groups.append(([full_run], " on all sites"))
+    for runs, place in groups:
+        for name, value, limit, reason in gradients.measured(runs, runs, place):
+            yield Check(name, value, f"≤ {limit:.0e}", value <= limit, reason)
 
 
 def _few_sizes(subject: _Subject) -> list[int]:
     """Return sizes of a small lattice that the method accepts and that has the same boundary seams as the run."""
-    about = subject.solver.interface
-    least = 3 if len(about.axes) < 3 else 2
-    sizes = [-(-max(size, least) // p) * p for size, p in zip(about.least, about.periods, strict=True)]
+    interface = subject.solver.interface
+    least = 3 if len(interface.axes) < 3 else 2
+    sizes = [-(-max(size, least) // p) * p for size, p in zip(interface.least, interface.periods, strict=True)]
     return _with_seams(subject, sizes)
 
 
@@ -349,7 +367,7 @@ def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:
 
 
 @dataclass(frozen=True)
-class _Few:
+class _SmallLattice:
     """Lattice of a few sites with its initial state."""
 
     whole: Expansion
@@ -360,22 +378,24 @@ class _Few:
     @property
     def given(self) -> dict[str, Any]:
         """Keyword arguments of the steps."""
-        held = _held(self.subject.solver, self.x, self.parameters)
-        return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters, **held}
+        held_level = _level_argument(self.subject.solver, self.x, self.parameters)
+        return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters, **held_level}
 
     def tangent(self, solver: LatticeSolver, h: float) -> tuple[Floats, Floats]:
         """Return the state after a step and the tangent map of the step (numbers, numbers)."""
         count = self.x.size
-        after, columns = solver.step_tangent(self.x, h, np.eye(count).reshape(count, *self.x.shape), **self.given)
-        return after, columns.reshape(count, count).T
+        image, columns = solver.step_tangent(self.x, h, np.eye(count).reshape(count, *self.x.shape), **self.given)
+        return image, columns.reshape(count, count).T
 
     def defect(self, solver: LatticeSolver, h: float, units: Floats) -> float:
         """Return the largest entry of DΦ π DΦᵀ − π∘Φ, relative to its terms, for states in given units (numbers,)."""
         after, slopes = self.tangent(solver, h)
         slopes = slopes * units / units[:, None]
-        before, image = (_poisson(self.whole, x, self.parameters) / units / units[:, None] for x in (self.x, after))
-        size = float((np.abs(slopes) @ np.abs(before) @ np.abs(slopes).T).max()) or 1.0
-        return float(np.abs(slopes @ before @ slopes.T - image).max()) / size
+        start_tensor, image = (
+            _poisson(self.whole, x, self.parameters) / units / units[:, None] for x in (self.x, after)
+        )
+        size = float((np.abs(slopes) @ np.abs(start_tensor) @ np.abs(slopes).T).max()) or 1.0
+        return float(np.abs(slopes @ start_tensor @ slopes.T - image).max()) / size
 
     def slip(self, solver: LatticeSolver, units: Floats, apart: float) -> float:
         """Return the error of the tangent map against differences of order 6, relative to its largest entry, in these
@@ -383,29 +403,29 @@ class _Few:
         """
 
         def step(y: Floats) -> Floats:
-            there = solver.step((y * units).reshape(self.x.shape), self.subject.h, **self.given)
-            return np.asarray(there.reshape(-1) / units)
+            stepped_state = solver.step((y * units).reshape(self.x.shape), self.subject.h, **self.given)
+            return np.asarray(stepped_state.reshape(-1) / units)
 
         slopes = self.tangent(solver, self.subject.h)[1] * units / units[:, None]
         differences = _slopes(step, self.x.reshape(-1) / units, apart)
         return float(np.abs(slopes - differences).max() / np.abs(slopes).max())
 
 
-def _with_finite_brackets(cell: Cell, few: _Few) -> tuple[_Few, str]:
+def _with_finite_brackets(cell: Cell, small_lattice: _SmallLattice) -> tuple[_SmallLattice, str]:
     """Return the lattice with non-zero values for parameters whose value 0 makes π infinite, and a note on these
     values.
     """
     with np.errstate(all="ignore"):
-        if np.isfinite(_poisson(few.whole, few.x, few.parameters)).all():
-            return few, ""
+        if np.isfinite(_poisson(small_lattice.whole, small_lattice.x, small_lattice.parameters)).all():
+            return small_lattice, ""
     replaced: dict[str, Any] = {}
     for name in sorted(cell.vanishing):
-        values = np.asarray(few.parameters[name])
+        values = np.asarray(small_lattice.parameters[name])
         if not values.all():
             least = float(np.abs(values[values != 0]).min(initial=1.0))
             replaced[name] = np.where(values == 0, least, values)
     note = "".join(f", {name} = {np.abs(values).min():.3g} for 0" for name, values in replaced.items())
-    return replace(few, parameters={**few.parameters, **replaced}), note
+    return replace(small_lattice, parameters={**small_lattice.parameters, **replaced}), note
 
 
 def _units(sizes: Floats) -> Floats:
@@ -417,8 +437,10 @@ def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Fl
     weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
     columns = []
     for k in range(len(y)):
-        moved = apart * np.eye(len(y))[k]
-        columns.append(sum(w * (function(y + m * moved) - function(y - m * moved)) for m, w in weights.items()))
+        displacement = apart * np.eye(len(y))[k]
+        columns.append(
+            sum(w * (function(y + m * displacement) - function(y - m * displacement)) for m, w in weights.items())
+        )
     return np.array(columns).T / apart
 
 
@@ -445,9 +467,9 @@ def _on_few(
     return start.state.reshape(len(cell.fields), -1)[:, picked], arguments
 
 
-def _poisson(whole: Expansion, x: Floats, parameters: Mapping[str, Any]) -> Floats:
-    entries, index = whole.poisson(), {c: k for k, c in enumerate(whole.coordinates)}
-    values = dict(zip(whole.coordinates, x.reshape(-1).tolist(), strict=True)) | whole.numbers(parameters)
+def _poisson(expansion: Expansion, x: Floats, parameters: Mapping[str, Any]) -> Floats:
+    entries, index = expansion.poisson(), {c: k for k, c in enumerate(expansion.coordinates)}
+    values = dict(zip(expansion.coordinates, x.reshape(-1).tolist(), strict=True)) | expansion.numbers(parameters)
     matrix = np.zeros((len(index), len(index)))
     for (a, b), value in zip(entries, evaluate(list(entries.values()), values), strict=True):
         matrix[index[a], index[b]] = float(value)
