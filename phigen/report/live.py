@@ -154,8 +154,8 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
     if not live.solvers or run is None:
         return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
     parameters = live.parameters or {}
-    quantities, shown = _quantities(system), _groups(system)
-    start, leaves = [float(v) for v in run.initial], [_leaf(system, group) for group in shown]
+    quantities, panels = _quantities(system), _groups(system)
+    start, leaves = [float(v) for v in run.initial], [_leaf(system, group) for group in panels]
     settings = {
         "coordinates": list(system.coordinates),
         "start": start,
@@ -169,7 +169,7 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
         ],
         "groups": [
             {"axes": [system.coordinates.index(n) for n in group], "leaf": leaf}
-            for group, leaf in zip(shown, leaves, strict=True)
+            for group, leaf in zip(panels, leaves, strict=True)
         ],
         "quantities": quantities,
         "observed": list(system.observables),
@@ -179,15 +179,15 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
     return page.block(
         "live",
         observed=list(system.observables),
-        say=_say(system, quantities, any(leaf is not None for leaf in leaves)),
+        say=_caption(system, quantities, any(leaf is not None for leaf in leaves)),
         sides=sides(compilation),
         kind="",
-        label=f"The motion of {', '.join(shown[0])}",
+        label=f"The motion of {', '.join(panels[0])}",
         quantities=[q["name"] for q in quantities],
         sliders=map(slid, general(live)),
-        choice=len(shown) > 1,
-        groups=list(enumerate(", ".join(g) for g in shown)),
-        folds=[(title, unfolded, map(slid, listed)) for title, unfolded, listed in _folds(system, start, parameters)],
+        choice=len(panels) > 1,
+        groups=list(enumerate(", ".join(g) for g in panels)),
+        folds=[(title, unfolded, map(slid, sliders)) for title, unfolded, sliders in _folds(system, start, parameters)],
         help=HELP.format("order and the step" if len(live.solvers) > 1 else "step"),
         data=page.data("live-data", settings),
     )
@@ -215,11 +215,11 @@ def quantity(
 
 def _quantities(system: System) -> list[dict[str, object]]:
     """Return the conserved quantities: energy, one entry for all Casimirs, one entry for all invariants."""
-    moved = moving(system)
-    quantities: list[dict[str, object]] = [] if ENERGY in moved else [quantity("energy error")]
-    casimirs = {name: i for i, name in enumerate(system.casimirs) if name not in moved}
+    changing = moving(system)
+    quantities: list[dict[str, object]] = [] if ENERGY in changing else [quantity("energy error")]
+    casimirs = {name: i for i, name in enumerate(system.casimirs) if name not in changing}
     if casimirs:
-        quantities.append(quantity(_named(system, casimirs), casimirs=[*casimirs.values()]))
+        quantities.append(quantity(_casimir_label(system, casimirs), casimirs=[*casimirs.values()]))
     invariants = {} if system.noise else {name: i for i, name in enumerate(system.invariants)}
     if invariants:
         name = f"error{'s' * (len(invariants) > 1)} of {', '.join(invariants)}"
@@ -229,13 +229,13 @@ def _quantities(system: System) -> list[dict[str, object]]:
     return quantities
 
 
-def _named(system: System, casimirs: Mapping[str, int]) -> str:
+def _casimir_label(system: System, casimirs: Mapping[str, int]) -> str:
     """Return the label of the errors of the Casimirs with these numbers."""
     names = ", ".join(casimirs)
     if len(casimirs) > 1:
         return f"Casimir errors ({names})" if len(casimirs) <= 3 else f"error of {len(casimirs)} Casimirs"
-    drawn = any(_leaf(system, group) == casimirs[names] for group in _groups(system))
-    return f"distance from the surface (Casimir {names})" if drawn else f"Casimir error ({names})"
+    is_leaf_drawn = any(_leaf(system, group) == casimirs[names] for group in _groups(system))
+    return f"distance from the surface (Casimir {names})" if is_leaf_drawn else f"Casimir error ({names})"
 
 
 def _groups(system: System) -> list[Group]:
@@ -249,24 +249,26 @@ def _leaf(system: System, group: Group) -> int | None:
     if len(group) == 2:
         return -1 if system.dimension == 2 and ENERGY not in moving(system) else None
     coordinates = set(system.coordinates)
-    moved, used = moving(system), [set(symbols_of(c)) & coordinates for c in system.casimirs.values()]
-    casimirs = zip(system.casimirs, used, strict=True)
+    changing, used_coordinates = moving(system), [set(symbols_of(c)) & coordinates for c in system.casimirs.values()]
+    casimirs = zip(system.casimirs, used_coordinates, strict=True)
     return next(
-        (i for i, (name, names) in enumerate(casimirs) if name not in moved and names and names <= set(group)), None
+        (i for i, (name, names) in enumerate(casimirs) if name not in changing and names and names <= set(group)), None
     )
 
 
-def _say(system: System, conserved: Sequence[Mapping[str, object]], drawn: bool) -> str:
+def _caption(system: System, conserved: Sequence[Mapping[str, object]], is_leaf_drawn: bool) -> str:
     """Return the text above the panel that describes the picture."""
-    said = "Two solvers integrate the motion from the same start, in your browser. "
+    introduction = "Two solvers integrate the motion from the same start, in your browser. "
     properties = ["conserves its energy"] if any(q["name"] == "energy error" for q in conserved) else []
-    if drawn:
+    if is_leaf_drawn:
         properties.append(f"never leaves the {'curve' if system.dimension == 2 else 'surface'} drawn here")
     elif len(conserved) > len(properties):
         properties.append("conserves its Casimirs")
     if not properties:
-        return f"{said}{NOTHING}"
-    return f"{said}The exact solution {' and '.join(properties)}. The numbers are the errors of the two solvers."
+        return f"{introduction}{NOTHING}"
+    return (
+        f"{introduction}The exact solution {' and '.join(properties)}. The numbers are the errors of the two solvers."
+    )
 
 
 def general(live: Live) -> Iterable[Slider]:
@@ -281,9 +283,9 @@ def _folds(
     system: System, start: list[float], parameters: Mapping[str, float]
 ) -> Iterable[tuple[str, bool, list[Slider]]]:
     """Yield groups of sliders: title, whether the group is unfolded, and the sliders."""
-    listed = [slider_of(p, parameters[p.name]) for p in system.parameters]
-    if listed:
-        yield "Parameters", len(listed) <= FEW, listed
+    sliders = [slider_of(p, parameters[p.name]) for p in system.parameters]
+    if sliders:
+        yield "Parameters", len(sliders) <= FEW, sliders
     reach = max(map(abs, start)) or 1.0
     coordinates = [Slider(name, "start", i, "linear", reach) for i, name in enumerate(system.coordinates)][:COORDINATES]
     yield "Start", len(coordinates) <= FEW, coordinates

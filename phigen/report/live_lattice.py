@@ -136,7 +136,7 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
         "live",
         kind="fields",
         observed=list(spec.recorded),
-        say=_say(compilation),
+        say=_caption(compilation),
         sides=sides(compilation),
         label=f"{panels[0][0]} at the sites",
         quantities=[q["name"] for q in _quantities(compilation)],
@@ -292,7 +292,7 @@ def _quantities(compilation: CompiledLattice) -> list[dict[str, Any]]:
     return quantities
 
 
-def _say(compilation: CompiledLattice) -> str:
+def _caption(compilation: CompiledLattice) -> str:
     introduction = "Two solvers integrate the motion from the same start, in your browser. "
     conserved = ["its invariants" if q["invariants"] else "its Casimirs" if q["casimirs"] else "its energy"
             for q in _quantities(compilation)]  # fmt: skip

@@ -121,7 +121,7 @@ def page(
 def alone(title: str, body: Markup, solvers: str, panel: Sequence[str]) -> str:
     """Return a page with only a live panel."""
     scripts = [_asset("space.js"), solvers, *map(_asset, (*panel, "alone.js"))]
-    return _complete("alone", [_short(script) for script in scripts], title=title, body=body)
+    return _complete("alone", [_minified(script) for script in scripts], title=title, body=body)
 
 
 def with_origin(html: str, origin: str) -> str:
@@ -130,7 +130,7 @@ def with_origin(html: str, origin: str) -> str:
     return html.replace(generator, f'<meta name="source" content="{escape(origin)}">\n{generator}', 1)
 
 
-def _short(script: str) -> str:
+def _minified(script: str) -> str:
     """Return a script without comment lines and without indentation."""
     lines = (line.strip() for line in script.splitlines())
     return "\n".join(line for line in lines if line and not line.startswith("//"))

@@ -31,7 +31,7 @@ def inlined(text: str, identifier: str, title: str, description: str) -> Markup:
             parent.remove(child)
     for element in root.iter():
         element.tag = element.tag.removeprefix(_SVG)
-        _plain(element)
+        _with_variables(element)
         _identified(element, f"{identifier}-")
     for side in ("width", "height"):
         root.set(side, f"{float(root.attrib[side].removesuffix('pt')) * PIXELS:.0f}")
@@ -43,7 +43,7 @@ def inlined(text: str, identifier: str, title: str, description: str) -> Markup:
     return Markup(ElementTree.tostring(root, encoding="unicode", short_empty_elements=True))
 
 
-def _plain(element: ElementTree.Element) -> None:
+def _with_variables(element: ElementTree.Element) -> None:
     """Convert styles to attributes, colours to variables, and numbers to two decimals."""
     for declaration in element.attrib.pop("style", "").split(";"):
         name, _, value = (part.strip() for part in declaration.partition(":"))

@@ -97,11 +97,11 @@ def _data(methods: Mapping[str, Trajectory], names: list[str], axes: list[int], 
         "steps": STEPS,
         "joined": joins(tables[0][:, axes]),
         "curves": [np.rint((table - low) / size * STEPS).astype(int).T.tolist() for table in tables],
-        "leaf": None if leaf is None else _whole((leaf - low[axes]) / size[axes] * STEPS),
+        "leaf": None if leaf is None else _integer_columns((leaf - low[axes]) / size[axes] * STEPS),
     }
 
 
-def _whole(points: Floats) -> list[list[int | None]]:
+def _integer_columns(points: Floats) -> list[list[int | None]]:
     """Return columns of integers, with None for NaN."""
     return [[None if v != v else round(v) for v in column] for column in points.T.tolist()]
 
