@@ -52,7 +52,7 @@ def stage_attitude(
         purpose = f"{slope.rstrip(',')}, and {SIZE_OF_COVECTOR}"
     inputs = {"coef": coefficients.slots, "y": system.coordinates}
     turn_kernel = Kernel("turn", purpose, inputs, (Output("turn", tuple(values)),))
-    path_attitude = _along(group, system) if realisation.path and not generating.free else None
+    path_attitude = _path_element_kernel(group, system) if realisation.path and not generating.free else None
     rate = rate_kernel(system, group, gauge)
     needs_algebra = group.matrices and (rate or not cayley)
     return Attitude(
@@ -84,7 +84,7 @@ def gauss_attitude(
     return Attitude(group, False, turn_kernel, rate=rate_kernel(system, group, gauge))
 
 
-def _along(group: Group, system: System) -> Kernel:
+def _path_element_kernel(group: Group, system: System) -> Kernel:
     """Return the kernel of the element of a path, where p is known but y is not."""
     p = [symbol(c) for c in system.coordinates]  # names of the arguments; the kernel does not depend on x
     inputs = {"p": system.coordinates}
@@ -129,7 +129,7 @@ def flow_attitude(
         increments, [*noise_rotations, *flow_rotations], [*driving_times(system), *times], strict=True
     )
     for k, (increment, turning, time) in enumerate(timed_increments, 1):
-        values = staged([*increment, *_carried(system, group, turning, time)], coefficients)
+        values = staged([*increment, *_element_after_flow(system, group, turning, time)], coefficients)
         parts = tuple(values[: len(increment)]), tuple(values[len(increment) :])
         inputs = {"coef": coefficients.slots, "state": system.coordinates, "element": _carrier(group)}
         purpose = f"the flow of {names[k - 1]}, and the group element of a step after it"
@@ -144,7 +144,7 @@ def _carrier(group: Group) -> tuple[Symbol, ...]:
     return tuple(Symbol("element", i) for i in range(group.size))
 
 
-def _carried(system: System, group: Group, turning: Turning, time: Expression) -> list[Expression]:
+def _element_after_flow(system: System, group: Group, turning: Turning, time: Expression) -> list[Expression]:
     """Return the element minus 1 after one more flow."""
     element_before, factors = [symbol(s) for s in _carrier(group)], factor_elements(system, group, turning, time)
     return joined(group, [element_before, joined(group, factors)]) if factors else element_before

@@ -56,7 +56,7 @@ def _pairs(count: int) -> tuple[tuple[Fraction, Fraction], ...]:
     c = [i * SPACING for i in range(count, 0, -1)]
     f = _kernel_series(count + 1)
     rows = [[2 * x ** (2 * k + 1) / factorial(2 * k + 1) for x in c] for k in range(count)]
-    return tuple(zip(c, _solved(rows, f[1:]), strict=True))
+    return tuple(zip(c, _linear_solution(rows, f[1:]), strict=True))
 
 
 def _kernel_series(count: int) -> list[Fraction]:
@@ -68,7 +68,7 @@ def _kernel_series(count: int) -> list[Fraction]:
     return f
 
 
-def _solved(rows: list[list[Fraction]], right: list[Fraction]) -> list[Fraction]:
+def _linear_solution(rows: list[list[Fraction]], right: list[Fraction]) -> list[Fraction]:
     """Return the solution of linear equations, whose matrix has no zeros as pivots."""
     work = [[*row, value] for row, value in zip(rows, right, strict=True)]
     for k, pivot in enumerate(work):

@@ -191,7 +191,7 @@ def _with_all_coefficients(reduced: ReducedSweeps, coefficients: Coefficients) -
 
 
 def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
-    """Return the Jacobians by the coordinates, without the time, then by the unknowns."""
+    """Return the Jacobians of a stage: by the coordinates, which exclude the time, then by the unknowns."""
     names = (*points.system.coordinates, *points.unknowns)
     kernels = []
     for values, name, subject in (

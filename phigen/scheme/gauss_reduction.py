@@ -35,7 +35,7 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
     reads = [{k for k, z in enumerate(points.unknowns) if z in names} for names in map(symbols_of, rates)]
     rows = sparse_derivatives(rates, points.unknowns)
     linear = [k for k, row in enumerate(rows) if all(coefficients.is_static(slope) for slope in row.values())]
-    required = _needed(reads)
+    required = _required_unknowns(reads)
     followers = [k for k in _followers(linear, reads) if k in required]
     iterated = [k for k in required if k not in followers]
     integrated = sorted({k for f in followers for k in reads[f]})
@@ -72,7 +72,7 @@ def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequenc
     return complete and all(points.system.poisson[i][j].is_zero for i, j in index_pairs)
 
 
-def _needed(reads: Sequence[set[int]]) -> list[int]:
+def _required_unknowns(reads: Sequence[set[int]]) -> list[int]:
     """Return the unknowns that others depend on, directly or through others, or that depend on themselves."""
     required = set(range(len(reads)))
     while True:

@@ -107,7 +107,9 @@ def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[
     return NearIntegrable(name, generalised[-1], tuple(alpha), generalised, tuple(a), tuple(b))
 
 
-def _listed(name: str, generalised: tuple[int, ...], stages: int, halves: tuple[str, str]) -> NearIntegrable:
+def _method_from_halves(
+    name: str, generalised: tuple[int, ...], stages: int, halves: tuple[str, str]
+) -> NearIntegrable:
     """Return the method from the first halves of a and b; their middles complete the sums to 1."""
     a, b = ([Fraction(v) for v in half.split()] for half in halves)
     return _method(name, generalised, _mirrored(a, stages + 1), _mirrored(b, stages))
@@ -164,9 +166,9 @@ METHODS = (
     _quadrature(3),
     _quadrature(5),
     *(_wisdom_holman(order) for order in (1, 3, 5, 7, 11, 17)),
-    _listed("aba-10-6-4", (10, 6, 4), 8, _10_6_4),
-    _listed("aba-8-6-4", (8, 6, 4), 7, _8_6_4),
-    _listed("aba-8-4", (8, 4), 5, _8_4),
+    _method_from_halves("aba-10-6-4", (10, 6, 4), 8, _10_6_4),
+    _method_from_halves("aba-8-6-4", (8, 6, 4), 7, _8_6_4),
+    _method_from_halves("aba-8-4", (8, 4), 5, _8_4),
     *(_modified(order) for order in (7, 11, 17)),
 )
 NAMES = tuple(method.name for method in METHODS)

@@ -73,7 +73,7 @@ def linearise(
     jacobians = []
     with progress.stage("Newton matrix", 2 * n) as running:
         for x_part, p_part in zip(by_x, by_p, strict=True):
-            jacobians.append(_along(x_part, p_part, hessian))
+            jacobians.append(_total_derivative_row(x_part, p_part, hessian))
             running.done += 1
     jacobian = [[e + (ONE if i == j else ZERO) for j, e in enumerate(row)] for i, row in enumerate(jacobians[:n])]
     return Linearised(values[:n], values[n : 2 * n], jacobian, jacobians[n:])
@@ -85,7 +85,7 @@ def _rows(expressions: Sequence[Expression], names: Sequence[str]) -> list[Spars
     return [{index[name]: d for name, d in row.items()} for row in sparse_derivatives(expressions, names)]
 
 
-def _along(x_part: SparseRow, p_part: SparseRow, hessian: Sequence[SparseRow]) -> list[Expression]:
+def _total_derivative_row(x_part: SparseRow, p_part: SparseRow, hessian: Sequence[SparseRow]) -> list[Expression]:
     """Return a row of ∂_x + ∂_p · Hess S_h."""
     n = len(hessian)
     products: list[SparseRow] = [{} for _ in range(n)]

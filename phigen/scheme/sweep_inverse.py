@@ -111,11 +111,11 @@ def _changes(program: Program, sweep: Sweep, parities: Mapping[str, int]) -> dic
     updated, changes = [program.coordinates[f] for f in sweep.moved], sweep.kernel.roots
     if all(parities.get(s, EVEN) for s in symbols_of(*changes)):
         return dict(zip(updated, over_negative_time(changes, parities), strict=True))
-    increments = {f: _divided(f, updated, change) for f, change in zip(updated, changes, strict=True)}
+    increments = {f: _inverse_of_multiple(f, updated, change) for f, change in zip(updated, changes, strict=True)}
     return {f: e for f, e in increments.items() if e is not None} if None not in increments.values() else {}
 
 
-def _divided(field: str, updated: Sequence[str], change: Expression) -> Expression | None:
+def _inverse_of_multiple(field: str, updated: Sequence[str], change: Expression) -> Expression | None:
     """Return the increment of the inverse where a field gains a multiple of itself, and terms without updated fields.
 
     None where the increment is of another form.
