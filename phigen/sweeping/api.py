@@ -156,7 +156,7 @@ def _sweep_of(
     sweep = sweep or SweepSettings("sweep", run.name)
     changes: dict[str, Any] = {"run": run.name}
     if over is not None:
-        words = _words(over, spec)
+        words = _plain_entries(over, spec)
         axes = tuple(_axis(key, value, spec) for key, value in over.items() if key not in words)
         changes |= {"over": axes, "random": 0, "seed": 0, "file": "", **words}
     if isinstance(keep, str):
@@ -191,7 +191,7 @@ def _sweep_of(
     return sweep
 
 
-def _words(over: Mapping[str, Any], spec: Spec) -> dict[str, Any]:
+def _plain_entries(over: Mapping[str, Any], spec: Spec) -> dict[str, Any]:
     """Return the entries of ``over`` that are not ranges; a range under the same name belongs to a parameter."""
     if not isinstance(over, Mapping):
         raise TypeError(f"over must map names to ranges or lists, not {over!r}")

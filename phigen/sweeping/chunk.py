@@ -53,14 +53,14 @@ def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
     """Return the job and its solver, loaded once per process; one process of a machine compiles, the others wait."""
     job = open_job(store)
     device = own_device(job.plan.about["target"])
-    with _alone(job.interface.name):
+    with _exclusive_lock(job.interface.name):
         if isinstance(job.interface, LatticeInterface):
             return job, LatticeSolver(job.backend(device), job.interface)
         return job, Solver(job.backend(device), job.interface)
 
 
 @contextlib.contextmanager
-def _alone(name: str) -> Iterator[None]:
+def _exclusive_lock(name: str) -> Iterator[None]:
     """Exclude all other processes of this machine from the block."""
     try:
         import fcntl

@@ -113,7 +113,7 @@ class _Member:
             len(self.solver.interface.observables), after=plan.after, backwards=h < 0, blocks=plan.blocks
         )
         frames = filled("the frames of a member", (len(plan.rows), *state.shape))
-        before, errors = self._seen(), dict.fromkeys(("energy_error", "casimir_error"), 0.0)
+        before, errors = self._conserved_values(), dict.fromkeys(("energy_error", "casimir_error"), 0.0)
         rows, rows_of_means = {mark: row for row, mark in enumerate(marks)}, set(observed)
         for mark in sorted({*marks, *observed}):
             self.session.advance(h, mark - self.session.steps)
@@ -143,7 +143,7 @@ class _Member:
         }
         return {word: values[s.of][s.observable] for word, s in statistics.items()}
 
-    def _seen(self) -> tuple[float, list[Floats]]:
+    def _conserved_values(self) -> tuple[float, list[Floats]]:
         """Return the energy and the Casimirs."""
         kinds: LatticeInterface = self.solver.interface
         if "casimir_error" not in self.plan.keep:
@@ -153,7 +153,7 @@ class _Member:
 
     def _changes(self, before: tuple[float, list[Floats]]) -> dict[str, float]:
         """Return the largest changes of energy and Casimirs from their values at the start."""
-        energy, casimirs = self._seen()
+        energy, casimirs = self._conserved_values()
         changes = [float(np.abs(a - b).max()) for a, b in zip(casimirs, before[1], strict=True)]
         return {"energy_error": abs(energy - before[0]), "casimir_error": max(changes, default=0.0)}
 

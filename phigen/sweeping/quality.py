@@ -34,7 +34,7 @@ def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
         values = {**job.plan.parameters, **starts, **varied}
         return value_and_terms(system.hamiltonian, system.coordinates, values)
 
-    return EnergyErrors() if system.driven else _counted(job, at_start, limit)
+    return EnergyErrors() if system.driven else _count_large_errors(job, at_start, limit)
 
 
 def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
@@ -45,10 +45,10 @@ def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
     from phigen.sweeping.lattice_members import energies_at_start
 
     solver = LatticeSolver(job.backend(), job.interface)  # type: ignore[arg-type]
-    return _counted(job, lambda varied, count: energies_at_start(job, solver, varied, count), limit)
+    return _count_large_errors(job, lambda varied, count: energies_at_start(job, solver, varied, count), limit)
 
 
-def _counted(
+def _count_large_errors(
     job: Job, at_start: Callable[[Mapping[str, Floats], int], tuple[Floats, Floats]], limit: float
 ) -> EnergyErrors:
     """Count the large errors; ``at_start`` returns initial energies of members and the magnitudes of their terms."""

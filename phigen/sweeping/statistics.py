@@ -37,7 +37,7 @@ def statistics_of(
     over_run = {word: s for word, s in statistics.items() if s.of}
     if over_run:
         results = {of: np.full((len(members), len(names)), np.nan) for of in STATISTICS}
-        for part, some, rows, numbers in _pieces(job, solver, members, states):
+        for part, some, rows, numbers in _member_groups(job, solver, members, states):
             results["mean"][part], results["std"][part] = _moments(job, solver, some, rows, numbers)
             if any(s.of == "error" for s in over_run.values()):
                 results["error"][part] = _errors(job, solver, some, rows, numbers)
@@ -83,7 +83,7 @@ def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: F
     return errors
 
 
-def _pieces(
+def _member_groups(
     job: Job, solver: Solver, members: Members, states: Floats
 ) -> Iterator[tuple[slice, Members, Floats, Floats]]:
     """Yield groups of members that fit into memory, with the states that count and their step numbers."""

@@ -89,11 +89,11 @@ def made(
         profile=setting.profile,
         tangent="lyapunov" in sweep.keep,
     )
-    listed = _listed(sweep, spec) if sweep.file else {}
+    listed = _member_columns(sweep, spec) if sweep.file else {}
     _expect_names([*(axis.name for axis in sweep.over), *listed], spec, sweep)
     plan = _plan(spec, sweep, run, {name: len(values) for name, values in listed.items()}, target)
     _expect_room_for_axes(sweep, spec)
-    beside = _beside(compilation, target, spec)
+    beside = _worker_data(compilation, target, spec)
     counts = np.zeros(2, dtype=np.int64)
 
     def count(members: int, failed: int) -> None:
@@ -189,7 +189,7 @@ def _files(spec: Spec, run: Run) -> dict[str, str]:
     return {"file": str(Path(spec.file).resolve())} if reads or any(v and v.file for v in values) else {}
 
 
-def _beside(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]:
+def _worker_data(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]:
     """Return the source of the solver and the other data that workers need."""
     program, command = compilation.program, f"phigen build {compilation.program.name}.yaml"
     (functions,) = emit(program, "numpy", command).values()
@@ -244,7 +244,7 @@ def _seconds_of_a_member(job: store.Job) -> float:
     return seconds * (1 + counted) + ("lyapunov" in plan.keep) * _TANGENT * plan.steps
 
 
-def _listed(sweep: SweepSettings, spec: Spec) -> dict[str, Floats]:
+def _member_columns(sweep: SweepSettings, spec: Spec) -> dict[str, Floats]:
     """Return the columns of a file of members by name. Raises `SpecError`, located at the file name in the spec."""
     path = Path(spec.file).parent / sweep.file
 
