@@ -68,17 +68,17 @@ class FlatLattice:
 
     def vector_field(self, states: Floats, parameters: Mapping[str, Any]) -> Floats:
         """The right-hand side at states (rows, DIM)."""
-        return np.array([self._at(x, parameters).vector_field().reshape(-1) for x in states])
+        return np.array([self._evaluation_session(x, parameters).vector_field().reshape(-1) for x in states])
 
     def energies(self, states: Floats, parameters: Mapping[str, Any]) -> Floats:
         """H of states (rows, DIM)."""
-        return np.array([self._at(x, parameters).hamiltonian() for x in states])
+        return np.array([self._evaluation_session(x, parameters).hamiltonian() for x in states])
 
     def terms(self, x: Floats, parameters: Mapping[str, Any]) -> float:
         """The sum of the magnitudes of the energies of the sites."""
-        return float(np.abs(self._at(x, parameters).density()).sum())
+        return float(np.abs(self._evaluation_session(x, parameters).density()).sum())
 
-    def _at(self, x: Floats, parameters: Mapping[str, Any]) -> LatticeSession:
+    def _evaluation_session(self, x: Floats, parameters: Mapping[str, Any]) -> LatticeSession:
         """Return the session in which the functions of one problem are evaluated."""
         state = x.reshape(self.shape)
         if not self._seen:
@@ -175,7 +175,7 @@ def lattice_problem(
     start = start_of(spec, run)
     interface = solver.interface
     sizes = _fewer(start.sizes, interface.least, interface.periods) if cell.relation == GRID else start.sizes
-    reduced_start = start if sizes == start.sizes else _begun(spec, run, sizes) or start
+    reduced_start = start if sizes == start.sizes else _start_with_sizes(spec, run, sizes) or start
     flat = FlatLattice(solver.backend, reduced_start.state.shape)
     values = solver.values({**reduced_start.arguments, **settings}, {}, reduced_start.sizes)
     return LatticeProblem(
@@ -196,7 +196,7 @@ def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -
     return tuple(reduced)
 
 
-def _begun(spec: Spec, run: Run, sizes: tuple[int, ...]) -> Start | None:
+def _start_with_sizes(spec: Spec, run: Run, sizes: tuple[int, ...]) -> Start | None:
     """Return the start of the run with other sizes; None if its arrays have fixed sizes."""
     assert run.lattice is not None
     try:

@@ -66,7 +66,7 @@ class Curve:
         return cheapest_step(self.points, accuracy, self.order)[1]
 
 
-def _floor(points: Sequence[Point]) -> int:
+def _index_of_least_error(points: Sequence[Point]) -> int:
     """The index of the point with the smallest error: finer steps have more rounding. The last point if there is none
     such.
     """
@@ -87,28 +87,28 @@ def at_floor(points: Sequence[Point]) -> bool:
 
 
 def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | None:
-    """The largest step whose error is the accuracy: interpolated, or extrapolated by the order below the finest step.
+    """Largest step that meets the accuracy: interpolated, or extrapolated by the order below the finest measured step.
 
-    None if no step reaches it, as far as can be told.
+    None if the measured points show no such step.
     """
-    points = points[: _floor(points) + 1]
+    points = points[: _index_of_least_error(points) + 1]
     if not points:
         return None
     meeting = [i for i, p in enumerate(points) if p.error <= accuracy]
     if not meeting:
-        return _beyond(points, accuracy, order)
+        return _extrapolated_step(points, accuracy, order)
     first = len(points)
     while first > 0 and points[first - 1].error <= accuracy:
         first -= 1
     if first == len(points):  # a coarse step meets the accuracy by chance, the finest does not
-        return _beyond(points, accuracy, order)
+        return _extrapolated_step(points, accuracy, order)
     if first == 0:
         return points[0].step
-    return _between(points[first - 1], points[first], accuracy)
+    return _interpolated_step(points[first - 1], points[first], accuracy)
 
 
-def _beyond(points: Sequence[Point], accuracy: float, order: int) -> float | None:
-    """The step below the finest at which the error should be the accuracy; None if rounding errors exceed it."""
+def _extrapolated_step(points: Sequence[Point], accuracy: float, order: int) -> float | None:
+    """Step below the finest, extrapolated to the accuracy; None if rounding errors exceed the accuracy."""
     last = points[-1]
     if at_floor(points) or accuracy < max(ROUNDING, last.rounding):
         return None
@@ -116,7 +116,7 @@ def _beyond(points: Sequence[Point], accuracy: float, order: int) -> float | Non
 
 
 def cheapest_step(points: Sequence[Point], accuracy: float, order: int) -> tuple[float, float]:
-    """The step that meets the accuracy at the least cost, and that cost in nanoseconds per unit of time; or 0 and inf.
+    """Step that meets the accuracy at the least cost, and its nanoseconds per unit of time; 0 and inf if there is none.
 
     The cheapest step need not be the largest: smaller steps have better predictors, and may save an iteration.
     """
@@ -129,8 +129,8 @@ def cheapest_step(points: Sequence[Point], accuracy: float, order: int) -> tuple
     return step, cost
 
 
-def _between(coarse: Point, fine: Point, accuracy: float) -> float:
-    """The step at which the error is the accuracy, on a straight line through two points in log–log scale."""
+def _interpolated_step(coarse: Point, fine: Point, accuracy: float) -> float:
+    """Step that meets the accuracy on a straight line through two points in log–log scale."""
     if coarse.error <= fine.error:
         return fine.step
     share = math.log(accuracy / fine.error) / math.log(coarse.error / fine.error)
@@ -161,9 +161,9 @@ def scan(
     The first step is at most ``largest_step``. The scan ends early if the accuracy would cost more than ``worth``
     nanoseconds per unit of time, if only rounding errors are left, and if ``patience`` returns False.
     """
-    points = _coarsest(measure, min(first, largest_step), largest_step, patience)
+    points = _points_at_largest_step(measure, min(first, largest_step), largest_step, patience)
     while points and len(points) < MOST_POINTS and patience():
-        if _enough(points, accuracy) or _hopeless(points, accuracy, order, worth):
+        if _is_complete(points, accuracy) or _is_too_costly(points, accuracy, order, worth):
             break
         point = measure(points[-1].step / FINER)
         if point is None:
@@ -177,7 +177,7 @@ def scan(
     return tuple(points)
 
 
-def _enough(points: Sequence[Point], accuracy: float) -> bool:
+def _is_complete(points: Sequence[Point], accuracy: float) -> bool:
     """Whether the scan is complete: the accuracy is reached and finer steps cost more, or only rounding errors are
     left.
     """
@@ -201,7 +201,7 @@ def _refined(
     return sorted([*points, point], key=lambda p: -p.step) if point else points
 
 
-def _coarsest(
+def _points_at_largest_step(
     measure: Callable[[float], Point | None], first: float, largest_step: float, patience: Callable[[], bool]
 ) -> list[Point]:
     """Find the largest possible step, to a factor `FINER`, from a first guess; empty if there is none near it."""
@@ -222,8 +222,8 @@ def _coarsest(
     return points
 
 
-def _hopeless(points: Sequence[Point], accuracy: float, order: int, worth: float) -> bool:
-    """Whether the accuracy, by the order, would cost more than it is worth."""
+def _is_too_costly(points: Sequence[Point], accuracy: float, order: int, worth: float) -> bool:
+    """Whether the accuracy, extrapolated by the order, would cost more than ``worth``."""
     last = points[-1]
     if last.cost > worth and last.error > accuracy:
         return True

@@ -67,7 +67,7 @@ class Setting:
 
     @property
     def family(self) -> Setting:
-        """The setting without its order: what is common to methods that differ in the order alone."""
+        """Setting without its order, which methods of different orders have in common."""
         return replace(self, order=0)
 
     @property
