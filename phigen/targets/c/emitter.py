@@ -192,7 +192,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
         "coordinates": ", ".join(program.coordinates),
         "defaults": _defaults(program),
         "casimirs": f" /* {', '.join(program.casimirs)} */" if program.casimirs else "",
-        "members": [(f"double {member[p.name]};", _about(p, member[p.name])) for p in program.parameters]
+        "members": [(f"double {member[p.name]};", _member_comment(p, member[p.name])) for p in program.parameters]
         or [("char unused;", "this system has no parameters")],
         "sizes": sizes,
         "observables": [
@@ -267,7 +267,7 @@ def _defaults(program: Program) -> str:
     return ", ".join(repr(float(p.value)) for p in program.parameters) or "0"
 
 
-def _about(parameter: Parameter, member: str) -> str:
+def _member_comment(parameter: Parameter, member: str) -> str:
     """Return the comment on a member of the struct, with the name in the spec if the member has another one."""
     comment = plain(parameter.description) or f"default {float(parameter.value)!r}"
     comment += f" [{plain(parameter.unit)}]" * bool(parameter.unit)

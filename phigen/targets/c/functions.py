@@ -94,7 +94,7 @@ def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool =
     phis = [rendered(program, "phi_device.c" if device else "phi.c", _phi(program, f, device=device)) for f in names]
     polynomial = [rendered(program, "polynomial.c", {})] if phis else []
     anomaly = [_anomaly(program)] if special.calls_anomaly(program) else []
-    functions = [_small(program, f) for f in small]
+    functions = [_small_argument_function(program, f) for f in small]
     elliptic = _elliptic(program, special.elliptic_used(program), near=False)
     elliptic += _remainders(program, special.remainders_used(program), near=False)
     return [*polynomial, *phis, *functions, *anomaly, *elliptic, *_exponentials(program)]
@@ -113,12 +113,15 @@ def near(program: Program, names: Iterable[str]) -> list[str]:
     """Versions of these functions for loops over lanes, for small arguments only."""
     listed = list(names)
     others = [f for f in listed if f not in (*ELLIPTIC, *REMAINDERS, *QUOTIENTS)]
-    texts = [_anomaly(program, near=True) if f == ANOMALY else _small(program, f, near=True) for f in others]
+    texts = [
+        _anomaly(program, near=True) if f == ANOMALY else _small_argument_function(program, f, near=True)
+        for f in others
+    ]
     texts += _elliptic(program, [f for f in ELLIPTIC if f in listed], near=True)
     return texts + _remainders(program, [f for f in (*REMAINDERS, *QUOTIENTS) if f in listed], near=True)
 
 
-def _small(program: Program, f: str, **values: object) -> str:
+def _small_argument_function(program: Program, f: str, **values: object) -> str:
     """Return a function with a polynomial for small arguments."""
     return rendered(program, "small.c", _values(program, f) | values)
 

@@ -127,14 +127,14 @@ class _Text:
             elif token in _SEPARATORS:
                 self._combine(operands, operators, (operand, place))
                 operand, operands, operators = place + 1, [], []
-            elif not first and (token in _PRECEDENCE or token in "?:") and self._ended(place - 1):
+            elif not first and (token in _PRECEDENCE or token in "?:") and self._may_end_operand(place - 1):
                 operands.append((operand, place))
                 operators.append(token)
                 operand = place + 1
             place += 1
         self._combine(operands, operators, (operand, end))
 
-    def _ended(self, place: int) -> bool:
+    def _may_end_operand(self, place: int) -> bool:
         """Whether an operand may end at a place, so that an operator after it is binary."""
         token = self[place]
         return token in (")", "]", "++", "--") or token[0].isalnum() or token[0] in "_\"'."

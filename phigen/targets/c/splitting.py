@@ -115,7 +115,7 @@ def reaches_far(kernel: Kernel) -> bool:
 
 
 def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tuple[list[Kernel], FlowTransposes]:
-    """Return the transposes of the flows without outputs that are always zero, and the builder of their functions."""
+    """Return the transposed flows, without identically zero outputs, and the builder of their functions."""
     kernels, flows = list[Kernel](), list[Transposed]()
     for flow, kernel in zip(step.flows, back, strict=True):
         reached = [[i for i, e in enumerate(o.values) if not e.is_zero] for o in kernel.outputs]

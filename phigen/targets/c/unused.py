@@ -34,7 +34,7 @@ def without_unused(lines: Sequence[str], prefix: str) -> list[str]:
     functions = [f for f in declarations if f.name.startswith(prefix)]
     static = [f for f in functions if f.static]
     inside = {k for f in static for k in range(f.begin, f.end)} | _declared(functions) | _types(lines, declarations)
-    reached = _reached(_used("\n".join(line for k, line in enumerate(lines) if k not in inside)), static, lines)
+    reached = _reached(_names_used("\n".join(line for k, line in enumerate(lines) if k not in inside)), static, lines)
     defined = {f.name for f in functions if f.defined}
     unused = [f for f in functions if (f.name not in reached if f.static else f.name not in defined)]
     return _without(lines, unused)
@@ -50,7 +50,7 @@ def _types(lines: Sequence[str], declarations: Iterable[Function]) -> set[int]:
     return {k for d in types for k in range(d.begin, d.end)}
 
 
-def _used(text: str) -> set[str]:
+def _names_used(text: str) -> set[str]:
     """The names in a text, without names of members; of directives, the names in their first lines."""
     return used_names(text) | {name for line in text.splitlines() if line.startswith("#") for name in names(line)}
 
@@ -59,7 +59,7 @@ def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str])
     """The static functions that other code calls, directly or through each other."""
     words: dict[str, set[str]] = {}
     for f in static:
-        words.setdefault(f.name, set()).update(_used("\n".join(lines[f.begin : f.end])) if f.defined else ())
+        words.setdefault(f.name, set()).update(_names_used("\n".join(lines[f.begin : f.end])) if f.defined else ())
     reached, open_ = set[str](), [name for name in words if name in called]
     while open_:
         name = open_.pop()

@@ -38,11 +38,11 @@ def _camel(name: str) -> str:
 
 
 def _anomaly() -> str:
-    c2, c3 = (_listed([float(c) for c in series]) for series in special.stumpff())
+    c2, c3 = (_number_lines([float(c) for c in series]) for series in special.stumpff())
     return render("js", "anomaly.mjs", {"c2": c2, "c3": c3, **special.anomaly_values()})
 
 
-def _listed(numbers: Sequence[float]) -> list[str]:
+def _number_lines(numbers: Sequence[float]) -> list[str]:
     """Return numbers as lines of four, each number followed by a comma."""
     return [" ".join(f"{c!r}," for c in numbers[k : k + 4]) for k in range(0, len(numbers), 4)]
 
@@ -52,8 +52,8 @@ def _phi(function: str) -> dict[str, Any]:
     values = cast(dict[str, Any], special.values(function, function))
     return {
         **values,
-        "near_coefficients": _listed(near_coefficients(order)),
-        "rest_coefficients": _listed(rest_coefficients(order)),
+        "near_coefficients": _number_lines(near_coefficients(order)),
+        "rest_coefficients": _number_lines(rest_coefficients(order)),
         "closed": [line.replace("phi", "value") for line in values["closed"]],
         "result": f"value{order}",
     }
@@ -65,6 +65,6 @@ def _entire(function: str, printer: Callable[[Scope], Printer]) -> dict[str, Any
         "function": function,
         "meaning": entire.meaning,
         "radius": repr(entire.radius),
-        "coefficients": _listed([float(c) for c in entire.terms()]),
+        "coefficients": _number_lines([float(c) for c in entire.terms()]),
         **special.far(function, printer, "s > 0 ? {0} : {1}"),
     }

@@ -112,7 +112,9 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
     loops = {loop.name: loop for part in parts for loop in part.loops}
     texts += [loop_text(program, loop) for loop in loops.values()]
     texts += reverse.drivers(parts)
-    return "\n".join([_tables(program, step, parts, adjoint.steps), *texts, _added(program, step, layout)])
+    return "\n".join(
+        [_tables(program, step, parts, adjoint.steps), *texts, _parameter_functions(program, step, layout)]
+    )
 
 
 def handed_by(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
@@ -226,7 +228,7 @@ class _Reverse:
                 seed, gather = "change_bar", sweep.gather
                 pulled.append(_Pulled(transposed, seed, gather, ends, before, bars, moved, undo, received, sweep))
             origin = f"the sweeps of H_{k + 1} have changed"
-            both = self._back(f"hand{k + 1}", origin, pulled, apart=handed_apart(program, step)[k])
+            both = self._transpose_traversals(f"hand{k + 1}", origin, pulled, apart=handed_apart(program, step)[k])
             along = [pair for kernel in back[k] for pair in kernel.along("site")]
             written = {layout.bar(step.sites.places[s][0]) for s, e in along if not e.is_zero}
             copied = [
@@ -254,9 +256,9 @@ class _Reverse:
             )
             before = tuple(ir.Call(e.kernel.name, (SEGMENT,)) for e, _ in over_ends(gather))
             pulled = _Pulled(kernel, seed, read, ends, before if summed and number == 0 else ())
-            yield self._back(name.replace("_back", "_hand"), f"{name} has read", [pulled])
+            yield self._transpose_traversals(name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
-    def _back(self, name: str, whom: str, pulled: Sequence[_Pulled], *, apart: bool = True) -> Back:
+    def _transpose_traversals(self, name: str, whom: str, pulled: Sequence[_Pulled], *, apart: bool = True) -> Back:
         """Return the traversals of some kernels; the second is called ``name`` if it is not merged with the next
         first one (``apart``)."""
         layout, loops = self.layout, list[ir.Function]()
@@ -331,7 +333,7 @@ _HANDED = ir.Member(ROW, "handed")
 
 
 def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iterable[Kernel]) -> str:
-    read = _read(step, kernels)
+    read = _values_read(step, kernels)
     stored = [{f for sweep in part for f in sweep.moved if program.coordinates[f] in read} for part in step.parts]
     rows = [", ".join(str(int(f in fields)) for f in range(program.dimension)) for fields in stored]
     ways_of = ways(step) if takes(program, step) else []
@@ -352,7 +354,7 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
     return rendered(program, "lattice_adjoint.c", values)
 
 
-def _read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
+def _values_read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
     """The fields, and parameters, whose values before a sweep some transposed kernel reads."""
     used = {s for kernel in kernels for s in {*kernel.inputs.get("site", ())} & {*symbols_of(*kernel.roots)}}
     return {(step.sites.ends.get(s) or step.sites.places[s])[0] for s in used}
@@ -365,7 +367,7 @@ def _sums(program: Program, step: Sweeps) -> str:
     return f"{program.name}_COEFFICIENTS"
 
 
-def _added(program: Program, step: Sweeps, layout: Layout) -> str:
+def _parameter_functions(program: Program, step: Sweeps, layout: Layout) -> str:
     """Return the functions that add the derivatives by parameters to those of the caller."""
     bars = {p: layout.bar(p) for p in (*step.sites.parameters, *step.sites.at_bonds)}
     added = sums_of_derivatives(program.parameters, members(program), bars)

@@ -39,13 +39,13 @@ Forms = Mapping[str, Mapping[str, str]]
 
 def printed(program: Program, loop: ir.Function, purposes: Iterable[str] = (), *, inline: bool = True) -> str:
     """Return the text of a loop, below its purpose or those of all loops that are equal to it."""
-    sentences = [plain(sentence(purpose)) for purpose in _together(purposes or (loop.doc,))]
+    sentences = [plain(sentence(purpose)) for purpose in _merged_purposes(purposes or (loop.doc,))]
     lines = [line for text in sentences for line in comment(text, "   ")]
     lines[0] = f"/* {lines[0].strip()}"
     return "\n".join([*lines[:-1], f"{lines[-1]} */", function(loop, program, "static inline" if inline else "static")])
 
 
-def _together(purposes: Iterable[str]) -> Iterator[str]:
+def _merged_purposes(purposes: Iterable[str]) -> Iterator[str]:
     """Yield the purposes of a loop, with the parts of H that have the same purpose in one sentence."""
     grouped: dict[str, dict[str, None]] = {}
     for purpose in purposes:
