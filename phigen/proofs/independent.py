@@ -72,7 +72,7 @@ class OutOfTimeError(BaseException):
 
 
 def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Agreement]:
-    """S_1 … S_terms, by default those of the method, then ∇S_h, α and β: each as soon as it is derived.
+    """Yield comparisons of S_1 … S_terms, by default all of the method, then of ∇S_h, α and β.
 
     ∇S_h of the program is compared if it needs no further S_i. If steps follow paths, α and β enter through the S_i
     only. Raises `LimitError` when the ``seconds`` are used up, or when a polynomial has too many terms.
@@ -272,7 +272,7 @@ def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: 
         if difference == 0 or functions.vanishes(difference):
             continue
         open_pairs += 1
-        point_or_count = _tried([theirs, mine], positive)
+        point_or_count = _differing_point([theirs, mine], positive)
         if isinstance(point_or_count, str):
             prefix = f"{label}, " if label else ""
             return Statement(
@@ -286,7 +286,7 @@ def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: 
     return Statement(name, CHECKED, f"{fewest} points, {AGREEING} digits")
 
 
-def _tried(pair: Sequence[Any], positive: Collection[str]) -> str | int:
+def _differing_point(pair: Sequence[Any], positive: Collection[str]) -> str | int:
     """A point where both differ, with their values; otherwise the number of points where they agree."""
     symbols = sorted(set().union(*(e.free_symbols for e in pair)), key=str)
     values = sympy.lambdify(symbols, list(pair), modules=[{Sign.__name__: mpmath.sign}, "mpmath"], cse=True)
