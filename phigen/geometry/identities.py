@@ -63,7 +63,7 @@ def _expansion(e: Expression, moving: Sequence[str]) -> Expression | None:
     parameters = [s for s in symbols_of(e) if s not in moving]
     for first, step in _BASES:
         base = {c: Fraction(first + k * step) for k, c in enumerate(moving)}
-        at_base = [_simplified(v) for v in _at(parts, base, parameters)]
+        at_base = [_simplified(v) for v in _values_at(parts, base, parameters)]
         if at_base:
             d = [symbol(c) - v for c, v in base.items()]
             directions = [number(1), *d, *(a * b / 2 for a in d for b in d)]
@@ -71,7 +71,9 @@ def _expansion(e: Expression, moving: Sequence[str]) -> Expression | None:
     return None
 
 
-def _at(parts: Sequence[Expression], base: Mapping[str, Fraction], parameters: Sequence[str]) -> list[Expression]:
+def _values_at(
+    parts: Sequence[Expression], base: Mapping[str, Fraction], parameters: Sequence[str]
+) -> list[Expression]:
     """The expressions at a point of the coordinates; none if they have no values there."""
     try:
         evaluate_precisely(parts, {**sample_point(parameters, parameters, 0), **base}, DIGITS)

@@ -122,13 +122,13 @@ def _next_solved(
         (substituted,) = substitute([e], solutions)
         unknown = [c for c in coordinates if c not in solutions and c in symbols_of(substituted)]
         if len(unknown) == 1:
-            value = _solved(substituted, symbol(y), unknown[0])
+            value = _solved_for(substituted, symbol(y), unknown[0])
             if value is not None:
                 return y, unknown[0], value
     return None
 
 
-def _solved(e: Expression, value: Expression, x: str) -> Expression | None:
+def _solved_for(e: Expression, value: Expression, x: str) -> Expression | None:
     """x from e(x) = value: directly where e is linear in x, else one operation after the other."""
     slope = _simplified(derivatives([e], x)[0])
     if x not in symbols_of(slope):
@@ -141,18 +141,18 @@ def _solved(e: Expression, value: Expression, x: str) -> Expression | None:
     independent = [a for a in e.args if a is not argument]
     match e.op:
         case "add":
-            return _solved(argument, value - independent[0], x)
+            return _solved_for(argument, value - independent[0], x)
         case "sub":
             right_side = value + independent[0] if e.args[0] is argument else independent[0] - value
-            return _solved(argument, right_side, x)
+            return _solved_for(argument, right_side, x)
         case "neg":
-            return _solved(argument, -value, x)
+            return _solved_for(argument, -value, x)
         case "mul":
-            return _solved(argument, value / independent[0], x)
+            return _solved_for(argument, value / independent[0], x)
         case "pow" if e.value == -1 or (e.value.numerator == 1 and e.value > 0):
-            return _solved(argument, power(value, 1 / Fraction(e.value)), x)
+            return _solved_for(argument, power(value, 1 / Fraction(e.value)), x)
         case op if op in FUNCTIONS and (inverse := FUNCTIONS[op].inverse):
-            return _solved(argument, call(inverse, value), x)
+            return _solved_for(argument, call(inverse, value), x)
     return None
 
 

@@ -229,7 +229,7 @@ def build_system(
     try:
         matrix, shape = structure(form, coordinates)
     except SpecError as error:
-        raise _located(error, locations) from None
+        raise _with_place(error, locations) from None
     used_names = {*coordinates, time, *(p.name for p in parameters), *declared, *(invariants or {})}
     further_casimirs, notes = found_casimirs(coordinates, matrix, shape, form, declared, used_names)
     acting = None
@@ -262,7 +262,7 @@ def hamiltonian_vector_field(poisson: Matrix, differential: Sequence[Expression]
     )
 
 
-def _located(error: SpecError, locations: Mapping[tuple[Any, ...], Location]) -> SpecError:
+def _with_place(error: SpecError, locations: Mapping[tuple[Any, ...], Location]) -> SpecError:
     """The error, with the place of the spec's ``poisson`` section if it has no place."""
     place = locations.get(("poisson",))
     return SpecError(
