@@ -67,7 +67,7 @@ def _assembled(system: System, even: EvenPart) -> BiRealisation:
         displacement,
         increment,
         is_symmetric(alpha, beta, system.coordinates),
-        explanation=f"π is {shape}: τ = exp in closed form ({_listed(even.forms)}); symmetric, β − α = π(x)p, "
+        explanation=f"π is {shape}: τ = exp in closed form ({_forms_text(even.forms)}); symmetric, β − α = π(x)p, "
         "exact for linear H",
         reference=REFERENCE,
     )
@@ -86,6 +86,6 @@ def _sums(x: Sequence[Expression], shifts: Sequence[Expression]) -> tuple[Expres
     return tuple(a + b for a, b in zip(x, shifts, strict=True))
 
 
-def _listed(forms: Sequence[str]) -> str:
+def _forms_text(forms: Sequence[str]) -> str:
     distinct = list(dict.fromkeys(forms)) or ["abelian"]
     return "; ".join(distinct[:3]) + (f" and {len(distinct) - 3} more" if len(distinct) > 3 else "")

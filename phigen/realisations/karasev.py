@@ -56,7 +56,7 @@ def series(system: System, degree: int) -> list[Expression]:
     flow = hamiltonian_vector_field(system.poisson, covector_symbols(coordinates))
     powers = [list(flow)]
     for _ in range(degree - 1):
-        powers.append(_along(powers[-1], coordinates, flow))
+        powers.append(_derivatives_along_flow(powers[-1], coordinates, flow))
     approximations = [x]  # approximations[d] is α up to degree d
     for order in range(1, degree + 1):
         # D^j x is itself of degree j in p, so there α is needed up to degree order − j only.
@@ -73,7 +73,9 @@ def series(system: System, degree: int) -> list[Expression]:
     return approximations[-1]
 
 
-def _along(functions: list[Expression], coordinates: tuple[str, ...], flow: tuple[Expression, ...]) -> list[Expression]:
+def _derivatives_along_flow(
+    functions: list[Expression], coordinates: tuple[str, ...], flow: tuple[Expression, ...]
+) -> list[Expression]:
     """D f for each function: the derivative along the flow."""
     columns = [derivatives(functions, c) for c in coordinates]
     return [

@@ -54,7 +54,7 @@ def assembled(
         values = {c: e for r in realisations for c, e in zip(r.coordinates, getattr(r, name), strict=True)}
         return tuple(values.get(c, ZERO) for c in system.coordinates)
 
-    descriptions = [f"({', '.join(r.coordinates)}): {r.kind}, {_short(r.explanation)}" for r in realisations]
+    descriptions = [f"({', '.join(r.coordinates)}): {r.kind}, {_first_clause(r.explanation)}" for r in realisations]
     return BiRealisation(
         KIND,
         system.coordinates,
@@ -69,5 +69,5 @@ def assembled(
     )
 
 
-def _short(explanation: str) -> str:
+def _first_clause(explanation: str) -> str:
     return explanation.removeprefix("auto picked ").partition("since ")[2] or explanation
