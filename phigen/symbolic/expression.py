@@ -416,12 +416,12 @@ def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T])
     a shared node is visited once.
     """
     values: dict[Expression, T] = {}
-    for node in _counted(topological(roots)):
+    for node in _with_progress(topological(roots)):
         values[node] = visit(node, [values[a] for a in node.args])
     return [values[r] for r in roots]
 
 
-def _counted(order: Sequence[Expression]) -> Iterable[Expression]:
+def _with_progress(order: Sequence[Expression]) -> Iterable[Expression]:
     """The nodes in turn; a stage reports progress if there are very many."""
     if len(order) < MANY:
         return order
@@ -512,7 +512,7 @@ def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> lis
     """The derivatives of each root that are not 0, by name: those of `derivatives`, in one sweep for all names."""
     variables = frozenset(names)
     slopes: dict[int, dict[str, Expression]] = {}
-    for node in _counted(topological(roots)):
+    for node in _with_progress(topological(roots)):
         if node.op == "symbol":
             slopes[id(node)] = {node.value: ONE} if node.value in variables else {}
             continue

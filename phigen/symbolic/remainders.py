@@ -79,8 +79,8 @@ def _coefficients(library: Any, t: Any, a: Any) -> tuple[list[Any], list[Any]]:
         f = [x + factor * y for x, y in zip(f, r, strict=True)]
         g = [x + factor * y for x, y in zip(g, q, strict=True)]
     for _ in range(halvings):
-        upper, square = _divided(_product(f, f), c)
-        _, remainder = _divided(_product(f, g), c)
+        upper, square = _divided_by_quadric(_product(f, f), c)
+        _, remainder = _divided_by_quadric(_product(f, g), c)
         f = [2 * x + y for x, y in zip(f, square, strict=True)]
         g = [2 * (x + y) + e for x, y, e in zip(g, remainder, [*upper, zero], strict=True)]
     return [e * u**k for k, e in enumerate(f)], [e * u ** (4 + k) for k, e in enumerate(g)]
@@ -91,7 +91,7 @@ def _product(a: Any, b: Any) -> list[Any]:
     return [sum(a[i] * b[n - i] for i in range(max(0, n - 3), min(n, 3) + 1)) for n in range(7)]
 
 
-def _divided(d: list[Any], c: Any) -> tuple[list[Any], list[Any]]:
+def _divided_by_quadric(d: list[Any], c: Any) -> tuple[list[Any], list[Any]]:
     """Return quotient and remainder of a polynomial of degree 6 at division by p."""
     d = [*d]
     for k in (6, 5, 4):
