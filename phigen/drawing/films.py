@@ -36,7 +36,7 @@ def film(run: LatticeTrajectory, title: str, path: Path, origin: str = "") -> No
     if (positions := places_of(run)) is not None:
         updates = [_graph(axes, name, run, positions) for axes, name in zip(panels, names, strict=True)]
     else:
-        updates = [_shown(axes, name, run.column(name)) for axes, name in zip(panels, names, strict=True)]
+        updates = [_displayed_values(axes, name, run.column(name)) for axes, name in zip(panels, names, strict=True)]
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
         with writer.saving(figure, str(part), DOTS):
@@ -80,7 +80,7 @@ def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> A
     return picture.set_array
 
 
-def _shown(axes: Any, name: str, values: Floats) -> Any:
+def _displayed_values(axes: Any, name: str, values: Floats) -> Any:
     """Return the function that extracts the displayed values from a coordinate (frames, *sizes)."""
     first = _flat(values[0])
     axes.set_title(name)

@@ -66,12 +66,12 @@ def net(leaf: Leaf, box: Floats) -> list[Floats]:
     cell = (box[1] - box[0]) / (GRID - 1)
     for axis in range(3):
         for level in np.linspace(box[0, axis], box[1, axis], CUTS + 2)[1:-1]:
-            for line in _cut(leaf, box, axis, float(level)):
+            for line in _lines_in_plane(leaf, box, axis, float(level)):
                 lines += _on_surface(leaf, line, axis, cell)
     return lines
 
 
-def _cut(leaf: Leaf, box: Floats, axis: int, level: float) -> list[Floats]:
+def _lines_in_plane(leaf: Leaf, box: Floats, axis: int, level: float) -> list[Floats]:
     """Return lines of the leaf in the plane x_axis = place, linearly interpolated on a grid."""
     from contourpy import contour_generator
 
