@@ -63,10 +63,10 @@ class _Parts:
         return Series(self.functions, lambda k, m: self._part(first + k, m))
 
     def bracket(self, f: int, g: int, degree: int) -> Any:
-        """The part of {f, g} = Σ_c ∂f/∂x_c ∂g/∂p_c − ∂f/∂p_c ∂g/∂x_c of a degree."""
+        """Part of degree ``degree`` in p of {f, g} = Σ_c ∂f/∂x_c ∂g/∂p_c − ∂f/∂p_c ∂g/∂x_c."""
         splits = [(k, degree + 1 - k) for k in range(degree + 2)]
         terms = (
-            self._part(f, k, c) * self._along(g, m, c) - self._along(f, k, c) * self._part(g, m, c)
+            self._part(f, k, c) * self._covector_slope(g, m, c) - self._covector_slope(f, k, c) * self._part(g, m, c)
             for k, m in splits
             for c in range(len(self._p))
         )
@@ -86,6 +86,6 @@ class _Parts:
         powers = (self.functions.element(pk) ** e for pk, e in zip(self._p, mu, strict=True) if e)
         return prod(powers, start=self.functions.ring(1))
 
-    def _along(self, f: int, degree: int, c: int) -> Any:
+    def _covector_slope(self, f: int, degree: int, c: int) -> Any:
         """∂f/∂p_c of the part of a degree."""
         return self._part(f, degree).diff(self.functions.element(self._p[c]))
