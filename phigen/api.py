@@ -184,9 +184,9 @@ def lattice_solver_of(compilation: Compilation, target: str = "auto", device: in
 def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any]:
     """Return the back end of a program, and its interface."""
     interface = interface_of(program)
-    chosen = chosen_target(target, _warn)
-    files = files_of(program, chosen, f"phigen build {program.name}.yaml")
-    return backend_of(files, interface, chosen, device), interface
+    target_name = chosen_target(target, _warn)
+    files = files_of(program, target_name, f"phigen build {program.name}.yaml")
+    return backend_of(files, interface, target_name, device), interface
 
 
 def files_of(program: Program, target: str, command: str) -> dict[str, str]:
@@ -216,7 +216,7 @@ def interface_of(program: Program) -> Interface:
     """Return the names and sizes of a program that the runtime needs."""
     from phigen.runtime.interface import Interface, LatticeInterface
 
-    about = Interface(
+    interface = Interface(
         name=program.name,
         coordinates=program.coordinates,
         order=program.order,
@@ -236,13 +236,13 @@ def interface_of(program: Program) -> Interface:
     )
     step = program.step.swept
     if step is None:
-        return about
+        return interface
     from phigen.targets.device.launches import launches
 
     sites = step.sites
     every_other = bool(step.partners and not step.partners.graph)
     return LatticeInterface(
-        **vars(about),
+        **vars(interface),
         axes=sites.axes,
         at_sites=sites.parameters,
         observed_fields=program.observables.fields,
@@ -264,8 +264,8 @@ def interface_of(program: Program) -> Interface:
     )
 
 
-def chosen_target(target: str, tell: Callable[[str], None] = lambda message: None) -> str:
-    """Return the name of a target; ``auto`` is C if there is a compiler, else NumPy; ``tell`` receives the reason.
+def chosen_target(target: str, warn: Callable[[str], None] = lambda message: None) -> str:
+    """Return the name of a target; ``auto`` is C if there is a compiler, else NumPy; ``warn`` receives the reason.
 
     Raises `ToolchainError` if a compiler is named in CC that does not work.
     """
@@ -277,7 +277,7 @@ def chosen_target(target: str, tell: Callable[[str], None] = lambda message: Non
         toolchain.find()
     except toolchain.NoCompilerError as error:
         target = registry.automatic(compiler=False)
-        tell(f"using {registry.TARGETS[target].title}, which is slower: {error}")
+        warn(f"using {registry.TARGETS[target].title}, which is slower: {error}")
         return target
     return registry.automatic(compiler=True)
 
@@ -307,8 +307,8 @@ def _expect_names(system: System) -> None:
         if not re.fullmatch(IDENTIFIER, name)
     ]
     reserved_names = TIMED_ARGUMENTS if system.time else ARGUMENTS
-    wrong = [name for name in system.parameter_names if name in reserved_names]
-    problems += [(f"a parameter cannot be called {name!r}", argument_hint(name)) for name in wrong]
+    reserved = [name for name in system.parameter_names if name in reserved_names]
+    problems += [(f"a parameter cannot be called {name!r}", argument_hint(name)) for name in reserved]
     diagnostics = [Diagnostic(message, hint=hint) for message, hint in filter(None, problems)]
     if diagnostics:
         raise SpecError(diagnostics)

@@ -97,8 +97,8 @@ class _Compiled(ABC):
     def method(self) -> str:
         """The scheme, the bi-realisation if there is one, the order and the profile, as the first lines of runs say."""
         scheme = self.described["scheme"]
-        named = scheme if self.label.startswith(scheme) else f"{scheme} ({self.label})"
-        return f"scheme {named}, order {self.order.order}, profile {self.program.profile}"
+        scheme_text = scheme if self.label.startswith(scheme) else f"{scheme} ({self.label})"
+        return f"scheme {scheme_text}, order {self.order.order}, profile {self.program.profile}"
 
     @property
     def described(self) -> dict[str, Any]:
@@ -113,8 +113,8 @@ class _Compiled(ABC):
     @property
     def notes(self) -> list[str]:
         """Decisions of the compiler that the user may not expect, a line each."""
-        chosen = f"scheme: auto chose {self.choice}" if self.choice else ""
-        return [*filter(None, [chosen, self.order.note])]
+        choice_note = f"scheme: auto chose {self.choice}" if self.choice else ""
+        return [*filter(None, [choice_note, self.order.note])]
 
     @property
     def monitor(self) -> Expression | None:
@@ -217,7 +217,7 @@ class _CompiledSystem(_Compiled, ABC):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledSeries(_CompiledSystem):
-    """A step from S_1, S_2, … and the bi-realisation, with what is discretised and its generating function."""
+    """A step from S_1, S_2, … and the bi-realisation, with the discretised system and its generating function."""
 
     realisation: BiRealisation
     gauged: Gauged
@@ -261,10 +261,10 @@ class CompiledSeries(_CompiledSystem):
     @property
     def reasons(self) -> Mapping[str, str]:
         """The reason for the bi-realisation."""
-        why, automatic = self.realisation.explanation, f"auto picked {self.realisation.kind}, "
-        if why.startswith(automatic):
-            why = "chosen by phigen, " + why.removeprefix(automatic)
-        return {**super().reasons, "bi-realisation": f"{self.label}, {why}"}
+        reason, automatic = self.realisation.explanation, f"auto picked {self.realisation.kind}, "
+        if reason.startswith(automatic):
+            reason = "chosen by phigen, " + reason.removeprefix(automatic)
+        return {**super().reasons, "bi-realisation": f"{self.label}, {reason}"}
 
     @property
     def has_series(self) -> bool:

@@ -207,18 +207,18 @@ def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation 
     return realisation
 
 
-def _compiled(spec: Spec, source: System, clock: _Clock, early: BiRealisation | None = None) -> Compilation:
-    """Compile a system by its scheme; ``early`` is what `_realised_early` has found."""
+def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None) -> Compilation:
+    """Compile a system by its scheme; ``early_realisation`` is what `_realised_early` has found."""
     if spec.scheme == "auto":
         return _cheapest(spec, source, clock)
     if spec.scheme == "splitting":
-        return _split(spec, source, clock)
+        return _compile_splitting(spec, source, clock)
     if spec.scheme == "gauss":
         return _collocated(spec, source, clock)
-    realisation = early or clock.timed("bi-realisation", lambda: realise(source, spec.birealisation))
+    realisation = early_realisation or clock.timed("bi-realisation", lambda: realise(source, spec.birealisation))
     plan = plan_order(spec.order, spec.terms, symmetric=realisation.symmetric)
     gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
-    monitor, affordable = gauged.gauge.monitor, early is not None and gauged.system is source
+    monitor, affordable = gauged.gauge.monitor, early_realisation is not None and gauged.system is source
     with fixed_gauge_named(gauged.gauge, source):
         reached = clock.timed(
             "generating function",
@@ -260,19 +260,19 @@ def _cheapest(spec: Spec, source: System, clock: _Clock) -> Compilation:
 
 def _is_of_series(spec: Spec) -> bool:
     """Whether options name parts of the series."""
-    named = spec.birealisation.kind != "auto" or spec.terms is not None
-    return named or spec.extras.modified_hamiltonian > 0
+    names_options = spec.birealisation.kind != "auto" or spec.terms is not None
+    return names_options or spec.extras.modified_hamiltonian > 0
 
 
 def _choice(best: str, compilations: Mapping[str, Compilation], failures: Mapping[str, SpecError]) -> str:
-    """Return the reason for a scheme: what is expected of the others."""
+    """Return the reason for a scheme: the expected costs of the other schemes."""
     least = _expected(compilations[best])
     if least == 0:
         return f"{best}: one exact flow"
-    others = [f"{_expected(c) / least:.1f} times the time for {s}" for s, c in compilations.items() if s != best]
-    others += [f"{s} does not apply" for s in failures]
-    others += ["more for series"] * ("series" not in {*compilations, *failures} and bool(compilations))
-    return f"{best}; expected: {', '.join(others)}" if others else f"{best}, which its options name"
+    alternatives = [f"{_expected(c) / least:.1f} times the time for {s}" for s, c in compilations.items() if s != best]
+    alternatives += [f"{s} does not apply" for s in failures]
+    alternatives += ["more for series"] * ("series" not in {*compilations, *failures} and bool(compilations))
+    return f"{best}; expected: {', '.join(alternatives)}" if alternatives else f"{best}, which its options name"
 
 
 def _expected(compilation: Compilation) -> float:
@@ -288,7 +288,7 @@ def _is_dearer(spec: Spec, source: System, least: float) -> bool:
     return efficiency.series_bound(_compiled(low, source, _Clock()).program, order) > least
 
 
-def _split(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
+def _compile_splitting(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
     """Compile to a splitting."""
     gauge = Gauge() if isinstance(spec.gauge, str) else fixed_gauge(source, spec.gauge)
     discretised = gauge.applied(source)
@@ -347,10 +347,10 @@ def _collocated(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
     group = _group(spec, source, "")
     monitor = monitor_of(spec)
     if isinstance(spec.gauge, str):
-        chosen = slowest(source, realisation) if spec.gauge == "auto" and not monitor else Gauge()
+        gauge_of_spec = slowest(source, realisation) if spec.gauge == "auto" and not monitor else Gauge()
     else:
-        chosen = fixed_gauge(source, spec.gauge)
-    gauge = replace(chosen, monitor=monitor)
+        gauge_of_spec = fixed_gauge(source, spec.gauge)
+    gauge = replace(gauge_of_spec, monitor=monitor)
     program = clock.timed("program", lambda: build_gauss(source, gauge, realisation, plan, spec, group))
     return CompiledGauss(
         spec=spec, system=source, order=plan, program=program, gauge=gauge, seconds=clock.seconds, gauss=realisation

@@ -100,7 +100,7 @@ class SpecError(PhigenError):
 
 
 class LimitError(SpecError):
-    """The spec, or what it would compile to, exceeds a limit."""
+    """The spec, or the program that it would compile to, exceeds a limit."""
 
     exit_code = 3
 
@@ -118,7 +118,7 @@ class ToolchainError(PhigenError):
 
 
 class DeviceError(ToolchainError):
-    """There is no usable device, or it failed; ``trajectory`` has the results until then, NaN where there are none."""
+    """There is no usable device, or the device failed; ``trajectory`` has the results so far, NaN if missing."""
 
     trajectory: Any = None
 

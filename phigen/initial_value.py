@@ -100,13 +100,13 @@ def solve_ivp(
     begin, end = map(float, t_span)
     if not (math.isfinite(begin) and math.isfinite(end)) or begin == end:
         raise ValueError(f"t_span must be two different numbers, not {t_span!r}")
-    requested_times = None if t_eval is None else _times(t_eval, begin, end)
+    requested_times = None if t_eval is None else _checked_times(t_eval, begin, end)
     values = {**(parameters or {}), **more}
     problem = _Problem(solver, begin, end, y0, values)
     try:
         step, converged = (math.copysign(h, end - begin), True) if h is not None else problem.chosen(rtol, atol)
-        listed = [events] if callable(events) else list(events or [])
-        crossings, stop = problem.events(listed, step)
+        event_list = [events] if callable(events) else list(events or [])
+        crossings, stop = problem.events(event_list, step)
         trajectory = problem.integrated(step, end if stop is None else stop)
     except StepError as error:
         partial = error.trajectory if isinstance(error.trajectory, Trajectory) else None
@@ -115,17 +115,21 @@ def solve_ivp(
         return OdeResult(t, y, None, None, None, -1, str(error), math.nan, partial)
     last = end if stop is None else stop
     t = problem.offset + trajectory.t
-    inside = None if requested_times is None else requested_times[(requested_times - last) * (end - begin) <= 0]
+    times_inside = None if requested_times is None else requested_times[(requested_times - last) * (end - begin) <= 0]
     sol = problem.solution(trajectory)
     status, message = (0, _REACHED) if stop is None else (1, _TERMINATED)
     if not converged:
         status, message = -1, f"the states at the end still change by more than rtol and atol at steps of {step!r}"
     return OdeResult(
-        t=t if inside is None else inside,
-        y=trajectory.x.T if inside is None else sol(inside),
+        t=t if times_inside is None else times_inside,
+        y=trajectory.x.T if times_inside is None else sol(times_inside),
         sol=sol if dense_output else None,
-        t_events=[np.array([t for t, _ in one]) for one in crossings] if events is not None else None,
-        y_events=[np.array([x for _, x in one]) for one in crossings] if events is not None else None,
+        t_events=[np.array([t for t, _ in event_crossings]) for event_crossings in crossings]
+        if events is not None
+        else None,
+        y_events=[np.array([x for _, x in event_crossings]) for event_crossings in crossings]
+        if events is not None
+        else None,
         status=status,
         message=message,
         h=step,
@@ -159,40 +163,42 @@ class _Problem:
 
         Returns the smallest step tried, and False, if there is none.
         """
-        h, before, failure = (self.end - self.begin) / _FIRST_STEPS, None, None
+        h, previous, failure = (self.end - self.begin) / _FIRST_STEPS, None, None
         for _ in range(_MAX_HALVINGS):
             try:
                 last = self.integrated(h, self.end, stride=np.iinfo(np.int64).max).x[-1]
             except StepError as error:
-                failure, before = error, None
+                failure, previous = error, None
             else:
-                if before is not None and (np.abs(last - before) <= atol + rtol * np.abs(last)).all():
+                if previous is not None and (np.abs(last - previous) <= atol + rtol * np.abs(last)).all():
                     return h, True
-                before, failure = last, None
+                previous, failure = last, None
             h /= 2
         if failure:
             raise failure
         return 2 * h, False
 
-    def events(self, listed: Sequence[Event], h: float) -> tuple[list[list[tuple[float, Floats]]], float | None]:
+    def events(self, event_list: Sequence[Event], h: float) -> tuple[list[list[tuple[float, Floats]]], float | None]:
         """Return times and states of each event until the end, and the time of the terminal event, if there is one."""
-        by_event = [self._crossings(event, h) for event in listed]
+        by_event = [self._crossings(event, h) for event in event_list]
         sign, stops = math.copysign(1.0, self.end - self.begin), []
-        for event, one in zip(listed, by_event, strict=True):
+        for event, event_crossings in zip(event_list, by_event, strict=True):
             count = int(getattr(event, "terminal", False) or 0)
-            stops += [one[count - 1][0]] if 0 < count <= len(one) else []
+            stops += [event_crossings[count - 1][0]] if 0 < count <= len(event_crossings) else []
         stop = min(stops, key=lambda t: sign * t) if stops else None
         last = self.end if stop is None else stop
-        return [[(t, x) for t, x in one if (t - last) * sign <= 0] for one in by_event], stop
+        return [[(t, x) for t, x in event_crossings if (t - last) * sign <= 0] for event_crossings in by_event], stop
 
     def _crossings(self, event: Event, h: float) -> list[tuple[float, Floats]]:
-        along = np.sign(getattr(event, "direction", 0)) * np.sign(
+        direction_of_change = np.sign(getattr(event, "direction", 0)) * np.sign(
             self.end - self.begin
         )  # directions refer to increasing time
-        direction = {1: "rising", -1: "falling", 0: "both"}[int(along)]
+        direction = {1: "rising", -1: "falling", 0: "both"}[int(direction_of_change)]
 
         def g(states: Floats, t: Floats) -> Floats:
-            return np.array([float(event(self.offset + at, x)) for at, x in zip(t.tolist(), states, strict=True)])
+            return np.array(
+                [float(event(self.offset + elapsed, x)) for elapsed, x in zip(t.tolist(), states, strict=True)]
+            )
 
         t0 = self.begin if self.solver.interface.time else 0.0
         values = self.solver.values(self.values, {})
@@ -226,7 +232,7 @@ def _compiled(system: System | str | PathLike[str], target: str, order: int | No
     return solver
 
 
-def _times(t_eval: ArrayLike, begin: float, end: float) -> Floats:
+def _checked_times(t_eval: ArrayLike, begin: float, end: float) -> Floats:
     times = np.asarray(t_eval, dtype=np.float64)
     low, high = sorted((begin, end))
     if times.ndim != 1 or not ((times >= low) & (times <= high)).all():

@@ -19,7 +19,7 @@ working = False
 
 
 def obey() -> None:
-    """Take over SIGINT, unless the process was told to ignore it, as jobs in the background are."""
+    """Handle SIGINT, unless the process ignores it, as background jobs do."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _handle)
         sys.unraisablehook = _unraisable

@@ -23,14 +23,14 @@ UNASKED = 2**24
 _HINT = "fewer sites; frames in a file; real: float, which halves the solver; phigen.mpi on several machines"
 
 
-def expect_room(what: str, needed: int, place: Location | None = None, hint: str = _HINT) -> None:
-    """Raise `LimitError` if ``needed`` bytes are not available; do nothing if the system does not say what is."""
-    if needed <= UNASKED:
+def expect_room(what: str, byte_count: int, place: Location | None = None, hint: str = _HINT) -> None:
+    """Raise `LimitError` if ``byte_count`` bytes are not available; do nothing if the system does not report it."""
+    if byte_count <= UNASKED:
         return
-    free = available()
-    if free is None or needed <= free:
+    available_bytes = available()
+    if available_bytes is None or byte_count <= available_bytes:
         return
-    message = f"{what} take {_readable(needed)} of memory at least, and {_readable(free)} are available"
+    message = f"{what} take {_readable(byte_count)} of memory at least, and {_readable(available_bytes)} are available"
     raise LimitError([Diagnostic(message, place, hint)])
 
 
@@ -46,8 +46,8 @@ def filled(what: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.f
 
 def available() -> int | None:
     """Return the bytes that this process can still allocate, swap space included; None if the system does not say."""
-    known = [free for free in (_of_machine(), *_of_groups()) if free is not None]
-    return min(known, default=None)
+    limits = [limit for limit in (_of_machine(), *_of_groups()) if limit is not None]
+    return min(limits, default=None)
 
 
 def _of_machine() -> int | None:
@@ -65,11 +65,11 @@ def _of_groups(root: Path = Path("/sys/fs/cgroup")) -> Iterator[int | None]:
 
     Cached pages of files count as available, since the system can drop them.
     """
-    for folder, limit, used, files in (
+    for folder, limit, usage, files in (
         (root, "memory.max", "memory.current", "file"),
         (root / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_cache"),
     ):
-        numbers = [_number(folder / name) for name in (limit, used)]
+        numbers = [_number(folder / name) for name in (limit, usage)]
         if numbers[0] is not None and numbers[1] is not None:
             yield max(0, numbers[0] - numbers[1] + _table(folder / "memory.stat").get(files, 0))
 

@@ -123,7 +123,7 @@ class DistributedLattice:
         paths = Path(output) if output else None, Path(checkpoints) if checkpoints else None
         if refused := self.comm.bcast(_objection(*paths, resume=resume) if self.comm.rank == 0 else ""):
             raise ValueError(refused)
-        whole = tuple(sizes) if sizes is not None else np.shape(x0)[1:]
+        lattice_sizes = tuple(sizes) if sizes is not None else np.shape(x0)[1:]
         h, steps, stride = (
             arguments.step_size(h),
             arguments.count(steps, "steps", 0),
@@ -132,12 +132,14 @@ class DistributedLattice:
         begin = arguments.start_time(t0, self.solver.interface, more)
         draws = arguments.draws(self.solver.interface, more, {"seed": seed, "member": member, "step0": step0})
         arrays = arguments.together(parameters, more)
-        arrays |= self.solver.defaults(arrays, whole)  # of the whole lattice, since a process has some of its planes
-        domain = _Domain(self, whole, x0, h, arrays, begin, draws)
+        arrays |= self.solver.defaults(
+            arrays, lattice_sizes
+        )  # of the whole lattice, since a process has some of its planes
+        domain = _Domain(self, lattice_sizes, x0, h, arrays, begin, draws)
         marks = row_steps(steps, stride)
-        shape = (len(marks), len(self.solver.coordinates), *whole)
+        shape = (len(marks), len(self.solver.coordinates), *lattice_sizes)
         checkpoint = (
-            _Kept(domain, Path(checkpoints), [h, steps, stride, begin, *astuple(draws)]) if checkpoints else None
+            _StoredState(domain, Path(checkpoints), [h, steps, stride, begin, *astuple(draws)]) if checkpoints else None
         )
         energy = checkpoint.restored() if checkpoint else []
         frames = _Frames(domain, Path(output) if output else None, shape, new=not energy)
@@ -194,9 +196,9 @@ class _Domain:
         self.reach = reach
         self.own = (ghosts[0], ghosts[0] + self.planes[1] - self.planes[0])
         self.total = self.own[1] + ghosts[1]
-        around = (self.planes[0] - ghosts[0], self.planes[1] + ghosts[1])
-        self.values = {name: self._local(value, *around, name) for name, value in parameters.items()}
-        start = self._cut(x0, *around, axis=1)
+        with_halo = (self.planes[0] - ghosts[0], self.planes[1] + ghosts[1])
+        self.values = {name: self._local(value, *with_halo, name) for name, value in parameters.items()}
+        start = self._planes_of(x0, *with_halo, axis=1)
         checked = lattice.solver.state(start, "x0")
         values = lattice.solver.values(self.values, {}, checked.shape[1:])
         session = lattice.solver.started(Beginning(checked, h, values, t0, draws))
@@ -230,21 +232,21 @@ class _Domain:
         ahead = None if is_open and rank == count - 1 else (rank + 1) % count
         return [behind, ahead]
 
-    def _cut(self, values: Given, first: int, end: int, axis: int) -> Floats:
+    def _planes_of(self, values: Given, first: int, end: int, axis: int) -> Floats:
         """The planes first..end of an array, or of a function of planes; periodic beyond the ends."""
         size = self.sizes[0]
         if not callable(values):
             return np.take(np.asarray(values, dtype=np.float64), np.arange(first, end) % size, axis)
-        pieces = [values(max(first, 0), min(end, size))]
+        parts = [values(max(first, 0), min(end, size))]
         if first < 0:
-            pieces.insert(0, values(size + first, size))
+            parts.insert(0, values(size + first, size))
         if end > size:
-            pieces.append(values(0, end - size))
-        return np.concatenate([np.asarray(piece, dtype=np.float64) for piece in pieces], axis)
+            parts.append(values(0, end - size))
+        return np.concatenate([np.asarray(part, dtype=np.float64) for part in parts], axis)
 
     def _local(self, value: Any, first: int, end: int, name: str) -> Any:
         if name in self.lattice.solver.interface.at_sites and (callable(value) or np.ndim(value)):
-            return self._cut(value, first, end, axis=0)
+            return self._planes_of(value, first, end, axis=0)
         return value
 
     # --- steps
@@ -255,17 +257,19 @@ class _Domain:
             self._put_all(self.saved)
         end, stretch = self.steps + steps, STRETCH
         while self.steps < end:
-            now = min(end - self.steps, stretch, self.far or STRETCH)
-            if self._tried(now):
+            chunk = min(end - self.steps, stretch, self.far or STRETCH)
+            if self._attempt_steps(chunk):
                 continue
-            if now > 1:
+            if chunk > 1:
                 stretch = 1
             elif self.far == 0:
                 self.far, stretch = FAR_STEPS, STRETCH
             else:
                 self._close()
-                said = f"{self.lattice.solver.interface.name}: step {self.steps} of size {self.h!r} failed: NOT_FINITE"
-                raise StepError(said, step=self.steps, status="NOT_FINITE")
+                message = (
+                    f"{self.lattice.solver.interface.name}: step {self.steps} of size {self.h!r} failed: NOT_FINITE"
+                )
+                raise StepError(message, step=self.steps, status="NOT_FINITE")
         self._close()
         self._tell_time(self.steps)
 
@@ -273,7 +277,7 @@ class _Domain:
         if self.lattice.solver.interface.time or self.noisy:
             self.session.passed(self.h, steps)
 
-    def _tried(self, steps: int) -> bool:
+    def _attempt_steps(self, steps: int) -> bool:
         """Make some steps, or none if they lead to values that are not finite."""
         for step in range(steps):
             self._tell_time(self.steps + step)
@@ -309,43 +313,43 @@ class _Domain:
         way = 1 if far or self.far else 0
         stale = stage.read & self.dirty
         if stale:
-            on_their_way = self._asked(stale)
+            on_their_way = self._request_halos(stale)
             inner = first + stage.behind, end - stage.ahead
             if inner[0] < inner[1]:
                 self.session.sweep(number, way, *inner)
             self._received(on_their_way)
             outer = [(first, inner[0]), (inner[1], end)] if inner[0] < inner[1] else [(first, end)]
-            for piece in outer:
-                self.session.sweep(number, way, *piece)
+            for outer_planes in outer:
+                self.session.sweep(number, way, *outer_planes)
         else:
             self.session.sweep(number, way, first, end)
         self.dirty = (self.dirty & ~stale) | stage.changed
 
-    def _asked(self, fields: int) -> list[tuple[Any, int, tuple[int, int], Floats]]:
+    def _request_halos(self, fields: int) -> list[tuple[Any, int, tuple[int, int], Floats]]:
         """Send the fields that the neighbours read, and request theirs."""
-        (behind, ahead), (first, end), (back, on) = self.beside, self.own, self.reach
-        asked, sent = [], []
+        (behind, ahead), (first, end), (reach_behind, reach_ahead) = self.beside, self.own, self.reach
+        requests, sent = [], []
         for field in (k for k in range(self.fields) if fields >> k & 1):
-            for other, tag, mine, theirs in (
-                (behind, 0, (first, first + on), (first - back, first)),
-                (ahead, 1, (end - back, end), (end, end + on)),
+            for neighbour, tag, mine, theirs in (
+                (behind, 0, (first, first + reach_ahead), (first - reach_behind, first)),
+                (ahead, 1, (end - reach_behind, end), (end, end + reach_ahead)),
             ):
-                if other is None:
+                if neighbour is None:
                     continue
                 if mine[0] < mine[1]:
-                    sent.append(self.comm.Isend(self.session.planes(field, *mine), other, 2 * field + tag))
+                    sent.append(self.comm.Isend(self.session.planes(field, *mine), neighbour, 2 * field + tag))
                 if theirs[0] < theirs[1]:
                     buffer = np.empty((theirs[1] - theirs[0], *self.sizes[1:]))
                     # what a neighbour ahead sends backwards has the tag of that
-                    asked.append((self.comm.Irecv(buffer, other, 2 * field + 1 - tag), field, theirs, buffer))
+                    requests.append((self.comm.Irecv(buffer, neighbour, 2 * field + 1 - tag), field, theirs, buffer))
         self._sent = sent
-        return asked
+        return requests
 
-    def _received(self, asked: Sequence[tuple[Any, int, tuple[int, int], Floats]]) -> None:
+    def _received(self, requests: Sequence[tuple[Any, int, tuple[int, int], Floats]]) -> None:
         begin = time.perf_counter()
-        _mpi().Request.Waitall([request for request, *_ in asked])
+        _mpi().Request.Waitall([request for request, *_ in requests])
         self.waiting += time.perf_counter() - begin
-        for _, field, planes, buffer in asked:
+        for _, field, planes, buffer in requests:
             self.session.put_planes(field, *planes, buffer)
         _mpi().Request.Waitall(self._sent)
 
@@ -363,28 +367,28 @@ class _Domain:
         self.dirty = (1 << self.fields) - 1
 
     def state(self) -> Floats:
-        """The own planes (coordinates, planes, …)."""
+        """Planes of this process (coordinates, planes, …)."""
         return np.array([self.session.planes(field, *self.own) for field in range(self.fields)])
 
     def energy(self) -> float:
         """H of the whole lattice, on all processes: the sum over planes, rounded once."""
-        self._received(self._asked(self.dirty))
+        self._received(self._request_halos(self.dirty))
         self.dirty = 0
         density = self.session.density()[self.own[0] : self.own[1]]
         sums = density.reshape(len(density), -1).sum(axis=1)
         return math.fsum(value for part in self.comm.allgather(sums) for value in part.tolist())
 
-    def restore(self, x: Floats, steps: int, far: int, is_open: bool) -> None:
-        """Go on from the own planes of a state."""
+    def restore(self, x: Floats, steps: int, full_range: int, is_open: bool) -> None:
+        """Continue from a state, of which each process has its planes."""
         for field in range(self.fields):
             self.session.put_planes(field, *self.own, x[field])
         self.dirty = (1 << self.fields) - 1
         self.saved = self._all()
-        self.steps, self.far, self.open = steps, far, is_open
+        self.steps, self.far, self.open = steps, full_range, is_open
         self._tell_time(steps)
 
     def saved_state(self) -> Floats:
-        """The own planes of the state that steps go on from."""
+        """Planes of this process at the last saved state, from which further steps continue."""
         return np.array([values[self.own[0] : self.own[1]] for values in self.saved])
 
 
@@ -394,13 +398,13 @@ def _part(path: Path) -> Path:
 
 
 def _objection(output: Path | None, checkpoints: Path | None, *, resume: bool) -> str:
-    """Why a run may not begin, or go on, with these files; "" where it may."""
+    """Reason why a run may not begin or continue with the existing files; "" if it may."""
     if checkpoints:
         return objection(checkpoints, output, resume=resume, how="resume=True")
     return objection_to_frames(_part(output)) if output else ""
 
 
-class _Shared:
+class _SharedArrayFile:
     """A ``.npy`` file of arrays (…, coordinates, *sizes) that all processes write and read their planes of."""
 
     def __init__(self, domain: _Domain, path: Path, shape: tuple[int, ...], *, new: bool) -> None:
@@ -411,9 +415,9 @@ class _Shared:
         domain.comm.barrier()
         with opened(path) as file:
             np.lib.format.read_magic(file)
-            stored, _, _ = np.lib.format.read_array_header_2_0(file)
+            stored_shape, _, _ = np.lib.format.read_array_header_2_0(file)
             self.start = file.tell()
-        if stored != shape:
+        if stored_shape != shape:
             raise ValueError(f"{path} does not hold arrays of this run")
         self.path = path
         mpi = _mpi()
@@ -425,12 +429,12 @@ class _Shared:
         return self.start + (block * planes + self.domain.planes[0]) * plane
 
     def write(self, k: int, x: Floats) -> None:
-        """The own planes of array k."""
+        """Write the planes of this process to array k."""
         for field, values in enumerate(x):
             self.file.Write_at_all(self._place(k * len(x) + field), np.ascontiguousarray(values))
 
     def read(self) -> Floats:
-        """The own planes of the first array."""
+        """Read the planes of this process from the first array."""
         if self.file.Get_size() < self.start + 8 * self.domain.fields * math.prod(self.domain.sizes):
             raise ValueError(f"{self.path} is shorter than a state of this run")
         first, end = self.domain.planes
@@ -455,7 +459,7 @@ class _Frames:
         if path.suffix != ".npy":
             raise ValueError(f"frames of processes go to files that end in .npy, not {str(path)!r}")
         self.part = _part(path)
-        self.file = _Shared(domain, self.part, shape, new=new)
+        self.file = _SharedArrayFile(domain, self.part, shape, new=new)
 
     def put(self, k: int) -> None:
         x = self.domain.state()
@@ -483,14 +487,14 @@ class _Frames:
         self.domain.comm.barrier()
 
 
-class _Kept:
+class _StoredState:
     """A state to go on from, in a file beside its description: two of them in turn, so that one is always whole."""
 
     def __init__(self, domain: _Domain, path: Path, run: Sequence[float]) -> None:
         self.domain, self.path = domain, path
         numbers = {name: float(v) for name, v in domain.values.items() if not callable(v) and np.ndim(v) == 0}
-        about = {"sizes": list(domain.sizes), "run": list(run), "parameters": numbers}
-        self.identity = {"solver": domain.lattice.solver.backend.identity, **about}
+        identity = {"sizes": list(domain.sizes), "run": list(run), "parameters": numbers}
+        self.identity = {"solver": domain.lattice.solver.backend.identity, **identity}
 
     def _file(self, count: int) -> Path:
         return self.path.with_name(f"{self.path.name}.{count % 2}.npy")
@@ -498,14 +502,14 @@ class _Kept:
     def save(self, energy: Sequence[float]) -> None:
         """Keep the state after so many frames, then say so."""
         domain, count = self.domain, len(energy)
-        shared = _Shared(domain, self._file(count), (domain.fields, *domain.sizes), new=True)
-        shared.write(0, domain.saved_state())
-        shared.close()
+        state_file = _SharedArrayFile(domain, self._file(count), (domain.fields, *domain.sizes), new=True)
+        state_file.write(0, domain.saved_state())
+        state_file.close()
         domain.comm.barrier()
         if domain.comm.rank == 0:
-            here = {"steps": domain.steps, "far": domain.far, "open": domain.open, "energy": list(energy)}
+            record = {"steps": domain.steps, "far": domain.far, "open": domain.open, "energy": list(energy)}
             with replacing(self.path) as file:
-                file.write(json.dumps({"identity": self.identity, **here}).encode())
+                file.write(json.dumps({"identity": self.identity, **record}).encode())
 
     def restored(self) -> list[float]:
         """Go on from what was kept; the energies of the frames before. Raises `ValueError` for that of another run."""
@@ -517,9 +521,9 @@ class _Kept:
         if saved["identity"] != self.identity:
             raise ValueError(f"{self.path} was stored by another run; remove it to start again")
         energy = [float(e) for e in saved["energy"]]
-        shared = _Shared(domain, self._file(len(energy)), (domain.fields, *domain.sizes), new=False)
-        domain.restore(shared.read(), saved["steps"], saved["far"], saved["open"])
-        shared.close()
+        state_file = _SharedArrayFile(domain, self._file(len(energy)), (domain.fields, *domain.sizes), new=False)
+        domain.restore(state_file.read(), saved["steps"], saved["far"], saved["open"])
+        state_file.close()
         return energy
 
     def _text(self) -> str:

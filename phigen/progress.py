@@ -65,8 +65,8 @@ _here = _Here()
 @contextmanager
 def watched(watcher: Watcher) -> Iterator[None]:
     """Within this context, ``watcher`` receives the stages of this thread."""
-    before, _here.watcher = _here.watcher, watcher
+    previous_watcher, _here.watcher = _here.watcher, watcher
     try:
         yield
     finally:
-        _here.watcher = before
+        _here.watcher = previous_watcher

@@ -95,11 +95,15 @@ def find(name: str) -> Target:
     if name in DEVICES:
         return DEVICES[name]
     if name not in TARGETS:
-        listed = {word: t.name for t in (*_LISTED, *DEVICES.values()) for word in (t.name, t.title.lower())}
+        names = {word: t.name for t in (*_LISTED, *DEVICES.values()) for word in (t.name, t.title.lower())}
         from difflib import get_close_matches
 
-        near = get_close_matches(name.lower(), listed, 1)
-        hint = f"did you mean {listed[near[0]]!r}?" if near else f"there are {', '.join((*TARGETS, *DEVICES))}"
+        similar_names = get_close_matches(name.lower(), names, 1)
+        hint = (
+            f"did you mean {names[similar_names[0]]!r}?"
+            if similar_names
+            else f"there are {', '.join((*TARGETS, *DEVICES))}"
+        )
         raise ValueError(f"unknown target {name!r}; {hint}")
     return TARGETS[name]
 
@@ -121,5 +125,5 @@ def loadable(targets: Iterable[str]) -> tuple[str, ...]:
 
 def target_of(files: Iterable[str], name: str) -> Target:
     """The target whose main file is among the files of a solver."""
-    present = set(files)
-    return next(target for target in _LISTED if f"{name}{target.suffixes[0]}" in present)
+    file_names = set(files)
+    return next(target for target in _LISTED if f"{name}{target.suffixes[0]}" in file_names)

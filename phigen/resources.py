@@ -42,10 +42,10 @@ def file_of(source: str) -> str:
     """Return the path itself if there is such a file, or if no bundled spec has that name; else the path of the
     bundled spec."""
     try:
-        there = Path(source).is_file()
+        exists = Path(source).is_file()
     except OSError:  # too long for a name
-        there = False
-    return source if there else str(bundled().get(source, source))
+        exists = False
+    return source if exists else str(bundled().get(source, source))
 
 
 def missing(source: str) -> Diagnostic:
@@ -61,12 +61,14 @@ def suggestion(source: str) -> str:
     path, names = Path(source), bundled()
     if path.stem in names:
         return f"did you mean {path.stem!r}? The bundled spec of that name needs neither folder nor suffix"
-    beside = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
-    if near := get_close_matches(path.name, beside, n=1) or [p for p in beside if Path(p).stem == path.name]:
-        return f"did you mean {str(path.with_name(near[0]))!r}?"
-    if near := get_close_matches(path.stem, names, n=3):
-        specs = "bundled specs" if len(near) > 1 else "a bundled spec"
-        return f"did you mean {' or '.join(map(repr, near))}? {'These are' if len(near) > 1 else 'It is'} {specs}"
+    neighbouring_files = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
+    if similar := get_close_matches(path.name, neighbouring_files, n=1) or [
+        p for p in neighbouring_files if Path(p).stem == path.name
+    ]:
+        return f"did you mean {str(path.with_name(similar[0]))!r}?"
+    if similar := get_close_matches(path.stem, names, n=3):
+        specs = "bundled specs" if len(similar) > 1 else "a bundled spec"
+        return f"did you mean {' or '.join(map(repr, similar))}? {'These are' if len(similar) > 1 else 'It is'} {specs}"
     return "phigen list shows the bundled specs; phigen new NAME writes a spec to start from"
 
 

@@ -100,11 +100,11 @@ class _Pending:
 
 
 def _make_folder(folder: Path, cleanup: ExitStack) -> None:
-    missing = []
+    missing_folders = []
     while not folder.exists() and folder != folder.parent:
-        missing.append(folder)
+        missing_folders.append(folder)
         folder = folder.parent
-    for new_folder in reversed(missing):
+    for new_folder in reversed(missing_folders):
         new_folder.mkdir(exist_ok=True)
         cleanup.callback(_remove_folder, new_folder)
 

@@ -117,7 +117,7 @@ class RowDrivers:
         return self.layout.row(ir.Entry(arrays, index))
 
     def copied_ends(self, arrays: ir.Value, number: int | ir.Value, *, near_ends: bool = False) -> ir.Call:
-        """Return the statement that copies the ends of a row beside it; of many rows each segment is a whole row."""
+        """Return the statement that copies the ends of a row to its halo; with many rows, a segment is a row."""
         begin, stop = (BEGIN, STOP) if near_ends else (FROM, TO)
         swept = (begin, stop) if self.layout.single_row else (ir.Constant(0), LENGTH)
         return ir.Call("ends", (self.first_of_row(arrays, number), LENGTH, *swept))

@@ -1,4 +1,4 @@
-"""Functions in lanes: which of them loops over lanes can call without leaving vector instructions."""
+"""Functions of SIMD lanes: those that a loop over lanes can call and still be compiled to vector instructions."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def sums_name(kernel: str) -> str:
 
 
 def transposed_sums_name(kernel: str) -> str:
-    """Return the name of the transpose of the function that sums, from the same kernel."""
+    """Return the name of the transpose of a summing function, from the kernel of one of the two functions."""
     return kernel.removesuffix("_a").removesuffix("_b") + "_back"
 
 
