@@ -351,7 +351,7 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
     label = f"{recorder.solver.interface.name}, order {recorder.solver.order}"
     with _disk_errors_as_interrupts(recorder), interruptible() as stop, console.progress(label, run.steps) as progress:
         see_tangent = growth.see if growth else None
-        flags = {"begun": recorder.watch.begun, "goes_on": experiment.has_part}
+        flags = {"is_started": recorder.watch.begun, "goes_on": experiment.has_part}
         pieces = march(session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent, **flags)
         if experiment.times is not None:
             pieces = _at_times(recorder, session, see_tangent)
