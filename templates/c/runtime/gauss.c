@@ -173,9 +173,13 @@ static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lane
     past->h = s->h;
     past->kicked = 0;
 #if PHI_FRAMED
+#if PHI_STAGED
     phi_lanes last[PHI_UNKNOWNS];
     memcpy(last, past->increments[older], sizeof last);
     phi_to_next_frame(s, end, last, past->increments[older]);
+#else
+    phi_to_next_frame(s, end, past->increments[older], past->increments[older]);
+#endif
     phi_to_next_frame(s, end, increments, past->increments[latest]);
 #if PHI_ADJOINT
     PHI_COPY_STAGES(past->solved, increments, past->solved);
