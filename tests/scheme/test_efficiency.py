@@ -14,9 +14,9 @@ FASTEST = {
     ("rigid_body", 4): "splitting", ("henon_heiles", 4): "splitting", ("henon_heiles", 8): "splitting",
     ("henon_heiles", 12): "gauss", ("so4_manakov", 4): "splitting", ("so4_manakov", 8): "gauss",
     ("kowalevski_top", 8): "splitting", ("kowalevski_top", 12): "gauss", ("pendulum", 8): "series",
-    ("maxwell_bloch", 4): "splitting",
+    ("maxwell_bloch", 4): "splitting", ("predator_prey", 4): "splitting", ("vortices3", 8): "gauss",
 }  # fmt: skip
-FAST = [("rigid_body", 4), ("henon_heiles", 8), ("henon_heiles", 12)]
+FAST = [("rigid_body", 4), ("henon_heiles", 8), ("henon_heiles", 12), ("predator_prey", 4)]
 
 
 def automatic(name, order, **more):
