@@ -40,8 +40,10 @@ class LatticeLoops:
         parameters = ("coef", "state", *["varied"] * sweep.is_tangent, "sites", *["colour"] * bool(self.step.by_colour))
         return self._over_sites(sweep.kernel, parameters, stores, sweep.gather, self._selection(sweep))
 
-    def _selection(self, sweep: Sweep) -> ir.Selection:
+    def _selection(self, sweep: Sweep | None) -> ir.Selection:
         coloured = self.step.sites.colours > 1
+        if sweep is None:
+            return ir.ALL_SITES
         return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window, sweep.first)
 
     def stage(self, kernel: Kernel) -> ir.Function:
@@ -76,28 +78,15 @@ class LatticeLoops:
         updates = (replace(s, adds=not kind, extreme=kind) for s, kind in zip(sums, kinds, strict=True))
         return self._over_ends(ends, kernel, parameters, updates)
 
-    def transposed_sweep(self, sweep: Sweep, kernel: Kernel) -> ir.Function:
-        """Return the transpose of a sweep, whose kernel is ``kernel``."""
-        stores = self._cotangents(kernel, sweep.gather.names if sweep.gather else ())
-        return self._over_sites(kernel, ("coef",), stores, sweep.gather, self._selection(sweep))
-
-    def transposed_stage(self, kernel: Kernel, gather: Gather | None) -> ir.Function:
-        """Return the transpose of a kernel of the equation of a stage; ``gather`` has the sums that it reads."""
-        stores = self._cotangents(kernel, gather.names if gather else ())
-        return self._over_sites(kernel, ("coef",), stores, gather)
-
-    def recomputing(
-        self, kernel: Kernel, sums: Sequence[str], fields: Sequence[str], colour: int | None = None
+    def transposed(
+        self, kernel: Kernel, gather: Gather | None, sweep: Sweep | None = None, fields: Sequence[str] = ()
     ) -> ir.Function:
-        """Return the transpose of a sweep or of a stage, for the sites of a colour.
+        """Return the transpose of a kernel of the equation of a stage, or of a ``sweep``.
 
-        It reads ``sums`` that are stored already, and recomputes ``fields`` before a sweep by the inverse flow.
+        ``gather`` has the sums that it reads; ``fields`` before the sweep are recomputed by the inverse flow.
         """
-        selection = ir.Selection(colour if self.step.sites.colours > 1 else None)
-        loop = ir.Loop(
-            "sites", (*self._reads(kernel, sums), *self._cotangents(kernel, sums, fields)), selection=selection
-        )
-        return _function(kernel, ("coef",), loop)
+        stores = self._cotangents(kernel, gather.names if gather else (), fields)
+        return self._over_sites(kernel, ("coef",), stores, gather, self._selection(sweep))
 
     def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
         """Return the transpose of the function that sums over bonds or pairs; ``kernel`` is the transposed kernel."""

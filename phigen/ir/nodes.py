@@ -535,6 +535,7 @@ _SUMMED = dict.fromkeys(("sums", "numbers"), Pointer(constant=False))
 TYPES: dict[str, ParameterType] = {
     "s": RecordType("solver"),
     "row": RecordType("row"),
+    "params": RecordType("params"),
     "coef": Pointer(),
     "out": Pointer(constant=False, restricted=True),
     **_NUMBERED,
@@ -570,9 +571,10 @@ class Function:
     types: tuple[tuple[str, ParameterType], ...] = ()
     returns: Type | None = None
 
-    def type_of(self, parameter: str) -> ParameterType:
-        """Return the type of a parameter on the level of memory."""
-        return {**TYPES, **dict(self.types)}[parameter]
+    @property
+    def known_types(self) -> dict[str, ParameterType]:
+        """The types of parameters on the level of memory, by their names."""
+        return {**TYPES, **dict(self.types)}
 
     def with_body(self, *body: Statement) -> Function:
         """Return the function with other statements."""

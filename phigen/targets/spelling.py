@@ -36,7 +36,7 @@ class Dialect:
     select: str = "{0} ? {1} : {2}"
     subscript: str = "{0}[{1}]"
     member: str = "{0}.{1}"
-    pointers: frozenset[str] = frozenset()  # addresses of records, unless the function declares the record
+    pointers: frozenset[str] = frozenset()  # parameters that are addresses of records
     links: frozenset[str] = frozenset()  # members that are addresses of records
     quote: str = '"{0}"'
 
@@ -53,9 +53,11 @@ class Spelling:
         called = _words("\n".join(dialect.language.functions.values()))
         self.scope = Scope(dialect.language.reserved | {*reserved, *called, *_fixed(body)})
         declarations = [s for s in statements(body) if isinstance(s, ir.Declare) and not s.in_place]
-        of_records = (s for s in declarations if isinstance(s.type, ir.RecordType) and not s.type.address)
-        records = {self.name(n) for s in of_records for n, _ in s.items}
-        self._pointers = dialect.pointers - records
+        self._pointers = set(dialect.pointers)
+        for s in declarations:
+            if isinstance(s.type, ir.RecordType):
+                change = self._pointers.update if s.type.address else self._pointers.difference_update
+                change(self.name(n) for n, _ in s.items)
         names = dict.fromkeys(name for s in declarations for name, _ in s.items)
         temporaries = (n for n in names if isinstance(n, Symbol) and n.kind == TEMPORARY)
         for k, temporary in enumerate(temporaries, 1):

@@ -21,9 +21,6 @@ _RUNTIME = (
     "ELEMENT", "BACK_PACKS", "FLOWS", "TERMS", "taylor_product", "taylor_chain", "taylor_power",
 )  # fmt: skip
 
-#: Names of addresses of records.
-_POINTERS = frozenset({"row", "s", "e", "group", "pack", "bar", "params_bar"})
-
 #: Types of integers.
 _INTEGERS = {ir.Type.INDEX: "ptrdiff_t", ir.Type.SIZE: "size_t", ir.Type.FLAG: "int"}
 
@@ -78,7 +75,8 @@ class CTypes:
 def function(printed: ir.Function, program: Program, linkage: str = "static") -> str:
     """Return a function of a solver as text, without its comment."""
     printer = _StatementPrinter.of(printed, program)
-    parameters = ", ".join(printer.types.parameter(p, printed.type_of(p), printer.spell) for p in printed.parameters)
+    types = printed.known_types
+    parameters = ", ".join(printer.types.parameter(p, types[p], printer.spell) for p in printed.parameters)
     returned = printer.types.value(printed.returns) if printed.returns else "void"
     head = f"{linkage} {returned} {program.name}_{printed.name}({parameters})"
     return "\n".join([f"{head}\n{{", *_indented(printer.lines(printed.body)), "}\n"])
@@ -111,7 +109,7 @@ def _spelling(printed: ir.Function, program: Program) -> Spelling:
         real.language(language),
         operators={"and": "&&", "or": "||", "not": "!", "index": "ptrdiff_t", "size": "size_t", "real": real.name},
         functions={**real.names(), **{function: f"{name}_{function}" for function in _RUNTIME}},
-        pointers=_POINTERS | {p for p in printed.parameters if p == "params"},
+        pointers=frozenset(p for p in printed.parameters if isinstance(printed.known_types.get(p), ir.RecordType)),
         links=frozenset({"s"}),
     )
     return Spelling(dialect, printed.parameters, printed.body)

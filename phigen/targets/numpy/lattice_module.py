@@ -129,7 +129,7 @@ def _transposes(loops: LatticeLoops, lowering: WholeArrays, kernels: Mapping[str
 
     def swept(sweep: Sweep) -> ir.Function:
         kernel = kernels[sweep.kernel.name + BACK]
-        return lowering.transposed_sweep(temporaries(loops.transposed_sweep(sweep, kernel)), sweep.moved)
+        return lowering.transposed_sweep(temporaries(loops.transposed(kernel, sweep.gather, sweep)), sweep.moved)
 
     def summed(gather: Gather) -> ir.Function:
         listed = [loops.transposed_sums(ends, kernels[ends.kernel.name + BACK]) for ends in gather.ends]
@@ -138,7 +138,7 @@ def _transposes(loops: LatticeLoops, lowering: WholeArrays, kernels: Mapping[str
     def staged(kernel: Kernel) -> ir.Function:
         seed = next(array for array in kernel.inputs if array.endswith("_bar"))
         gather = step.others.field if step.partners and kernel.inputs["gathered"] else None
-        return lowering.transposed_stage(temporaries(loops.transposed_stage(kernel, gather)), seed)
+        return lowering.transposed_stage(temporaries(loops.transposed(kernel, gather)), seed)
 
     sweeps = [sweep for part in step.parts for sweep in part]
     yield from map(function, identical([*map(swept, sweeps)]))

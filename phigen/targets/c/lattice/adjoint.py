@@ -274,7 +274,7 @@ class _Reverse:
         def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], recomputed: Sequence[str]) -> ir.Block:
             """Return the calls of a kernel, in each form."""
             sums, blocks = one.gather.names if one.gather else (), dict[str, ir.Block]()
-            on_sites = self.loops.sites.recomputing(kernel, sums, recomputed, one.sweep.colour if one.sweep else None)
+            on_sites = self.loops.sites.transposed(kernel, one.gather, one.sweep, recomputed)
             summed = len(sums) * any(o.name == "gathered_bar" for o in kernel.outputs)
             build = Transpose(
                 on_sites, one.seed, one.bars, tuple(listed), arrays, summed, one.taken, frozenset(recomputed)
