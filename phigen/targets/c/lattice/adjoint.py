@@ -58,7 +58,7 @@ from phigen.targets.c.language import members
 from phigen.targets.c.lattice.layout import Layout, layout_of
 from phigen.targets.c.lattice.loops import RowLoops, code
 from phigen.targets.c.lattice.loops import printed as loop_text
-from phigen.targets.c.lattice.sweep_functions import calls_of, driver_text, drivers
+from phigen.targets.c.lattice.sweep_functions import calls_of, drivers
 from phigen.targets.c.loops import commented
 from phigen.targets.c.real import rendered
 
@@ -194,9 +194,7 @@ class _Reverse:
             parameters = [*far, "v", "bar", "sums"] if back else ["bar", *["numbers"] * bool(step.partners)]
         parameters.insert(0, "flow" if step.by_colour else "part")
         build = self.row_drivers
-        return driver_text(
-            self.program, build.driver(name, title, parameters, [*cases.values()], [*cases], vectors=True)
-        )
+        return commented(build.driver(name, title, parameters, [*cases.values()], [*cases], vectors=True), self.program)
 
     def of_parts(self) -> Iterator[Back]:
         """Yield the two traversals of all sweeps of each part; one traversal if the next flow adds the

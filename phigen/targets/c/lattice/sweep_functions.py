@@ -41,7 +41,7 @@ from phigen.targets.c.lattice.loops import (
     observables,
     printed,
 )
-from phigen.targets.c.loops import commented, function
+from phigen.targets.c.loops import commented
 
 
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
@@ -81,11 +81,6 @@ def drivers(loops: RowLoops) -> RowDrivers:
     """Return the builder of the row drivers of a lattice."""
     by_hand = switches(loops.layout)["BY_HAND"]
     return RowDrivers(loops.layout, loops.layout.halo, may_be_empty=by_hand, one_loop=not loops.fast)
-
-
-def driver_text(program: Program, driver: ir.Function) -> str:
-    """Return the text of a driver, below its purpose."""
-    return f"/* {driver.doc}. */\n{function(driver, program)}"
 
 
 @dataclass(frozen=True)
@@ -157,7 +152,7 @@ class _PartLoops:
             for form in sorted(forms):
                 title = f"The flow of H_{k + 1}" + ", with full-range functions" * (form == "_far")
                 case = self._segment(k, {form: forms[form]}, names)
-                yield driver_text(program, build.driver(f"rows{k + 1}{form}", title, ["coef"], [case]))
+                yield commented(build.driver(f"rows{k + 1}{form}", title, ["coef"], [case]), program)
             arguments = (S, COEF, ir.fixed("first"), ir.fixed("end"))
             blocks: dict[str, ir.Block] = {form: (ir.Call(f"rows{k + 1}{form}", arguments),) for form in forms}
             cases.append(row_drivers.in_forms(blocks))
@@ -165,7 +160,7 @@ class _PartLoops:
             yield self._gathering(step.relative.remainder)
         title = "a flow" if coloured else "the flow of a part of H"
         title = f"How {title} carries a tangent vector" if self.varied else title[0].upper() + title[1:]
-        yield driver_text(program, build.driver(name, title, parameters, cases, threads=threads))
+        yield commented(build.driver(name, title, parameters, cases, threads=threads), program)
 
     def _gathering(self, remainder: int) -> str:
         """Return the driver of the sums over pairs of bodies in relative coordinates."""
@@ -178,7 +173,7 @@ class _PartLoops:
         name = "gather_tangent_rows" if self.varied else "gather_rows"
         title = "The sums over other bodies" + ", and their variations" * self.varied
         case = RowSegment(calls, tuple(setup))
-        return driver_text(program, drivers(self.loops).driver(name, title, ["coef", *["v"] * self.varied], [case]))
+        return commented(drivers(self.loops).driver(name, title, ["coef", *["v"] * self.varied], [case]), program)
 
     def _calls_of_part(self, part: Sequence[Sweep]) -> Calls:
         """Return the calls for a row segment that make the flow of a part of H, in each form.
@@ -367,7 +362,7 @@ def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end:
     far = rows is not None and bool(rows.limited)
     parameters = ["coef", *["far"] * far, "y", *["v"] * varied, "to"]
     name = "stage_piece" if end else f"{kernel.name}_piece"
-    yield driver_text(program, drivers(loops).driver(name, _TITLES[kernel.role], parameters, [case], alone=True))
+    yield commented(drivers(loops).driver(name, _TITLES[kernel.role], parameters, [case], alone=True), program)
 
 
 _TITLES = {
