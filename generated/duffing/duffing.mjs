@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ea3c41a948bedae0367dbdf1c6b0e5f7264826e382571fd45d661c7d6a071b73
+ * body-sha256: 8c7ba6520fd8c0c430b8e343d0941704ac510fc0241952844ae7e8045e6ee2d4
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -431,7 +431,7 @@ export class Solver {
 
   /** Replace the state by x + carry. */
   #place(x, carry) {
-    moveHistory(this, x);
+    shiftHistory(this, x);
     this.x.set(x);
     this.carry.set(carry);
     return this;
@@ -625,8 +625,8 @@ function clearHistory(solver, stage) {
 }
 
 /** Shift the predictors of all stages with the state, to x. */
-function moveHistory(solver, x) {
-  for (const history of solver.history) history.move(solver.x, x);
+function shiftHistory(solver, x) {
+  for (const history of solver.history) history.shift(solver.x, x);
 }
 
 /** Set y to the value that the predictor gives for the next solution, or to x if it gives none. */
@@ -659,7 +659,7 @@ class History {
    * @param {Float64Array} from
    * @param {Float64Array} to
    */
-  move(from, to) {
+  shift(from, to) {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
   }
 

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: da8504c4223520cd9b617b6fec834dcccf076964360a136c82d3bc11ffaeffb3
+ * body-sha256: 93479381e53931e9433b628b3b203c6a3a92afbe647da77bf85e4d12137080d7
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -731,7 +731,7 @@ export class Solver {
 
   /** Replace the state by x + carry. */
   #place(x, carry) {
-    moveHistory(this, x);
+    shiftHistory(this, x);
     this.x.set(x);
     this.carry.set(carry);
     return this;
@@ -910,8 +910,8 @@ function clearHistory(solver, stage) {
 }
 
 /** Shift the predictors of all stages with the state, to x. */
-function moveHistory(solver, x) {
-  for (const history of solver.history) history.move(solver.x, x);
+function shiftHistory(solver, x) {
+  for (const history of solver.history) history.shift(solver.x, x);
 }
 
 /** Set y to the value that the predictor gives for the next solution, or to x if it gives none. */
@@ -944,7 +944,7 @@ class History {
    * @param {Float64Array} from
    * @param {Float64Array} to
    */
-  move(from, to) {
+  shift(from, to) {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
   }
 

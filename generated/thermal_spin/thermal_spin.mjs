@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d0178252b92d95f97c1f172260fd72355bc3b7e256b0ed33895ce6eb6aeca249
+ * body-sha256: b6085e2797c5be0ac66f53e1a8cc9d19e7d9c2be4a1c9005fef01bc594ea41d7
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -537,7 +537,7 @@ export class Solver {
 
   /** Replace the state by x + carry. */
   #place(x, carry) {
-    moveHistory(this, x);
+    shiftHistory(this, x);
     this.x.set(x);
     this.carry.set(carry);
     return this;
@@ -838,8 +838,8 @@ function clearHistory(solver, stage) {
 }
 
 /** Shift the predictors of all stages with the state, to x. */
-function moveHistory(solver, x) {
-  for (const history of solver.history) history.move(solver.x, x);
+function shiftHistory(solver, x) {
+  for (const history of solver.history) history.shift(solver.x, x);
 }
 
 /** Set y to x: solutions of steps with noise cannot be predicted. */
@@ -872,7 +872,7 @@ class History {
    * @param {Float64Array} from
    * @param {Float64Array} to
    */
-  move(from, to) {
+  shift(from, to) {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
   }
 

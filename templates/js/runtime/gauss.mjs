@@ -35,7 +35,7 @@ export class History {
   }
 
   /** Clear the predictor, after the state has been changed. */
-  move() {
+  shift() {
     this.clear();
   }
 

@@ -67,8 +67,8 @@ export function linearised(coef, x, y, side, sizes, sites) {
 }
 
 /** Solution y of a stage by Newton's method; null if there is none near x. */
-export function byNewton(coef, x, guess, sites) {
-  const y = Float64Array.from(guess);
+export function byNewton(coef, x, prediction, sites) {
+  const y = Float64Array.from(prediction);
   const image = new Float64Array(y.length);
   relax(coef, x, x, sites, image);
   const far = PLAUSIBLE * (total(x) + total(image.map((v, k) => v - x[k])));

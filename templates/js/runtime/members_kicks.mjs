@@ -1,5 +1,5 @@
 import { finite } from "./errors.mjs";
-import { moveHistory } from "./history_shifted.mjs";
+import { shiftHistory } from "./history_shifted.mjs";
 import { takeLevel } from "./level_of_new_state.mjs";
 import { restartAttitude } from "./attitude_gauge.mjs";
 import { DIM } from "./model.mjs";
@@ -39,7 +39,7 @@ export class Kicks {
   /** Replace the state by x + carry. */
   #place(x, carry) {
     takeLevel(this, x);
-    moveHistory(this, x);
+    shiftHistory(this, x);
     this.x.set(x);
     this.carry.set(carry);
     restartAttitude(this);

@@ -30,7 +30,7 @@ export class History {
    * @param {Float64Array} from
    * @param {Float64Array} to
    */
-  move(from, to) {
+  shift(from, to) {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
   }
 

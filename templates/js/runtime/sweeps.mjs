@@ -42,8 +42,8 @@ export function solved(change, before, first) {
 }
 
 /** Solution y of a stage by fixed-point sweeps from a prediction; null on failure. */
-function bySweeps(coef, x, guess, sites) {
-  let y = guess;
+function bySweeps(coef, x, prediction, sites) {
+  let y = prediction;
   let before = 0;
   for (let sweeps = 1; sweeps <= MOST_SWEEPS; sweeps++) {
     const next = new Float64Array(y.length);
@@ -87,14 +87,14 @@ export function makeStep(solver) {
     // #if TIMED
     sites.t = solver.t + MOMENTS[stage] * solver.h;
     // #endif
-    const guess = Float64Array.from(x);
+    const prediction = Float64Array.from(x);
     for (const difference of predictor.differences.slice(0, predictor.order)) {
-      for (let k = 0; k < guess.length; k++) guess[k] += difference[k];
+      for (let k = 0; k < prediction.length; k++) prediction[k] += difference[k];
     }
-    let y = past.stiff ? null : bySweeps(coef, x, guess, sites);
+    let y = past.stiff ? null : bySweeps(coef, x, prediction, sites);
     if (y === null) { // Newton's method from here on
       past.stiff = true;
-      y = byNewton(coef, x, guess, sites);
+      y = byNewton(coef, x, prediction, sites);
     }
     if (y === null) return "NO_CONVERGENCE";
     predictor.order = remember(predictor.differences, y.map((v, k) => v - x[k]));
