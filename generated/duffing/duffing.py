@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 3039f7dcb8382d32a7d321d9a41521d45faba65475b888cca264fdd531a45a04
+# body-sha256: d49bb4fa4b3085d81a05fa485abfecb26445a6cb48f25d4d6fe7f43885429c28
 import numpy as np
 
 VERSION = "0.1.0"
@@ -285,13 +285,13 @@ def _advance(stage, x, carry, memory):
     """Make one stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
     prediction = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, prediction)
-    guessed = memory[0].any(axis=-1)
-    failed = np.flatnonzero((status != "") & guessed)
+    predicted = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & predicted)
     if len(failed):
         # A prediction may be bad: repeat from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
-    return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
+    return following, rest, (y - x, np.where(predicted[:, np.newaxis], memory[0], y - x)), status
 
 
 def _choose_gauge(parameters, x):

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: dfff061b387d3241af869854c8a8a518921b1b352b128d7313c28037fcea9d45
+# body-sha256: cfaccc4a9ded53561e927775e770c231f449a1d4c91348b236dde200c686e599
 import numpy as np
 
 VERSION = "0.1.0"
@@ -531,13 +531,13 @@ def _attempt(coef, x, carry, p):
 def _advance(stage, x, carry, memory):
     """Make one stage of all members; `memory` holds the last two p, for the predictor."""
     following, rest, p, status = _solved(stage, x, carry, 2 * memory[0] - memory[1])
-    guessed = memory[0].any(axis=-1)
-    failed = np.flatnonzero((status != "") & guessed)
+    predicted = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & predicted)
     if len(failed):
         # A prediction may be bad: repeat from p = 0.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], np.zeros_like(x[failed]))
         following[failed], rest[failed], p[failed], status[failed] = again
-    return following, rest, (p, np.where(guessed[:, np.newaxis], memory[0], p)), status
+    return following, rest, (p, np.where(predicted[:, np.newaxis], memory[0], p)), status
 
 
 def _choose_gauge(parameters, x):

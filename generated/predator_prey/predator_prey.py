@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 08f11bf53f727bd22b2a0b2a46584e7d72c028106ffb849cec116c68b401c59f
+# body-sha256: e4fb0e111a67f6c4ff6ad19cc8e14140de6132d77c82c0c79508159de63819f5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -279,13 +279,13 @@ def _advance(stage, x, carry, memory):
     """Make one stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
     prediction = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, prediction)
-    guessed = memory[0].any(axis=-1)
-    failed = np.flatnonzero((status != "") & guessed)
+    predicted = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & predicted)
     if len(failed):
         # A prediction may be bad: repeat from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
-    return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
+    return following, rest, (y - x, np.where(predicted[:, np.newaxis], memory[0], y - x)), status
 
 
 def _choose_gauge(parameters, x):

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 535e26e93fb400492a78c5985c4840301005a3cf8dbf2bc4c1aa4a62593cd4c9
+# body-sha256: dc53e959cb5de9d2a758be31ce66e58d8052b5294c0ff942e497d8571ec9ce5e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -882,13 +882,13 @@ def _attempt(coef, x, carry, p):
 def _advance(stage, x, carry, memory):
     """Make one stage of all members; `memory` holds the last two p, for the predictor."""
     following, rest, p, status = _solved(stage, x, carry, 2 * memory[0] - memory[1])
-    guessed = memory[0].any(axis=-1)
-    failed = np.flatnonzero((status != "") & guessed)
+    predicted = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & predicted)
     if len(failed):
         # A prediction may be bad: repeat from p = 0.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], np.zeros_like(x[failed]))
         following[failed], rest[failed], p[failed], status[failed] = again
-    return following, rest, (p, np.where(guessed[:, np.newaxis], memory[0], p)), status
+    return following, rest, (p, np.where(predicted[:, np.newaxis], memory[0], p)), status
 
 
 def _choose_gauge(parameters, x):

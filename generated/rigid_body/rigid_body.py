@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: fbac6daa7e2d1768dc6056118666a46dc2e36e2ba7328126ffb88af492791822
+# body-sha256: 7cabb983711bae43de3db5fdbf7e0a13942ea78097ad773cdce8f41cb79bcc7c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -531,13 +531,13 @@ def _advance(stage, x, carry, memory):
     """Make one stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
     prediction = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, prediction)
-    guessed = memory[0].any(axis=-1)
-    failed = np.flatnonzero((status != "") & guessed)
+    predicted = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & predicted)
     if len(failed):
         # A prediction may be bad: repeat from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
-    return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
+    return following, rest, (y - x, np.where(predicted[:, np.newaxis], memory[0], y - x)), status
 
 
 SAMPLES = 32  # number of states along a short piece of the trajectory
