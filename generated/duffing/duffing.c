@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 4729dada9f1b23744b14beed591f0bb70f2f4a4587c16eb5a44838cd79cb4cf3
+ * body-sha256: 4db280a6ddb49c121ea5267bda887976cd6f6baccde77c09e72f2bae7b394736
  */
 #include "duffing.h"
 #include <float.h>
@@ -380,7 +380,6 @@ duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM])
     memcpy(from, s->x, sizeof from);
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
-    /* shift the predictors with the state */
     for (int i = 0; i < duffing_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
     return duffing_OK;
 }

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 1dc40e008e0b68daa73b6276cc1584a257dcfff7b511c3ca0734d1e68d4263fc
+ * body-sha256: 1b17a8fa5615e2e4b2cf38b4d4e1fd1be049cdb4f627afea4d05cbd01e3ecbeb
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -688,7 +688,6 @@ guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const d
     memcpy(from, s->x, sizeof from);
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
-    /* shift the predictors with the state */
     for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
         for (int i = 0; i < guiding_centre_DIM; ++i) s->history[stage].difference[0][i] += s->x[i] - from[i];
     return guiding_centre_OK;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 554b2e90b8b1f91fa79ce99343271bd71f7561112217108a0bb81bd37bb0e0a9
+ * body-sha256: 5892ee4fb5c25c70ff19c0ab7c8ca998e0e51651b0a72e8b244c53be4e039ea4
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -349,7 +349,6 @@ predator_prey_status predator_prey_set_state(predator_prey_solver *s, const doub
     memcpy(from, s->x, sizeof from);
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
-    /* shift the predictors with the state */
     for (int i = 0; i < predator_prey_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
     return predator_prey_OK;
 }

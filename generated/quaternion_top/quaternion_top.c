@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: f5e6f443ab425483dc1b544426c57fbba0ce61df7f2768dcaae5fbf009fa7d16
+ * body-sha256: a7561c03563008f0e66ee1043fd99f0f68e98fc33911ccae6c1c62cf3a576670
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -926,7 +926,6 @@ quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const d
     memcpy(from, s->x, sizeof from);
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
-    /* shift the predictors with the state */
     for (int i = 0; i < quaternion_top_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
     return quaternion_top_OK;
 }

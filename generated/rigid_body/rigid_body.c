@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: several steps or members at once; Newton's method in
  *   lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members:
  *   implicit steps; Ensembles
- * body-sha256: d18e8f83beb5e5c1d35f984ca1df4b56e7325d15095621a57429f833f43475b3
+ * body-sha256: 852a3a0cf2492a44e1b5e5b9cec3928c9356c216d4780d5ad2efbd7ec2c4f27a
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -464,10 +464,10 @@ static double rigid_body_missed(const double *value, double (*weight)[8])
     enum { AHEAD = rigid_body_AHEAD, WINDOW = rigid_body_WINDOW, CHECKS = rigid_body_CHECKS };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
+        double predicted[8] = { 0.0 };
         for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+            for (int l = 0; l < 8; ++l) predicted[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(predicted[l] - value[i + WINDOW + l]));
     }
     return most;
 }
@@ -523,11 +523,11 @@ static int rigid_body_train(rigid_body_history *history, int component)
 
 /* Whether a prediction is near the state. Far away the equation of a step has solutions unrelated to the
    motion. */
-static int rigid_body_near(const double guess[rigid_body_DIM], const double last[rigid_body_DIM])
+static int rigid_body_near(const double predicted[rigid_body_DIM], const double last[rigid_body_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < rigid_body_DIM; ++i) {
-        distance += fabs(guess[i] - last[i]);
+        distance += fabs(predicted[i] - last[i]);
         size += fabs(last[i]);
     }
     return distance <= rigid_body_REACH * size;
@@ -564,7 +564,7 @@ static int rigid_body_predict(const rigid_body_history *history, double value[ri
 /* Select the predictor that would have been best for a solution that took several iterations. */
 static void rigid_body_judge(rigid_body_history *history, const double value[rigid_body_DIM])
 {
-    double row[rigid_body_HISTORY + 1][rigid_body_DIM], guess[rigid_body_DIM], least = HUGE_VAL,
+    double row[rigid_body_HISTORY + 1][rigid_body_DIM], predicted[rigid_body_DIM], least = HUGE_VAL,
         fitted = HUGE_VAL;
     const int rows = history->count < rigid_body_HISTORY ? history->count : rigid_body_HISTORY;
     memcpy(row[0], value, sizeof row[0]);
@@ -580,9 +580,9 @@ static void rigid_body_judge(rigid_body_history *history, const double value[rig
         }
     }
     history->use_recurrence = history->recurrence_terms > 0;
-    if (history->use_recurrence && rigid_body_predict(history, guess)) {
+    if (history->use_recurrence && rigid_body_predict(history, predicted)) {
         fitted = 0.0;
-        for (int i = 0; i < rigid_body_DIM; ++i) fitted += fabs(value[i] - guess[i]);
+        for (int i = 0; i < rigid_body_DIM; ++i) fitted += fabs(value[i] - predicted[i]);
     }
     history->use_recurrence = history->recurrence_terms > 0 && fitted <= least;
     if (history->extrapolation_order == 0) history->extrapolation_order = 1;
@@ -903,7 +903,7 @@ static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h,
    would have had past values that differ by the change of the state and by the difference of the slopes.
    Recurrences are dropped, as they were fitted to the former motion. After a large change, the next step
    clears the predictors. */
-static void rigid_body_move_guesses(rigid_body_solver *s, const double from[rigid_body_DIM])
+static void rigid_body_shift_predictors(rigid_body_solver *s, const double from[rigid_body_DIM])
 {
     double distance = 0.0, size = 0.0, before[rigid_body_DIM], slope[rigid_body_DIM];
     for (int i = 0; i < rigid_body_DIM; ++i) {
@@ -935,7 +935,7 @@ rigid_body_status rigid_body_set_state(rigid_body_solver *s, const double x[rigi
     memcpy(from, s->x, sizeof from);
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
-    rigid_body_move_guesses(s, from);
+    rigid_body_shift_predictors(s, from);
     return rigid_body_OK;
 }
 
@@ -945,7 +945,7 @@ rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigi
     double from[rigid_body_DIM];
     memcpy(from, s->x, sizeof from);
     if (!rigid_body_advance(s, change, s->carry)) return rigid_body_BAD_ARGUMENT;
-    rigid_body_move_guesses(s, from);
+    rigid_body_shift_predictors(s, from);
     return rigid_body_OK;
 }
 
@@ -2071,6 +2071,20 @@ static rigid_body_status rigid_body_group_run(const rigid_body_members *all, siz
     return result;
 }
 
+/* Report a failure as the result, unless an earlier member has failed. */
+static void rigid_body_report_first(rigid_body_status status, size_t m, size_t *earliest,
+    rigid_body_status *result)
+{
+    if (status == rigid_body_OK) return;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+    if (m < *earliest) {
+        *earliest = m;
+        *result = status;
+    }
+}
+
 /* ---- Ensembles ---- */
 /* Integrate all members. Returns the first status that is not OK. */
 static rigid_body_status rigid_body_run(const rigid_body_members *all)
@@ -2081,15 +2095,7 @@ static rigid_body_status rigid_body_run(const rigid_body_members *all)
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < all->members; first += rigid_body_GROUP) {
-        const rigid_body_status group = rigid_body_group_run(all, first);
-        if (group == rigid_body_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            result = group;
-        }
+        rigid_body_report_first(rigid_body_group_run(all, first), first, &earliest, &result);
     }
     return result;
 }

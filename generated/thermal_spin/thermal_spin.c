@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 9a85f95befe7e73bdcb1838dd4f56392f2c980b11c290d1bdbf81449815b4c6c
+ * body-sha256: 6a8963c1d3d63fed06883c2dd1a1a4a907548fe0c81c65e19c618c7ba52c9703
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -521,6 +521,20 @@ const char *thermal_spin_status_string(thermal_spin_status status)
 size_t thermal_spin_solver_size(void) { return sizeof(thermal_spin_solver); }
 size_t thermal_spin_solver_steps_done(const thermal_spin_solver *s) { return s->steps; }
 
+/* Report a failure as the result, unless an earlier member has failed. */
+static void thermal_spin_report_first(thermal_spin_status status, size_t m, size_t *earliest,
+    thermal_spin_status *result)
+{
+    if (status == thermal_spin_OK) return;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+    if (m < *earliest) {
+        *earliest = m;
+        *result = status;
+    }
+}
+
 /* ---- Ensembles ---- */
 thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
@@ -540,14 +554,7 @@ thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, 
         if (ended == thermal_spin_OK) ended = thermal_spin_integrate(&s, h, steps);
         for (size_t i = 0; i < thermal_spin_DIM; ++i) x[i * members + m] = s.x[i];
         if (status != NULL) status[m] = (unsigned char)ended;
-        if (ended == thermal_spin_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (m < earliest) {
-            earliest = m;
-            result = ended;
-        }
+        thermal_spin_report_first(ended, m, &earliest, &result);
     }
     return result;
 }

@@ -179,11 +179,11 @@ STATE = (
     ),
     StateBlock(
         "history",
-        "GUESSED",
+        "PREDICTED",
         ("phi_history PHI_OF(history, PHI_STAGES); /* predictor of the starting value of the iteration */",),
     ),
     StateBlock("steps", "GAUSS", copied=("twin.history = this.history.map((history) => history.copy());",)),
-    StateBlock("forgotten", "GUESSED && !GAUSS", reset=("PHI_FORGET(s->history);",)),
+    StateBlock("forgotten", "PREDICTED && !GAUSS", reset=("PHI_FORGET(s->history);",)),
     StateBlock(
         "recurrence",
         "RECURRENCES",

@@ -166,7 +166,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
         if has["EACH"]:
             batch = 1 if step.kind.flows else LANES * _packs_back(lanes, has)
             sizes.append(("TRAIL_EACH", trail * max(1, batch), "the same for a batch of members"))
-    if has["GUESSED"] and not has["RECURRENCES"] and not has["GAUSS"]:
+    if has["PREDICTED"] and not has["RECURRENCES"] and not has["GAUSS"]:
         predictor = PredictorPolicy()
         sizes.append(("DIFFERENCES", predictor.differences, "for the predictor; more would amplify rounding"))
     sizes += text_of(program).declared(step, lanes)

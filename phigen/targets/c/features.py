@@ -11,7 +11,7 @@ from phigen.targets.c.lanes import grouped
 from phigen.targets.features import Feature
 
 FEATURES = (
-    Feature("GUESSED", lambda p: p.step.kind.predicted and not p.noise),
+    Feature("PREDICTED", lambda p: p.step.kind.predicted and not p.noise),
     Feature("DEVICE", lambda p: False),  # of `phigen.targets.device`
     Feature("COMMON", lambda p: False),  # of `phigen.targets.device` too
     Feature("SINGLE", lambda p: p.single),
@@ -24,7 +24,7 @@ FEATURES = (
     Feature("EACH", lambda p: not p.noise, ("ENSEMBLE",), "members"),
     Feature("ATTITUDES", requires=("ATTITUDE", "ENSEMBLE")),
     Feature("GAUGE_SEARCH", requires=("GAUGE",), part="gauge-search"),
-    Feature("RECURRENCES", lambda p: p.step.kind.implicit, ("GUESSED",), "recurrences"),
+    Feature("RECURRENCES", lambda p: p.step.kind.implicit, ("PREDICTED",), "recurrences"),
 )
 
 

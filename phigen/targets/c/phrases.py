@@ -90,7 +90,7 @@ ORDERS = Choice(
 
 VALUES = Choice(
     "The value of the unknown of a stage in the step that was made last, and the arguments of its predictor.",
-    ("RECURRENCES", "GUESSED"),
+    ("RECURRENCES", "PREDICTED"),
     {
         "LAST_VALUE": (
             "PHI_OF(s->history, stage).past[PHI_OF(s->history, stage).count - 1]",
@@ -623,7 +623,7 @@ DEVICE_NOISE = Choice(
 
 DEVICE_MEMORY = Choice(
     "Shared memory of a device that the predictors of a work item use.",
-    ("GUESSED && !GAUSS",),
+    ("PREDICTED && !GAUSS",),
     {
         "LENT_MEMORY": ("PHI_SHARED_ARRAY double memory[PHI_LENT * PHI_GROUP];", ""),
         "LEND(s)": ("phi_lend(s, memory);", ""),
@@ -661,9 +661,23 @@ SWEEPS = Choice(
     },
 )
 
+_SHIFT = "for (int i = 0; i < PHI_DIM; ++i) {}.difference[0][i] += s->x[i] - from[i];"
+SHIFTED = Choice(
+    "The shift of the predictors with the state, if this is set or kicked.",
+    ("RECURRENCES", "PREDICTED && !GAUSS && COMPOSED", "PREDICTED && !GAUSS"),
+    {
+        "SHIFT_PREDICTORS(s, from)": (
+            "phi_shift_predictors(s, from);",
+            f"PHI_EACH_STAGE {_SHIFT.format('s->history[stage]')}",
+            _SHIFT.format("s->history"),
+            "",
+        )
+    },
+)
+
 PREDICTORS = Choice(
     "Each stage has a predictor of its own, if there are any.",
-    ("GUESSES",),
+    ("SWEEP_PREDICTORS",),
     {"AND_PREDICTOR": ("PHI_AND_STAGE", "")},
 )
 
@@ -713,6 +727,7 @@ ALL = (
     STAGE_PREDICTORS,
     SWEEPS,
     PREDICTORS,
+    SHIFTED,
     MEMORY,
     DEVICE_STARTS,
     DEVICE_COEFFICIENTS,

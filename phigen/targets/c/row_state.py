@@ -156,7 +156,7 @@ LATTICE = (
     ),
     StateBlock(
         "predictor",
-        "SERIES && GUESSES",
+        "SERIES && SWEEP_PREDICTORS",
         ("phi_predictor PHI_OF(predictor, PHI_STAGES); /* predictor of each stage */",),
         reset=(
             "PHI_EACH_STAGE",

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "attitude.c"
+#include "first_failure.c"
 #include "members.c"
 #include "model.h"
 #include "noise.c"
@@ -67,15 +68,7 @@ phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *a
 #pragma omp parallel for schedule(dynamic, 16)
 #endif
     for (size_t m = 0; m < members; ++m) {
-        const phi_status member = phi_turn_member(&all, m);
-        if (member == PHI_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (m < earliest) {
-            earliest = m;
-            worst = member;
-        }
+        phi_report_first(phi_turn_member(&all, m), m, &earliest, &worst);
     }
     return worst;
 }

@@ -8,6 +8,7 @@
 #include "members.c"
 #include "solver.c"
 #include "attitudes.c"
+#include "first_failure.c"
 
 #if PHI_EACH || PHI_NOISE
 /* ---- Ensembles ---- */
@@ -22,15 +23,7 @@ static phi_status phi_run(const phi_members *all)
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < all->members; first += PHI_GROUP) {
-        const phi_status group = phi_group_run(all, first);
-        if (group == PHI_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            result = group;
-        }
+        phi_report_first(phi_group_run(all, first), first, &earliest, &result);
     }
     return result;
 }
@@ -91,14 +84,7 @@ phi_status PHI_ENSEMBLE_OF(const phi_params *params, double *x, size_t members P
         for (size_t i = 0; i < PHI_DIM; ++i) x[i * members + m] = s.x[i];
         if (status != NULL) status[m] = (unsigned char)ended;
 #if PHI_NOISE
-        if (ended == PHI_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (m < earliest) {
-            earliest = m;
-            result = ended;
-        }
+        phi_report_first(ended, m, &earliest, &result);
 #else
         if (result == PHI_OK) result = ended;
 #endif

@@ -50,7 +50,7 @@ static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *tape P
     }
     s->side = NULL;
     if (status != PHI_OK) return PHI_SINGULAR;
-#if PHI_GUESSES
+#if PHI_SWEEP_PREDICTORS
     phi_remember(s, side PHI_AND_STAGE, now);
 #endif
     memcpy(m, s->y[now], sizeof *m * PHI_DIM);

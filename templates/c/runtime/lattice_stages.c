@@ -150,7 +150,7 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
 #if PHI_ADJOINT
         if (tape != NULL) tape = phi_store_stage(s, now, tape);
 #endif
-#if PHI_GUESSES
+#if PHI_SWEEP_PREDICTORS
         phi_remember(s, s->x PHI_AND_STAGE, now);
 #endif
         PHI_EACH_PIECE

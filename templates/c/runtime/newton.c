@@ -35,7 +35,7 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
     double y[PHI_DIM], delta[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM];
     double jacobian[PHI_DIM * PHI_DIM], slope[PHI_DIM * PHI_DIM];
     double previous = HUGE_VAL;
-#if PHI_GUESSED
+#if PHI_PREDICTED
     if (!phi_predict(&PHI_OF(s->history, stage), y)) PHI_COPY(y, s->x, y, PHI_DIM);
 #else
     PHI_COPY(y, s->x, y, PHI_DIM);

@@ -119,7 +119,7 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
     const double *coef = PHI_OF(s->coef, stage);
     double p[PHI_DIM], y[PHI_DIM], residual[PHI_DIM], change[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], previous = HUGE_VAL;
-#if PHI_GUESSED
+#if PHI_PREDICTED
     if (!phi_predict(&PHI_OF(s->history, stage), y)) PHI_COPY(y, s->x, y, PHI_DIM);
 #else
     PHI_COPY(y, s->x, y, PHI_DIM);

@@ -16,7 +16,7 @@
 phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
 {
     if (s == NULL || x == NULL || !phi_finite(x, PHI_DIM)) return PHI_BAD_ARGUMENT;
-#if PHI_GUESSED && !PHI_GAUSS || PHI_MONITOR
+#if PHI_PREDICTED && !PHI_GAUSS || PHI_MONITOR
     double from[PHI_DIM];
     memcpy(from, s->x, sizeof from);
 #endif
@@ -27,14 +27,9 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
     PHI_TAKE_LEVEL(s, from)
-#if PHI_RECURRENCES
-    phi_move_guesses(s, from);
-#elif PHI_GAUSS
+    PHI_SHIFT_PREDICTORS(s, from)
+#if PHI_GAUSS
     memset(&s->history, 0, sizeof s->history);
-#elif PHI_GUESSED
-    /* shift the predictors with the state */
-    PHI_EACH_STAGE
-        for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif
     phi_renew_rate(s);
     return PHI_OK;
@@ -43,7 +38,7 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
 phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
 {
     if (s == NULL || change == NULL) return PHI_BAD_ARGUMENT;
-#if PHI_GUESSED && !PHI_GAUSS || PHI_MONITOR
+#if PHI_PREDICTED && !PHI_GAUSS || PHI_MONITOR
     double from[PHI_DIM];
     memcpy(from, s->x, sizeof from);
 #endif
@@ -53,13 +48,9 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
 #endif
     if (!phi_advance(s, change, s->carry)) return PHI_BAD_ARGUMENT;
     PHI_TAKE_LEVEL(s, from)
-#if PHI_RECURRENCES
-    phi_move_guesses(s, from);
-#elif PHI_GAUSS
+    PHI_SHIFT_PREDICTORS(s, from)
+#if PHI_GAUSS
     s->history.kicked = 1; /* the increments of the last step still predict those of the next one */
-#elif PHI_GUESSED
-    PHI_EACH_STAGE
-        for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif
     phi_renew_rate(s);
     return PHI_OK;

@@ -11,7 +11,7 @@
 /* Shift the predictors with the state, for as many past values as the extrapolation needs: a motion through x would
    have had past values that differ by the change of the state and by the difference of the slopes. Recurrences are
    dropped, as they were fitted to the former motion. After a large change, the next step clears the predictors. */
-static void phi_move_guesses(phi_solver *s, const double from[PHI_DIM])
+static void phi_shift_predictors(phi_solver *s, const double from[PHI_DIM])
 {
     double distance = 0.0, size = 0.0, before[PHI_DIM], slope[PHI_DIM];
     for (int i = 0; i < PHI_DIM; ++i) {

@@ -7,11 +7,11 @@
 #include "predictor_policy.h"
 
 /* Whether a prediction is near the state. Far away the equation of a step has solutions unrelated to the motion. */
-static int phi_near(const double guess[PHI_DIM], const double last[PHI_DIM])
+static int phi_near(const double predicted[PHI_DIM], const double last[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < PHI_DIM; ++i) {
-        distance += fabs(guess[i] - last[i]);
+        distance += fabs(predicted[i] - last[i]);
         size += fabs(last[i]);
     }
     return distance <= PHI_REACH * size;
@@ -48,7 +48,7 @@ static int phi_predict(const phi_history *history, double value[PHI_DIM])
 /* Select the predictor that would have been best for a solution that took several iterations. */
 static void phi_judge(phi_history *history, const double value[PHI_DIM])
 {
-    double row[PHI_HISTORY + 1][PHI_DIM], guess[PHI_DIM], least = HUGE_VAL, fitted = HUGE_VAL;
+    double row[PHI_HISTORY + 1][PHI_DIM], predicted[PHI_DIM], least = HUGE_VAL, fitted = HUGE_VAL;
     const int rows = history->count < PHI_HISTORY ? history->count : PHI_HISTORY;
     memcpy(row[0], value, sizeof row[0]);
     for (int k = 0; k < rows; ++k) memcpy(row[k + 1], history->past[history->count - 1 - k], sizeof row[0]);
@@ -63,9 +63,9 @@ static void phi_judge(phi_history *history, const double value[PHI_DIM])
         }
     }
     history->use_recurrence = history->recurrence_terms > 0;
-    if (history->use_recurrence && phi_predict(history, guess)) {
+    if (history->use_recurrence && phi_predict(history, predicted)) {
         fitted = 0.0;
-        for (int i = 0; i < PHI_DIM; ++i) fitted += fabs(value[i] - guess[i]);
+        for (int i = 0; i < PHI_DIM; ++i) fitted += fabs(value[i] - predicted[i]);
     }
     history->use_recurrence = history->recurrence_terms > 0 && fitted <= least;
     if (history->extrapolation_order == 0) history->extrapolation_order = 1;

@@ -47,10 +47,10 @@ static double phi_missed(const double *value, double (*weight)[8])
     enum { AHEAD = PHI_AHEAD, WINDOW = PHI_WINDOW, CHECKS = PHI_CHECKS };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
+        double predicted[8] = { 0.0 };
         for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+            for (int l = 0; l < 8; ++l) predicted[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(predicted[l] - value[i + WINDOW + l]));
     }
     return most;
 }

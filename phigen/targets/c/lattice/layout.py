@@ -128,5 +128,5 @@ def switches(layout: Layout) -> dict[str, bool]:
         or step.rates is not None
         or step.relative is not None,
         "ONE_ROW": len(step.sites.axes) == 1,
-        "GUESSES": step.equation is not None and program.offers("recurrences"),
+        "SWEEP_PREDICTORS": step.equation is not None and program.offers("recurrences"),
     }

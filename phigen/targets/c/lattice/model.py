@@ -41,7 +41,9 @@ def declarations(program: Program, step: Sweeps) -> str:
         sizes += (
             [("DIRECTIONS", LatticeNewtonPolicy().directions, "dimension of a Krylov space")] if has["KRYLOV"] else []
         )
-        sizes += [("DIFFERENCES", _differences(program), "differences of the predictor")] if has["GUESSES"] else []
+        sizes += (
+            [("DIFFERENCES", _differences(program), "differences of the predictor")] if has["SWEEP_PREDICTORS"] else []
+        )
     if step.partners:
         sizes.append(("GATHERED", _gathered(layout), "sums over other sites that are stored for each site"))
     if step.sites.at_bonds:
@@ -87,7 +89,7 @@ def _reserved(layout: Layout, has: Mapping[str, bool]) -> int:
     program, dimension, stage = layout.program, layout.program.dimension, 0
     if layout.step.equation:
         stage = 2 if layout.slopes else 3  # y before and after a sweep, and varied
-        stage += len(program.fractions) * _differences(program) * has["GUESSES"]
+        stage += len(program.fractions) * _differences(program) * has["SWEEP_PREDICTORS"]
         stage += (
             has["BANDED"]
             + (LatticeNewtonPolicy().directions + 1 + (dimension + 1) * has["SITE_BLOCKS"]) * has["KRYLOV"]

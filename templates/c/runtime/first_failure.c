@@ -1,0 +1,17 @@
+#ifndef PHI_FILE_FIRST_FAILURE
+#define PHI_FILE_FIRST_FAILURE
+#include "model.h"
+
+/* Report a failure as the result, unless an earlier member has failed. */
+static void phi_report_first(phi_status status, size_t m, size_t *earliest, phi_status *result)
+{
+    if (status == PHI_OK) return;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+    if (m < *earliest) {
+        *earliest = m;
+        *result = status;
+    }
+}
+#endif
