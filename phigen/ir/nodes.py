@@ -439,6 +439,11 @@ class Loop:
         """Return the loop with other statements."""
         return replace(self, body=tuple(statements))
 
+    @property
+    def stores(self) -> list[Store]:
+        """The stores among its statements."""
+        return [s for s in self.body if isinstance(s, Store)]
+
 
 @dataclass(frozen=True)
 class Discard:
@@ -570,6 +575,13 @@ class Function:
     body: Block
     types: tuple[tuple[str, ParameterType], ...] = ()
     returns: Type | None = None
+
+    @property
+    def loop(self) -> Loop:
+        """The loop of a function on the level of sites, its last statement."""
+        loop = self.body[-1]
+        assert isinstance(loop, Loop)
+        return loop
 
     @property
     def known_types(self) -> dict[str, ParameterType]:

@@ -228,22 +228,10 @@ class RowDeclarations:
         return [*together(self.loaded.items()), *self.weights]
 
 
-def lowered(function: ir.Function) -> ir.Loop:
-    """Return the loop of a function on the level of sites, its last statement."""
-    loop = function.body[-1]
-    assert isinstance(loop, ir.Loop)
-    return loop
-
-
 def rows_of(function: ir.Function, layout: RowLayout, reading: Reading | None = None) -> RowDeclarations:
     """Return the declarations of the values that a function on the level of sites reads."""
     rows = RowDeclarations(layout, reading or Reading())
-    return rows.read((*function.body, *lowered(function).body))
-
-
-def stores_of(function: ir.Function) -> list[ir.Store]:
-    """Return the stores in the loop of a function on the level of sites."""
-    return [s for s in lowered(function).body if isinstance(s, ir.Store)]
+    return rows.read((*function.body, *function.loop.body))
 
 
 def over_sites(body: Iterable[ir.Statement], independent: str = "SITE", **fields: object) -> ir.Loop:

@@ -182,8 +182,8 @@ def over_pairs(body: Iterable[ir.Statement], selection: ir.Selection = ir.ALL_SI
 
 def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:
     """Yield the calls that set extremes to their initial values; callers set sums to 0."""
-    for s in loop.body:
-        if isinstance(s, ir.Store) and s.extreme:
+    for s in loop.stores:
+        if s.extreme:
             ends = of_array(ir.Constant(0), s.array.number), of_array(ir.Constant(0), s.array.number + 1)
             yield ir.Call("fill", (limit(s.extreme, "Infinity"), *ends), ir.fixed("sums"))
 

@@ -23,10 +23,8 @@ from phigen.ir.passes.by_rows import (
     RowLayout,
     gathered,
     grouped,
-    lowered,
     over_sites,
     rows_of,
-    stores_of,
     together,
 )  # fmt: skip
 from phigen.ir.passes.extremes import limit, updates
@@ -46,7 +44,7 @@ SITES: ir.Value = ir.Cast(ir.Member(SOLVER, "sites"))
 
 def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, compensated: bool = False) -> ir.Function:
     """Return a sweep; the colour of a coloured one is in its code, or a member of the row if it is ``passed``."""
-    stores = stores_of(function)
+    stores = function.loop.stores
     if function.role is Role.SWEEP_TANGENT:
         names = {s.array.number: Symbol("out", s.array.name) for s in sorted(stores, key=lambda s: s.array.name)}
         return _storing(function, layout, names, "varied", ir.Pointer(constant=False), adds=True)
@@ -63,7 +61,7 @@ def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, com
             body.append(ir.Assign(field, ir.Accumulated(ir.Name(s.array.name), s.value)))
         else:
             body.append(ir.Assign(field, s.value, adds=True))
-    selection = lowered(function).selection
+    selection = function.loop.selection
     colour, low = selection.colour, _from(selection)
     swept = ir.Member(ROW, "swept") if passed else ir.Constant(colour)
     swept_sites = of_colour(body, colour, swept, layout, low)
@@ -115,9 +113,9 @@ def _storing(
     function: ir.Function, layout: RowLayout, names: Mapping[int, str], member: str, kind: ir.Pointer, *, adds: bool
 ) -> ir.Function:
     """Return a function that stores to the arrays of a ``member`` of the row, by pointers with ``names``."""
-    rows, selection = rows_of(function, layout), lowered(function).selection
+    rows, selection = rows_of(function, layout), function.loop.selection
     head = grouped({name: (kind, layout.row(ir.entry(ir.Member(ROW, member), k))) for k, name in names.items()})
-    places = ((ir.Entry(ir.Name(names[s.array.number]), SITE), s.value) for s in stores_of(function))
+    places = ((ir.Entry(ir.Name(names[s.array.number]), SITE), s.value) for s in function.loop.stores)
     body = (*rows.at_site(), *rows.computed, *(ir.Assign(place, value, adds) for place, value in places))
     loop = of_colour(body, selection.colour, ir.Constant(selection.colour), layout, _from(selection))
     return row_function(function, "coef", "row", body=(*head, *rows.before(), loop))
@@ -150,23 +148,13 @@ class BondLoop:
         """The parameters of the function by rows."""
         return (*[p for p in self.function.parameters if p == "coef"], "row", *self.arguments)
 
-    @property
-    def loop(self) -> ir.Loop:
-        """The loop over bonds or pairs."""
-        return lowered(self.function)
-
-    @property
-    def stores(self) -> list[ir.Store]:
-        """The values that are summed."""
-        return stores_of(self.function)
-
 
 def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], apart: ir.Value = SITES) -> ir.Function:
     """Return a density, an energy or the vector field, after ``calls`` that sum over bonds.
 
     The values of one site are at the distance ``apart``.
     """
-    rows, stores = rows_of(function, layout), stores_of(function)
+    rows, stores = rows_of(function, layout), function.loop.stores
     body = (*rows.at_site(), *rows.computed, *_observed(stores))
     head = (*(ir.Call(name, (ROW,)) for name in calls), *_apart(stores, apart), *rows.before())
     return row_function(function, "row", "out", body=(*head, over_sites(body)))
@@ -176,7 +164,7 @@ def observable_with_bonds(
     function: ir.Function, layout: RowLayout, sums: Sequence[BondLoop], apart: ir.Value = SITES
 ) -> ir.Function:
     """Return an observable where each site sums over its own bonds."""
-    loop, observed = lowered(function), stores_of(function)
+    loop, observed = function.loop, function.loop.stores
     oriented = frozenset[str]().union(*(s.oriented for s in sums))
     outer = [*function.body, *(s for bond_loop in sums for s in bond_loop.function.body)]
     order = [*layout.members]
@@ -186,11 +174,13 @@ def observable_with_bonds(
     )
     rows = RowDeclarations(layout, Reading(local=True, oriented=oriented)).read(dict.fromkeys(once)).read(loop.body)
     computed, bond_loops = rows.computed, []
-    rows.read(sorted((s for bond_loop in sums for s in bond_loop.loop.body if not _is_computed(s)), key=_at_bond))
+    rows.read(
+        sorted((s for bond_loop in sums for s in bond_loop.function.loop.body if not _is_computed(s)), key=_at_bond)
+    )
     for bond_loop in sums:
-        rows.computed = [s for s in bond_loop.loop.body if _is_computed(s)]
+        rows.computed = [s for s in bond_loop.function.loop.body if _is_computed(s)]
         bond_loops.append(_summed_over_bonds(bond_loop, rows))
-    stores = [s for bond_loop in sums for s in bond_loop.stores]
+    stores = [s for bond_loop in sums for s in bond_loop.function.loop.stores]
     body = (*rows.at_site(), _begun(stores), *bond_loops, *computed, *_observed(observed))
     return row_function(function, "row", "out", body=(*_apart(observed, apart), *rows.before(), over_sites(body, "")))
 
@@ -223,10 +213,10 @@ def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
 def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Function:
     """Return the function that sums over the bonds of each site; unless ``first``, it adds to the sums."""
     reading = Reading(oriented=bond_loop.oriented, at_bonds=bond_loop.at_bonds)
-    rows, count = rows_of(bond_loop.function, layout, reading), len(bond_loop.stores)
+    rows, count = rows_of(bond_loop.function, layout, reading), len(bond_loop.function.loop.stores)
     sums = (ir.Entry(gathered(k), SITE) for k in range(count))
     stores = [ir.Assign(place, ir.fixed(f"sum{k}"), adds=not first) for k, place in enumerate(sums)]
-    body = (*together(rows.here), _begun(bond_loop.stores), _summed_over_bonds(bond_loop, rows), *stores)
+    body = (*together(rows.here), _begun(bond_loop.function.loop.stores), _summed_over_bonds(bond_loop, rows), *stores)
     return row_function(bond_loop.function, *bond_loop.parameters, body=(*rows.before(), over_sites(body, "")))
 
 
@@ -244,8 +234,8 @@ def _start(s: ir.Store) -> ir.Value:
 def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
     """Return the loop over the bonds of a site."""
     sign = ir.fixed("sign") if "sign" in bond_loop.arguments else ONE
-    updated = (u for s in bond_loop.stores for u in updates(s, ir.fixed(f"sum{s.array.number}"), s.value))
-    return bonds_of(bond_loop.loop, rows, updated, sign, across=bond_loop.across)
+    updated = (u for s in bond_loop.function.loop.stores for u in updates(s, ir.fixed(f"sum{s.array.number}"), s.value))
+    return bonds_of(bond_loop.function.loop, rows, updated, sign, across=bond_loop.across)
 
 
 def bonds_of(
@@ -280,20 +270,22 @@ def bonds_of(
 def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
     """Return the function that sums over all other sites, for the sites of a row segment."""
     rows = rows_of(bond_loop.function, layout)
-    sums = [ir.fixed(f"g{s.array.number}") for s in bond_loop.stores]
+    sums = [ir.fixed(f"g{s.array.number}") for s in bond_loop.function.loop.stores]
     arrays = {g.symbol: (WRITTEN, gathered(k)) for k, g in enumerate(sums)}
     places = [ir.Entry(g, SITE) for g in sums]
-    starts = [_start(s) for s in bond_loop.stores]
+    starts = [_start(s) for s in bond_loop.function.loop.stores]
     alike = {start: [p for p, other in zip(places, starts, strict=True) if other == start] for start in starts}
     clear = [
         over_sites((ir.Assign(alike[start][0], start, too=tuple(alike[start][1:])),), "", kind="line")
         for start in alike
     ]
     same = ir.Binary("==", SITE, OTHER)
-    values = [ir.Select(same, start, s.value) for start, s in zip(starts, bond_loop.stores, strict=True)]
-    updated = (u for s, p, v in zip(bond_loop.stores, places, values, strict=True) for u in updates(s, p, v))
+    values = [ir.Select(same, start, s.value) for start, s in zip(starts, bond_loop.function.loop.stores, strict=True)]
+    updated = (
+        u for s, p, v in zip(bond_loop.function.loop.stores, places, values, strict=True) for u in updates(s, p, v)
+    )
     inner = over_sites((*together(rows.here), *rows.computed, *updated))
-    selection = bond_loop.loop.selection
+    selection = bond_loop.function.loop.selection
     high = ir.Member(SOLVER, "massive") if selection.massive else LENGTH
     outer = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(selection.first), high)
     return row_function(

@@ -26,10 +26,8 @@ from phigen.ir.passes.by_rows import (
     RowDeclarations,
     RowLayout,
     gathered,
-    lowered,
     over_sites,
     rows_of,
-    stores_of,
     together,
 )  # fmt: skip
 from phigen.ir.passes.row_loops import ONE, ZERO, bonds_of, of_colour, row_function
@@ -77,7 +75,7 @@ class Transpose:
 
 def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.Function:
     """Return the first loop of a transpose; with ``vectors`` sums over sites stay in registers."""
-    loop, fields = lowered(transpose.function), transpose.fields
+    loop, fields = transpose.function.loop, transpose.fields
     variations = [ir.fixed(f"v_{k}") for k in range(layout.lattice.program.dimension)]
     pointers = [ir.fixed(f"bar_{k}") for k in fields] or variations
     around = [ir.entry(ir.Member(ROW, "bar"), k) for k in fields]
@@ -85,7 +83,7 @@ def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.
     rows, seeds = rows_of(transpose.function, layout, reading), _seeds(loop)
     handed_values, stores = _stores(transpose, rows)
     written_bars = {
-        s.array.number for s in stores_of(transpose.function) if s.array.storage in _COTANGENTS and not any(s.offset)
+        s.array.number for s in transpose.function.loop.stores if s.array.storage in _COTANGENTS and not any(s.offset)
     }
     written_bars |= {h.base for h in transpose.received} | {fields[k] for k in seeds if fields}
     colour = loop.selection.colour
@@ -113,7 +111,7 @@ def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.V
     places = {(h.base, h.offset): h.array for h in transpose.handed}
     handed_values: dict[int, ir.Value] = {}
     stores: list[ir.Statement] = []
-    for s in stores_of(transpose.function):
+    for s in transpose.function.loop.stores:
         number = s.array.number
         if s.array.storage is Storage.SUM_COTANGENT:
             handed_values[transpose.sums_from + number] = s.value
@@ -222,7 +220,7 @@ class BondTranspose:
     @property
     def updates(self) -> list[ir.Update]:
         """The values that are added up."""
-        return [s for s in lowered(self.function).body if isinstance(s, ir.Update)]
+        return [s for s in self.function.loop.body if isinstance(s, ir.Update)]
 
 
 def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
@@ -232,8 +230,8 @@ def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
     reading = Reading(seeds={HERE: arrays}, here=transpose.end, oriented=transpose.oriented)
     rows = rows_of(transpose.function, layout, reading)
     head = [*rows.before()]
-    head += [_pointer("handed", "handed", first + k, None, ir.Pointer()) for k in _seeds(lowered(transpose.function))]
-    bars = {s.array.number for s in stores_of(transpose.function) if s.array.storage is Storage.COTANGENT}
+    head += [_pointer("handed", "handed", first + k, None, ir.Pointer()) for k in _seeds(transpose.function.loop)]
+    bars = {s.array.number for s in transpose.function.loop.stores if s.array.storage is Storage.COTANGENT}
     head += [_pointer("bar", "bar", k, None, ir.Pointer(constant=False)) for k in sorted(bars)]
     shares = [k for k, s in enumerate(updates) if isinstance(s, ir.Reduce)]
     head += [_zero(f"share{k}") for k in shares]
@@ -262,7 +260,7 @@ def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
         if k in at_bonds:
             place = ir.Entry(ir.fixed(f"bar_{at_bonds[k].number}"), BOND)
         inner.append(ir.Assign(place, value, adds=True))
-    bonds = bonds_of(lowered(transpose.function), rows, inner, ONE if transpose.end == "a" else ir.Constant(-1.0))
+    bonds = bonds_of(transpose.function.loop, rows, inner, ONE if transpose.end == "a" else ir.Constant(-1.0))
     summed = [k for k in range(len(updates)) if k not in at_bonds]
     zeros = (_zero(f"site_bar{k}") for k in summed)
     stores = (_into(updates[k], k, SITE, ir.fixed(f"site_bar{k}")) for k in summed)

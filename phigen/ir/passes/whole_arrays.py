@@ -47,9 +47,9 @@ class WholeArrays:
 
     def sweep(self, function: ir.Function) -> ir.Function:
         """Return a sweep as a function from a state, or from its variation, to the next."""
-        loop, array = _loop(function), V if function.role is Role.SWEEP_TANGENT else X
+        loop, array = function.loop, V if function.role is Role.SWEEP_TANGENT else X
         body = [*_unless_beside(loop, array), *self._sums(function), *self._reads(function), *_copied(MOVED, array)]
-        for s in _stores(loop):
+        for s in loop.stores:
             old = ir.entry(array, s.array.number)
             new = _chosen(loop.selection, ir.Binary("+", old, ir.Grouped(s.value)), old)
             body.append(ir.Assign(ir.entry(MOVED, s.array.number), new))
@@ -60,7 +60,7 @@ class WholeArrays:
     def stage(self, function: ir.Function) -> ir.Function:
         """Return a kernel of the equation of a stage as a function of y, named x, and of x, named start."""
         shape = ir.Member(SITES, "sizes")
-        values = (ir.Called("broadcast_to", (s.value, shape), NP) for s in _stores(_loop(function)))
+        values = (ir.Called("broadcast_to", (s.value, shape), NP) for s in function.loop.stores)
         result = ir.Return(ir.Called("array", (ir.Listed(tuple(values)),), NP))
         varied = ("v",) if "varied" in function.parameters else ()
         parameters = ("coef", "start", "x", *varied, "sites")
@@ -68,7 +68,7 @@ class WholeArrays:
 
     def observable(self, function: ir.Function) -> ir.Function:
         """Return a density, an energy or the vector field as a function of the state."""
-        values, added = _split([*_stores(_loop(function))])
+        values, added = _split(function.loop.stores)
         sums = () if added else self._sums(function)
         empty = ir.Called("empty", (ir.fixed(f"({len(values)}, *sites.sizes)"),), NP)
         body = [*sums, *self._reads(function), ir.real(OUT, empty)]
@@ -81,8 +81,8 @@ class WholeArrays:
         """Return one function for the sums over bonds or pairs of several functions, such as those for both ends."""
         body: list[ir.Statement] = []
         for function in functions:
-            loop = _loop(function)
-            added = (self._summed(s, loop.selection) for s in _stores(loop))
+            loop = function.loop
+            added = (self._summed(s, loop.selection) for s in loop.stores)
             total = ir.Binary("+", SUMS, ir.Called("array", (ir.Listed(tuple(added)),), NP))
             body += [*self._bonds(loop), *self._reads(function), ir.Assign(SUMS, total)]
         quiet = ir.Within(ir.Called("errstate", (ir.fixed('all="ignore"'),), NP), tuple(body))
@@ -95,7 +95,7 @@ class WholeArrays:
 
     def transposed_sweep(self, function: ir.Function, updated: Sequence[int]) -> ir.Function:
         """Return a function from the cotangent after a sweep to the cotangent before, at the state before it."""
-        loop = _loop(function)
+        loop = function.loop
         seeds = (_chosen(loop.selection, ir.entry(BAR, k), ir.Constant(0.0)) for k in updated)
         body = [*_unless_beside(loop, BAR), ir.real(ir.fixed("change_bar"), ir.Listed(tuple(seeds)))]
         body += [*self._sums(function), *self._reads(function), *_copied(BAR, BAR)]
@@ -112,7 +112,7 @@ class WholeArrays:
             *self._reads(function),
             ir.Unpack(("bar", "start_bar"), ir.Several((zeros, zeros))),
         ]
-        body += self._added_cotangents(_loop(function))
+        body += self._added_cotangents(function.loop)
         body += self._transposed_sums(function, ir.Member(SITES, "parameters"))
         parameters = ("coef", "start", "x", seed, "sites", "coef_bar", "parameters_bar")
         return replace(function, parameters=parameters, body=(*body, ir.Return(ir.Several(both))))
@@ -122,7 +122,7 @@ class WholeArrays:
         end = "here" if self.lattice.step.others.graph else AXIS.text
         body: list[ir.Statement] = []
         for function in functions:
-            loop = _loop(function)
+            loop = function.loop
             seeds = ir.real(ir.fixed(HERE), ir.fixed(f"[g[{end}] for g in gathered_bar]"))
             body += [*self._bonds(loop), seeds, *self._reads(function), *self._added_cotangents(loop)]
         parameters = (_source(functions[0]), "x", "gathered_bar", *_TRANSPOSED)
@@ -132,7 +132,7 @@ class WholeArrays:
         """Yield the call that maps cotangents of sums over bonds or pairs to those of their arguments."""
         for s in function.body:
             if isinstance(s, ir.GatherSums):
-                stores = [c for c in _stores(_loop(function)) if c.array.storage is Storage.SUM_COTANGENT]
+                stores = [c for c in function.loop.stores if c.array.storage is Storage.SUM_COTANGENT]
                 values = {c.array.number: c.value for c in stores}
                 listed = (ir.Called("filled", (values.get(k, ir.Constant(0.0)),), SITES) for k in range(s.count))
                 rest = (BAR, SITES, ir.fixed("coef_bar"), ir.fixed("parameters_bar"))
@@ -218,7 +218,7 @@ class WholeArrays:
 
     def _reads(self, function: ir.Function) -> Iterator[ir.Statement]:
         """Yield the declarations of a function, those in its loop last."""
-        for s in (*function.body, *_loop(function).body):
+        for s in (*function.body, *function.loop.body):
             match s:
                 case ir.Declare(items=((name, value),)):
                     load = isinstance(value, ir.Load) and value.array.storage in _READ_IN_PLACE
@@ -246,7 +246,7 @@ class WholeArrays:
                 if function.role.is_energy and array.storage is Storage.SUM:
                     return next(self._sums_value(function, s) for s in function.body if isinstance(s, ir.GatherSums))
                 loaded = self._load(array, offset, end)
-                others = _loop(function).selection
+                others = function.loop.selection
                 if end == "b" and others.massive:
                     first = others.first or ""
                     loaded = ir.Entry(loaded, ir.fixed(f"{first}:sites.massive"))
@@ -282,16 +282,6 @@ def identical(functions: Sequence[ir.Function]) -> Iterator[ir.Function]:
             plain = tuple(p for p in function.parameters if "=" not in p)
             called = ir.Called(f"_{known.name}", tuple(map(ir.fixed, function.parameters)))
             yield replace(function, parameters=plain, body=(ir.Return(called),))
-
-
-def _loop(function: ir.Function) -> ir.Loop:
-    loop = function.body[-1]
-    assert isinstance(loop, ir.Loop)
-    return loop
-
-
-def _stores(loop: ir.Loop) -> Iterator[ir.Store]:
-    return (s for s in loop.body if isinstance(s, ir.Store))
 
 
 def _split(stores: Sequence[ir.Store]) -> tuple[list[ir.Store], list[ir.Store]]:

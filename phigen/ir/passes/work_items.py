@@ -70,7 +70,7 @@ class _WorkItems:
         if loop.kind == "sites":
             yield from (new for s in loop.body for new in self.lowered(s))
             return
-        stores = [s for s in loop.body if isinstance(s, ir.Store)]
+        stores = loop.stores
         totals = [ir.fixed(f"total{s.array.number}") for s in stores]
         for s, total in zip(stores, totals, strict=True):
             before = ir.Select(ir.fixed("adds"), self._element(s.array, SITE), ir.Constant(0.0))

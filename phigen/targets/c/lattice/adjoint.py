@@ -107,7 +107,7 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
     layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
     texts = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
     texts += [function(program, adjoint.refresh)] if adjoint.refresh else []
-    reverse = _Reverse(RowLoops(layout), rows, kernels)
+    reverse = _Reverse(layout, rows, kernels)
     parts = [*(reverse.of_equation() if step.equation else reverse.of_parts())]
     loops = {loop.name: loop for part in parts for loop in part.loops}
     texts += [loop_text(program, loop) for loop in loops.values()]
@@ -133,27 +133,16 @@ _ARRAYS = {name: member(name, ir.fixed(name)) for name in ("x", "bar", "handed",
 
 
 @dataclass(frozen=True)
-class _Reverse:
+class _Reverse(RowLoops):
     """The reverse pass of one lattice; ``kernels`` are the transposes by their names."""
 
-    loops: RowLoops
     rows: Rows
     kernels: Mapping[str, Kernel]
 
     @property
-    def program(self) -> Program:
-        """The program."""
-        return self.loops.program
-
-    @property
-    def layout(self) -> Layout:
-        """The layout of the rows."""
-        return self.loops.layout
-
-    @property
     def row_drivers(self) -> RowDrivers:
         """The builder of drivers."""
-        return drivers(self.loops)
+        return drivers(self)
 
     def drivers(self, parts: Sequence[Back]) -> Iterator[str]:
         """Yield the drivers of the two traversals."""
@@ -272,14 +261,14 @@ class _Reverse:
         def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], recomputed: Sequence[str]) -> ir.Block:
             """Return the calls of a kernel, in each form."""
             sums, blocks = one.gather.names if one.gather else (), dict[str, ir.Block]()
-            on_sites = self.loops.sites.transposed(kernel, one.gather, one.sweep, recomputed)
+            on_sites = self.sites.transposed(kernel, one.gather, one.sweep, recomputed)
             summed = len(sums) * any(o.name == "gathered_bar" for o in kernel.outputs)
             build = Transpose(
                 on_sites, one.seed, one.bars, tuple(listed), arrays, summed, one.taken, frozenset(recomputed)
             )
-            for form, versions in self.loops.forms(self.rows, [on_sites]).items():
-                of_form = (replace(build, function=f) for f in self.loops.after_passes(on_sites, form, versions))
-                parts = [row_transposes.transposed(f, layout, vectors=self.loops.fast) for f in of_form]
+            for form, versions in self.forms(self.rows, [on_sites]).items():
+                of_form = (replace(build, function=f) for f in self.after_passes(on_sites, form, versions))
+                parts = [row_transposes.transposed(f, layout, vectors=self.fast) for f in of_form]
                 blocks[form] = tuple(called(loop, sites) for loop, sites in calls_of(parts, one.sweep))
                 loops.extend(parts)
             return in_forms(blocks)
@@ -290,7 +279,7 @@ class _Reverse:
             fields = [self.program.coordinates[f] for f in one.recomputed]
             first += [*one.before, *(self._cleared(listed) if one.sweep and beside_seams(one.sweep) else ())]
             first += over_sites(one, one.kernel, listed, () if one.undo else fields)
-            bonds = [loop for e in one.ends for loop in self.loops.transposed_sums(*e, arrays, summed=bool(one.undo))]
+            bonds = [loop for e in one.ends for loop in self.transposed_sums(*e, arrays, summed=bool(one.undo))]
             loops += bonds
             second += map(called, bonds)
             second += over_sites(one, one.undo, (), fields) if one.undo else ()
@@ -301,7 +290,7 @@ class _Reverse:
             first.append(self.row_drivers.copied_ends(_HANDED, array, near_ends=near_ends))
         if beside and apart:
             purpose = f"contributions to the cotangents of sites by those that {whom}"
-            loops.append(row_transposes.handing(name, purpose, beside, self.loops.layout))
+            loops.append(row_transposes.handing(name, purpose, beside, self.layout))
             second.append(ir.Call(name, (SEGMENT,)))
         recomputed = sorted({f for one in pulled for f in one.recomputed})
         return Back(tuple(loops), tuple(first), tuple(second), arrays, tuple(recomputed))
@@ -321,9 +310,9 @@ class _Reverse:
         """Yield the calls of loops that sum over bonds or pairs; loops of equal code are called once."""
         names = dict[object, str]()
         for other in (s for part in self.layout.step.parts for s in part):
-            for loop in self.loops.sums(other.gather, swept=True):
+            for loop in self.sums(other.gather, swept=True):
                 names.setdefault(code(loop), loop.name)
-        for loop in self.loops.sums(sweep.gather, swept=True):
+        for loop in self.sums(sweep.gather, swept=True):
             yield ir.Call(names[code(loop)], (COEF, SEGMENT))
 
 
