@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 98e8bc3595759d3e47ef21cad386e91571836cdd4e88a42786fb8dc80dd0a543
+ * body-sha256: b551692b1a3d1e604c2c10f3719421cd006af98ed7e0ec0b398b0a0480144b42
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -238,7 +238,7 @@ static inline void point_vortices_slope(const double *coef, const point_vortices
     }
 }
 
-/* How a sweep follows y along v, for a row segment. */
+/* Derivative of a sweep by y along v, for a row segment. */
 static void point_vortices_slope_piece(const point_vortices_solver *s, const double *coef, double *const *y,
     double *const *v, double *const *to, size_t unit)
 {

@@ -166,12 +166,12 @@ class _Reverse(RowLoops):
             first[k] = RowSegment(part.first, (*setup, *in_first), updated=part.recomputed, arrays=ir.fixed("x"))
             if part.second:
                 second[k] = RowSegment(part.second, (*setup, *find_givers))
-        title = "How a kernel goes back" if step.equation else "How a part goes back"
+        title = "Reverse pass of a kernel" if step.equation else "Reverse pass of a part of H"
         yield self._driver(title, "back_rows", first)
         if receives:
             second = dict([*second.items()][:1])
         if second:
-            yield self._driver("What sites are handed", "hand_rows", second)
+            yield self._driver("Contributions of other sites to the cotangents of sites", "hand_rows", second)
 
     def _driver(self, title: str, name: str, cases: Mapping[int, RowSegment]) -> str:
         """Return the text of a driver that makes one traversal of some parts."""

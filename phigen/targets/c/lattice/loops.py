@@ -124,18 +124,18 @@ class RowLoops:
     def sums(self, gather: Gather | None, *, swept: bool = False) -> Iterator[ir.Function]:
         """Yield the loops that sum over all bonds of a site, or its pairs with other sites.
 
-        Those that a sweep reads (``swept``) may have further arguments, see `told_of_bonds`.
+        Those that a sweep reads (``swept``) may have further arguments, see `bond_arguments`.
         """
         partners = self.layout.partners
         of_parts = [sums for _, sums in partners.of_parts]
         observed = not swept and gather in (partners.energy, partners.field, partners.observed, *of_parts)
         for number, (ends, oriented) in enumerate(over_ends(gather) if gather else ()):
-            arguments = self.told_of_bonds(ends, oriented) if swept else ()
+            arguments = self.bond_arguments(ends, oriented) if swept else ()
             one = self._bond_loop(ends, oriented, {} if observed else self.versions, arguments)
             over = row_loops.over_bonds(one, self.layout, first=number == 0) if self.layout.graph else None
             yield over or row_loops.over_pairs(one, self.layout)
 
-    def told_of_bonds(self, ends: Ends, oriented: frozenset[str]) -> tuple[str, ...]:
+    def bond_arguments(self, ends: Ends, oriented: frozenset[str]) -> tuple[str, ...]:
         """Return further arguments of short loops over bonds, so that several parts of H share a loop.
 
         The arguments are the address of the parameters at bonds, the sign of the direction of bonds, and whether the

@@ -159,7 +159,7 @@ class _PartLoops:
         if step.relative:
             yield self._gathering(step.relative.remainder)
         title = "a flow" if coloured else "the flow of a part of H"
-        title = f"How {title} carries a tangent vector" if self.varied else title[0].upper() + title[1:]
+        title = f"Derivative of {title} along a tangent vector" if self.varied else title[0].upper() + title[1:]
         yield commented(build.driver(name, title, parameters, cases, threads=threads), program)
 
     def _gathering(self, remainder: int) -> str:
@@ -206,7 +206,7 @@ class _PartLoops:
             across = ir.Constant(int(meant[k][0].chosen == "there"))
             at_bonds = ir.label("_".join(bonds)) if bonds else ir.Member(S, "at_bonds")
             values = {"at_bonds": at_bonds, "sign": ir.Constant(sign), "across": across}
-            return tuple(values[name] for name in self.loops.told_of_bonds(*meant[k]))
+            return tuple(values[name] for name in self.loops.bond_arguments(*meant[k]))
 
         for k, loop in enumerate(self.loops.sums(sweep.gather, swept=True)):
             others = list[_Call]()
@@ -367,8 +367,8 @@ def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end:
 
 _TITLES = {
     Role.RELAX: "A sweep, or to x the end of a stage",
-    Role.SLOPE: "How a sweep follows y along v",
-    Role.OWN_SLOPE: "How a sweep follows y at the site itself",
-    Role.SIDE: "How a sweep follows x along v",
-    Role.FOLLOW: "How the end of a stage follows y along v, added",
+    Role.SLOPE: "Derivative of a sweep by y along v",
+    Role.OWN_SLOPE: "Derivative of a sweep by y at the site itself",
+    Role.SIDE: "Derivative of a sweep by x along v",
+    Role.FOLLOW: "Derivative of the end of a stage by y along v, added",
 }
