@@ -4,6 +4,7 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from phigen import resources
@@ -103,6 +104,13 @@ KINDS = {
 }
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    """The syntax tree of a module."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imports() -> dict[str, set[str]]:
     """The modules of phigen that each module imports, inside functions too, but not for annotations alone."""
     files = {".".join(p.relative_to(ROOT).with_suffix("").parts): p for p in sorted((ROOT / "phigen").rglob("*.py"))}
@@ -110,7 +118,7 @@ def imports() -> dict[str, set[str]]:
     graph = {}
     for name, path in files.items():
         modules = set()
-        for node in executed(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in executed(parsed(path)):
             if isinstance(node, ast.Import):
                 modules |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module:
@@ -124,7 +132,7 @@ def imports() -> dict[str, set[str]]:
 def executed(tree: ast.AST) -> Iterator[ast.AST]:
     """The nodes of a module without those under ``if TYPE_CHECKING``."""
     for node in ast.iter_child_nodes(tree):
-        if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)):
+        if not (isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"):
             yield node
             yield from executed(node)
 
@@ -181,7 +189,7 @@ def kind_tests(tree: ast.AST) -> list[int]:
     kinds = {a.asname or a.name for node in imported for a in node.names if a.name in KINDS[node.module or ""]}
     asked = list[int]()
     for node in ast.walk(tree):
-        is_call = isinstance(node, ast.Call) and ast.unparse(node.func) == "isinstance"
+        is_call = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "isinstance"
         is_comparison = isinstance(node, ast.Compare) and not isinstance(node.ops[0], ast.In | ast.NotIn)
         listed = node.args[1:] if is_call else [node.cls] if isinstance(node, ast.MatchClass) else []
         listed = [node.left, *node.comparators] if is_comparison else listed
@@ -194,7 +202,7 @@ def kind_tests(tree: ast.AST) -> list[int]:
 def all_kind_tests() -> dict[str, list[int]]:
     """The same for all modules that have any, by their names."""
     files = sorted((ROOT / "phigen").rglob("*.py"))
-    asked = {str(p.relative_to(ROOT)): kind_tests(ast.parse(p.read_text(encoding="utf-8"))) for p in files}
+    asked = {str(p.relative_to(ROOT)): kind_tests(parsed(p)) for p in files}
     return {name: lines for name, lines in asked.items() if lines}
 
 

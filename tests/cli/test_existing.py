@@ -16,16 +16,26 @@ runs:
   s: {sizes: [8], initial: {q: 1, p: 0}, step: 0.1, steps: 5, record: [M], stop: M - 2}
 """
 MINE = b"my thesis, chapter 1\n"
+FILES = ("a.csv", "a.npz", "a.zarr", "a.svg", "a.pdf", "a.gif")
 
 
-@pytest.fixture(params=["harmonic_oscillator", "chain"])
-def spec(request, in_tmp):
-    if request.param == "chain":
-        (in_tmp / "chain.yaml").write_text(LATTICE)
-        return "chain.yaml"
-    return request.param
+OSCILLATOR = """phigen: 1
+name: swing
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + q**2/2
+runs:
+  r: {initial: [1, 0], step: 0.1, steps: 5, section: p}
+  s: {initial: [1, 0], step: 0.1, steps: 5, section: q}
+"""
 
 
+@pytest.fixture(params=["swing", "chain"])
+def spec(request, write):
+    return write("spec.yaml", {"swing": OSCILLATOR, "chain": LATTICE}[request.param])
+
+
+@pytest.mark.few("a.csv", "a.svg", of=FILES)
 @pytest.mark.parametrize(
     ("option", "file"), [("-o", "a.csv"), ("-o", "a.npz"), ("--plot", "a.svg"), ("--plot", "a.pdf")]
 )
@@ -63,17 +73,6 @@ def test_pages_of_others_are_replaced_by_force_only(phigen, in_tmp):
     assert "a result of phigen panel, not of phigen report" in phigen("report", "pendulum", "-o", "page.html").stderr
 
 
-OSCILLATOR = """phigen: 1
-name: swing
-coordinates: [q, p]
-poisson: {canonical: {q: [q], p: [p]}}
-hamiltonian: p**2/2 + q**2/2
-runs:
-  r: {initial: [1, 0], step: 0.1, steps: 5, section: p}
-  s: {initial: [1, 0], step: 0.1, steps: 5, section: q}
-"""
-
-
 @pytest.mark.parametrize("command", ["compare", "tune", "verify", "sweep"])
 def test_figures_of_other_commands_are_replaced_by_force_only(phigen, write, in_tmp, command):
     spec = write("spec.yaml", f"{OSCILLATOR}sweeps: {{r: {{over: {{q: [1, 2]}}}}}}\n")
@@ -85,6 +84,7 @@ def test_figures_of_other_commands_are_replaced_by_force_only(phigen, write, in_
     assert (in_tmp / "a.svg").read_bytes() == drawn
 
 
+@pytest.mark.few("a.csv", "a.npz", "a.pdf", "a.zarr", of=FILES)
 @pytest.mark.parametrize(
     ("text", "option", "file"),
     [(OSCILLATOR, "-o", "a.csv"), (OSCILLATOR, "--section", "a.npz"), (OSCILLATOR, "--plot", "a.pdf"),
