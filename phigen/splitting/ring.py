@@ -91,6 +91,8 @@ class Ring:
             if g.kind != "reciprocal" or element == 0:
                 continue
             reciprocal, q = self.tower.names.index(g.name), g.arguments[0]
+            if element.degrees()[reciprocal] == 0:
+                continue
             pending, final = [element], []
             while pending:
                 powers = self.terms(pending.pop(), [reciprocal])

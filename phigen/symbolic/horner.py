@@ -39,21 +39,19 @@ def _nested(terms: Mapping[Powers, Expression], variables: Sequence[Expression])
         return coefficient * _monomial(monomial, variables)
     common = _common(terms)
     if common:
-        inner = {tuple((i, e - common.get(i, 0)) for i, e in m if e > common.get(i, 0)): c for m, c in terms.items()}
+        inner = {tuple([(i, r) for i, e in m if (r := e - common.get(i, 0))]): c for m, c in terms.items()}
         return _monomial(tuple(common.items()), variables) * _nested(inner, variables)
-    counts = Counter(i for m in terms for i, _ in m)
+    counts = Counter([i for m in terms for i, _ in m])
     best = min(counts, key=lambda i: (-counts[i], i))
     if counts[best] <= 1:
         ordered = sorted(terms.items(), key=lambda item: _graded(item[0]))
         return total(c * _monomial(m, variables) for m, c in ordered)
-    exponents = {m: dict(m).get(best, 0) for m in terms}
-    step = min(e for e in exponents.values() if e)
+    places = {m: next((k for k, (i, _) in enumerate(m) if i == best), -1) for m in terms}
+    step = min(m[k][1] for m, k in places.items() if k >= 0)
     with_variable = {
-        tuple((i, e - step if i == best else e) for i, e in m if i != best or e > step): c
-        for m, c in terms.items()
-        if exponents[m]
+        m[:k] + ((best, m[k][1] - step),) * (m[k][1] > step) + m[k + 1 :]: terms[m] for m, k in places.items() if k >= 0
     }
-    without_variable = {m: c for m, c in terms.items() if not exponents[m]}
+    without_variable = {m: c for m, c in terms.items() if places[m] < 0}
     nested = power(variables[best], step) * _nested(with_variable, variables)
     return nested + _nested(without_variable, variables) if without_variable else nested
 

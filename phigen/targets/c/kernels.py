@@ -93,9 +93,11 @@ def function(
         return built if lanes else in_output_order(built, [name for name, _ in kernel.named], headings=whole)
 
     built = after_passes(whole=True)
-    whole = len(cut(built, LONGEST_FUNCTION)) == 1
-    built = built if whole else after_passes(whole=False)
     pieces = cut(built, LONGEST_FUNCTION)
+    whole = len(pieces) == 1
+    if not whole:
+        built = after_passes(whole=False)
+        pieces = cut(built, LONGEST_FUNCTION)
     said = [] if exported else _comment(f"{called}." if lanes else sentence(kernel.purpose))  # the header says it
     head = [*said, _signature(program, kernel, form) + "\n{"]
     if whole:
