@@ -119,8 +119,10 @@ class SplittingPlan:
             return ["scheme: the exact flow of H, which is elementary", "step: explicit"]
         parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
         reason = f", since {choice.why}" if choice.why else ""
+        schedule = choice.schedule() if not coloured_parts else None
+        further = f", {len(schedule.begin)} more before and after a run" if schedule and schedule.begin else ""
         flows = (
-            f"{len(choice.schedule().flows)} flows"
+            f"{len(choice.schedule().flows)} flows{further}"
             if not coloured_parts
             else f"{', '.join(coloured_parts)} for each colour of sites"
         )
@@ -212,8 +214,8 @@ def _plan_bodies(cell: Cell, spec: Spec) -> SplittingPlan:
     bodies = lattice_bodies(cell, spec)
     parts = bodies.flows()
     choice = planned(spec, SplitHamiltonian(parts.flows, small=1), spec.wanted_order, spec.composition, lambda: ())
-    if isinstance(choice.method, Corrected):
-        hint = "composition: saba-8-2 at order 2 or aba-10-6-4 at order 4, which need no corrector"
+    if isinstance(choice.method, Corrected) and choice.method.multiple:
+        hint = "composition: saba-8-2 at order 2 or aba-10-6-4 at order 4, or wisdom-holman-17"
         message = f"scheme splitting: composition {choice.method.name} is not offered for lattices"
         raise SpecError([spec.diagnostic(("composition",), message, hint)])
     return SplittingPlan(parts, choice, bodies=bodies)

@@ -175,6 +175,43 @@ def test_a_step_is_a_poisson_map(change: str, target: str) -> None:
     np.testing.assert_allclose(matrix, differences, rtol=0, atol=1e-8)
 
 
+def written_out(count: int, change: str, composition: str, order: int) -> str:
+    """Return the ordinary spec of bodies in a plane, with canonical momenta."""
+    q, p = ([f"{k}{a}{i}" for a in "xy" for i in range(count)] for k in ("", "p"))
+    kinetic = (f"(px{i}**2 + py{i}**2)/(2*m{i})" for i in range(count))
+    pairs = (f"m{i}*m{j}/sqrt((x{i} - x{j})**2 + (y{i} - y{j})**2)" for i in range(count) for j in range(i))
+    return (
+        f"phigen: 1\nname: written_out\ncoordinates: [{', '.join([*q, *p])}]\n"
+        f"parameters: {{{', '.join(f'm{i}: {{value: 1, positive: true}}' for i in range(count))}}}\n"
+        f"poisson: {{canonical: {{q: [{', '.join(q)}], p: [{', '.join(p)}]}}}}\n"
+        f"hamiltonian: {' + '.join(kinetic)} - {' - '.join(pairs)}\n"
+        f"scheme: splitting\ncoordinates_from: {change}\ncomposition: {composition}\norder: {order}\n"
+    )
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize(("composition", "order"), [("wisdom-holman-17", 2), ("aba-8-6-4", 4), ("wisdom-holman", 2)])
+def test_a_lattice_is_its_ordinary_spec(change: str, composition: str, order: int) -> None:
+    m = np.array([1, 2e-3, 1e-3, 3e-3])
+    x = with_momenta(orbits(4, 2), m)
+    masses = {f"m{i}": float(v) for i, v in enumerate(m)}
+    ordinary = phigen.compile(phigen.spec.loads(written_out(4, change, composition, order)))
+    expected = ordinary.integrate(x.ravel(), h=0.2, steps=60, stride=20, **masses)
+    for target in ("c", "numpy"):
+        lattice = solver(text(change, "xy", composition, order, momenta=True), target)
+        run = lattice.integrate(x, h=0.2, steps=60, stride=20, m=m)
+        np.testing.assert_allclose(run.x.reshape(4, -1), expected.x, rtol=0, atol=2e-13)
+
+
+def test_correctors_remove_the_error_of_first_order() -> None:
+    x, m = orbits(), MASSES
+    errors = []
+    for composition in ("wisdom-holman", "wisdom-holman-3", "wisdom-holman-17"):
+        run = solver(text("jacobi", composition=composition, order=2)).integrate(x, h=0.2, steps=400, stride=20, m=m)
+        errors.append(abs(run.energy / run.energy[0] - 1).max())
+    assert errors[0] > 20 * errors[1] > 40 * errors[2]
+
+
 @pytest.mark.parametrize("change", CHANGES)
 def test_two_bodies_move_exactly(change: str) -> None:
     m, x = np.array([1, 0.3]), orbits(2, 2, eccentricity=0.5)
@@ -227,12 +264,14 @@ def test_a_swarm_costs_in_proportion_to_its_particles() -> None:
         CDLL("libgomp.so.1").omp_set_num_threads(2)
 
 
-@pytest.mark.parametrize("change", CHANGES)
-def test_all_targets_agree(change: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("change", "composition"), [*((c, "aba-10-6-4") for c in CHANGES), ("jacobi", "wisdom-holman-5")]
+)
+def test_all_targets_agree(change: str, composition: str, tmp_path: Path) -> None:
     for kind, m in (("velocities", MASSES), ("momenta", np.where(MASSES > 0, MASSES, 1e-4))):
         momenta = kind == "momenta"
         x = orbits() if not momenta else with_momenta(orbits(), m)
-        spec = text(change, momenta=momenta)
+        spec = text(change, composition=composition, order=4 if composition == "aba-10-6-4" else 2, momenta=momenta)
         vectors = np.random.default_rng(5).normal(size=(2, *x.shape)) * (m if momenta else 1)
         carried = {t: solver(spec, t, tangent=True).step_tangent(x, 0.3, vectors, m=m) for t in ("c", "numpy")}
         states = {t: solver(spec, t).integrate(x, h=0.3, steps=20, m=m).x[-1] for t in ("c", "numpy")}

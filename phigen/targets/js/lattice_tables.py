@@ -61,7 +61,7 @@ def _tables(program: Program, step: Sweeps) -> dict[str, object]:
         "sums": step.sums,
         "gathers": lattice_values.switches(step)["GATHER"],
         "unit": "stages" if step.equation else "flows",
-        "schedule": f"[{', '.join(f'[{part},{_FIXED}{row}]' for part, row in step.schedule.flows)}]",
+        "schedule": f"[{', '.join(f'[{part},{_FIXED}{row}]' for part, row in step.schedule.flows_of_run)}]",
         "flows": f"[{', '.join(map(_listed, step.parts))}]",
         "body_axes": json.dumps(step.relative.axes) if step.relative else "",
         "mass": json.dumps(step.relative.mass) if step.relative else "",

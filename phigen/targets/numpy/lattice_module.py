@@ -31,7 +31,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         **facts(program, listed, quoted, "None"),
         **lattice_values.tables(program, step, listed),
         **{name: PYTHON.text(policy) for name, policy in POLICIES.items()},
-        "schedule": repr(tuple(step.schedule.flows)),
+        "schedule": repr(tuple(step.schedule.flows_of_run)),
         "by_colour": repr(step.by_colour),
     }
     values["sized"] = bool(program.time or program.noise or step.relative)

@@ -72,6 +72,8 @@ static void phi_draw(const phi_solver *s, size_t steps, int part)
 #endif
 #if PHI_NOISE
 /* Make some steps: flows of the noise, those of H, and those of the noise in reverse order. */
+#elif PHI_CORRECTED
+/* Make some steps, after the flows before a run where one begins. 0 steps: the flows after a run alone. */
 #else
 /* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
 #endif
@@ -91,6 +93,12 @@ static void phi_steps(const phi_solver *s, size_t steps)
             phi_sweep_part(s, phi_flow_parts[flow], s->coef + flow * PHI_ROW PHI_AND_FAR(s->far > 0));
 #endif
         }
+#elif PHI_CORRECTED
+    const int before = PHI_FLOWS + PHI_FLOWS_BEFORE;
+    for (int flow = before; steps == 0 && flow < PHI_ROWS_OF_FLOWS; ++flow) phi_apply_flow(s, s->steps, flow);
+    for (int flow = PHI_FLOWS; steps > 0 && !s->open && flow < before; ++flow) phi_apply_flow(s, s->steps, flow);
+    for (size_t step = s->steps; step < s->steps + steps; ++step)
+        for (int flow = 0; flow < PHI_FLOWS; ++flow) phi_apply_flow(s, step, flow);
 #else
     if (steps == 0) phi_apply_flow(s, s->steps - 1, PHI_FLOWS - 1);
 #if PHI_WAVES

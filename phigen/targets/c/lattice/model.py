@@ -117,15 +117,17 @@ def rows_of(step: Sweeps) -> int:
 
 def _flows(step: Sweeps) -> list[tuple[int, int]]:
     """The flows of a step. Without noise, the first flow occurs once more: merged with the last of the step before.
-    With noise, each flow has its own increments."""
+    With noise, each flow has its own increments. Flows before and after a run come last."""
     flows = step.schedule.flows
+    if step.corrected:
+        return [*flows, *step.schedule.begin, *step.schedule.end]
     return [*flows, *([] if step.sites.increments else flows[:1])]
 
 
 def _by_flow(step: Sweeps, values: Sequence[float], joined: float) -> list[float]:
     """The values of the rows of the schedule for each flow; the last is for merged flows."""
     by_flow = [values[row] for _, row in _flows(step)]
-    return by_flow if step.sites.increments else [*by_flow[:-1], joined]
+    return by_flow if step.sites.increments or step.corrected else [*by_flow[:-1], joined]
 
 
 def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
@@ -154,7 +156,7 @@ def model(program: Program, step: Sweeps) -> str:
         "fractions": len(program.fractions) > 1,
         "bound": repr(MAX_NORMAL_VARIATE) if program.noise else "",
         "reductions": ", ".join(_braced(_reduction(r)) for r in program.observables.reductions),
-        "joined": not program.noise,
+        "joined": not program.noise and not step.corrected,
         "late": has["LATE"],
     }
     timed = step.refresh or (program.time and step.equation)
@@ -198,6 +200,8 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
             yield "BAND", band(step), "diagonals beside that of the matrix of Newton's method"
     else:
         yield "FLOWS", len(step.schedule.flows), "in a step"
+    if step.corrected:
+        yield "FLOWS_BEFORE", len(step.schedule.begin), "before a run; those after it come last"
     if step.rates:
         yield "NEGATIVE", 1 + step.rates.negative, "the part B of H, which is negative"
     if step.relative:
