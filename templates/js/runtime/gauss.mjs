@@ -55,8 +55,9 @@ export function forgetSteps(solver) {
 }
 
 /**
- * The factors of the increments in the offsets of the unknowns from the end of a step, at a fraction of it: the
- * collocation polynomial, as integrals of Lagrange polynomials from 1 on, by sums of Legendre polynomials.
+ * The factors of the increments in the offsets of the unknowns from the end of a step, at a fraction of it:
+ * the collocation polynomial, as integrals of Lagrange polynomials from 1 on, by sums of Legendre
+ * polynomials.
  */
 export function factorsAt(fraction) {
   const x = 2 * fraction - 1;
