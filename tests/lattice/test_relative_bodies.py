@@ -9,6 +9,7 @@ from time import process_time
 
 import numpy as np
 import pytest
+from lattice.lattices import with_threads
 from node import answers
 
 import phigen
@@ -320,6 +321,21 @@ def test_a_collision_is_an_error_and_a_hyperbola_is_not(change: str, target: str
     with pytest.raises(StepError) as raised:
         solver(text(change, "xy"), target).integrate(met, h=3.0, steps=3, m=m)
     assert raised.value.status == "NOT_FINITE"
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_threads_do_not_change_the_bits(change: str) -> None:
+    x, m = orbits(1200, 2), np.zeros(1200)
+    m[:3] = 1, 1e-3, 5e-4
+    one = solver(text(change, "xy", composition="saba-4-2", order=2), tangent=True)
+    vector = np.random.default_rng(2).normal(size=(1, *x.shape))
+
+    def run() -> np.ndarray:
+        carried = one.step_tangent(x, 0.2, vector, m=m)[1]
+        return np.concatenate([one.integrate(x, h=0.2, steps=5, stride=5, m=m).x[-1], carried[0]])
+
+    first, *others = with_threads(run)
+    assert all(np.array_equal(first, other) for other in others)
 
 
 def test_runs_continue_and_steps_backward_return() -> None:
