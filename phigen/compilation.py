@@ -89,7 +89,7 @@ class _Compiled(ABC):
 
     @property
     def in_double(self) -> Self:
-        """The same in double precision."""
+        """This compilation in double precision."""
         program = self.program
         return replace(self, program=replace(program, extras=replace(program.extras, real="double")))
 
@@ -102,7 +102,7 @@ class _Compiled(ABC):
 
     @property
     def described(self) -> dict[str, Any]:
-        """The method for machines."""
+        """Description of the method as plain data."""
         return {"scheme": self.scheme_name}
 
     @property
@@ -386,7 +386,7 @@ class CompiledGauss(_CompiledSystem):
 
     @property
     def described(self) -> dict[str, Any]:
-        """The method for machines."""
+        """Description of the method as plain data."""
         return {"scheme": self.scheme_name, "structure": self.structure}
 
     def by_gauss(self) -> CompiledGauss:
@@ -462,8 +462,10 @@ class CompiledLattice(_Compiled):
 
     @property
     def described(self) -> dict[str, Any]:
-        """The method for machines, with the colours, and the reason where sizes of runs ask for the series, or for more
-        colours."""
+        """Description of the method as plain data, with the number of colours.
+
+        ``since`` is the reason if the sizes of runs require the series, or more colours.
+        """
         plan = self.sweeps
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
 

@@ -62,10 +62,10 @@ class DistributedRun:
 
 
 class DistributedLattice:
-    """The solver of a lattice on all processes of a communicator, by default on all there are.
+    """Solver of a lattice on the processes of a communicator, by default on all processes.
 
-    ``source`` is what `phigen.compile` takes, a grid whose H is split, or a `LatticeSolver` of such a one for C, of
-    profile fast. Raises `ValueError` for other lattices.
+    ``source`` is an argument of `phigen.compile`, or a `LatticeSolver` for C in profile fast. The lattice must be a
+    grid whose H is split. Raises `ValueError` for other lattices.
     """
 
     def __init__(self, source: Any, comm: Any = None, order: int | None = None) -> None:

@@ -119,7 +119,7 @@ def suffixes(targets: Iterable[str] = TARGETS) -> list[str]:
 
 
 def loadable(targets: Iterable[str]) -> tuple[str, ...]:
-    """Those of the targets that Python can run."""
+    """Those among some targets that Python can run."""
     return tuple(target for target in targets if target in LOADABLE)
 
 

@@ -401,7 +401,7 @@ class _Rows:
 
 
 def _compared_rows(experiment: Experiment, h: float) -> _Rows:
-    """Those of the run itself, by steps of size h, which are equal in t."""
+    """Rows of the run in units of steps of size h, which are equal in t."""
     run, end = experiment.run, experiment.end
     last = end.span / h if end else float(run.steps)
     if experiment.times is not None:

@@ -74,7 +74,7 @@ def _live(compilation: Compilation, experiment: Experiment, scheme: str | None, 
 def _integrated(
     material: Material, solver: Solver, experiment: Experiment, lyapunov: bool, console: Console
 ) -> tuple[Material, list[PhigenError]]:
-    """With the trajectories of the solver and of the methods that the run compares with."""
+    """Add the trajectories of the solver and of the methods that the run compares with."""
     from phigen.cli.recording import Files, Recorder, compared
     from phigen.cli.run_summary import told_steps
     from phigen.study.classical import COMPARED
@@ -117,7 +117,7 @@ def _recorded(recorder: Recorder, console: Console) -> StepError | None:
 def _opening(
     compilation: Compilation, solver: Solver, experiment: Experiment, other_methods: Sequence[str], console: Console
 ) -> dict[str, Trajectory]:
-    """Every one of the first steps, by the solver and by other methods; nothing if the run has no more."""
+    """Trajectories of all first steps, by the solver and by other methods; empty if the run is not longer."""
     from phigen.cli.recording import Files, Recorder, compared
 
     run, is_short = experiment.run, experiment.run.steps <= _OPENING
@@ -134,7 +134,7 @@ def _opening(
 
 
 def _with_constancy(material: Material, experiment: Experiment) -> Material:
-    """With the constancy of the modified Hamiltonian, or why it was not measured."""
+    """Add the constancy of the modified Hamiltonian, or the reason why it was not measured."""
     from phigen.cli.verify import constancy_of
     from phigen.study.backward import NotOfferedError
 

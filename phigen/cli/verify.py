@@ -166,7 +166,7 @@ def verified(
 def verified_lattice(
     compilation: Compilation, name: str | None, quick: bool, console: Console, targets: Sequence[str] = ()
 ) -> Verification:
-    """The same for a lattice."""
+    """Verification of the compilation of a lattice on a run of its spec."""
     from phigen.api import chosen_target, lattice_solver_of
     from phigen.cli.endings import ended
     from phigen.cli.lattice_experiment import LatticeExperiment

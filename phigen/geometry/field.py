@@ -119,7 +119,7 @@ class Field(Arithmetic[Scalar]):
         return base ** int(exponent)
 
     def function(self, name: str, args: list[Scalar]) -> Scalar:
-        """KeyError: functions of the field are not decomposed."""
+        """Raise `KeyError`: the field has no functions."""
         raise KeyError(name)
 
     def expression(self, element: Scalar) -> Expression:

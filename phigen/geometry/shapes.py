@@ -78,7 +78,7 @@ class Affine:
 
 @dataclass(frozen=True)
 class General:
-    """None of the other shapes."""
+    """π of a shape for which there is no class of its own."""
 
     def __str__(self) -> str:
         return "general"

@@ -173,7 +173,7 @@ class System:
         return cast(str, display("formulas of a system")(self))
 
     def _repr_html_(self) -> str:
-        """The same with the parameters, for notebooks."""
+        """HTML of the system with its parameters, for notebooks."""
         return cast(str, display("page of a system")(self))
 
 

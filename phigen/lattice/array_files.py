@@ -144,7 +144,7 @@ def _array(path: Path, shape: tuple[int, ...]) -> Floats:
 
 
 def _header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype]:
-    """Return the shape and the kind of elements."""
+    """Return the shape of the array in a file and the kind of its elements."""
     version = np.lib.format.read_magic(file)
     readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
     if version not in readers:

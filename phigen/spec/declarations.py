@@ -178,7 +178,7 @@ class Declarations:
         return AllowedNames(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
 
     def dated_constants(self, value_name: str) -> AllowedNames:
-        """The same and the time."""
+        """Return parameters, definitions of parameters and the time, and the time itself; see `constants`."""
         scope = self.constants(value_name)
         dated = {n: self.definitions[n] for n in self.dated - self.varying}
         dated |= {self.time: symbol(self.time)} if self.time else {}

@@ -1,8 +1,8 @@
 """Symbols of values at sites of a lattice, with an offset: ``x[i+1]``, ``x[i-1,j+2]``, ``x[a]``.
 
 On a grid the offset is steps along axes, in their order, zeros left out; ``x`` alone is x at the site itself. Where
-there are no axes, it is an end, a or b, of a bond or a pair. These are ordinary symbols, told apart by their text:
-brackets are in no name of a spec.
+there are no axes, it is an end, a or b, of a bond or a pair. These are ordinary symbols. Their
+brackets distinguish them: names of a spec have none.
 """
 
 from __future__ import annotations

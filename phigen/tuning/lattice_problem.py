@@ -115,7 +115,7 @@ class LatticeProblem(Problem):
 
     @property
     def most_rows(self) -> int:
-        """The largest number of rows whose energies are examined, and fit into memory."""
+        """Largest number of rows whose energies are computed, limited by the memory."""
         return min(LATTICE_ROWS, max(64, MOST_NUMBERS // len(self.start)))
 
     @property

@@ -74,9 +74,9 @@ def test_rk4_is_compared_in_double_precision_with_a_solver_in_single(phigen, wri
         .replace("0, 0.6", "0, 0.9")
         .replace("STEP", "0.1")
     )
-    found = phigen("run", write("single.yaml", spec), "-t", "c")
-    said = re.search(r"the energy error reaches (\S+) of .*; RK4 with .* reaches (\S+) in this run", found.stderr)
-    assert said, found.stderr
+    result = phigen("run", write("single.yaml", spec), "-t", "c")
+    said = re.search(r"the energy error reaches (\S+) of .*; RK4 with .* reaches (\S+) in this run", result.stderr)
+    assert said, result.stderr
     assert float(said[2]) < 1e-5 < 1e-3 < float(said[1])
 
 

@@ -159,6 +159,12 @@ def test_panel_begins_with_the_step_of_the_run_where_there_is_no_time_for_trials
     [("kepler", ["site", "sizes", "t0"]), ("fput", ["bonds", "places", "t0"]), ("food_web", ["t0"])],
 )
 def test_data_of_the_panel_have_null_for_what_a_system_lacks(raced, name, lacking):
-    given = load(file_of(name))
-    raced(compile_spec(given) if given.lattice else compiled(name), next(iter(given.runs.values())), 1, 1, 1)
+    specification = load(file_of(name))
+    raced(
+        compile_spec(specification) if specification.lattice else compiled(name),
+        next(iter(specification.runs.values())),
+        1,
+        1,
+        1,
+    )
     assert asked(raced.path, "return module.lacking()") == lacking

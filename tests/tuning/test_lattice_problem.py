@@ -119,14 +119,14 @@ def test_settings_of_lattices_mean_what_is_built():
 
 def test_of_a_budget_that_is_used_up_only_the_setting_of_the_spec_is_left(monkeypatch):
     """It is scanned at one step, confirmed and timed once; no candidate and no classical method is measured."""
-    clock, timed, found = TimeBudget(1.0, time.perf_counter() - 100.0), [], problem()
+    clock, timed, lattice_run = TimeBudget(1.0, time.perf_counter() - 100.0), [], problem()
 
     def counted(method, h, steps):
         timed.append(h)
         return nanoseconds_per_step(method, h, steps)
 
     monkeypatch.setattr(study, "nanoseconds_per_step", counted)
-    tuning = study.tune(compiled(), found, "energy", 1e-2, clock)
+    tuning = study.tune(compiled(), lattice_run, "energy", 1e-2, clock)
     assert [curve.setting for curve in tuning.curves] == [own_setting(compiled())]
     assert (len(tuning.curves[0].points), len(tuning.finalists), tuning.peers, tuning.present) == (1, 1, (), None)
     assert len(timed) == 1

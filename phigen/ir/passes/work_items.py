@@ -82,7 +82,7 @@ class _WorkItems:
         yield from (ir.Assign(self._element(s.array, SITE), total) for s, total in zip(stores, totals, strict=True))
 
     def lowered(self, s: ir.Statement) -> Iterator[ir.Statement]:
-        """Yield the statements on the level of memory for one on the level of sites."""
+        """Lower a statement on sites to statements on memory."""
         match s:
             case ir.Store(array, value, adds):
                 yield from self._stored(array, value, adds=adds)

@@ -49,7 +49,7 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
 
 
 def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
-    """The other sizes."""
+    """Sizes of a Gauss step beside the number of stages: name, value and comment."""
     return [
         ("PLAIN", step.plain, "unknowns that are offsets of coordinates; others are those of group elements"),
         (
